@@ -35,6 +35,7 @@ VERBS = {
     "review": "review runs from their telemetry or recordings",
     "recover": "recover a complete file from a killed run",
     "magnetics": "analyse the magnetic model",
+    "explain": "print value, unit, distribution and origin of fields",
 }
 """Verbs: modules of this folder, and their help. A module is imported only if its verb is called."""
 

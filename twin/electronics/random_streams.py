@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from functools import cache
 from hashlib import blake2b
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,6 +31,15 @@ _FACTOR_HIGH, _FACTOR_LOW = np.uint64(2549297995355413924), np.uint64(4865540595
 
 _HALF, _FULL = np.uint64(32), np.uint64(64)
 _ONE, _FOLD, _TURN, _UNUSED = np.uint64(1), np.uint64(16), np.uint64(58), np.uint64(11)
+
+# Distributions of quantities whose size is a field, as `explain` prints them.
+UNIFORM: dict[str, Any] = {
+    "distribution": "uniform between minus and plus the value, drawn from the seed for each part"
+}
+SMOOTH: dict[str, Any] = {
+    "distribution": "sum of four harmonics with the value as largest magnitude, drawn from the seed for each part"
+}
+NORMAL: dict[str, Any] = {"distribution": "normal with the value as standard deviation, new in each sample"}
 
 NUMBER = 2.0**-53
 """Distance between two possible random numbers."""

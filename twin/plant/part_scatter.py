@@ -7,7 +7,7 @@ from typing import Annotated, Any
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
 
-from spheretwin.electronics.random_streams import errors
+from spheretwin.electronics.random_streams import UNIFORM, errors
 from spheretwin.models.actuator import Actuator
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.scatter import PartErrors, Scatter, part_errors
@@ -26,13 +26,17 @@ class PartScatter(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
 
     gain_error: Annotated[float, Field(ge=0, le=LARGEST_GAIN_ERROR)] = Field(
-        0.0, description="largest relative error of a pole's remanence, or of a coil's torque per ampere"
+        0.0,
+        description="largest relative error of a pole's remanence, or of a coil's torque per ampere",
+        json_schema_extra=UNIFORM,
     )
     angle_error_rad: Annotated[float, Field(ge=0, le=LARGEST_ANGLE_rad)] = Field(
-        0.0, description="largest placement error in each of two directions normal to the axis, rad"
+        0.0,
+        description="largest placement error in each of two directions normal to the axis, rad",
+        json_schema_extra=UNIFORM,
     )
     distance_error_m: Annotated[float, Field(ge=0, le=LARGEST_DISTANCE_m)] = Field(
-        0.0, description="largest error of the distance from the joint centre, m"
+        0.0, description="largest error of the distance from the joint centre, m", json_schema_extra=UNIFORM
     )
     errors: tuple[tuple[Gain, Angle, Angle, Distance], ...] | None = Field(
         None,

@@ -300,3 +300,17 @@ def _field_of_another(path: tuple[str | int, ...], scenario: type[BaseModel]) ->
         return ""
     owners = [other for other, member in family.members.items() if name in member.model_fields]
     return f", a field of {family.discriminator} {' and '.join(owners)}, not of {tag}" if owners else ""
+
+
+# Ends of names, the longest first.
+UNITS = {
+    "_rad_s3": "rad/s³", "_rad_s2": "rad/s²", "_Nm_rad": "N·m/rad", "_kg_m2": "kg·m²", "_rad_s": "rad/s",
+    "_Nm_s": "N·m·s", "_m_s2": "m/s²", "_per_K": "1/K", "_degC": "°C", "_ohm": "Ω", "_rad": "rad",
+    "_A_V": "A/V", "_J_K": "J/K", "_K_W": "K/W", "_lsb": "LSB", "_Nm": "N·m", "_kg": "kg", "_Hz": "Hz",
+    "_m": "m", "_s": "s", "_A": "A", "_V": "V", "_H": "H", "duration": "s",
+}  # fmt: skip
+
+
+def unit_of(dotted: str) -> str:
+    """Return the unit at the end of the name of a field; empty for a number without unit, and for a text."""
+    return next((unit for end, unit in UNITS.items() if dotted.endswith(end)), "")

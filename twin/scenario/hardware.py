@@ -2,66 +2,74 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from math import radians
-from typing import Any
+from typing import Any, NamedTuple
 
 from spheretwin.electronics.drive_section import ResolvedDrive, drive_sheet
 from spheretwin.electronics.sensor_chain import SensorsSection, sensor_sheet
 
 NOMINAL = "nominal"
 
-# Electronics of the prototype: README.md in the folder `electronics` states the sources.
-PROTOTYPE_SENSORS: dict[str, Any] = {
-    "sensors.potentiometer.electrical_angle_rad": radians(300),
-    "sensors.potentiometer.supply_V": 5.0,
-    "sensors.potentiometer.nonlinearity_rad": radians(0.02),
-    "sensors.potentiometer.noise_rad": radians(0.02),
-    "sensors.adc.bits": 16,
-    "sensors.adc.range_V": 2.5,
-    "sensors.adc.offset_V": 1e-3,
-    "sensors.adc.gain_error": 1e-3,
-    "sensors.adc.noise_V": 5 / 2**16,  # 1 LSB
-    "sensors.adc.oversampling": 1,
-    "sensors.encoder.counts": 2000,
-    "sensors.current.noise_A": 0.02,  # assumed: a Hall sensor's
+class Origin(NamedTuple):
+    """Value of a field of a hardware set, with its origin."""
+
+    value: Any
+    origin: str
+
+
+# README.md in the folder `electronics` describes the parts.
+_SENSORS = {
+    "sensors.potentiometer.electrical_angle_rad": Origin(radians(300), "assumed: no sheet of the part"),
+    "sensors.potentiometer.supply_V": Origin(5.0, "assumed: the input range of the ADC"),
+    "sensors.potentiometer.nonlinearity_rad": Origin(radians(0.02), "assumed: residual of a calibration"),
+    "sensors.potentiometer.noise_rad": Origin(radians(0.02), "assumed"),
+    "sensors.adc.bits": Origin(16, "data sheet of the ADS8364"),
+    "sensors.adc.range_V": Origin(2.5, "data sheet of the ADS8364"),
+    "sensors.adc.offset_V": Origin(1e-3, "assumed"),
+    "sensors.adc.gain_error": Origin(1e-3, "assumed"),
+    "sensors.adc.noise_V": Origin(5 / 2**16, "assumed: 1 LSB"),
+    "sensors.adc.oversampling": Origin(1, "assumed"),
+    "sensors.encoder.counts": Origin(2000, "assumed: OME-500-2MCA with 500 pulses per turn, times 4"),
+    "sensors.current.noise_A": Origin(0.02, "assumed: a Hall sensor"),
 }
-"""Values by dotted name."""
-
-PROTOTYPE_DRIVE: dict[str, Any] = {
-    "drive.delay_s": 1e-3,  # assumed: one control period
-    "drive.dac_bits": 16,  # sheet (AD5370)
-    "drive.dac_range_V": 10.0,  # sheet: span 20 V at 5 V; centred on 0, assumed
-    "drive.dac_offset_V": 2e-3,  # assumed
-    "drive.dac_gain_error": 1e-3,  # assumed
-    "drive.dac_inl_lsb": 4.0,  # assumed
-    "drive.supply_V": 24.0,  # assumed; sheet (OPA549): 4 to 30
-    "drive.drop_up_V": 4.8,  # sheet, worst at 8 A
-    "drive.drop_down_V": 4.6,  # sheet, worst at 8 A
-    "drive.bandwidth_rad_s": 12566.370614359172,  # assumed: 2 kHz
-    "drive.transconductance_A_V": 0.8,  # assumed
-    "drive.amplifier_offset_V": 1e-3,  # sheet, typical; 5e-3 at most
-    "drive.current_limit_A": 8.0,  # sheet, continuous
-    "drive.resistance_ohm": 1.3,  # assumed
-    "drive.inductance_H": 0.9e-3,  # assumed
-    "drive.resistance_per_K": 0.0039,  # property of copper
-    "drive.heat_capacity_J_K": 60.0,  # assumed
-    "drive.thermal_resistance_K_W": 4.0,  # assumed
-    "drive.ambient_degC": 20.0,  # assumed
-    "drive.shutdown_degC": 155.0,  # assumed: insulation of class F
+_DRIVE = {
+    "drive.delay_s": Origin(1e-3, "assumed: one control period"),
+    "drive.dac_bits": Origin(16, "data sheet of the AD5370"),
+    "drive.dac_range_V": Origin(10.0, "data sheet of the AD5370: span 20 V at 5 V; centre 0 assumed"),
+    "drive.dac_offset_V": Origin(2e-3, "assumed"),
+    "drive.dac_gain_error": Origin(1e-3, "assumed"),
+    "drive.dac_inl_lsb": Origin(4.0, "assumed"),
+    "drive.supply_V": Origin(24.0, "assumed; data sheet of the OPA549: 4 to 30 V"),
+    "drive.drop_up_V": Origin(4.8, "data sheet of the OPA549, worst case at 8 A"),
+    "drive.drop_down_V": Origin(4.6, "data sheet of the OPA549, worst case at 8 A"),
+    "drive.bandwidth_rad_s": Origin(12566.370614359172, "assumed: 2 kHz"),
+    "drive.transconductance_A_V": Origin(0.8, "assumed"),
+    "drive.amplifier_offset_V": Origin(1e-3, "data sheet of the OPA549, typical; 5 mV at most"),
+    "drive.current_limit_A": Origin(8.0, "data sheet of the OPA549, continuous"),
+    "drive.resistance_ohm": Origin(1.3, "assumed"),
+    "drive.inductance_H": Origin(0.9e-3, "assumed"),
+    "drive.resistance_per_K": Origin(0.0039, "property of copper"),
+    "drive.heat_capacity_J_K": Origin(60.0, "assumed"),
+    "drive.thermal_resistance_K_W": Origin(4.0, "assumed"),
+    "drive.ambient_degC": Origin(20.0, "assumed"),
+    "drive.shutdown_degC": Origin(155.0, "assumed: insulation of class F"),
 }
-"""Values by dotted name."""
-
-# Joint bearings: assumed, as no data sheet is available (2 mN·m is the lower of two estimates, 5 the higher).
-PROTOTYPE_BEARINGS: dict[str, Any] = {
-    "plant.coulomb_Nm": (2e-3, 2e-3, 2e-3),
-    "plant.viscous_Nm_s": (1e-4, 1e-4, 1e-4),
+_BEARINGS = {
+    "plant.coulomb_Nm": Origin((2e-3, 2e-3, 2e-3), "assumed: the lower of two estimates, 2 and 5 mN·m"),
+    "plant.viscous_Nm_s": Origin((1e-4, 1e-4, 1e-4), "assumed"),
+}
+_SOFTWARE = {
+    "estimator.kind": Origin("kalman", "assumed: the estimator with the least noise for its lag"),
+    "watchdog.on": Origin(True, "assumed: a laboratory does not run such a machine without one"),
 }
 
-# The prototype's software is not documented: the estimator is the one with the least noise for its lag.
-PROTOTYPE_ESTIMATOR: dict[str, Any] = {"estimator.kind": "kalman"}
 
-# Assumed: a laboratory does not run such a machine without a watchdog.
-PROTOTYPE_WATCHDOG: dict[str, Any] = {"watchdog.on": True}
+def _values(fields: Mapping[str, Origin]) -> dict[str, Any]:
+    return {name: field.value for name, field in fields.items()}
+
+
+PROTOTYPE_SENSORS, PROTOTYPE_DRIVE, PROTOTYPE_BEARINGS = map(_values, (_SENSORS, _DRIVE, _BEARINGS))
 
 
 def _section(fields: dict[str, Any]) -> dict[str, Any]:
@@ -92,12 +100,20 @@ HARDWARE: dict[str, dict[str, Any]] = {
         **PROTOTYPE_SENSORS,
         **PROTOTYPE_DRIVE,
         **PROTOTYPE_BEARINGS,
-        **PROTOTYPE_ESTIMATOR,
-        **PROTOTYPE_WATCHDOG,
+        **_values(_SOFTWARE),
         **PROTOTYPE_NOMINAL,
     },
 }
 """Hardware sets: fields by dotted name and their values; each field can also be set separately."""
+
+_STATED = {name: field.origin for name, field in {**_SENSORS, **_DRIVE, **_BEARINGS, **_SOFTWARE}.items()}
+
+# Nominal values are those of the machine's own data sheets.
+ORIGINS: dict[str, dict[str, str]] = {
+    name: {dotted: _STATED.get(dotted, "computed from the values of the set") for dotted in fields}
+    for name, fields in HARDWARE.items()
+}
+"""Origin of each value of each hardware set."""
 
 
 def hardware_defaults(fields: dict[str, Any], name: Any) -> dict[str, Any]:

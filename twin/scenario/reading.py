@@ -300,7 +300,7 @@ def field_descriptions(scenario: Scenario) -> list[tuple[str, str, str]]:
     return [
         (
             "--" + dotted.replace("_", "-"),
-            _shown(value),
+            value_text(value),
             (field.description or "") + families.get(_without_indices(dotted), ""),
         )
         for dotted, value, field in fields_of(scenario)
@@ -312,10 +312,11 @@ def _without_indices(dotted: str) -> str:
     return re.sub(r"\.\d+(?=\.|$)", f".{INDEX}", dotted)
 
 
-def _shown(value: Any) -> str:
+def value_text(value: Any) -> str:
+    """Return a value as it is written after a flag; an empty text for none."""
     if isinstance(value, tuple):
         nested = any(isinstance(entry, tuple) for entry in value)
-        return json.dumps(value) if nested else " ".join(map(_shown, value))
+        return json.dumps(value) if nested else " ".join(map(value_text, value))
     if isinstance(value, dict | list | bool):
         return json.dumps(value, ensure_ascii=False)
     if isinstance(value, float):

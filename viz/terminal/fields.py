@@ -32,6 +32,17 @@ def print_fields(title: str, fields: Sequence[FieldText]) -> None:
         print("\n".join([first, *lines]))
 
 
+def print_facts(title: str, facts: Sequence[tuple[str, str, str, str, str, str]]) -> None:
+    """Print fields: name, value and unit in one line; meaning, distribution and origin below it."""
+    width = tables.terminal_console().width
+    print(f"{title}:")
+    for name, value, unit, distribution, origin, meaning in facts:
+        print(" ".join(filter(None, [f"\n{name} = {value or 'none'}", unit])))
+        for label, text in (("", meaning), ("distribution: ", distribution), ("origin: ", origin)):
+            if text:
+                print("\n".join(_wrapped(label + text, width, 2 * INDENT)))
+
+
 def print_sections(sections: Sequence[str]) -> None:
     """Print the names of the sections, and how their fields are printed."""
     width = tables.terminal_console().width

@@ -1,0 +1,133 @@
+"""``spheretwin explain``: value, unit, distribution and origin of the fields of a run."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Iterator, Mapping
+from typing import Any, NamedTuple
+
+from spheretwin import scenario as scenarios
+from spheretwin.active_config import initial_config
+from spheretwin.cli.common import print_json
+from spheretwin.cli.options import Parser
+from spheretwin.models.base.errors import InputError, did_you_mean, shown
+from spheretwin.scenario import reading
+from spheretwin.scenario.fields import every_field, fields_of, unit_of
+from spheretwin.scenario.hardware import HARDWARE, ORIGINS
+from spheretwin.scenario.sections import Scenario
+from spheretwin.viz.terminal.fields import print_facts
+
+DEFAULT = "default"
+
+
+class FieldFacts(NamedTuple):
+    """Facts of one field."""
+
+    field: str
+    value: Any
+    unit: str
+    distribution: str
+    """Distribution of the quantity that the value describes; empty for a constant."""
+    origin: str
+    meaning: str
+
+
+def declare(parser: Parser) -> None:
+    """Declare the arguments of the verb."""
+    parser.description = (
+        "Print value, unit, distribution and origin: of a hardware set (explain hardware prototype), of the"
+        " fields that a scenario sets (explain scenario nutation), or of a field (explain plant.coulomb_Nm)."
+    )
+    parser.add_argument(
+        "subject", nargs="+", metavar="SUBJECT", help="hardware NAME, scenario NAME or FILE, or a field"
+    )
+    parser.add_argument("--all", action="store_true", help="of a scenario also the fields that have their defaults")
+    parser.add_argument("--json", help="print the result as JSON, alone on stdout")
+    parser.set_run(run)
+
+
+def run(options: argparse.Namespace) -> bool:
+    """Run the verb."""
+    facts = list(_facts(options.subject, options.all))
+    if options.json:
+        print_json({"fields": [fact._asdict() for fact in facts]})
+    else:
+        print_facts(" ".join(options.subject), [(*fact[:1], reading.value_text(fact.value), *fact[2:]) for fact in facts])
+    return True
+
+
+def _facts(subject: list[str], everything: bool) -> Iterator[FieldFacts]:
+    match subject:
+        case ["hardware", name]:
+            return _of_hardware(name)
+        case ["scenario", source]:
+            return _of_scenario(source, everything)
+        case [name]:
+            return _of_field(name)
+    raise InputError(
+        f"command line: expected hardware NAME, scenario NAME or a field, received {shown(' '.join(subject))}"
+    )
+
+
+def _of_hardware(name: str) -> Iterator[FieldFacts]:
+    if name not in HARDWARE:
+        names = ", ".join(HARDWARE)
+        raise InputError(
+            f"explain: expected a hardware set of {names}, received {shown(name)}{did_you_mean(name, HARDWARE)}"
+        )
+    fields = dict(every_field(Scenario))
+    for dotted, value in HARDWARE[name].items():
+        yield _fact(dotted, value, fields[dotted], ORIGINS[name][dotted])
+
+
+def _of_scenario(source: str, everything: bool) -> Iterator[FieldFacts]:
+    scenario = initial_config(scenarios.load(source), None, None).scenario
+    given, stated = set(_flat(reading.read(source))), ORIGINS[scenario.hardware]
+    described = dict(every_field(Scenario))  # a resolved section repeats no description
+    for dotted, value, resolved in fields_of(scenario):
+        field = resolved if resolved.description else described.get(dotted, resolved)
+        if dotted in given:
+            origin = f"scenario {scenario.name}"
+        elif dotted in stated:
+            origin = f"hardware {scenario.hardware}: {stated[dotted]}"
+        else:
+            origin = DEFAULT if value == field.default else "computed from the model file and other fields"
+        if everything or origin != DEFAULT:
+            yield _fact(dotted, value, field, origin)
+
+
+def _of_field(name: str) -> Iterator[FieldFacts]:
+    """Yield the default of a field, or of every field of a section, and its values in the hardware sets."""
+    fields = dict(every_field(Scenario))
+    wanted = [dotted for dotted in fields if dotted == name or dotted.startswith(f"{name}.")]
+    if not wanted:
+        raise InputError(
+            f"explain: expected a field, such as plant.coulomb_Nm, received {shown(name)}"
+            f"{did_you_mean(name, fields)}"
+        )
+    for dotted in wanted:
+        field = fields[dotted]
+        if field.description:
+            yield _fact(dotted, None if field.is_required() else field.default, field, DEFAULT)
+        for hardware, values in HARDWARE.items():
+            if dotted in values:
+                origin = f"hardware {hardware}: {ORIGINS[hardware][dotted]}"
+                yield _fact(dotted, values[dotted], field, origin)
+
+
+def _fact(dotted: str, value: Any, field: Any, origin: str) -> FieldFacts:
+    extra = field.json_schema_extra if isinstance(field.json_schema_extra, dict) else {}
+    distribution = str(extra.get("distribution", ""))
+    return FieldFacts(dotted, value, unit_of(dotted), distribution, origin, field.description or "")
+
+
+def _flat(fields: Mapping[str, Any], prefix: str = "") -> Iterator[str]:
+    """Yield the dotted names of the values of a scenario file; lists of tables have their indices."""
+    for name, value in fields.items():
+        if isinstance(value, Mapping):
+            yield from _flat(value, f"{prefix}{name}.")
+        elif isinstance(value, list) and value and isinstance(value[0], Mapping):
+            for index, entry in enumerate(value):
+                yield from _flat(entry, f"{prefix}{name}.{index}.")
+        else:
+            yield prefix + name
