@@ -41,7 +41,9 @@ def declare(parser: Parser) -> None:
     parser.add_argument(
         "subject", nargs="+", metavar="SUBJECT", help="hardware NAME, scenario NAME or FILE, or a field"
     )
-    parser.add_argument("--all", action="store_true", help="of a scenario also the fields that have their defaults")
+    parser.add_argument(
+        "--all", action="store_true", help="of a scenario also the fields that have their defaults"
+    )
     parser.add_argument("--json", help="print the result as JSON, alone on stdout")
     parser.set_run(run)
 
@@ -52,7 +54,10 @@ def run(options: argparse.Namespace) -> bool:
     if options.json:
         print_json({"fields": [fact._asdict() for fact in facts]})
     else:
-        print_facts(" ".join(options.subject), [(*fact[:1], reading.value_text(fact.value), *fact[2:]) for fact in facts])
+        print_facts(
+            " ".join(options.subject),
+            [(*fact[:1], reading.value_text(fact.value), *fact[2:]) for fact in facts],
+        )
     return True
 
 

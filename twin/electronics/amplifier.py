@@ -32,7 +32,7 @@ from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
 from spheretwin.electronics.coil import OPEN, GroupCoils, Relaxation, relaxation
-from spheretwin.electronics.random_streams import errors
+from spheretwin.electronics.random_streams import UNIFORM, errors
 from spheretwin.electronics.stages import DriveSetup, DriveStage, FaultLine, fault_line
 from spheretwin.models.base.compiled import allocation_free, part_of_its_caller
 
@@ -70,6 +70,7 @@ class AmplifierSection(DriveStage):
         0.0,
         description="largest offset of an amplifier, at its input, drawn from the seed, V"
         " (OPA549, from its sheet: 1e-3 typical, 5e-3 at most)",
+        json_schema_extra=UNIFORM,
     )
 
     @model_validator(mode="after")

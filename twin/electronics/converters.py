@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from spheretwin.electronics.random_streams import errors
+from spheretwin.electronics.random_streams import NORMAL, SMOOTH, UNIFORM, errors
 from spheretwin.electronics.stages import (
     DriveSetup,
     DriveStage,
@@ -56,15 +56,20 @@ class DacSection(DriveStage):
         " assumed: centred on 0)",
     )
     dac_offset_V: Annotated[float, Field(ge=0, le=10)] = Field(
-        0.0, description="largest offset of a channel, drawn from the seed, V (assumed: 2e-3)"
+        0.0,
+        description="largest offset of a channel, drawn from the seed, V (assumed: 2e-3)",
+        json_schema_extra=UNIFORM,
     )
     dac_gain_error: Annotated[float, Field(ge=0, le=0.5)] = Field(
-        0.0, description="largest relative gain error of a channel, drawn from the seed (assumed: 1e-3)"
+        0.0,
+        description="largest relative gain error of a channel, drawn from the seed (assumed: 1e-3)",
+        json_schema_extra=UNIFORM,
     )
     dac_inl_lsb: Annotated[float, Field(ge=0, le=1e4)] = Field(
         0.0,
         description="largest integral nonlinearity of a channel, a smooth curve drawn from the seed, LSB"
         " (assumed: 4)",
+        json_schema_extra=SMOOTH,
     )
 
     @staticmethod
@@ -203,13 +208,19 @@ class AdcSection(SensorStage):
         2.5, description="largest input of either sign, V (ADS8364's sheet: ±2.5 V)"
     )
     offset_V: Annotated[float, Field(ge=0, le=1e3)] = Field(
-        0.0, description="largest offset; each channel's is drawn from the seed, V (assumed: 1 mV)"
+        0.0,
+        description="largest offset; each channel's is drawn from the seed, V (assumed: 1 mV)",
+        json_schema_extra=UNIFORM,
     )
     gain_error: Annotated[float, Field(ge=0, le=0.5)] = Field(
-        0.0, description="largest error of the gain; each channel's is drawn from the seed (assumed: 0.1 %)"
+        0.0,
+        description="largest error of the gain; each channel's is drawn from the seed (assumed: 0.1 %)",
+        json_schema_extra=UNIFORM,
     )
     noise_V: Annotated[float, Field(ge=0, le=1e3)] = Field(
-        0.0, description="noise of a conversion at the input, V rms (assumed: 1 LSB, 76 µV)"
+        0.0,
+        description="noise of a conversion at the input, V rms (assumed: 1 LSB, 76 µV)",
+        json_schema_extra=NORMAL,
     )
     oversampling: Annotated[int, Field(ge=1, le=MOST_CONVERSIONS)] = Field(
         1,

@@ -39,6 +39,10 @@ UNIFORM: dict[str, Any] = {
 SMOOTH: dict[str, Any] = {
     "distribution": "sum of four harmonics with the value as largest magnitude, drawn from the seed for each part"
 }
+PHASE: dict[str, Any] = {"distribution": "amplitude of a sine whose phase is uniform, drawn from the seed"}
+REVERSAL: dict[str, Any] = {
+    "distribution": "normal, cut at 3 standard deviations, which are the value; new at each reversal"
+}
 NORMAL: dict[str, Any] = {"distribution": "normal with the value as standard deviation, new in each sample"}
 
 NUMBER = 2.0**-53

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, Field, model_validator
 
-from spheretwin.electronics.random_streams import errors, uniforms
+from spheretwin.electronics.random_streams import NORMAL, PHASE, REVERSAL, SMOOTH, UNIFORM, errors, uniforms
 from spheretwin.electronics.stages import FaultLine, SensorSetup, SensorStage, TickNoise, fault_line, through
 from spheretwin.models.base.compiled import allocation_free
 from spheretwin.trajectories.rounding import CONFIG
@@ -44,9 +44,12 @@ class PotentiometerSection(SensorStage):
         0.0,
         description="largest residual after calibration, four harmonics of the track drawn from the seed, rad"
         " (assumed for the prototype: 0.02°; uncalibrated 5 % of the track, as comparable parts state)",
+        json_schema_extra=SMOOTH,
     )
     noise_rad: Annotated[float, Field(ge=0, le=1)] = Field(
-        0.0, description="noise of the wiper, white from conversion to conversion, rad rms (assumed: 0.02°)"
+        0.0,
+        description="noise of the wiper, white from conversion to conversion, rad rms (assumed: 0.02°)",
+        json_schema_extra=NORMAL,
     )
     hysteresis_rad: Annotated[float, Field(ge=0, le=1)] = Field(
         0.0,
@@ -57,6 +60,7 @@ class PotentiometerSection(SensorStage):
         0.0,
         description="largest deviation of a reading from the mean of approaches from the same side, new at"
         " each reversal (normal, 3 standard deviations), rad; at most half of hysteresis_rad",
+        json_schema_extra=REVERSAL,
     )
 
     @model_validator(mode="after")
@@ -261,11 +265,13 @@ class EncoderSection(SensorStage):
         0.0,
         description="amplitude of the error once per turn, of a disc off its axis; its phase is drawn from"
         " the seed, rad (2 × offset / diameter of the grating)",
+        json_schema_extra=PHASE,
     )
     start_error_rad: Annotated[float, Field(ge=0, le=pi)] = Field(
         0.0,
         description="largest error of the count until the index passes, drawn from the seed, rad; 0 if the"
         " counter was referenced before the run",
+        json_schema_extra=UNIFORM,
     )
     index_rad: Annotated[float, Field(ge=-pi, le=pi)] = Field(
         0.0, description="angle of the index, rounded to a count, rad"
@@ -365,7 +371,9 @@ class CurrentSection(BaseModel):
     model_config = CONFIG
 
     noise_A: Annotated[float, Field(ge=0, le=1e3)] = Field(
-        0.0, description="noise of a sample, A rms (assumed for the prototype: 0.02, a Hall sensor's)"
+        0.0,
+        description="noise of a sample, A rms (assumed for the prototype: 0.02, a Hall sensor's)",
+        json_schema_extra=NORMAL,
     )
 
 

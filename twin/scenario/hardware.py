@@ -11,6 +11,7 @@ from spheretwin.electronics.sensor_chain import SensorsSection, sensor_sheet
 
 NOMINAL = "nominal"
 
+
 class Origin(NamedTuple):
     """Value of a field of a hardware set, with its origin."""
 

@@ -71,7 +71,22 @@ def test_units_are_those_of_the_meanings():
     compared = 0
     for name, field in every_field(Scenario):
         stated = (field.description or "").partition(" (")[0].partition("; ")[0].rpartition(", ")[2]
-        if not name.startswith("controller.") and stated in {"rad", "V", "A", "s", "N·m", "N·m·s", "kg", "m/s²", "rad/s", "°C", "1/K", "J/K", "K/W", "m"}:
+        if not name.startswith("controller.") and stated in {
+            "rad",
+            "V",
+            "A",
+            "s",
+            "N·m",
+            "N·m·s",
+            "kg",
+            "m/s²",
+            "rad/s",
+            "°C",
+            "1/K",
+            "J/K",
+            "K/W",
+            "m",
+        }:
             assert unit_of(name) == stated, name
             compared += 1
     assert compared > 50
@@ -89,10 +104,14 @@ def test_a_scenario_tells_what_it_sets_and_what_follows(capsys, tmp_path):
     few = explained(capsys, "scenario", "tilt")
     assert few == {name: row for name, row in rows.items() if row["origin"] != "default"}
     path = tmp_path / "mine.toml"
-    path.write_text('name = "mine"\nhardware = "prototype"\n[trajectory]\nshape = "hold"\n[plant]\npayload_kg = 0.1\n')
+    path.write_text(
+        'name = "mine"\nhardware = "prototype"\n[trajectory]\nshape = "hold"\n[plant]\npayload_kg = 0.1\n'
+    )
     own = explained(capsys, "scenario", str(path))
     assert own["plant.payload_kg"]["origin"] == "scenario mine"
-    assert own["drive.supply_V"]["origin"] == "hardware prototype: assumed; data sheet of the OPA549: 4 to 30 V"
+    assert (
+        own["drive.supply_V"]["origin"] == "hardware prototype: assumed; data sheet of the OPA549: 4 to 30 V"
+    )
 
 
 def test_the_text_has_the_same_facts_within_80_columns(capsys, monkeypatch):
@@ -108,7 +127,10 @@ def test_the_text_has_the_same_facts_within_80_columns(capsys, monkeypatch):
 @pytest.mark.parametrize(
     ("subject", "message"),
     [
-        (["hardware", "proto"], "expected a hardware set of ideal, prototype, received 'proto'; did you mean prototype?"),
+        (
+            ["hardware", "proto"],
+            "expected a hardware set of ideal, prototype, received 'proto'; did you mean prototype?",
+        ),
         (["plant.coulomb"], "received 'plant.coulomb'; did you mean plant.coulomb_Nm?"),
         (["law", "afsm", "x"], "expected hardware NAME, scenario NAME or a field, received 'law afsm x'"),
         (["scenario", "tylt"], "did you mean tilt?"),
