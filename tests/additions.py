@@ -207,7 +207,7 @@ def draw_names(evidence):
 
     figure = Figure()
     figure.text(0.1, 0.5, ", ".join(check.name for check in evidence.checks))
-    return Drawing("names.png", "Names of the checks.", figure)
+    return Drawing("names.svg", "Names of the checks.", figure)
 """,
         "twin/crosscheck/suite.py",
         ("    draw_closed_loop,\n", "    draw_closed_loop,\n    draw_names,\n"),

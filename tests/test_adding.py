@@ -156,7 +156,7 @@ with Session(scenario) as session:
 part = suite.PARTS[-1]
 evidence = Evidence({part.name: part.examine(Subject(actuators.MJCF_PATH, actuators.load(), 10))})
 suite.FIGURES = suite.FIGURES[-1:]
-suite.write(folder, evidence, {"none": "1"})
+suite.write(folder, evidence)
 table = read_parquet(parquet)[0]
 from spheretwin.electronics.random_streams import errors
 
@@ -169,7 +169,7 @@ print("RESULT" + json.dumps({
     "carried": table["current_A"].tolist(), "random": drawn_numbers(),
     "largest": table["largest_current_A"].tolist(), "q_ref": table["q_ref_rad"][-1].tolist(),
     "disturbance": table["disturbance_Nm"][:, 1].tolist(), "current": abs(table["current_command_A"]).max(),
-    "page": (folder / suite.PAGE).read_text(), "figure": (folder / "names.png").stat().st_size,
+    "page": (folder / "crosscheck.md").read_text(), "figure": (folder / "names.svg").stat().st_size,
     "recording": (folder / "n.rrd").stat().st_size,
     "reproduced": reproduced, "experiments": (folder / "page" / "reproduce.md").read_text(),
 }))
@@ -309,7 +309,7 @@ def test_a_check(grown):
 
 
 def test_a_figure(grown):
-    assert "(names.png)" in grown["page"]
+    assert "(names.svg)" in grown["page"]
     assert grown["figure"] > 1000
 
 

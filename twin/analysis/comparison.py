@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import shlex
 from collections.abc import Iterator, Sequence
 from itertools import groupby
 from pathlib import Path
@@ -221,7 +222,9 @@ TITLES = {
 """Title of the figure of each group of quantities."""
 
 
-def write_figures(runs: Sequence[Reviewed], figures: Sequence[dict[str, Any]], into: Path) -> Path:
+def write_figures(
+    runs: Sequence[Reviewed], figures: Sequence[dict[str, Any]], into: Path, figure_format: str = "svg"
+) -> Path:
     """Write figures and page into a folder; returns the page's path.
 
     Parameters
@@ -231,6 +234,8 @@ def write_figures(runs: Sequence[Reviewed], figures: Sequence[dict[str, Any]], i
         Report of each run.
     into : Path
         A folder that takes files.
+    figure_format : str
+        Format of the figures in addition to SVG.
 
     Raises
     ------
@@ -247,15 +252,22 @@ def write_figures(runs: Sequence[Reviewed], figures: Sequence[dict[str, Any]], i
     title = drawn_runs[0].label if len(runs) == 1 else f"{len(runs)} runs: {conditions}"
     with np.errstate(all="ignore"):  # what damage leaves of numbers may be of any size
         drawings = _drawings(drawn_runs, leading, quantities, spectra, conditions)
-        markdown.save_drawings(into, drawings, vector=True)
+        markdown.save_drawings(into, drawings, figure_format)
         over_time = interactive.over_time(drawn_runs, leading, quantities)
+    below = _below(runs, drawn_runs, figures)
+    above = [
+        _above(title, drawn_runs, interactive.points_per_line(drawn_runs, leading, quantities)),
+        "",
+        *markdown.contents([*(f"## {heading}" for heading in interactive.TITLES.values()), below]),
+    ]
+    names = " ".join(shlex.quote(run.path.name) for run in runs)
     content = interactive.page(
         title,
         drawn_runs,
         over_time,
         interactive.error_spectra(drawn_runs, spectra),
-        _above(title, drawn_runs, interactive.points_per_line(drawn_runs, leading, quantities)),
-        _below(runs, drawn_runs, figures),
+        "\n".join(above),
+        "\n".join([below, "", *markdown.foot(f"spheretwin review {names} --figures DIR")]),
     )
     return markdown.save_text(into / PAGE, content)
 
@@ -287,13 +299,13 @@ def _drawings(
 
     for group, inside in groupby(quantities, key=lambda quantity: quantity.group):
         title = TITLES[group]
-        yield Drawing(f"{group}.png", title, over_time(runs, leading, list(inside), named(title)))
+        yield Drawing(f"{group}.svg", title, over_time(runs, leading, list(inside), named(title)))
     title = "Currents of all groups"
-    yield Drawing("currents.png", title, currents(runs, named(title)))
+    yield Drawing("currents.svg", title, currents(runs, named(title)))
     title = "Spectra of the tracking errors"
-    yield Drawing("spectra.png", title, of_errors(runs, spectra, named(title)))
+    yield Drawing("spectra.svg", title, of_errors(runs, spectra, named(title)))
     title = "Events"
-    yield Drawing("events.png", title, events_figure(runs, named(title)))
+    yield Drawing("events.svg", title, events_figure(runs, named(title)))
 
 
 def _spectra(run: Reviewed) -> list[Spectrum]:
@@ -322,7 +334,7 @@ def _above(title: str, runs: Sequence[ComparedRun], most: int) -> str:
 def _below(runs: Sequence[Reviewed], drawn: Sequence[ComparedRun], figures: Sequence[dict[str, Any]]) -> str:
     head = ["differences from run 1" if len(runs) > 1 else "", *(_plain(run.label) for run in drawn)]
     rows = [[cell.replace("\n", "; ") for cell in row] for row in table_rows(figures, BAND_rad)]
-    lines = ["## Figures", "", *markdown.table(head, rows, [False] + [True] * len(runs)), ""]
+    lines = ["## Metrics", "", *markdown.table(head, rows, [False] + [True] * len(runs)), ""]
     if len(runs) > 1:
         lines += ["## Differences of the scenarios", "", *_difference_table(runs)]
     return "\n".join(lines)

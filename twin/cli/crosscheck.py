@@ -27,6 +27,7 @@ def declare(parser: Parser) -> None:
         " loop. Exit code 1 when a bound is broken."
     )
     parser.add_argument("--out", help="write a page with figures into this folder")
+    parser.add_argument("--figure-format")
     parser.add_argument("--json", help="print the checks as JSON, alone on stdout")
     parser.add_argument(
         "--states",
@@ -51,7 +52,7 @@ def run(options: argparse.Namespace) -> bool:
         evidence = suite.run(options.mjcf, options.states, begun)
     wall_s = time.perf_counter() - started
     checks = evidence.checks
-    written = [suite.write(options.out, evidence, versions())] if options.out else []
+    written = suite.write(options.out, evidence, options.figure_format) if options.out else []
     if options.json:
         print_json({"checks": checks, "wall_s": wall_s, "versions": versions()})
     else:

@@ -11,6 +11,11 @@ from typing import Any, NoReturn
 from spheretwin.models.base.errors import InputError, did_you_mean, shown
 
 COMMON: dict[str, dict[str, Any]] = {
+    "--figure-format": {
+        "choices": ("svg", "pdf", "png"),
+        "default": "svg",
+        "help": "format in which figures are written in addition to svg",
+    },
     "--json": {"action": "store_true"},
     "--mjcf": {"type": Path, "metavar": "FILE.xml", "help": "model file"},
     "--out": {"type": Path, "metavar": "DIR"},

@@ -34,6 +34,7 @@ def declare(parser: Parser) -> None:
     )
     parser.add_argument("names", metavar="NAME", nargs="+", help=f"{', '.join(EXPERIMENTS)}, or {ALL}")
     parser.add_argument("--out", help="write a page with figures into this folder")
+    parser.add_argument("--figure-format")
     parser.add_argument("--json", help="print the rows as JSON, alone on stdout")
     parser.add_argument("--verbose", help="also print every result and every table")
     parser.add_argument(
@@ -73,7 +74,9 @@ def run(options: argparse.Namespace) -> bool:
     wall_s = time.perf_counter() - started
     rows_by_plan = [rows(result.plan, result.outcomes, result.summaries) for result in results]
     chapters = [chapter_of(*both) for both in zip(results, rows_by_plan, strict=True)]
-    written = page.write(options.out, chapters, _command(options), versions()) if options.out else []
+    written = []
+    if options.out:
+        written = page.write(options.out, chapters, _command(options), options.figure_format)
     if options.json:
         every = [row for plan_rows in rows_by_plan for row in plan_rows]
         print_json({"rows": every, "seeds": options.seeds, "wall_s": wall_s, "versions": versions()})

@@ -54,8 +54,9 @@ def declare(parser: Parser) -> None:
         "--figures",
         type=Path,
         metavar="DIR",
-        help="draw all runs: PNG, SVG and one page with interactive plots, without viewer or network",
+        help="draw all runs: SVG and one page with interactive plots, without viewer or network",
     )
+    parser.add_argument("--figure-format")
     parser.add_argument("--json", help="print the result as JSON, alone on stdout")
     parser.set_run(run)
 
@@ -69,7 +70,9 @@ def run(options: argparse.Namespace) -> bool:
         recorded_run.export(runs[0], options.export)
     if options.merge:
         comparison.merge(runs, options.merge)
-    page = comparison.write_figures(runs, summaries, options.figures) if options.figures else None
+    page = None
+    if options.figures:
+        page = comparison.write_figures(runs, summaries, options.figures, options.figure_format)
     if options.json:
         _print_json(reviewed, has_tolerances=options.tolerance is not None)
     else:

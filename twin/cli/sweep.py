@@ -76,6 +76,7 @@ def declare(parser: Parser) -> None:
         help="tune the gains that the section [optimise] of the study names",
     )
     parser.add_argument("--trials", type=whole(), metavar="N", help="trials of each law, with --optimise")
+    parser.add_argument("--figure-format")
     parser.add_argument("--json", help="print the result as JSON, alone on stdout")
     parser.set_run(run)
 
@@ -109,7 +110,7 @@ def run(options: argparse.Namespace) -> bool:
         )
     rows = statistics.read(outcome.table)
     printed = summary(rows)
-    written = _report(outcome, rows, printed, options.study)
+    written = _report(outcome, rows, printed, options)
     if options.json:
         print_json({**_outcome_json(outcome), "summary": printed, "versions": versions()})
     else:
@@ -162,7 +163,7 @@ def _optimised(study: Study, options: argparse.Namespace) -> bool:
         )
     trials = f" --trials {options.trials}" if options.trials else ""
     command = f"spheretwin sweep {shlex.quote(options.study)} --optimise{trials}"
-    written = tuning_page.write(folder, study, outcome, command, versions())
+    written = tuning_page.write(folder, study, outcome, command, options.figure_format)
     if find_spec("matplotlib") is None:
         print("spheretwin: sweep: no figures without the extra `spheretwin[plots]`", file=sys.stderr)
     printed = tuning_summary(outcome, objectives)
@@ -193,12 +194,14 @@ def _outcome_json(outcome: StudyResult) -> dict[str, Any]:
     }
 
 
-def _report(outcome: StudyResult, rows: statistics.Rows, printed: dict[str, Any], source: str) -> list[Path]:
+def _report(
+    outcome: StudyResult, rows: statistics.Rows, printed: dict[str, Any], options: argparse.Namespace
+) -> list[Path]:
     """Write the page next to the table if figures can be drawn."""
     if report.can_be_drawn():
-        return report.write(
-            outcome.table.parent, rows, printed, (outcome.of, outcome.study_rows), source, versions()
-        )
+        of = outcome.of, outcome.study_rows
+        folder, source, kind = outcome.table.parent, options.study, options.figure_format
+        return report.write(folder, rows, printed, of, source, kind)
     print("spheretwin: sweep: no report was written: it needs the extra `spheretwin[plots]`", file=sys.stderr)
     return []
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -19,7 +19,7 @@ from spheretwin.models.base.checks import Check, broken
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.mjcf import beyond_a_free_rotor, read
 from spheretwin.viz.pages import markdown as pieces
-from spheretwin.viz.pages.markdown import Drawing, save_drawings, save_text
+from spheretwin.viz.pages.markdown import Drawing, write_page
 
 PARTS = (
     dynamics.PART,
@@ -87,7 +87,7 @@ def draw_closed_loop(evidence: Evidence) -> Drawing:
         "The nutation in closed loop on two plants",
     )
     return Drawing(
-        "closed_loop.png", "The same run on MuJoCo and on the Lagrangian under our own RK4.", figure
+        "closed_loop.svg", "The same run on MuJoCo and on the Lagrangian under our own RK4.", figure
     )
 
 
@@ -99,7 +99,7 @@ def draw_convergence(evidence: Evidence) -> Drawing:
         name: crosscheck.Slope(*measured) for name, measured in evidence.of(Trajectories).convergence.items()
     }
     figure = crosscheck.convergence(slopes, "Order of convergence against DOP853")
-    return Drawing("convergence.png", "Largest error over 5 s at five steps, with the fitted slopes.", figure)
+    return Drawing("convergence.svg", "Largest error over 5 s at five steps, with the fitted slopes.", figure)
 
 
 def draw_differences(evidence: Evidence) -> Drawing:
@@ -111,7 +111,7 @@ def draw_differences(evidence: Evidence) -> Drawing:
         evidence.of(dynamics.Dynamics).differences, bounds, "Engines against the Lagrangian at random states"
     )
     caption = "Relative differences at random states of all three plants; 1e-18 stands for none at all."
-    return Drawing("dynamics.png", caption, figure)
+    return Drawing("dynamics.svg", caption, figure)
 
 
 def draw_friction(evidence: Evidence) -> Drawing:
@@ -141,7 +141,7 @@ def draw_friction(evidence: Evidence) -> Drawing:
         "Sticking, breakaway, sliding and coming to rest of hinge γ under our stage of friction and under"
         " MuJoCo's own, and under ideal friction; dots: settled under half of the level."
     )
-    return Drawing("friction.png", caption, figure)
+    return Drawing("friction.svg", caption, figure)
 
 
 def draw_margins(evidence: Evidence) -> Drawing:
@@ -155,7 +155,7 @@ def draw_margins(evidence: Evidence) -> Drawing:
     }
     figure = crosscheck.margins(shares, "How much of its bound each figure takes up")
     caption = "Value over bound; orders of convergence and breakaway torques, which have two, are below."
-    return Drawing("margins.png", caption, figure)
+    return Drawing("margins.svg", caption, figure)
 
 
 def draw_torque_free(evidence: Evidence) -> Drawing:
@@ -177,7 +177,7 @@ def draw_torque_free(evidence: Evidence) -> Drawing:
     title = f"Torque-free rotor over {free_rotor.DURATION_s:g} s, by spin rate"
     figure = crosscheck.drifts(rotor.t_s, panels, title)
     caption = "Drift of energy and angular momentum, and attitude against Euler's exact solution at J1 = J2."
-    return Drawing("torque_free.png", caption, figure)
+    return Drawing("torque_free.svg", caption, figure)
 
 
 def draw_trajectory(evidence: Evidence) -> Drawing:
@@ -193,7 +193,7 @@ def draw_trajectory(evidence: Evidence) -> Drawing:
         "MuJoCo RK4 against DOP853 on the Lagrangian, torques held over 10 ms",
     )
     return Drawing(
-        "trajectory.png", "Nutation by given torques, and how far engine and reference part.", figure
+        "trajectory.svg", "Nutation by given torques, and how far engine and reference part.", figure
     )
 
 
@@ -208,14 +208,14 @@ FIGURES: tuple[Callable[[Evidence], Drawing], ...] = (
 )
 
 
-PAGE = "crosscheck.md"
+NAME = "crosscheck"
 
-HEAD = ("check", "what is compared", "states", "value", "bound", "kept", "why the bound")
+HEAD = ("check", "compared quantities", "states", "value", "bound", "passed", "reason for the bound")
 NUMBERS = (False, False, True, True, True, False, False)
 
 
-def write(folder: Path, evidence: Evidence, versions: Mapping[str, str]) -> Path:
-    """Write the page and its figures into a folder; returns the page.
+def write(folder: Path, evidence: Evidence, figure_format: str = "svg") -> list[Path]:
+    """Write the page and its figures into a folder; return both forms of the page.
 
     Parameters
     ----------
@@ -223,8 +223,8 @@ def write(folder: Path, evidence: Evidence, versions: Mapping[str, str]) -> Path
         Exists.
     evidence : Evidence
         Result of the suite.
-    versions : mapping
-        Version by package, for the foot of the page.
+    figure_format : str
+        Format of the figures in addition to SVG.
 
     Raises
     ------
@@ -232,29 +232,16 @@ def write(folder: Path, evidence: Evidence, versions: Mapping[str, str]) -> Path
         A file cannot be written there.
     """
     drawings = [draw(evidence) for draw in FIGURES]
-    save_drawings(folder, drawings)
-    return save_text(folder / PAGE, markdown(evidence.checks, drawings, versions))
-
-
-def markdown(checks: list[Check], drawings: list[Drawing], versions: Mapping[str, str]) -> str:
-    """Text of the page."""
-    names = broken(checks)
-    verdict = f"**Broken: {'; '.join(names)}.**" if names else "Every bound is kept."
-    used = ", ".join(f"{name} {version}" for name, version in versions.items())
-    return "\n".join(
-        [
-            "# Cross-check",
-            "",
-            "The engine (MuJoCo) against the Lagrangian model, which knows nothing of it, and against"
-            f" Pinocchio. {verdict}",
-            "",
-            *pieces.table(HEAD, [_row(check) for check in checks], NUMBERS),
-            "",
-            *map(pieces.figure, drawings),
-            f"Made by `spheretwin crosscheck` with {used}.",
-            "",
-        ]
-    )
+    checks, names = evidence.checks, broken(evidence.checks)
+    verdict = f"**Exceeded bounds: {'; '.join(names)}.**" if names else "**No bound is exceeded.**"
+    summary = [
+        "Comparison of the engine (MuJoCo) with the Lagrangian model, which is derived independently, and"
+        f" with Pinocchio: {len(checks)} checks. {verdict}"
+    ]
+    sections = ["## Checks", "", *pieces.table(HEAD, [_row(check) for check in checks], NUMBERS), ""]
+    sections += ["## Figures", "", *map(pieces.figure, drawings)]
+    command = "spheretwin crosscheck"
+    return write_page(folder, NAME, "Cross-check", summary, sections, drawings, command, figure_format)
 
 
 def _row(check: Check) -> tuple[str, ...]:

@@ -13,6 +13,7 @@ from spheretwin.control.laws import LAWS
 from spheretwin.models import actuator
 from spheretwin.models.telemetry.signals import ANGLES
 from spheretwin.paper.experiment import Case, Experiment, Finding, Outcome, Outcomes, ResultTable, Section
+from spheretwin.paper.laws import BY_LAW
 from spheretwin.paper.rows import of_axis, spread_deg
 from spheretwin.scenario.hardware import HARDWARE
 from spheretwin.viz.pages.markdown import Drawing
@@ -139,7 +140,7 @@ STAGES = (
 
 
 METHOD = (
-    "The largest *true* error, which nothing can hide. *Ideal* is the motion and the mass alone: true angles"
+    "The tables show the largest *true* error. *Ideal* is the motion and the mass alone: true angles"
     " and rates, no delay, no friction, and currents that are their commands at once. The plain lag L/R of"
     " the coils, which runs without amplifiers have, is no part of the prototype, whose amplifiers drive the"
     " current: it is a row of its own. The voltage limit has amplifiers of no lag of their own on ±24 V less"
@@ -173,14 +174,24 @@ def sections(outcomes: Outcomes) -> list[Section]:
     laws = [law for law in LAWS if any(outcomes.runs(case(law, stage)) for stage in STAGES)]
     tables = [_table(outcomes, laws, axis) for axis in range(len(ANGLES))]
     most = "; ".join(filter(None, (_most(outcomes, law) for law in laws)))
-    text = f"{METHOD} By itself changes most: {most}." if most else METHOD
-    return [Section("One part at a time", text, tables, [lambda: _drawing(outcomes, laws)])]
+    text = f"{METHOD} The single part with the largest change of the error: {most}." if most else METHOD
+    return [Section("Single parts of the prototype", text, tables, [lambda: _drawing(outcomes, laws)])]
 
 
 def findings(outcomes: Outcomes) -> list[Finding]:
     """The part of the prototype that changes most, under each law."""
     most = [text for law in LAWS if (text := _most(outcomes, law))]
-    return [Finding(None, f"one part of the prototype alone changes most: {'; '.join(most)}")] if most else []
+    return (
+        [Finding(None, f"single part with the largest change of the error: {'; '.join(most)}")]
+        if most
+        else []
+    )
+
+
+def law_name(law: str) -> str:
+    """Label of a law, with the preset of its gains if it has presets."""
+    preset = getattr(LAWS[law](), "preset", None)
+    return f"{BY_LAW[law].label}, preset {preset}" if preset else BY_LAW[law].label
 
 
 def _most(outcomes: Outcomes, law: str) -> str:
@@ -191,13 +202,13 @@ def _most(outcomes: Outcomes, law: str) -> str:
     if not np.all(np.isfinite(changes)):
         return ""
     part, axis = np.unravel_index(np.argmax(np.abs(changes)), changes.shape)
-    return f"{law}, {parts[part].name} ({ANGLES[axis]} {changes[part, axis]:+.3f}°)"
+    return f"{law_name(law)}, {parts[part].name} ({ANGLES[axis]} {changes[part, axis]:+.3f}°)"
 
 
 def _table(outcomes: Outcomes, laws: Sequence[str], axis: int) -> ResultTable:
     rows = [(stage.name, *(_cell(outcomes.runs(case(law, stage)), axis) for law in laws)) for stage in STAGES]
     title = f"Largest true |error| of {ANGLES[axis]} in degrees: median over the seeds, and range"
-    return ResultTable(title, ("switched on", *laws), rows)
+    return ResultTable(title, ("part of the prototype", *map(law_name, laws)), rows)
 
 
 def _cell(runs: Sequence[Outcome], axis: int) -> str:
@@ -218,12 +229,14 @@ def _drawing(outcomes: Outcomes, laws: Sequence[str]) -> Drawing:
         for axis, name in enumerate(ANGLES)
     }
     names = [stage.name for stage in STAGES]
-    title, change = "One part of the prototype at a time", "change against its base, degrees"
+    title, change = "Single parts of the prototype", "change against its base, degrees"
     caption = (
         "Largest true |error|, median over the seeds. Colours: what the part changes, against ideal, or for"
         " single errors of the sensors against the estimator alone."
     )
-    return Drawing("budget.png", caption, figures.heat(panels, names, laws, title, change))
+    return Drawing(
+        "budget.svg", caption, figures.heat(panels, names, list(map(law_name, laws)), title, change)
+    )
 
 
 def _medians_deg(runs: Sequence[Outcome]) -> Array:

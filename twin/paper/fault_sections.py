@@ -99,7 +99,7 @@ def shares(by_way: Mapping[str, Mapping[int, float]]) -> Drawing:
         f"Share of the runs that complete and err at most {TWICE:g} times as much as the healthy run"
         " after the fault, by the number of open groups."
     )
-    return Drawing("faults_shares.png", caption, figure)
+    return Drawing("faults_shares.svg", caption, figure)
 
 
 def draw_pairs(outcomes: Outcomes) -> Drawing:
@@ -112,7 +112,7 @@ def draw_pairs(outcomes: Outcomes) -> Drawing:
         "Largest error of any hinge after the fault over that of the healthy run over the same window, median"
         f" over the seeds; on the diagonal a single group. A cross: more than {TWICE:g}."
     )
-    return Drawing("faults_pairs.png", caption, figure)
+    return Drawing("faults_pairs.svg", caption, figure)
 
 
 def ratios(outcomes: Outcomes, way: cases.Way) -> NDArray[np.float64]:
@@ -133,7 +133,7 @@ def latencies(by_kind: Mapping[str, Sequence[float]]) -> Drawing:
     caption = (
         "Share of the faults that are not detected yet. What remains at the right is not detected in the run."
     )
-    return Drawing("faults_latency.png", caption, figure)
+    return Drawing("faults_latency.svg", caption, figure)
 
 
 def torque_left(points: Mapping[str, Sequence[tuple[float, float, int]]]) -> Drawing:
@@ -150,7 +150,7 @@ def torque_left(points: Mapping[str, Sequence[tuple[float, float, int]]]) -> Dra
         "Every run of the open groups: its error against the least share of the needed torque that the groups"
         f" left can give. Dashed: as much as is needed, and {TWICE:g} times the healthy error."
     )
-    return Drawing("faults_torque.png", caption, figure)
+    return Drawing("faults_torque.svg", caption, figure)
 
 
 GROUPS_METHOD = (

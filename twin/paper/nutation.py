@@ -104,7 +104,7 @@ def angles(runs: Runs) -> Drawing:
         for law, (first, *_) in runs.items()
     }
     caption = "Angles q and what was asked of them, q_d, of the first seed."
-    return Drawing("figure8_angles.png", caption, figures.angles(by_label, ANGLES, TITLE))
+    return Drawing("figure8_angles.svg", caption, figures.angles(by_label, ANGLES, TITLE))
 
 
 def errors(runs: Runs) -> Drawing:
@@ -117,7 +117,7 @@ def errors(runs: Runs) -> Drawing:
     }
     window = f"{1e3 * WINDOW_s:g} ms"
     caption = f"Largest |error| within each {window}: median over the seeds, and their range as a band."
-    return Drawing("figure8_errors.png", caption, figures.errors(by_label, WINDOW_s, ANGLES, TITLE))
+    return Drawing("figure8_errors.svg", caption, figures.errors(by_label, WINDOW_s, ANGLES, TITLE))
 
 
 def paths(runs: Runs) -> Drawing:
@@ -136,7 +136,7 @@ def paths(runs: Runs) -> Drawing:
         for law, (first, *_) in runs.items()
     }
     caption = "Path of the shaft's tip, desired and actual, of the first seed: in space, and from above."
-    return Drawing("figure8_paths.png", caption, figures.paths(by_label, f"{TITLE}: the shaft's tip"))
+    return Drawing("figure8_paths.svg", caption, figures.paths(by_label, f"{TITLE}: the shaft's tip"))
 
 
 def _longest(runs: Runs) -> Trajectory:

@@ -1,8 +1,8 @@
-"""What the experiments found as one page: Markdown, HTML of the same content, and the figures."""
+"""Page of the experiments: results of the paper that were reproduced, then a chapter for each experiment."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -10,23 +10,21 @@ from spheretwin.models import actuator as actuators
 from spheretwin.paper.experiment import Experiment, Finding, Section
 from spheretwin.paper.rows import plants_text
 from spheretwin.paper.runner import PlanResult
-from spheretwin.viz.pages import html
 from spheretwin.viz.pages import markdown as pieces
-from spheretwin.viz.pages.markdown import Drawing, save_drawings, save_text
+from spheretwin.viz.pages.markdown import Drawing, save_text, write_page
 
 if TYPE_CHECKING:
     from spheretwin.viz.comparison.trajectories import LawTrajectory
 
-TITLE = "What the paper shows, run again"
-MARKDOWN, HTML = "reproduce.md", "reproduce.html"
-
+TITLE = "Reproduction of the paper's results"
+NAME = "reproduce"
 
 MOST_COMMANDS = 200
-"""On the page; of an experiment of more rows they are in a file beside it."""
+"""Largest number of commands on the page; more are in a file next to it."""
 
-FIRST = "What was reproduced, and what was not"
+REPRODUCED = "Results of the paper"
 MARKS = {True: "**reproduced**", False: "**not reproduced**"}
-BESIDES = "What was found besides"
+FURTHER = "Further findings"
 
 
 class Chapter(NamedTuple):
@@ -56,7 +54,12 @@ def chapter_of(result: PlanResult, rows: Sequence[Mapping[str, Any]]) -> Chapter
     )
 
 
-def write(folder: Path, chapters: Sequence[Chapter], command: str, versions: Mapping[str, str]) -> list[Path]:
+def write(
+    folder: Path,
+    chapters: Sequence[Chapter],
+    command: str,
+    figure_format: str = "svg",
+) -> list[Path]:
     """Write the page, its figures and its recordings into a folder; returns both forms of the page and these.
 
     Parameters
@@ -65,84 +68,71 @@ def write(folder: Path, chapters: Sequence[Chapter], command: str, versions: Map
         Exists.
     chapters : sequence of Chapter
     command : str
-        What makes the page again, for its foot.
-    versions : mapping
-        Version by package, for the same.
+        Command that creates the page.
+    figure_format : str
+        Format of the figures in addition to SVG.
 
     Raises
     ------
     InputError
         A file cannot be written there.
     """
-    drawings = [
-        [[draw() for draw in section.drawings] for section in chapter.sections] for chapter in chapters
-    ]
-    every = (drawing for of_chapter in drawings for of_section in of_chapter for drawing in of_section)
-    save_drawings(folder, every, vector=True)
+    drawings: list[Drawing] = []
+    summary, sections = _results(chapters)
+    sections += [line for chapter in chapters for line in _chapter(chapter, drawings)]
     recordings = [_recorded(folder, chapter) for chapter in chapters if chapter.trajectories]
     for chapter in chapters:
         if len(chapter.commands) > MOST_COMMANDS:
             save_text(folder / _commands_file(chapter), "\n".join([*chapter.commands, ""]))
-    text = markdown(chapters, drawings, command, versions)
     return [
-        save_text(folder / MARKDOWN, text),
-        save_text(folder / HTML, html.page(TITLE, text, folder)),
+        *write_page(folder, NAME, TITLE, summary, sections, drawings, command, figure_format),
         *recordings,
     ]
 
 
-def markdown(
-    chapters: Sequence[Chapter],
-    drawn: Sequence[Sequence[Sequence[Drawing]]],
-    command: str,
-    versions: Mapping[str, str],
-) -> str:
-    """Text of the page."""
-    used = ", ".join(f"{name} {version}" for name, version in versions.items())
-    lines = [f"# {TITLE}", "", *_first(chapters)]
-    for chapter, drawings in zip(chapters, drawn, strict=True):
-        lines += [f"## {chapter.experiment.title}", "", chapter.experiment.summary, ""]
-        lines += [chapter.plants, ""] if chapter.plants else []
-        for section, of_section in zip(chapter.sections, drawings, strict=True):
-            lines += _section(section, of_section)
-        lines += _alone(chapter)
-    lines += [f"Made by `{command}` with {used}.", ""]
-    return "\n".join(lines)
+def _chapter(chapter: Chapter, drawings: list[Drawing]) -> list[str]:
+    """Lines of an experiment; its figures are added to the drawings."""
+    lines = [f"## {chapter.experiment.title}", "", chapter.experiment.summary, ""]
+    lines += [chapter.plants, ""] if chapter.plants else []
+    for section in chapter.sections:
+        of_section = [draw() for draw in section.drawings]
+        drawings += of_section
+        lines += [*_section(section), *map(pieces.figure, of_section)]
+    return [*lines, *_commands(chapter)]
 
 
-def _first(chapters: Sequence[Chapter]) -> list[str]:
-    """The first page: a line a finding, those on the paper first."""
+def _results(chapters: Sequence[Chapter]) -> tuple[list[str], list[str]]:
+    """Summary with the number of reproduced results, and sections with a row for each finding."""
     findings = [(chapter.experiment.name, finding) for chapter in chapters for finding in chapter.findings]
     of_paper = [
         (name, MARKS[finding.reproduced], f"{finding.text}.")
         for name, finding in findings
         if finding.reproduced is not None
     ]
-    others = [(name, f"{finding.text}.") for name, finding in findings if finding.reproduced is None]
-    lines = []
+    further = [(name, f"{finding.text}.") for name, finding in findings if finding.reproduced is None]
+    summary, lines = [f"{len(chapters)} experiments, {len(findings)} findings."], []
     if of_paper:
-        lines += [
-            f"## {FIRST}",
-            "",
-            *pieces.table(("", "", "of what the paper shows"), of_paper, (False,) * 3),
-            "",
-        ]
-    if others:
-        lines += [f"## {BESIDES}", "", *pieces.table(("", "what was found"), others, (False,) * 2), ""]
-    return lines
+        count = sum(bool(finding.reproduced) for _, finding in findings)
+        table = pieces.table(("experiment", "verdict", "result"), of_paper, (False,) * 3)
+        summary.append(f"{count} of {len(of_paper)} results of the paper were reproduced.")
+        lines += [f"## {REPRODUCED}", "", *table, ""]
+    if further:
+        table = pieces.table(("experiment", "finding"), further, (False,) * 2)
+        lines += [f"## {FURTHER}", "", *table, ""]
+    return summary, lines
 
 
-def _alone(chapter: Chapter) -> list[str]:
-    """How each row is run alone."""
+def _commands(chapter: Chapter) -> list[str]:
+    """Commands that run single rows."""
     if not chapter.commands:
         return []
-    lines = ["### Each row alone", ""]
+    lines = ["### Commands for single runs", ""]
     if len(chapter.commands) > MOST_COMMANDS:
         file = _commands_file(chapter)
-        said = f"The command lines of {len(chapter.commands)} rows are in [{file}]({file})"
-        return [*lines, f"{said}, in the order of the JSON.", ""]
-    said = "A line a row of the JSON, in its order, under the first seed; the others count on from it."
-    return [*lines, said, "", "```sh", *chapter.commands, "```", ""]
+        text = f"The commands of {len(chapter.commands)} rows are in [{file}]({file})"
+        return [*lines, f"{text}, in the order of the JSON.", ""]
+    text = "One command for each row of the JSON, in its order, with the first seed; further seeds follow it."
+    return [*lines, text, "", "```sh", *chapter.commands, "```", ""]
 
 
 def _recorded(folder: Path, chapter: Chapter) -> Path:
@@ -158,9 +148,9 @@ def _commands_file(chapter: Chapter) -> str:
     return f"{chapter.experiment.name}_commands.txt"
 
 
-def _section(section: Section, drawings: Iterable[Drawing]) -> list[str]:
+def _section(section: Section) -> list[str]:
     lines = [f"### {section.title}", "", section.text, ""]
     for table in section.tables:
         numbers = [column >= table.texts for column in range(len(table.head))]
         lines += [f"**{table.title}**", "", *pieces.table(table.head, table.rows, numbers), ""]
-    return [*lines, *map(pieces.figure, drawings)]
+    return lines

@@ -219,7 +219,7 @@ def _draw(results: Sequence[ReadingResult]) -> Drawing:
         " the line at 1 is the paper."
     )
     figure = figures.ratios(rows, labels, "largest |error| over the printed one", title)
-    return Drawing("readings_ratios.png", caption, figure)
+    return Drawing("readings_ratios.svg", caption, figure)
 
 
 EXPERIMENT = Experiment(

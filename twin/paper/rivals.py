@@ -35,7 +35,7 @@ def figure(hardware: Hardware, outcomes: Outcomes) -> Drawing:
     labels = {name: law.label for name, law in BY_LAW.items()}
     front = fronts.fronts(panels, labels, "variation of the commands, A/s")
     caption = f"{hardware.title}. {CAPTION}{'' if hardware.in_degrees else FULL_CURRENT}"
-    return Drawing(f"rivals_{hardware.name}.png", caption, front)
+    return Drawing(f"rivals_{hardware.name}.svg", caption, front)
 
 
 def _panel(hardware: Hardware, condition: Condition, outcomes: Outcomes) -> FrontPanel:
@@ -124,7 +124,7 @@ def _of_hardware(hardware: Hardware, outcomes: Outcomes) -> list[Section]:
 
 EXPERIMENT = Experiment(
     name="rivals",
-    title="The laws compared: the same search for all",
+    title="Comparison of the laws, tuned by the same search",
     summary="Every law tuned with the same budget for the sinusoid on ideal hardware and for the tilt on the"
     " prototype, within limits on the variation of the currents, and run under other seeds and with a wrong"
     " nominal model.",

@@ -287,7 +287,7 @@ def _draw(variation: Variation, outcomes: Outcomes) -> Drawing:
         " as error bars. Wide bars are the numbers that the paper prints, tied to those of the same law; a"
         " hollow marker is of runs that ended early."
     )
-    return Drawing(f"{variation.figure}_errors.png", caption, figure)
+    return Drawing(f"{variation.figure}_errors.svg", caption, figure)
 
 
 def _experiment(variation: Variation, summary: str) -> Experiment:

@@ -342,7 +342,7 @@ def _draw(outcomes: Outcomes) -> Drawing:
         "RMS error of the worst hinge over the second half of the run, as one thing is made worse; hollow"
         f" where the law does not hold; dashed, {1e3 * HOLDS_rad:g} mrad."
     )
-    return Drawing("stability_margins.png", caption, figure)
+    return Drawing("stability_margins.svg", caption, figure)
 
 
 EXPERIMENT = Experiment(

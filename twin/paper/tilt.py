@@ -44,7 +44,7 @@ def errors_drawing(windows: Mapping[str, Sequence[Array]]) -> Drawing:
     from spheretwin.viz.figures import over_time as figures
 
     courses = {
-        BY_LAW[law].label: figures.ErrorCourse(
+        f"{BY_LAW[law].label} ({paper_text(BY_LAW[law])})": figures.ErrorCourse(
             law, np.degrees(rows.padded(of_seeds)), BY_LAW[law].paper_deg or 0.0, BY_LAW[law].paper_axes
         )
         for law, of_seeds in windows.items()
@@ -52,9 +52,14 @@ def errors_drawing(windows: Mapping[str, Sequence[Array]]) -> Drawing:
     figure = figures.courses(courses, WINDOW_s, ("α", "β"), "Tilt on the prototype: measured error")
     caption = (
         f"Largest measured |error| within each {1e3 * WINDOW_s:g} ms: median over the seeds, and their range"
-        " as a band. Dotted: the largest error in the paper's figure."
+        " as a band. Dotted, and in the legend: the largest error of α in the paper's figure."
     )
-    return Drawing("figure11_errors.png", caption, figure)
+    return Drawing("figure11_errors.svg", caption, figure)
+
+
+def paper_text(law: TiltLaw) -> str:
+    """Printed value of a law, or the source of its gains if the paper does not have it."""
+    return f"paper {law.paper}°" if law.paper_deg else law.gains
 
 
 def changes_drawing(by_law: Mapping[str, Mapping[str, Errors]]) -> Drawing:
@@ -75,7 +80,7 @@ def changes_drawing(by_law: Mapping[str, Mapping[str, Errors]]) -> Drawing:
     ]
     figure = figures.lines(groups, "largest |error| of α, degrees", "One change at a time")
     caption = "Largest |error| of α: median over the seeds, and range; filled as measured, hollow as it is."
-    return Drawing("figure11_changes.png", caption, figure)
+    return Drawing("figure11_changes.svg", caption, figure)
 
 
 def estimators_drawing() -> Drawing:
@@ -86,7 +91,7 @@ def estimators_drawing() -> Drawing:
     curves = {kind: figures.Curve(*result) for kind, result in compare(BANDWIDTHS_rad_s.tolist()).items()}
     figure = figures.estimators(BANDWIDTHS_rad_s, curves, "Rates of the paper's sinusoid from noisy angles")
     caption = "RMS error and lag of the estimated rate against the estimator's bandwidth, 0.02° rms of noise."
-    return Drawing("figure11_estimators.png", caption, figure)
+    return Drawing("figure11_estimators.svg", caption, figure)
 
 
 MEASURED = (

@@ -1,10 +1,10 @@
-"""Report of a study: lines over one axis, a map over two, rank correlations over more, and its page."""
+"""Page of a study: lines over one axis, a map over two, rank correlations over more, tables of the rows."""
 
 from __future__ import annotations
 
 import shlex
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -14,9 +14,8 @@ from numpy.typing import NDArray
 
 from spheretwin.models.base.errors import shown
 from spheretwin.study.statistics import Array, Rows, ranked, strongest
-from spheretwin.viz.pages import html
 from spheretwin.viz.pages import markdown as pieces
-from spheretwin.viz.pages.markdown import Drawing, save_drawings, save_text
+from spheretwin.viz.pages.markdown import Drawing, write_page
 
 if TYPE_CHECKING:
     from spheretwin.viz.figures.maps import MapPanel, StudyLine
@@ -58,9 +57,9 @@ def _lines(rows: Rows, field: str, values: NDArray[Any]) -> Drawing:
         f"{rows.study['name']}: {_quantity(rows)}",
     )
     caption = (
-        f"{_quantity(rows)} by {field}: the median of the completed rows a line, their whole range a band."
+        f"{_quantity(rows)} by {field}: the line is the median of the completed rows, the band their range."
     )
-    return Drawing("report_axis.png", caption, figure)
+    return Drawing("report_axis.svg", caption, figure)
 
 
 def _map(rows: Rows, varied: Mapping[str, NDArray[Any]]) -> Drawing:
@@ -76,10 +75,10 @@ def _map(rows: Rows, varied: Mapping[str, NDArray[Any]]) -> Drawing:
         f"{rows.study['name']}: {_quantity(rows)}",
     )
     caption = (
-        f"{_quantity(rows)} by {first} and {second}, a panel a law: the median of the completed rows."
-        " A cross is where a row did not come to its end."
+        f"{_quantity(rows)} by {first} and {second}, one panel for each law: median of the completed rows."
+        " A cross marks a cell with a row that did not complete."
     )
-    return Drawing("report_map.png", caption, figure)
+    return Drawing("report_map.svg", caption, figure)
 
 
 def _many(rows: Rows, numbers: Mapping[str, NDArray[Any]]) -> Iterator[Drawing]:
@@ -109,7 +108,7 @@ def _many(rows: Rows, numbers: Mapping[str, NDArray[Any]]) -> Iterator[Drawing]:
         f" its distance from the middle one{left}: the {len(bars)} strongest of {len(names)} axes, over the"
         " completed rows. What does not matter is in the grey band 95 times of a hundred."
     )
-    yield Drawing("report_ranks.png", caption, figure)
+    yield Drawing("report_ranks.svg", caption, figure)
     shown = [names[place] for place in order[:MOST_SCATTERS]]
     figure = distributions.scatters(
         {name: {law: numbers[name][of_law] for law, of_law in complete.items()} for name in shown},
@@ -121,7 +120,7 @@ def _many(rows: Rows, numbers: Mapping[str, NDArray[Any]]) -> Iterator[Drawing]:
         f"{_quantity(rows)} of the completed rows over the {len(shown)} axes that it goes with most:"
         " a dot a row, a line the median of each tenth."
     )
-    yield Drawing("report_strongest.png", caption, figure)
+    yield Drawing("report_strongest.svg", caption, figure)
 
 
 def _distributions(rows: Rows) -> Drawing:
@@ -142,7 +141,7 @@ def _distributions(rows: Rows) -> Drawing:
         "Share of all rows that were completed with at most this: a curve ends below 1 by the rows that were"
         " not, or that never settled. Of a figure of each hinge, the largest of the three."
     )
-    return Drawing("report_spread.png", caption, figure)
+    return Drawing("report_spread.svg", caption, figure)
 
 
 def _quantity(rows: Rows) -> str:
@@ -196,7 +195,7 @@ def _value_text(value: Any) -> str:
     return f"{value:.4g}" if isinstance(value, float) else str(value)
 
 
-MARKDOWN, HTML = "report.md", "report.html"
+NAME = "report"
 
 MOST_NAMED = 5
 """Number of listed rows, of the worst and of the failed ones."""
@@ -213,7 +212,7 @@ def write(
     summary: Mapping[str, Any],
     requested: tuple[int, int],
     source: str,
-    versions: Mapping[str, str],
+    figure_format: str = "svg",
 ) -> list[Path]:
     """Write the page and its figures into a folder; returns both forms of the page.
 
@@ -228,48 +227,30 @@ def write(
         Requested rows, and rows of the study.
     source : str
         Name of the study on the command line.
-    versions : mapping
-        Version by package, for the foot.
+    figure_format : str
+        Format of the figures in addition to SVG.
 
     Raises
     ------
     SpheretwinError
         A file cannot be written there.
     """
-    figures = list(drawings(rows))
-    save_drawings(folder, figures)
-    text = markdown(rows, summary, requested, figures, source, versions)
-    title = str(rows.study["name"])
-    return [save_text(folder / MARKDOWN, text), save_text(folder / HTML, html.page(title, text))]
-
-
-def markdown(
-    rows: Rows,
-    summary: Mapping[str, Any],
-    requested: tuple[int, int],
-    figures: Sequence[Drawing],
-    source: str,
-    versions: Mapping[str, str],
-) -> str:
-    """Text of the page."""
     study, command = rows.study, f"spheretwin sweep {shlex.quote(source)}"
-    used = ", ".join(f"{name} {version}" for name, version in versions.items())
-    lines = [f"# {study['name']}", "", study["description"], "", _ends(rows, *requested), ""]
-    lines += ["## Figures of the rows", "", *_summary(summary), ""]
-    lines += [pieces.figure(drawing) for drawing in figures]
-    lines += _worst(rows, command)
-    lines += _failures(rows)
-    lines += ["## What differs from row to row", "", *_axes(study, rows), ""]
+    figures = list(drawings(rows))
+    sections = ["## Metrics of the rows", "", *_summary(summary), ""]
+    sections += ["## Figures", "", *map(pieces.figure, figures)] if figures else []
+    sections += [*_worst(rows, command), *_failures(rows)]
+    sections += ["## Varied fields", "", *_axes(study, rows), ""]
     limit = f" --limit {requested[0]}" if requested[0] < requested[1] else ""
-    lines += [f"Made by `{command}{limit}` with {used}.", ""]
-    return "\n".join(lines)
+    lead = [study["description"], "", _ends(rows, *requested)]
+    return write_page(folder, NAME, study["name"], lead, sections, figures, command + limit, figure_format)
 
 
 def _ends(rows: Rows, of: int, total: int) -> str:
     """Number of the rows and their statuses."""
     count = len(rows.laws)
     ends = ", ".join(f"{number} {status}" for status, number in Counter(rows.statuses.tolist()).items())
-    missing = f" The other {of - count} are still to be run: the same command goes on." if count < of else ""
+    missing = f" {of - count} rows remain: the same command continues." if count < of else ""
     first = f" Only {of} of the study's {total} rows were requested." if of < total else ""
     return f"{count} of {of} rows: {ends or 'none'}.{missing}{first}"
 
@@ -307,8 +288,8 @@ def _worst(rows: Rows, command: str) -> list[str]:
     ]
     head = ["row", "key", "law", rows.main]
     table = pieces.table(head, body, [True, False, False, True])
-    alone = f"`{command} --row KEY` runs one alone, and prints the command line that does."
-    return ["## The worst that were completed", "", *table, "", alone, ""]
+    alone = f"`{command} --row KEY` runs one row and prints its command line."
+    return ["## Completed rows with the largest value", "", *table, "", alone, ""]
 
 
 def _failures(rows: Rows) -> list[str]:
@@ -330,18 +311,18 @@ def _failures(rows: Rows) -> list[str]:
         for (law, status, complaint), places in kinds[: 2 * MOST_NAMED]
     ]
     table = pieces.table(
-        ["law", "status", "why", "rows", "the first"], body, [False, False, False, True, False]
+        ["law", "status", "reason", "rows", "first row"], body, [False, False, False, True, False]
     )
     rest = [f"And {len(kinds) - len(body)} other reasons.", ""] if len(kinds) > len(body) else []
-    return ["## Rows that did not come to their end", "", *table, "", *rest]
+    return ["## Rows that did not complete", "", *table, "", *rest]
 
 
 def _axes(study: Mapping[str, Any], rows: Rows) -> list[str]:
     """Axes with the values of the finished rows."""
     if not study["axis"]:
-        return ["Nothing but the seed."]
+        return ["Only the seed differs."]
     body = [[f"`{axis['field']}`", axis["kind"], _range(rows.axes[axis["field"]])] for axis in study["axis"]]
-    return pieces.table(["field", "values", ""], body, [False, False, False])
+    return pieces.table(["field", "kind", "values"], body, [False, False, False])
 
 
 def _range(values: Any) -> str:

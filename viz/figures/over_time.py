@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from spheretwin.viz.figures.style import (
     INK,
+    LawStyle,
     WIDTH_in,
     faint_grid,
     on_errors,
@@ -69,14 +70,16 @@ def courses(
     """
     figure = Figure(figsize=(WIDTH_in, 6.6), layout="constrained")
     panels = figure.subplots(len(axes_names), 1, sharex=True, sharey=True, squeeze=False)[:, 0]
+    looks = styles([course.law for course in by_label.values()])
     for axis, (panel, name) in enumerate(zip(panels, axes_names, strict=True)):
         for label, course in by_label.items():
-            _course(panel, label, course, window_s, axis)
+            _course(panel, label, course, looks[course.law], window_s, axis)
         _on_logarithmic(panel, "y")
         panel.set_ylabel(f"|error| of {name}, degrees")
     panels[0].set_title(title, fontsize="medium")
     panels[-1].set_xlabel("time, s")
-    panels[0].legend(loc="lower center", bbox_to_anchor=(0.5, 1.1), ncols=len(by_label), frameon=False)
+    panels[0].legend(loc="lower center", bbox_to_anchor=(0.5, 1.1), ncols=2, frameon=False,
+                     fontsize="small", handlelength=3.2)  # fmt: skip
     return figure
 
 
@@ -113,13 +116,16 @@ def lines(groups: Sequence[ErrorGroup], quantity: str, title: str) -> Figure:
     return figure
 
 
-def _course(panel: Axes, label: str, course: ErrorCourse, window_s: float, axis: int) -> None:
-    errors, colour = np.maximum(course.errors_deg[:, :, axis], LEAST_deg), law_colour(course.law)
+def _course(
+    panel: Axes, label: str, course: ErrorCourse, style: LawStyle, window_s: float, axis: int
+) -> None:
+    errors, colour = np.maximum(course.errors_deg[:, :, axis], LEAST_deg), style.colour
     whole = ~np.any(np.isnan(errors), axis=0)  # where every seed still runs
     t_s = window_s * (np.arange(errors.shape[1])[whole] + 0.5)
     low, middle, high = np.quantile(errors[:, whole], [0, 0.5, 1], axis=0)
     panel.fill_between(t_s, low, high, color=colour, alpha=0.18, linewidth=0)
-    panel.plot(t_s, middle, color=colour, linewidth=1.3, label=label)
+    panel.plot(t_s, middle, linewidth=1.3, marker=style.marker, markersize=4.5, label=label,
+               markevery=max(1, errors.shape[1] // MARKS), **style.line())  # fmt: skip
     if axis in course.paper_axes:
         panel.axhline(course.paper_deg, color=colour, linestyle=":", linewidth=1.4, zorder=1)
 

@@ -45,20 +45,37 @@ DASHES: tuple[Any, ...] = (
 """Dashes by the place of a run: runs are distinct in grey print."""
 
 
-def save(figure: Figure, path: Path) -> None:
-    """Write a figure as PNG, or as SVG under that suffix; the same figure gives the same bytes.
+METADATA: dict[str, dict[str, None]] = {
+    "svg": dict.fromkeys(("Creator", "Date", "Format", "Type")),
+    "pdf": {"CreationDate": None},
+    "png": {"Software": None},
+}
+"""Entries that are left out of a file, by its format."""
+
+
+def save(figure: Figure, path: Path, title: str = "") -> None:
+    """Write a figure as SVG with real text, as PDF or as PNG; the same figure gives the same bytes.
+
+    Parameters
+    ----------
+    figure : Figure
+    path : Path
+        With the suffix of the format.
+    title : str
+        Description for readers of an SVG who do not see it.
 
     Raises
     ------
     InputError
         The file cannot be written there.
     """
-    with whole_file(path) as temporary:
-        if path.suffix == ".svg":
-            with rc_context({"svg.hashsalt": path.name}):
-                figure.savefig(temporary, format="svg", metadata={"Date": None})
-        else:
-            figure.savefig(temporary, format="png", dpi=DPI, metadata={"Software": None})
+    kind = path.suffix[1:]
+    metadata = METADATA[kind] | ({"Title": title} if title and kind == "svg" else {})
+    with (
+        whole_file(path) as temporary,
+        rc_context({"svg.hashsalt": path.name, "svg.fonttype": "none", "pdf.fonttype": 42}),
+    ):
+        figure.savefig(temporary, format=kind, dpi=DPI, metadata=metadata)
 
 
 def faint_grid(axes: Axes, alpha: float = 0.35, **options: Any) -> None:

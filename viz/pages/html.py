@@ -1,9 +1,10 @@
-"""HTML of a Markdown page, complete in one file: no font, no request to any host, no script of its own."""
+"""HTML of a Markdown page in one file, without fonts, scripts and requests to a host."""
 
 from __future__ import annotations
 
-import base64
-from collections.abc import Callable, Sequence
+import re
+from collections import Counter
+from collections.abc import Callable, Iterable
 from html import escape
 from pathlib import Path
 
@@ -29,7 +30,12 @@ th, td { padding: 0.35rem 0.7rem; border-bottom: 1px solid var(--faint); text-al
 td[style*="right"] { white-space: nowrap; }
 th { background: var(--soft); }
 th:first-child, td:first-child { padding-left: 0.4rem; }
-img { display: block; max-width: 100%; height: auto; background: #fff; border-radius: 4px; }
+main > ul:first-of-type { columns: 2 22rem; padding: 0.8rem 0.8rem 0.8rem 2rem; background: var(--soft); }
+main > ul:first-of-type ul { padding-left: 1.2rem; }
+a { color: inherit; }
+hr { border: 0; border-top: 1px solid var(--faint); margin-top: 3rem; }
+p:has(svg) { max-width: none; overflow-x: auto; }
+svg { display: block; max-width: 100%; min-width: 36rem; height: auto; background: #fff; border-radius: 4px; }
 code { font-family: ui-monospace, monospace; font-size: 0.92em; background: var(--soft); padding: 0 0.2em; }
 pre { overflow: auto; max-height: 16rem; padding: 0.6rem; background: var(--soft); font-size: 0.85rem; }
 pre code { padding: 0; }
@@ -59,8 +65,11 @@ def rendered(markdown: str, figures: Path | None = None) -> str:
     reader.add_render_rule("table_open", _constant('<div class="wide" tabindex="0">\n<table>\n'))
     reader.add_render_rule("table_close", _constant("</table>\n</div>\n"))
     tokens = reader.parse(markdown)
+    headings = [i for i, token in enumerate(tokens) if token.type == "heading_open" and token.tag != "h1"]
+    for i, anchor in zip(headings, anchors(tokens[i + 1].content for i in headings), strict=True):
+        tokens[i].attrs["id"] = anchor
     if figures:
-        _put_in(tokens, figures)
+        reader.add_render_rule("image", lambda _, images, place, *__: _svg(figures, images[place]))
     return str(reader.renderer.render(tokens, reader.options, {}))
 
 
@@ -95,13 +104,23 @@ def whole(title: str, body: str, head: str = "") -> str:
     )
 
 
-def _put_in(tokens: Sequence[Token], folder: Path) -> None:
-    """Give each figure its bytes for its file's name, in place."""
-    for token in tokens:
-        if token.type == "image":
-            content = base64.b64encode((folder / str(token.attrs["src"])).read_bytes()).decode()
-            token.attrs["src"] = f"data:image/png;base64,{content}"
-        _put_in(token.children or (), folder)
+def anchors(titles: Iterable[str]) -> list[str]:
+    """Anchor of each heading, as GitHub makes them; a number tells equal ones apart."""
+    counts: Counter[str] = Counter()
+    names = []
+    for title in titles:
+        name = re.sub(r"[^\w\- ]", "", title.lower()).replace(" ", "-")
+        names.append(f"{name}-{counts[name]}" if counts[name] else name)
+        counts[name] += 1
+    return names
+
+
+def _svg(folder: Path, image: Token) -> str:
+    """Inline SVG of a figure; its identifiers begin with the file's name, as a page has several."""
+    path = folder / str(image.attrs["src"])
+    content = path.read_text(encoding="utf-8")
+    content = re.sub(r'(\bid="|href="#|url\(#)', rf"\g<1>{path.stem}-", content[content.index("<svg") :])
+    return content.replace("<svg", '<svg role="img"', 1)
 
 
 def _constant(text: str) -> Callable[..., str]:

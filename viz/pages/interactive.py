@@ -30,9 +30,10 @@ body { max-width: 84rem; }
   padding: 0.5rem 0; background: var(--paper); }
 .runs button { font: inherit; font-size: 0.9rem; padding: 0.2rem 0.7rem; border-radius: 1rem;
   border: 1px solid var(--faint); background: var(--soft); color: inherit; cursor: pointer; }
-.runs button::before { content: ""; display: inline-block; width: 1.2rem; height: 0.25rem;
+.runs [data-run]::before { content: ""; display: inline-block; width: 1.2rem; height: 0.25rem;
   margin-right: 0.5rem; vertical-align: middle; background: var(--run); }
-.runs button[aria-pressed="false"] { opacity: 0.4; text-decoration: line-through; }
+.runs [data-run][aria-pressed="false"] { opacity: 0.4; text-decoration: line-through; }
+#logarithmic[aria-pressed="true"] { background: var(--faint); }
 .plot { background: #fff; border-radius: 4px; }
 """
 
@@ -43,7 +44,7 @@ const plots = Object.keys(figures).map((name) => document.getElementById(name));
 for (const plot of plots) {
   Plotly.newPlot(plot, figures[plot.id].data, figures[plot.id].layout, config);
 }
-for (const button of document.querySelectorAll(".runs button")) {
+for (const button of document.querySelectorAll("[data-run]")) {
   button.addEventListener("click", () => {
     const on = button.getAttribute("aria-pressed") === "false";
     button.setAttribute("aria-pressed", on);
@@ -53,7 +54,27 @@ for (const button of document.querySelectorAll(".runs button")) {
     }
   });
 }
+const scale = document.getElementById("logarithmic"), plot = plots[0], axes = plot.layout.meta;
+const ranges = axes.map((axis) => [...plot.layout[axis].range]);
+scale.addEventListener("click", async () => {
+  const on = scale.getAttribute("aria-pressed") === "false";
+  scale.setAttribute("aria-pressed", on);
+  for (const [i, axis] of axes.entries()) {
+    const linear = {[`${axis}.type`]: "linear", [`${axis}.range`]: [...ranges[i]]};
+    await Plotly.relayout(plot, on ? {[`${axis}.type`]: "log", [`${axis}.autorange`]: true} : linear);
+    const [low, high] = plot.layout[axis].range;
+    if (on) await Plotly.relayout(plot, {[`${axis}.range`]: [Math.max(low, high - 4), high]});
+  }
+});
 """
+
+
+SCALE = (
+    '<button type="button" id="logarithmic" aria-pressed="false">logarithmic axis of the error angle</button>'
+)
+
+TITLES = {"over-time": "Signals over time", "spectra": "Spectra of the tracking errors"}
+"""Heading of each figure."""
 
 
 def page(
@@ -78,8 +99,8 @@ def page(
     content = ", ".join(f'"{name}": {figure.to_json()}' for name, figure in figures.items())
     body = [
         html.rendered(above),
-        f'<div class="runs" role="group" aria-label="runs">{_switches(runs)}</div>',
-        *(f'<div class="plot" id="{name}"></div>' for name in figures),
+        f'<div class="runs" role="group" aria-label="runs">{_switches(runs)}{SCALE}</div>',
+        *(html.rendered(f"## {TITLES[name]}") + f'<div class="plot" id="{name}"></div>' for name in figures),
         html.rendered(below),
         f"<script>{get_plotlyjs()}</script>",
         # No text of a user's ends the script.
@@ -204,7 +225,13 @@ def over_time(
         panels.append(PlotPanel(_text(quantity.heading), [*reference_lines, *lines], axis))
     panels += _currents(runs)
     panels.append(_events(runs, colours))
-    return stacked(panels, "time [s]")
+    figure = stacked(panels, "time [s]")
+    figure.layout.meta = [
+        f"yaxis{'' if place == 1 else place}"
+        for place, quantity in enumerate(quantities, start=1)
+        if quantity.group == "whole"
+    ]
+    return figure
 
 
 def points_per_line(

@@ -32,7 +32,7 @@ def test_json_stands_alone_and_the_page_is_written(tmp_path):
             "completed",
         )
         assert len(row["max_abs_error_rad"]) == len(row["tail_rms_error_rad"]) == 3
-    assert {"reproduce.md", "reproduce.html", "figure11_errors.png"} <= {
+    assert {"reproduce.md", "reproduce.html", "figure11_errors.svg"} <= {
         path.name for path in folder.iterdir()
     }
     text = (folder / "reproduce.md").read_text(encoding="utf-8")

@@ -30,7 +30,7 @@ def test_people_get_a_table_and_a_page(source, tmp_path, capsys, monkeypatch):
     assert "completed" in out
     assert err == ""
     names = {path.name for path in (tmp_path / "short_study").iterdir()}
-    assert {"journal.jsonl", "table.parquet", "report.md", "report.html", "report_axis.png"} <= names
+    assert {"journal.jsonl", "table.parquet", "report.md", "report.html", "report_axis.svg"} <= names
 
 
 def test_json_stands_alone(source, tmp_path, capsys):

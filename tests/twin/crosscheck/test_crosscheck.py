@@ -12,7 +12,6 @@ from matplotlib.image import imread
 from spheretwin import cli
 from spheretwin.crosscheck import coil_driven, dynamics, identities, suite, trajectories
 from spheretwin.crosscheck import identities as free_rotor
-from spheretwin.crosscheck import suite as page
 from spheretwin.crosscheck import trajectories as closed_loop
 from spheretwin.models import actuator as actuators
 from spheretwin.models.base.checks import Check
@@ -50,7 +49,7 @@ def of_both(*quantities):
 def told(tmp_path_factory):
     """One run of the command, with its page."""
     folder = tmp_path_factory.mktemp("crosscheck") / "page"
-    return crosscheck("--states", 200, "--json", "--out", folder), folder
+    return crosscheck("--states", 200, "--json", "--out", folder, "--figure-format", "png"), folder
 
 
 def test_every_bound_is_kept(told):
@@ -86,15 +85,15 @@ def test_random_states_are_counted_over_all_plants(told):
 
 def test_page_has_every_row_and_every_figure(told):
     done, folder = told
-    text = (folder / page.PAGE).read_text(encoding="utf-8")
+    text = (folder / "crosscheck.md").read_text(encoding="utf-8")
     for row in json.loads(done.stdout)["checks"]:
         assert f"| {row['name']} |" in text
     # Bars within a cell are escaped: every row has as many cells as the head.
     table = [line.replace("\\|", "") for line in text.splitlines() if line.startswith("|")]
     assert {line.count("|") for line in table} == {8}
     for name in FIGURES:
-        assert f"({name}.png)" in text
-        pixels = imread(folder / f"{name}.png")
+        assert f"({name}.svg)" in text
+        pixels = imread(folder / f"{name}.png")  # the format that the command line names
         assert min(pixels.shape[:2]) > 400
         assert pixels[:, :, :3].std() > 0.05
 

@@ -111,6 +111,6 @@ def test_the_part_that_changes_most_is_named():
     outcomes = Outcomes(
         {error_budget.case("pd", stage).name: [outcome(errors[stage.name])] for stage in STAGES}
     )
-    assert error_budget._most(outcomes, "pd") == "pd, friction (β +2.000°)"
+    assert error_budget._most(outcomes, "pd") == "PD, friction (β +2.000°)"
     del outcomes["pd: delay"]
     assert error_budget._most(outcomes, "pd") == ""

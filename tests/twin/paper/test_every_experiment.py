@@ -45,7 +45,7 @@ def test_every_experiment_has_rows_and_a_page(name, tmp_path):
     assert all(
         len(row) == len(table.head) for section in sections for table in section.tables for row in table.rows
     )
-    written = page.write(tmp_path, [Chapter(plan.experiment, sections)], "", {})
+    written = page.write(tmp_path, [Chapter(plan.experiment, sections)], "")
     markdown = written[0].read_text(encoding="utf-8")
-    for figure in tmp_path.glob("*.png"):
+    for figure in tmp_path.glob("*.svg"):
         assert f"({figure.name})" in markdown

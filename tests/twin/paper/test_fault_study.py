@@ -244,7 +244,7 @@ def test_page_shows_every_figure_and_row(found):
     assert len(other.tables[0].rows) == 1
     files = [draw().file for section in (groups, delays, reasons, parts, other) for draw in section.drawings]
     assert files == [
-        "faults_shares.png", "faults_pairs.png", "faults_latency.png", "faults_torque.png",
+        "faults_shares.svg", "faults_pairs.svg", "faults_latency.svg", "faults_torque.svg",
     ]  # fmt: skip
 
 

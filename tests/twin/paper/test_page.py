@@ -1,6 +1,5 @@
 """The page of the experiments: Markdown and HTML of the same content, for any reader, from no other host."""
 
-import base64
 import re
 from html.parser import HTMLParser
 
@@ -18,7 +17,7 @@ from tests.twin.paper.cases import IDEAL, experiment
 def drawing():
     figure = Figure()
     figure.text(0.5, 0.5, "drawn")
-    return Drawing("short.png", "What is |drawn|.", figure)
+    return Drawing("short.svg", "What is |drawn|.", figure)
 
 
 class Reader(HTMLParser):
@@ -42,9 +41,7 @@ def written(tmp_path_factory):
     made = experiment(IDEAL._replace(name="one | two"))
     sections = made.sections(run_plan(make_plan(made, 1)))
     sections = [section._replace(drawings=[drawing]) for section in sections]
-    paths = page.write(
-        folder, [Chapter(made, sections)], "spheretwin reproduce short --seeds 3", {"python": "3"}
-    )
+    paths = page.write(folder, [Chapter(made, sections)], "spheretwin reproduce short --seeds 3")
     return folder, *(path.read_text(encoding="utf-8") for path in paths)
 
 
@@ -53,7 +50,6 @@ def test_both_forms_and_the_figures_are_in_the_folder(written):
     assert sorted(path.name for path in folder.iterdir()) == [
         "reproduce.html",
         "reproduce.md",
-        "short.png",
         "short.svg",
     ]
 
@@ -74,7 +70,7 @@ def test_both_forms_have_the_same_content(written):
         assert text in said
     cells = [tag for tag, _ in reader.tags if tag in ("td", "th")]
     assert len(cells) == 4
-    assert "Made by `spheretwin reproduce short --seeds 3` with python 3." in markdown
+    assert "Created by `spheretwin reproduce short --seeds 3` with python " in markdown
     assert "spheretwin reproduce short --seeds 3" in said
 
 
@@ -82,14 +78,11 @@ def test_html_asks_nobody_for_anything(written):
     reader = Reader(written[2])
     names = {tag for tag, _ in reader.tags}
     assert not names & {"script", "link", "iframe", "object", "b"}  # nor is a tag in a text obeyed
-    asked = [
-        value for _, attributes in reader.tags for key, value in attributes.items() if key in ("src", "href")
-    ]
-    (figure,) = asked
-    kind, _, content = figure.partition(",")
-    assert kind == "data:image/png;base64"  # the page stands alone
-    assert base64.b64decode(content) == (written[0] / "short.png").read_bytes()
-    assert not re.search(r"url\(|@import|https?:", written[2])
+    links = [value for _, attributes in reader.tags for key, value in attributes.items() if "href" in key]
+    assert all(link.startswith("#") for link in links)
+    assert "img" not in names  # the figure is in the page itself
+    assert "drawn" in reader.texts
+    assert not re.search(r"url\((?!#)|@import|src=", written[2])
 
 
 def test_html_is_read_on_a_phone_and_in_the_dark(written):
@@ -105,12 +98,13 @@ def test_the_first_page_says_what_was_reproduced(tmp_path):
     made = experiment(IDEAL)
     findings = [Finding(True, "this was"), Finding(False, "that was not | at all"), Finding(None, "more")]
     chapters = [Chapter(made, made.sections(run_plan(make_plan(made, 1))), findings)]
-    text = page.write(tmp_path, chapters, "", {})[0].read_text(encoding="utf-8")
+    text = page.write(tmp_path, chapters, "")[0].read_text(encoding="utf-8")
     first = text.split("## A short one")[0]
-    assert page.FIRST in first
+    assert "1 of 2 results of the paper were reproduced." in first
+    assert f"## {page.REPRODUCED}" in first
     assert "| short | **reproduced** | this was. |" in first
     assert "| short | **not reproduced** | that was not \\| at all. |" in first
-    assert "| short | more. |" in first.split(page.BESIDES)[1]
+    assert "| short | more. |" in first.split(f"## {page.FURTHER}")[1]
 
 
 @pytest.mark.parametrize("count", [2, page.MOST_COMMANDS + 1])
@@ -118,7 +112,7 @@ def test_every_row_s_command_line_is_there(tmp_path, count):
     made = experiment(IDEAL)
     commands = [f"spheretwin simulate tilt --seed {number}" for number in range(count)]
     chapters = [Chapter(made, made.sections(run_plan(make_plan(made, 1))), [], commands, "Rows: some.")]
-    text, html = (path.read_text(encoding="utf-8") for path in page.write(tmp_path, chapters, "", {}))
+    text, html = (path.read_text(encoding="utf-8") for path in page.write(tmp_path, chapters, ""))
     assert "Rows: some." in text
     file = tmp_path / "short_commands.txt"
     if count > page.MOST_COMMANDS:

@@ -201,9 +201,9 @@ def test_rows_and_page_have_what_ran(short, tmp_path):
     assert unexpected_ends(plan, outcomes) == []
     json.dumps(rows(plan, outcomes), allow_nan=False)
     chapter = Chapter(plan.experiment, EXPERIMENT.sections(outcomes), EXPERIMENT.findings(outcomes))
-    written = page.write(tmp_path, [chapter], "", {})[0].read_text(encoding="utf-8")
+    written = page.write(tmp_path, [chapter], "")[0].read_text(encoding="utf-8")
     for hardware in HARDWARE:
-        figure = f"rivals_{hardware.name}.png"
+        figure = f"rivals_{hardware.name}.svg"
         assert (tmp_path / figure).stat().st_size > 0
         assert f"({figure})" in written
         for each in load(hardware.study).optimise.gain:

@@ -109,13 +109,13 @@ NUMBERS = np.linspace(0, 1, 24)
 @pytest.mark.parametrize(
     ("axes", "files"),
     [
-        ({}, ["report_spread.png"]),
-        ({"a": NUMBERS}, ["report_axis.png", "report_spread.png"]),
-        ({"a": np.array(["x", "y"] * 12, dtype=object)}, ["report_axis.png", "report_spread.png"]),
-        ({"a": NUMBERS // 0.25, "b": NUMBERS % 0.25 // 0.1}, ["report_map.png", "report_spread.png"]),
+        ({}, ["report_spread.svg"]),
+        ({"a": NUMBERS}, ["report_axis.svg", "report_spread.svg"]),
+        ({"a": np.array(["x", "y"] * 12, dtype=object)}, ["report_axis.svg", "report_spread.svg"]),
+        ({"a": NUMBERS // 0.25, "b": NUMBERS % 0.25 // 0.1}, ["report_map.svg", "report_spread.svg"]),
         (
             {"a": NUMBERS, "b": NUMBERS[::-1], "c": NUMBERS**2},
-            ["report_ranks.png", "report_strongest.png", "report_spread.png"],
+            ["report_ranks.svg", "report_strongest.svg", "report_spread.svg"],
         ),
     ],
 )
@@ -130,7 +130,7 @@ def test_figures_suit_the_axes(axes, files, laws):
 @pytest.mark.parametrize("lost", [range(24), range(23)])
 def test_where_hardly_a_row_was_completed_nothing_fails(tmp_path, lost):
     rows = made(24, {"max_abs_error_rad": NUMBERS}, {"a": NUMBERS, "b": NUMBERS, "c": NUMBERS}, lost=lost)
-    assert len(report.write(tmp_path, rows, summary(rows), (24, 24), "made", {})) == 2
+    assert len(report.write(tmp_path, rows, summary(rows), (24, 24), "made")) == 2
     assert "| pd | left_workspace |" in (tmp_path / "report.md").read_text()
 
 
@@ -138,7 +138,7 @@ def test_the_page_tells_of_a_study(tmp_path):
     chosen = loads(axis=[*LOADS, values("plant.payload_kg", 0.0, -1.0)])
     told = found(chosen, tmp_path)
     rows = read(tmp_path / "table.parquet")
-    markdown, html = report.write(tmp_path, rows, summary(rows), (48, 48), "my study.toml", {"python": "3"})
+    markdown, html = report.write(tmp_path, rows, summary(rows), (48, 48), "my study.toml")
     text = markdown.read_text()
     assert "48 of 48 rows: 24 completed, 24 refused." in text
     assert "afsm, surface_slope = [60.0, 60.0, 60.0]" in text
@@ -158,7 +158,7 @@ def test_the_same_table_gives_the_same_page(tmp_path):
     for name in ("a", "b"):
         found(loads(), tmp_path / name)
         rows = read(tmp_path / name / "table.parquet")
-        report.write(tmp_path / name, rows, summary(rows), (24, 24), "short", {})
+        report.write(tmp_path / name, rows, summary(rows), (24, 24), "short")
     for path in (tmp_path / "a").glob("report*"):
         assert path.read_bytes() == (tmp_path / "b" / path.name).read_bytes()
 
@@ -166,8 +166,8 @@ def test_the_same_table_gives_the_same_page(tmp_path):
 def test_a_study_of_one_row_has_a_page(tmp_path):
     found(study(), tmp_path)
     rows = read(tmp_path / "table.parquet")
-    report.write(tmp_path, rows, summary(rows), (1, 1), "short", {})
-    assert "Nothing but the seed." in (tmp_path / "report.md").read_text()
+    report.write(tmp_path, rows, summary(rows), (1, 1), "short")
+    assert "Only the seed differs." in (tmp_path / "report.md").read_text()
 
 
 def test_a_damaged_table_is_refused_with_its_place(tmp_path):

@@ -1,4 +1,10 @@
-"""A page of Markdown as HTML: its tables, and all tags escaped."""
+"""Page of a command: tables, escaped tags, table of contents, figures with text, and the foot."""
+
+import re
+from xml.etree import ElementTree
+
+import pytest
+from matplotlib.figure import Figure
 
 from spheretwin.viz.pages import html, markdown
 
@@ -18,3 +24,65 @@ def test_tags_are_shown_and_not_obeyed():
     assert "<title>a &lt; b</title>" in made
     assert "<script" not in made
     assert 'href="javascript' not in made
+
+
+SVG = "{http://www.w3.org/2000/svg}"
+
+
+def drawing(name):
+    figure = Figure()
+    axes = figure.subplots()
+    axes.plot([0, 1], [2, 3], "o", clip_on=True)
+    axes.set_xlabel(f"torque of {name}, N·m")
+    return markdown.Drawing(f"{name}.svg", f"Torque of {name} < 2.", figure)
+
+
+def write(folder, figure_format="svg"):
+    folder.mkdir()
+    drawings = [drawing("first"), drawing("second")]
+    sections = ["## Gains, `pd`", "", "### Errors", "", "## Errors", "", *map(markdown.figure, drawings)]
+    return markdown.write_page(
+        folder, "page", "A title", ["Two of three hold."], sections, drawings, "spheretwin x", figure_format,
+    )  # fmt: skip
+
+
+def test_page_has_title_summary_contents_sections_and_foot_in_this_order(tmp_path):
+    markdown_page, html_page = write(tmp_path / "a")
+    parts = [
+        "A title", "Two of three hold.", "](#gains-pd)", "](#errors)", "](#errors-1)", "## Gains",
+        "Torque of first", "Created by `spheretwin x` with python ",
+    ]  # fmt: skip
+    text = markdown_page.read_text()
+    places = [text.index(part) for part in parts]
+    assert places == sorted(places)
+    page = html_page.read_text()
+    links = re.findall(r'<a href="#([^"]*)"', page)
+    assert links == re.findall(r'<h[23] id="([^"]*)"', page) == ["gains-pd", "errors", "errors-1"]
+    assert page.index("Two of three") < page.index('href="#gains-pd"') < page.index('id="gains-pd"')
+
+
+def test_figures_of_a_page_have_text_a_title_and_identifiers_of_their_own(tmp_path):
+    page = write(tmp_path / "a")[1].read_text()
+    for name in ("first", "second"):
+        root = ElementTree.parse(tmp_path / "a" / f"{name}.svg").getroot()
+        assert f"torque of {name}, N·m" in [text.text for text in root.iter(f"{SVG}text")]
+        assert root.find(f"{SVG}title").text == f"Torque of {name} < 2."
+        assert f">torque of {name}, N·m</text>" in page
+        assert f"<title>Torque of {name} &lt; 2.</title>" in page
+    names = re.findall(r'\bid="([^"]*)"', page)
+    assert len(names) == len(set(names))
+    assert set(re.findall(r'href="#([^"]*)"|url\(#([^)]*)\)', page)) <= {
+        pair for name in names for pair in ((name, ""), ("", name))
+    }
+
+
+@pytest.mark.parametrize(("kind", "start"), [("pdf", b"%PDF"), ("png", b"\x89PNG"), ("svg", b"<?xml")])
+def test_the_same_page_has_the_same_bytes_in_each_format(tmp_path, kind, start):
+    for name in ("a", "b"):
+        write(tmp_path / name, kind)
+    files = {path.name for path in (tmp_path / "a").iterdir()}
+    figures = {f"{name}.{suffix}" for name in ("first", "second") for suffix in ("svg", kind)}
+    assert files == {"page.md", "page.html"} | figures
+    for file in files:
+        assert (tmp_path / "a" / file).read_bytes() == (tmp_path / "b" / file).read_bytes()
+    assert (tmp_path / "a" / f"first.{kind}").read_bytes().startswith(start)

@@ -16,9 +16,8 @@ from spheretwin.study.study import Study
 from spheretwin.study.tuning.gains import section_of
 from spheretwin.study.tuning.trials import Ended
 from spheretwin.study.tuning.tuning import LawResult, ReportedTrial, TuningResult
-from spheretwin.viz.pages import html
 from spheretwin.viz.pages import markdown as pieces
-from spheretwin.viz.pages.markdown import Drawing, save_drawings, save_text
+from spheretwin.viz.pages.markdown import Drawing, save_text, write_page
 
 if TYPE_CHECKING:
     from spheretwin.viz.figures import fronts
@@ -34,14 +33,14 @@ def drawings(name: str, result: TuningResult, objectives: Sequence[Objective]) -
     names = [objective.called for objective in objectives]
     figures = [
         Drawing(
-            "trials.png",
+            "trials.svg",
             "Objectives trial by trial: rings were pruned, and are at least that; crosses lost.",
             fronts.progress(by_label, names, f"{name}: trials"),
         )
     ]
     if len(objectives) == 2:
         caption = "The front: no trial is as good in both objectives and better in one."
-        figures.append(Drawing("front.png", caption, fronts.front(by_label, names, f"{name}: front")))
+        figures.append(Drawing("front.svg", caption, fronts.front(by_label, names, f"{name}: front")))
     return figures
 
 
@@ -144,7 +143,7 @@ def _signed(values: Sequence[float], objectives: Sequence[Objective]) -> dict[st
     return {objective.called: objective.sign * value for objective, value in pairs}
 
 
-MARKDOWN, HTML, GAINS = "tuning.md", "tuning.html", "gains.json"
+NAME, GAINS = "tuning", "gains.json"
 
 METHODS = {
     "tpe": "proposed by a tree-structured Parzen estimator",
@@ -157,9 +156,13 @@ ALIGNED = [False, False, True, True, False, False]
 
 
 def write(
-    folder: Path, study: Study, result: TuningResult, command: str, versions: Mapping[str, str]
+    folder: Path,
+    study: Study,
+    result: TuningResult,
+    command: str,
+    figure_format: str = "svg",
 ) -> list[Path]:
-    """Write the page, and its figures where matplotlib is, into a folder; returns both forms of the page.
+    """Write the page, its figures if matplotlib is installed, and the gains; return pages and gains.
 
     Parameters
     ----------
@@ -168,41 +171,28 @@ def write(
     study : Study
     result : TuningResult
     command : str
-        Command that creates the page again.
-    versions : mapping
-        Version by package, for the foot.
+        Command that creates the page.
+    figure_format : str
+        Format of the figures in addition to SVG.
 
     Raises
     ------
     SpheretwinError
         A file cannot be written there.
     """
-    figures: list[Drawing] = []
-    if find_spec("matplotlib") is not None:
-        figures = drawings(study.name, result, section_of(study).objective)
-        save_drawings(folder, figures)
-    text = markdown(study, result, figures, command, versions)
-    gains = json.dumps(best(result, section_of(study).objective), indent=1, ensure_ascii=False)
+    optimise = section_of(study)
+    can_draw = find_spec("matplotlib") is not None
+    figures = drawings(study.name, result, optimise.objective) if can_draw else []
+    sections = ["## Method", "", *_what(study), ""]
+    sections += ["## Figures", "", *map(pieces.figure, figures)] if figures else []
+    for law, of_law in summary(result, optimise.objective)["laws"].items():
+        sections += [f"## {law}", "", _counted(of_law), "", *_chosen(of_law), ""]
+    gains = json.dumps(best(result, optimise.objective), indent=1, ensure_ascii=False)
+    lead = [study.description]
     return [
-        save_text(folder / MARKDOWN, text),
-        save_text(folder / HTML, html.page(study.name, text)),
+        *write_page(folder, NAME, study.name, lead, sections, figures, command, figure_format),
         save_text(folder / GAINS, f"{gains}\n"),
     ]
-
-
-def markdown(
-    study: Study, result: TuningResult, figures: Sequence[Drawing], command: str, versions: Mapping[str, str]
-) -> str:
-    """Text of the page."""
-    optimise = section_of(study)
-    whole = summary(result, optimise.objective)
-    used = ", ".join(f"{name} {version}" for name, version in versions.items())
-    lines = [f"# {study.name}", "", study.description, "", *_what(study), ""]
-    lines += [pieces.figure(figure) for figure in figures]
-    for law, of_law in whole["laws"].items():
-        lines += [f"## {law}", "", _counted(of_law), "", *_chosen(of_law), ""]
-    lines += [f"Made by `{command}` with {used}.", ""]
-    return "\n".join(lines)
 
 
 def _what(study: Study) -> list[str]:
@@ -227,7 +217,7 @@ def _what(study: Study) -> list[str]:
         + _limits(optimise)
         + fresh,
         "",
-        *pieces.table(["gain", "law", "from", "to", "sets", "why"], ranges, ALIGNED),
+        *pieces.table(["gain", "law", "from", "to", "fields", "reason"], ranges, ALIGNED),
     ]
 
 

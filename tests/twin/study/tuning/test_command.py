@@ -83,7 +83,7 @@ def test_json_stands_alone_and_files_are_written(small, tmp_path, capsys):
     assert list(told["laws"]) == ["pd", "pid"]
     files = {path.name for path in (tmp_path / "out").iterdir()}
     pages = {"tuning.md", "tuning.html", "gains.json"}
-    assert files == {"trials.jsonl", "trials.parquet", "trials.png", "front.png"} | pages
+    assert files == {"trials.jsonl", "trials.parquet", "trials.svg", "front.svg"} | pages
     table = parquet.read_table(told["table"]).to_pylist()
     for law, of_law in told["laws"].items():
         assert sum(of_law["ended"].values()) == 8
@@ -169,10 +169,11 @@ def test_the_page_has_every_law_its_front_and_its_figures(small, tmp_path, capsy
             line.split("|")[1].strip() for line in section.partition("\n## ")[0].splitlines() if "|" in line
         ]
         assert rows[2:] == ["start", *(str(each["trial"]) for each in of_law["best"])]
-    for file in ("trials.png", "front.png"):
+    for file in ("trials.svg", "front.svg"):
         assert f"]({file})" in text
-        assert file in (tmp_path / "out" / "tuning.html").read_text(encoding="utf-8")
-    assert f"Made by `spheretwin sweep {small} --optimise` with python" in text
+        figure = (tmp_path / "out" / file).read_text(encoding="utf-8")
+        assert ">pd</text>" in figure
+    assert f"Created by `spheretwin sweep {small} --optimise` with python" in text
 
 
 def test_the_command_that_is_told_runs_the_gains(small, tmp_path, capsys):
@@ -204,7 +205,7 @@ def test_without_matplotlib_there_are_trials_and_a_word(small, tmp_path, capsys,
     out, err = capsys.readouterr()
     assert json.loads(out)["trials"] == 16
     assert err == "spheretwin: sweep: no figures without the extra `spheretwin[plots]`\n"
-    assert list((tmp_path / "out").glob("*.png")) == []
+    assert list((tmp_path / "out").glob("*.svg")) == []
     assert "![" not in (tmp_path / "out" / "tuning.md").read_text(encoding="utf-8")
 
 
