@@ -28,6 +28,7 @@ WHOLE = {
     "hardware": "prototype", "controller.law": "adrc", "detector.detect": True, "duration": 0.2,
     "controller.governor.acceleration_rad_s2": 20.0, "controller.prediction.on": True,
     "controller.feed_forward.friction": 0.8, "controller.feed_forward.inertia": 1.0,
+    "sensors.potentiometer.hysteresis_rad": 2e-4,
 }  # fmt: skip
 
 # Another value of everything that is true of plant, drive and sensors.
@@ -40,6 +41,27 @@ TRUTH = {
     "plant.friction_smoothing_rad_s": 0.1,
     "plant.group_gain": [0.9] * 18,
     "plant.payload_kg": 0.04,
+    **{
+        f"plant.{part}.{name}": value
+        for part, count in (("poles", 16), ("coils", 36))
+        for name, value in {
+            "gain_error": 0.03,
+            "angle_error_rad": 5e-3,
+            "distance_error_m": 1e-4,
+            "errors": [[0.01, 1e-3, 1e-3, 1e-4]] * count,
+        }.items()
+    },
+    "plant.stiction.on": True,
+    "plant.stiction.break_away": 2.0,
+    "plant.stiction.presliding_rad": 5e-3,
+    "plant.stiction.damping_ratio": 0.5,
+    "plant.stiction.stribeck_rad_s": 0.2,
+    "plant.cable.stiffness_Nm_rad": [2e-3, 2e-3, 1e-3],
+    "plant.cable.neutral_rad": [0.1, 0.0, 0.0],
+    "plant.cable.torque_Nm": [1e-3, 0.0, 0.0],
+    "plant.cable.hysteresis_Nm": [3e-4, 3e-4, 3e-4],
+    "plant.cable.hysteresis_rad": 0.1,
+    "drive.coil_coupling": 1.0,
     "drive.delay_s": 5e-3,
     "drive.time_constant_s": None,
     "drive.dac_bits": 12,
@@ -73,6 +95,12 @@ TRUTH = {
     "sensors.adc.noise_V": 1e-2,
     "sensors.adc.oversampling": 4,
     "sensors.encoder.counts": 500,
+    "sensors.encoder.eccentricity_rad": 1e-3,
+    "sensors.encoder.start_error_rad": 0.1,
+    "sensors.encoder.index_rad": 0.5,
+    "sensors.potentiometer.hysteresis_rad": 4e-4,
+    "sensors.potentiometer.repeatability_rad": 5e-5,
+    "sensors.adc.skew_s": 1e-5,
     "sensors.current.noise_A": 0.2,
 }
 # Numerics and the start are no knowledge; a model file is another machine; the curve has a test of its own.

@@ -76,9 +76,9 @@ def _facts(subject: list[str], everything: bool) -> Iterator[FieldFacts]:
 
 def _of_hardware(name: str) -> Iterator[FieldFacts]:
     if name not in HARDWARE:
-        names = ", ".join(HARDWARE)
         raise InputError(
-            f"explain: expected a hardware set of {names}, received {shown(name)}{did_you_mean(name, HARDWARE)}"
+            f"explain: expected a hardware set of {', '.join(HARDWARE)}, received {shown(name)}"
+            f"{did_you_mean(name, HARDWARE)}"
         )
     fields = dict(every_field(Scenario))
     for dotted, value in HARDWARE[name].items():

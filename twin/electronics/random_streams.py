@@ -37,7 +37,8 @@ UNIFORM: dict[str, Any] = {
     "distribution": "uniform between minus and plus the value, drawn from the seed for each part"
 }
 SMOOTH: dict[str, Any] = {
-    "distribution": "sum of four harmonics with the value as largest magnitude, drawn from the seed for each part"
+    "distribution": "sum of four harmonics with the value as largest magnitude, drawn from the seed for each"
+    " part"
 }
 PHASE: dict[str, Any] = {"distribution": "amplitude of a sine whose phase is uniform, drawn from the seed"}
 REVERSAL: dict[str, Any] = {

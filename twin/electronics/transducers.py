@@ -321,11 +321,11 @@ class Encoder(NamedTuple):
     phase_rad: float
     starts_with_error: bool
     index_count: float
-    count: NDArray[np.float64]  # (2,) error in counts, and turns from the index at the last tick or NaN
+    counter: NDArray[np.float64]  # (2,) error in counts, and turns from the index at the last tick or NaN
 
     def state_arrays(self) -> tuple[Any, ...]:
         """Return the arrays with the state."""
-        return self.line, self.count
+        return self.line, self.counter
 
 
 @allocation_free
@@ -338,16 +338,16 @@ def pass_encoder(encoder: Encoder, measurement: NDArray[np.float64], noise: Tick
     if encoder.starts_with_error:
         line_rad = 2 * pi / encoder.counts_per_turn
         update_reference(encoder, np.rint(measurement[0, 2] / line_rad))
-        measurement[0, 2] += encoder.count[0] * line_rad
+        measurement[0, 2] += encoder.counter[0] * line_rad
 
 
 @allocation_free
 def update_reference(encoder: Encoder, count: float) -> None:
     """Remove the error of the start if the count is at the index or has passed it since the last tick."""
     turns = (count - encoder.index_count) / encoder.counts_per_turn
-    if turns == floor(turns) or abs(floor(turns) - encoder.count[1]) > 0.0:
-        encoder.count[0] = 0.0
-    encoder.count[1] = floor(turns)
+    if turns == floor(turns) or abs(floor(turns) - encoder.counter[1]) > 0.0:
+        encoder.counter[0] = 0.0
+    encoder.counter[1] = floor(turns)
 
 
 @allocation_free

@@ -190,7 +190,7 @@ def findings(outcomes: Outcomes) -> list[Finding]:
 
 def law_name(law: str) -> str:
     """Label of a law, with the preset of its gains if it has presets."""
-    preset = getattr(LAWS[law](), "preset", None)
+    preset = getattr(LAWS[law](law=law), "preset", None)
     return f"{BY_LAW[law].label}, preset {preset}" if preset else BY_LAW[law].label
 
 

@@ -1,4 +1,4 @@
-"""Explanations of fields: values, units, distributions and origins against scenario, hardware and defaults."""
+"""Explanations of fields: values, units, distributions, origins against scenario, hardware and defaults."""
 
 import json
 
@@ -55,7 +55,8 @@ def test_every_stated_origin_says_assumed_or_names_its_source():
 def test_unit_and_distribution_of_a_field(capsys, name, unit, distribution):
     row = explained(capsys, name)[name]
     assert row["unit"] == unit
-    assert row["distribution"].startswith(distribution) and bool(row["distribution"]) == bool(distribution)
+    assert row["distribution"].startswith(distribution)
+    assert bool(row["distribution"]) == bool(distribution)
 
 
 def test_each_drawn_error_states_its_distribution():
@@ -139,4 +140,5 @@ def test_the_text_has_the_same_facts_within_80_columns(capsys, monkeypatch):
 def test_what_is_unknown_is_refused_with_the_nearest_name(capsys, subject, message):
     assert cli.main(["explain", *subject]) == cli.BAD_INPUT
     out, err = capsys.readouterr()
-    assert out == "" and message in err and len(err.splitlines()) == 1
+    assert (out, len(err.splitlines())) == ("", 1)
+    assert message in err

@@ -116,7 +116,7 @@ def test_a_run_that_ends_early_exits_1_and_is_named(capsys, monkeypatch):
         (["figure11", "--limit", "few"], ["--limit", "few"]),
         (
             ["figure11", "--colour", "red"],
-            ["--out, --json, --verbose, --seeds, --limit or --plant", "--colour red"],
+            ["--out, --figure-format, --json, --verbose, --seeds, --limit or --plant", "--colour red"],
         ),
         (["figure11", "--plant", "water"], ["--plant", "mujoco", "lagrangian", "water"]),
         (["figure11", "--out", "taken"], ["writable folder", "taken"]),

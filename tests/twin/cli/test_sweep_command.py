@@ -87,7 +87,8 @@ def test_plants_that_differ_are_told_in_one_line(source, tmp_path, capsys, monke
         (["paper", "--row", "0"], "expected the key of one of its rows, received 0"),
         (
             ["paper", "--disturbance.load", "1"],
-            "expected STUDY, --out, --threads, --engine, --address, --limit, --row, --optimise, --trials or",
+            "expected STUDY, --out, --threads, --engine, --address, --limit, --row, --optimise, --trials,"
+            " --figure-format or --json, received",
         ),
     ],
 )

@@ -169,10 +169,10 @@ def test_the_page_has_every_law_its_front_and_its_figures(small, tmp_path, capsy
             line.split("|")[1].strip() for line in section.partition("\n## ")[0].splitlines() if "|" in line
         ]
         assert rows[2:] == ["start", *(str(each["trial"]) for each in of_law["best"])]
-    for file in ("trials.svg", "front.svg"):
+    for file, label in (("trials.svg", "best so far"), ("front.svg", "start")):
         assert f"]({file})" in text
         figure = (tmp_path / "out" / file).read_text(encoding="utf-8")
-        assert ">pd</text>" in figure
+        assert all(f">{law}, {label}</text>" in figure for law in laws)
     assert f"Created by `spheretwin sweep {small} --optimise` with python" in text
 
 
