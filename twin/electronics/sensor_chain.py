@@ -172,7 +172,7 @@ def write_telemetry(chain: SensorChain, row: Array) -> None:
     tracks, encoder = chain.stages[_POTENTIOMETER], chain.stages[_ENCODER]
     for channel in range(tracks.play.shape[0]):
         row[channel] = tracks.play[channel, LAG]
-    row[2] = encoder.count[0] * (2 * np.pi / encoder.counts_per_turn) if encoder.starts_with_error else 0.0
+    row[2] = encoder.counter[0] * (2 * np.pi / encoder.counts_per_turn) if encoder.starts_with_error else 0.0
 
 
 @allocation_free
