@@ -97,7 +97,7 @@ class Reference:
         t_s = SAMPLE_s * np.arange(round(duration_s / SAMPLE_s) + 1)
         events = [partial(self._margin, *place) for place in np.ndindex(2, 3)]
         for event in events:
-            event.terminal, event.direction = True, -1  # type: ignore[attr-defined]
+            vars(event).update(terminal=True, direction=-1)  # attributes that `solve_ivp` reads
         states: list[Array] = []
         state, now, break_aways = np.concatenate([start_rad, np.zeros(3)]), 0.0, 0
         while len(states) < len(t_s):

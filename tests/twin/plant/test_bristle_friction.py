@@ -168,10 +168,10 @@ def test_the_stribeck_curve_is_that_of_the_rate_of_slip(actuator):
     stiction = STICTION.model_copy(update={"stribeck_rad_s": 0.5})
     _, qdot, bearing = spin(actuator, load, stiction=stiction)
     sliding = np.argmax(qdot > 0.05)
+    level_Nm = BREAK_AWAY_Nm * (1 / RATIO + (1 - 1 / RATIO) * np.exp(-((qdot / 0.5) ** 2)))
     # The mean over a step is the trapezoid of both ends, within the predicted rate: h² times a second
     # derivative.
-    factor = lambda rate: 1 / RATIO + (1 - 1 / RATIO) * np.exp(-((rate / 0.5) ** 2))  # noqa: E731
-    expected = 0.5 * BREAK_AWAY_Nm * (factor(qdot[sliding:-1]) + factor(qdot[sliding + 1 :]))
+    expected = 0.5 * (level_Nm[sliding:-1] + level_Nm[sliding + 1 :])
     np.testing.assert_allclose(bearing[sliding:-1], expected, rtol=2e-6)
     assert qdot[-1] > 0.8
 
