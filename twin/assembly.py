@@ -209,7 +209,7 @@ def _friction(section: ResolvedPlant, actuator: Actuator) -> Friction:
     )
 
 
-def _bristles(section: ResolvedPlant, actuator: Actuator) -> BristleFriction:
+def _bristles(section: ResolvedPlant, actuator: Actuator) -> BristleFriction | None:
     inertia = _inertia(section, actuator)
     return bristle_friction(section.stiction, section.coulomb_Nm, section.cable, inertia, section.step_s)
 

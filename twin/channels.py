@@ -14,9 +14,9 @@ from spheretwin.electronics.drive import write_telemetry as write_drive_telemetr
 from spheretwin.electronics.sensors import write_telemetry as write_sensor_telemetry
 from spheretwin.faults.fault import MODES
 from spheretwin.faults.schedule import part_names
-from spheretwin.models.base.compiled import copy_into, part_of_its_caller
+from spheretwin.models.base.compiled import part_of_its_caller
 from spheretwin.models.telemetry.signals import ANGLES, Signal
-from spheretwin.plant.bristle_friction import LAST
+from spheretwin.plant.bristle_friction import log_cable, log_presliding
 from spheretwin.plant.cable import acts
 from spheretwin.scenario.sections import Scenario
 
@@ -164,7 +164,7 @@ PRESLIDING_SIGNALS = (
 @part_of_its_caller
 def write_presliding(row: NDArray, controller: Any, sensors: Any, plant: Any) -> None:
     """Write the columns of one tick."""
-    copy_into(row, 0, plant.bristles.deflection_rad[LAST], 3)
+    log_presliding(plant.bristles, row)
 
 
 PRESLIDING = Channel(
@@ -180,7 +180,7 @@ CABLE_SIGNALS = (
 @part_of_its_caller
 def write_cable(row: NDArray, controller: Any, sensors: Any, plant: Any) -> None:
     """Write the columns of one tick."""
-    copy_into(row, 0, plant.bristles.first_cable_q, 3)
+    log_cable(plant.bristles, row)
 
 
 CABLE = Channel(lambda groups: CABLE_SIGNALS, lambda scenario: acts(scenario.plant.cable), write_cable)

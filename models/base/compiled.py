@@ -12,7 +12,13 @@ import numpy as np
 from numba.extending import overload, register_jitable
 from numpy.typing import NDArray
 
-from spheretwin.models.base.numba_internals import NO_ALLOCATION, Dispatcher, c_callback, cached
+from spheretwin.models.base.numba_internals import (
+    NO_ALLOCATION,
+    Dispatcher,
+    TupleCompiler,
+    c_callback,
+    cached,
+)
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -20,6 +26,7 @@ COMPILES = not numba.config.DISABLE_JIT
 """Whether functions are compiled; ``NUMBA_DISABLE_JIT=1`` runs them as plain Python, for debugging."""
 
 _OPTIONS: dict[str, Any] = {"error_model": "numpy", "fastmath": {"contract"}}
+_ALLOCATION_FREE = {**NO_ALLOCATION, "pipeline_class": TupleCompiler}
 
 # Attribute of a plain function with its compiled callbacks: they refer to it, and must not outlive it.
 _CALLBACKS = "__spheretwin_callbacks__"
@@ -41,7 +48,7 @@ def allocation_free(function: F) -> F:
     It then needs no reference counting, which would be a third of the loop's own time: each array in a tuple
     is counted up and down, with a locked instruction, whenever the tuple is passed.
     """
-    return _compiled(function, **NO_ALLOCATION)
+    return _compiled(function, **_ALLOCATION_FREE)
 
 
 def rounding_each(function: F) -> F:
@@ -49,7 +56,7 @@ def rounding_each(function: F) -> F:
 
     For results that must equal those of NumPy to the last bit.
     """
-    return _compiled(function, **NO_ALLOCATION, fastmath=False)
+    return _compiled(function, **_ALLOCATION_FREE, fastmath=False)
 
 
 def part_of_its_caller(function: F) -> F:
@@ -58,7 +65,7 @@ def part_of_its_caller(function: F) -> F:
     For functions that are called once per tick or step with tuples of many arrays: passing an array copies
     seven numbers, a quarter of the loop's own time.
     """
-    return _compiled(function, **NO_ALLOCATION, inline="always")
+    return _compiled(function, **_ALLOCATION_FREE, inline="always")
 
 
 def for_types_of(function: Any, *arguments: Any) -> Callable[..., Any]:
@@ -170,7 +177,10 @@ def compilable(function: F) -> F:
 def _compiled(function: F, **more: Any) -> F:
     if not COMPILES:
         return function
-    return cast("F", cached(numba.njit(nogil=True, **{**_OPTIONS, **more})(function), function))
+    return cast(
+        "F",
+        cached(numba.njit(nogil=True, **{**_OPTIONS, **more})(function), function),
+    )
 
 
 @allocation_free

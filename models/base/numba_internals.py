@@ -10,6 +10,10 @@ Consequence: the loop does not compile.
 *No reference counting* (`_nrt`). Reason: it takes a third of the loop's own time. Consequence: the option is
 refused, or the loop is slower.
 
+*Tuples as values* (`Lower._find_singly_assigned_variable`). Reason: numba gives each variable that several
+blocks use a place in memory, and LLVM spends most of the compile time on copies of tuples of many arrays.
+Consequence: the loop compiles two to three times as long.
+
 *Callbacks with bounds checks and exceptions* (`CFunc`, `Dispatcher`, the text of `sys.unraisablehook`).
 Reason: numba checks bounds only in the outermost function, and drops the exceptions of callbacks.
 Consequence: an exception of a law is printed, and the run ends as diverged.
@@ -25,6 +29,7 @@ import re
 import sys
 import threading
 import warnings
+from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from types import CellType, FunctionType
@@ -34,13 +39,18 @@ import llvmlite.binding
 from llvmlite import ir
 from numba import types
 from numba.core import cgutils
+from numba.core import ir as numba_ir
+from numba.core.analysis import compute_cfg_from_blocks, compute_use_defs, must_use_alloca
 from numba.core.caching import NullCache
 from numba.core.ccallback import CFunc
-from numba.core.compiler import CompileResult
+from numba.core.compiler import CompilerBase, CompileResult, DefaultPassBuilder
+from numba.core.compiler_machinery import PassManager, register_pass
 from numba.core.dispatcher import Dispatcher as Dispatcher  # the class of compiled functions
 from numba.core.errors import NumbaWarning
+from numba.core.lowering import Lower
 from numba.core.runtime import rtsys
 from numba.core.serialize import dumps
+from numba.core.typed_passes import NativeLowering
 from numba.cpython import hashing
 from numba.experimental import function_type
 from numba.extending import intrinsic, overload
@@ -56,8 +66,7 @@ NO_ALLOCATION = {"_nrt": False}
 """Options of a compiled function that creates no array: it counts no references."""
 
 
-# mypy sees the base class as Any, because numba has no type information.
-class MachineCode(NullCache):  # type: ignore[misc]
+class MachineCode(NullCache):
     """Cache of the machine code of one function, one entry for each signature.
 
     Numba's own cache takes its folder from a setting that all packages share, and an entry that is damaged or
@@ -136,6 +145,57 @@ def cached(dispatcher: Any, function: Callable[..., Any]) -> Any:
     """Return a compiled function with a cache, as its `enable_caching` does with numba's own."""
     dispatcher._cache = MachineCode(function, "function")
     return dispatcher
+
+
+class _TupleLower(Lower):
+    """Translation to LLVM in which a tuple that is assigned once is a value, not a place in memory.
+
+    For functions without reference counting: numba may release a variable where it has no value.
+    """
+
+    def _find_singly_assigned_variable(self) -> None:
+        super()._find_singly_assigned_variable()
+        blocks = self.func_ir.blocks
+        dominators, flow = compute_cfg_from_blocks(blocks).dominators(), compute_use_defs(blocks)
+        assignments = Counter(
+            statement.target.name
+            for block in blocks.values()
+            for statement in block.find_insts(numba_ir.Assign)
+        )
+        in_memory = must_use_alloca(blocks)
+        for label, names in flow.defmap.items():
+            for name in names:
+                is_tuple = isinstance(self.typeof(name), types.BaseTuple)
+                if not is_tuple or assignments[name] != 1 or name in in_memory:
+                    continue
+                users = [user for user, used in flow.usemap.items() if name in used]
+                # Blocks are translated in the order of their labels.
+                if all(label < user and label in dominators[user] for user in users):
+                    self._singly_assigned_vars.add(name)
+
+
+@register_pass(mutates_CFG=True, analysis_only=False)
+class _TupleLowering(NativeLowering):
+    """Pass with this translation."""
+
+    _name = "tuple_lowering"
+
+    @property
+    def lowering_class(self) -> type[Lower]:
+        return _TupleLower
+
+
+class TupleCompiler(CompilerBase):
+    """Numba's compiler with tuples as values."""
+
+    def define_pipelines(self) -> list[PassManager]:
+        """Return the passes."""
+        passes = DefaultPassBuilder.define_nopython_pipeline(self.state)
+        passes.passes = [
+            (_TupleLowering if kind is NativeLowering else kind, name) for kind, name in passes.passes
+        ]
+        passes.finalize()
+        return [passes]
 
 
 def c_callback(

@@ -48,7 +48,6 @@ MOST_SWEEPS = 30
 class Coupling(NamedTuple):
     """Coupling of all groups, for compiled code."""
 
-    on: bool
     amplifiers: tuple[Amplifier, Amplifier]  # for the two parts of a physics step
     mutual_H: Array  # (n, n)
     own_emf: Array  # (n,) V, by the motion of the rotor
@@ -56,10 +55,10 @@ class Coupling(NamedTuple):
     charge_As: Array  # (n,) of the parts of this step
 
 
-def coupling(section: ResolvedDrive, mutual_H: Array | None, amplifier: Amplifier) -> Coupling:
-    """Return the coupling of the groups of a drive; off without mutual inductance (n, n), H."""
+def coupling(section: ResolvedDrive, mutual_H: Array | None, amplifier: Amplifier) -> Coupling | None:
+    """Return the coupling of the groups of a drive; None without mutual inductance (n, n), H."""
     if mutual_H is None:
-        return Coupling(False, (amplifier, amplifier), np.zeros((0, 0)), *np.zeros((3, 0)))
+        return None
     check_coupling(section, mutual_H)
     rate, step_s = amplifier.bandwidth_rad_s, amplifier.step_s
     first_s = min(FIRST_PART / rate, step_s / 2)
@@ -68,7 +67,7 @@ def coupling(section: ResolvedDrive, mutual_H: Array | None, amplifier: Amplifie
         for part_s in (first_s, step_s - first_s)
     )
     mutual = section.coil_coupling * mutual_H
-    return Coupling(True, (first, second), mutual, *np.zeros((3, len(mutual))))
+    return Coupling((first, second), mutual, *np.zeros((3, len(mutual))))
 
 
 def check_coupling(section: ResolvedDrive, mutual_H: Array) -> None:

@@ -9,6 +9,7 @@ the controller its output.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -49,7 +50,7 @@ from spheretwin.electronics.coil_coupling import (
 from spheretwin.electronics.delay import Delay, delay, due, latch
 from spheretwin.electronics.drive_section import STAGES, ResolvedDrive
 from spheretwin.electronics.stages import DriveSetup, FaultLine, chained, fault_line, through
-from spheretwin.models.base.compiled import allocation_free, part_of_its_caller
+from spheretwin.models.base.compiled import allocation_free, implements, part_of_its_caller
 from spheretwin.models.base.state import transfer_state
 from spheretwin.models.kinematics import angular_velocity
 
@@ -91,7 +92,7 @@ class DriveChain(NamedTuple):
     supply: FaultLine  # of the supply voltage
     amplifier: Amplifier
     coil: GroupCoils
-    coupling: Coupling
+    coupling: Coupling | None
     flow: Flow
     draws: Array  # standard normal numbers of this tick, of faults
     setpoint: Array  # (n,) A, command at the input of the amplifiers
@@ -248,11 +249,7 @@ def advance(
     if chain.supplied or any_open_short:
         angular_velocity(q, qdot, chain.rate_S)
         back_emf(G, gain, chain.rate_S, chain.emf)
-    if chain.coupling.on:
-        _advance_coupled_groups(chain, setpoint, any_open_short, current, mean)
-    else:
-        amplifier = with_supply(chain.amplifier, chain.period[SUPPLY_V] - chain.supply_V)
-        _advance_groups(chain, amplifier, setpoint, any_open_short, current, mean)
+    _advance_all_groups(chain.coupling, chain, setpoint, any_open_short, current, mean)
     if chain.supplied:
         _add_supply_charge(chain, setpoint, mean)
 
@@ -279,12 +276,21 @@ def _advance_groups(
         _advance_open_short_groups(chain, amplifier.step_s, current, mean)
 
 
+@part_of_its_caller
+def _advance_uncoupled_groups(
+    coupling: None, chain: DriveChain, setpoint: Array, any_open_short: bool, current: Array, mean: Array
+) -> None:
+    """Advance the currents of groups without coupling by one physics step."""
+    amplifier = with_supply(chain.amplifier, chain.period[SUPPLY_V] - chain.supply_V)
+    _advance_groups(chain, amplifier, setpoint, any_open_short, current, mean)
+
+
 @allocation_free
 def _advance_coupled_groups(
-    chain: DriveChain, setpoint: Array, any_open_short: bool, current: Array, mean: Array
+    coupling: Coupling, chain: DriveChain, setpoint: Array, any_open_short: bool, current: Array, mean: Array
 ) -> None:
     """Advance the currents of coupled groups by one physics step, in two parts."""
-    coupling, groups = chain.coupling, current.shape[0]
+    groups = current.shape[0]
     for j in range(groups):
         coupling.own_emf[j], coupling.charge_As[j] = chain.emf[j], 0.0
     for part in range(len(coupling.amplifiers)):
@@ -302,6 +308,33 @@ def _advance_coupled_groups(
             coupling.charge_As[j] += amplifier.step_s * mean[j]
     for j in range(groups):
         mean[j] = coupling.charge_As[j] / chain.amplifier.step_s
+
+
+def _advance_all_groups(
+    coupling: Coupling | None,
+    chain: DriveChain,
+    setpoint: Array,
+    any_open_short: bool,
+    current: Array,
+    mean: Array,
+) -> None:
+    """Advance the currents by one physics step; only the code that a run needs is compiled."""
+    advance_all: Any = _advance_coupled_groups if coupling else _advance_uncoupled_groups
+    advance_all(coupling, chain, setpoint, any_open_short, current, mean)
+
+
+@implements(_advance_all_groups, inline=True)
+def _compiled_advance_all(
+    coupling: Any, chain: Any, setpoint: Any, any_open_short: Any, current: Any, mean: Any
+) -> Callable[..., Any]:
+    implementation = (
+        _advance_coupled_groups if hasattr(coupling, "instance_class") else _advance_uncoupled_groups
+    )
+
+    def call(coupling: Any, chain: Any, setpoint: Any, any_open_short: Any, current: Any, mean: Any) -> None:
+        implementation(coupling, chain, setpoint, any_open_short, current, mean)
+
+    return call
 
 
 @part_of_its_caller

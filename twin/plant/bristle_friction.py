@@ -35,7 +35,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field
 
-from spheretwin.models.base.compiled import allocation_free
+from spheretwin.models.base.compiled import allocation_free, copy_into
 from spheretwin.models.lagrangian import InertiaEntries, inertia_entries, solve_inertia, triple, turns
 from spheretwin.plant.cable import CableSection, acts
 from spheretwin.plant.friction import momentum
@@ -86,7 +86,6 @@ class StictionSection(BaseModel):
 class BristleFriction(NamedTuple):
     """Elements of a run with their state, for compiled code; the first index is the element."""
 
-    on: bool  # false if there is neither static friction nor a cable: no cost
     stiffness_Nm_rad: Array  # (3, 3) by hinge
     damping_Nm_s: Array  # (3, 3) by hinge, only as long as an element does not slip
     slip_rad: Array  # (3,) largest deflection
@@ -114,8 +113,8 @@ def bristle_friction(
     cable: CableSection,
     inertia: Array,
     step_s: float,
-) -> BristleFriction:
-    """Return the elements of the hinges (alpha, beta, gamma), all without deflection.
+) -> BristleFriction | None:
+    """Return the elements of the hinges (alpha, beta, gamma), all without deflection; None without any.
 
     Parameters
     ----------
@@ -128,6 +127,8 @@ def bristle_friction(
     step_s : float, s
         Physics step.
     """
+    if not (stiction.on or acts(cable)):
+        return None
     slip = np.array([*SLIP_SHARES, 0.0]) * stiction.presliding_rad
     slip[CABLE] = cable.hysteresis_rad
     stiffness, damping = np.zeros((2, ELEMENTS, 3))
@@ -140,7 +141,6 @@ def bristle_friction(
     stiff = step_s**2 * stiffness.sum(axis=0).max() / inertia.min()
     stiff += (step_s * damping.sum(axis=0).max() / inertia.min()) ** 2
     return BristleFriction(
-        on=bool(stiffness.any()) or acts(cable),
         stiffness_Nm_rad=stiffness,
         damping_Nm_s=damping,
         slip_rad=slip,
@@ -161,7 +161,7 @@ def bristle_friction(
 
 @allocation_free
 def begin_bristles(
-    bristles: BristleFriction, middle_q: Array, q: Array, qdot: Array, torque_q: Array
+    bristles: BristleFriction | None, middle_q: Array, q: Array, qdot: Array, torque_q: Array
 ) -> None:
     """Store pose and rates (3,) at the start of the rotor's step; add the cable and the last torque.
 
@@ -169,6 +169,8 @@ def begin_bristles(
     step, the spring of the cable is of second order and preserves phase volume: it gains and loses no energy
     on average. It is stable for a step below 2 sqrt(J / stiffness).
     """
+    if bristles is None:
+        return
     for i in range(3):
         bristles.trial[START, i], bristles.trial[START_RATE, i] = q[i], qdot[i]
         stretch = middle_q[i] - bristles.spring[1, i]
@@ -178,7 +180,12 @@ def begin_bristles(
 
 @allocation_free
 def apply_bristles(
-    bristles: BristleFriction, middle_q: Array, middle_qdot: Array, last_qdot: Array, q: Array, qdot: Array
+    bristles: BristleFriction | None,
+    middle_q: Array,
+    middle_qdot: Array,
+    last_qdot: Array,
+    q: Array,
+    qdot: Array,
 ) -> None:
     """Correct the rotor's step for the change of the torque of the elements.
 
@@ -213,6 +220,8 @@ def apply_bristles(
     springs store: an implicit spring, damping and slip take energy, and a smaller slip deflection releases it
     as heat.
     """
+    if bristles is None:
+        return
     h, g, trial, former = bristles.step_s, bristles.implicitness, bristles.trial, bristles.torque_q
     M = inertia_entries(turns(triple(middle_q)), triple(bristles.inertia))
     for i in range(3):
@@ -250,6 +259,31 @@ def apply_bristles(
             bristles.deflection_rad[element, i] = deflection
         bristles.stribeck_factor[i] = factor
         q[i], qdot[i] = trial[START, i] + travel, trial[RATE, i]
+
+
+@allocation_free
+def log_bristles(bristles: BristleFriction | None, substep: int, friction_q: Array) -> None:
+    """Add the friction of the bearings in a physics step to (3,), N·m; keep the cable's in the first one."""
+    if bristles is None:
+        return
+    for i in range(3):
+        friction_q[i] -= bristles.torque_q[0, i]
+        if substep == 0:
+            bristles.first_cable_q[i] = bristles.spring_q[i] - bristles.torque_q[1, i]
+
+
+@allocation_free
+def log_presliding(bristles: BristleFriction | None, row: Array) -> None:
+    """Write the elastic rotation within static friction into the beginning of a row."""
+    if bristles is not None:
+        copy_into(row, 0, bristles.deflection_rad[LAST], 3)
+
+
+@allocation_free
+def log_cable(bristles: BristleFriction | None, row: Array) -> None:
+    """Write the torque of the cable into the beginning of a row."""
+    if bristles is not None:
+        copy_into(row, 0, bristles.first_cable_q, 3)
 
 
 @allocation_free

@@ -14,7 +14,7 @@ from spheretwin.models.base.compiled import copy_into, implements, part_of_its_c
 from spheretwin.models.kinematics import generalised_torque
 from spheretwin.models.magnetics import TorqueModel, fill_torque_matrix, rotor_torque
 from spheretwin.plant import lagrangian_rotor, mujoco_rotor
-from spheretwin.plant.bristle_friction import BristleFriction, apply_bristles, begin_bristles
+from spheretwin.plant.bristle_friction import BristleFriction, apply_bristles, begin_bristles, log_bristles
 from spheretwin.plant.friction import Friction, slow_down
 from spheretwin.plant.rotor import EngineKind
 
@@ -65,7 +65,7 @@ class Plant(NamedTuple):
     scratch: NDArray[np.float64]  # of `fill_torque_matrix`
     drive: DriveModel
     friction: Friction
-    bristles: BristleFriction
+    bristles: BristleFriction | None
     group_gain: NDArray[np.float64]  # (n,) torque per ampere over that of the torque matrix
     unmodelled_torque: NDArray[np.float64]  # (3,) N·m on the hinges (paper: ΔG)
     hinge_range: NDArray[np.float64]  # (3, 2) rad
@@ -152,15 +152,10 @@ def plant_tick(
         generalised_torque(middle_q, torque_S, torque_q)
         for i in range(3):
             torque_q[i] -= disturbance[i] + unmodelled[i]
-        if bristles.on:
-            begin_bristles(bristles, middle_q, q, qdot, torque_q)
+        begin_bristles(bristles, middle_q, q, qdot, torque_q)
         step(rotor)
-        if bristles.on:
-            apply_bristles(bristles, middle_q, middle_qdot, last_qdot, q, qdot)
-            for i in range(3):
-                friction_q[i] -= bristles.torque_q[0, i]
-                if substep == 0:
-                    bristles.first_cable_q[i] = bristles.spring_q[i] - bristles.torque_q[1, i]
+        apply_bristles(bristles, middle_q, middle_qdot, last_qdot, q, qdot)
+        log_bristles(bristles, substep, friction_q)
         if friction.acts:
             slow_down(friction, q, qdot, friction_q)
         if substep == 0:

@@ -1,15 +1,16 @@
 """Private APIs of numba and MuJoCo exist and do what this package needs; a failure names the API."""
 
 import ctypes
+from typing import NamedTuple
 
 import mujoco
 import numba
 import numpy as np
 import pytest
-from numba.core import ccallback, compiler, dispatcher
+from numba.core import ccallback, compiler, dispatcher, lowering
 from numba.core.runtime import rtsys
 
-from spheretwin.models.base import mujoco_library
+from spheretwin.models.base import mujoco_library, numba_internals
 from spheretwin.models.base.compiled import COMPILES, allocation_free, compiled
 
 NUMBA = [
@@ -18,6 +19,7 @@ NUMBA = [
     (rtsys, "initialize"),
     (ccallback.CFunc, "compile"),
     (dispatcher.Dispatcher, "enable_caching"),
+    (lowering.Lower, "_find_singly_assigned_variable"),
 ]
 MODEL = "<mujoco><worldbody><body><joint/><geom size='1'/></body></worldbody></mujoco>"
 
@@ -44,6 +46,47 @@ def test_the_option_nrt_switches_allocation_off():
     assert allocate().shape == (3,)
     with pytest.raises(numba.TypingError):
         allocate_without()
+
+
+class Pair(NamedTuple):
+    first: np.ndarray
+    second: np.ndarray
+
+
+def sum_of_larger(pair, other, count):
+    """Use tuples that are assigned once, in a branch, in a loop, or again after their first use."""
+    total, chosen, inner = 0.0, pair, (pair, other)
+    for i in range(count):
+        if pair.first[i] < other.first[i]:
+            chosen = other
+        elif i % 3 == 0:
+            chosen = inner[0]
+        outer = (chosen, other)
+        for _ in range(2):
+            total += outer[0].second[i] - 0.25 * outer[1].first[i]
+            if total > 3.0:
+                total -= inner[1].second[i]
+    return total
+
+
+@needs_compiler
+def test_a_tuple_that_is_assigned_once_is_a_value(monkeypatch):
+    values = set()
+
+    def record(lower):
+        find(lower)
+        values.update(lower._singly_assigned_vars)
+
+    find = numba_internals._TupleLower._find_singly_assigned_variable
+    monkeypatch.setattr(numba_internals._TupleLower, "_find_singly_assigned_variable", record)
+    random = np.random.default_rng(5)
+    pairs = Pair(*random.random((2, 40))), Pair(*random.random((2, 40)))
+    function = numba.njit(sum_of_larger, _nrt=False, pipeline_class=numba_internals.TupleCompiler)
+    # The same operations in the same order.
+    assert function(*pairs, 40) == sum_of_larger(*pairs, 40)
+    assert {"pair", "other", "inner"} <= values, (
+        f"numba {numba.__version__} asks other functions than _TupleLower in numba_internals.py"
+    )
 
 
 @needs_compiler

@@ -424,9 +424,7 @@ def repeated(count, bristles, q, qdot, torque):
         apply_bristles(bristles, q, qdot, qdot, q, qdot)
 
 
-def test_without_coefficients_the_elements_are_off(actuator):
-    assert not elements(actuator, StictionSection()).on
-    assert not elements(actuator, coulomb=(0.0, 0.0, 0.0)).on
-    assert elements(actuator).on
-    assert elements(actuator, StictionSection(), CableSection(hysteresis_Nm=(0.0, 1e-3, 0.0))).on
+def test_there_are_elements_only_with_static_friction_or_a_cable(actuator):
+    assert elements(actuator, StictionSection()) is None
+    assert elements(actuator, StictionSection(), CableSection(hysteresis_Nm=(0.0, 1e-3, 0.0))) is not None
     assert elements(actuator).stiffness_Nm_rad[: LAST + 1].sum(axis=0) == pytest.approx(STIFFNESS_Nm_rad)
