@@ -24,7 +24,8 @@ def _inner_parts(part: Any, method: str = "state_arrays") -> list[Any]:
     """Return the parts of a part: those that its method names, otherwise all nested tuples."""
     if hasattr(part, method):
         return list(getattr(part, method)())
-    return [inner for inner in part if isinstance(inner, tuple)] if isinstance(part, tuple) else []
+    # A part that is off is None: parts of both configurations stay paired.
+    return [inner for inner in part if isinstance(inner, tuple | None)] if isinstance(part, tuple) else []
 
 
 def save_state(part: Any) -> Array:

@@ -259,8 +259,10 @@ def test_coasting_ends_as_coulomb_and_viscous_friction_do(actuator):
 
 def test_viscous_friction_alone_is_the_same_with_and_without_elements(actuator):
     viscous = 1e-2
-    stiction = STICTION.model_copy(update={"on": False})
-    _, rates, _ = spin(actuator, np.zeros(1600), stiction=stiction, rate=10.0, viscous_Nm_s=viscous)
+    bristles = elements(actuator, coulomb=(0.0, 0.0, 0.0))
+    still = on_gamma(np.zeros(1600))
+    _, rates, _ = motion(lagrangian(actuator), bristles, still, UPRIGHT, on_gamma(10.0), viscous)
+    rates = rates[:, 2]
     decay = viscous / actuator.inertia[2]
     exact = 10.0 * np.exp(-decay * STEP_s * np.arange(1600))
     # As for `slow_down`: (decay h)²/24e.
@@ -357,7 +359,10 @@ def test_the_elements_neither_create_energy_nor_lose_their_own_balance(
     lost = M @ (after - qdot)
     scale = np.abs(M) @ (np.abs(after) + np.abs(qdot))
     levels_q = (bristles.stiffness_Nm_rad * bristles.slip_rad[:, None]).sum(axis=0)
-    rounding = 1e-10 * (scale + h * levels_q) + 1e-300
+    # The iteration ends at 1e-13 of the largest rate, which stiffness and damping multiply.
+    fastest = max(np.abs(after).max(), np.abs(qdot).max())
+    impedance = h * (h * bristles.stiffness_Nm_rad + bristles.damping_Nm_s).sum(axis=0)
+    rounding = 1e-10 * (scale + h * levels_q) + 1e-12 * impedance * fastest + 1e-300
     np.testing.assert_array_less(np.abs(lost + h * bristles.torque_q.sum(axis=0)), rounding)
     assert np.all(np.abs(bristles.deflection_rad) <= bristles.slip_rad[:, None] * (1 + 1e-12))
     most = (bristles.stiffness_Nm_rad * bristles.slip_rad[:, None])[:2].sum(axis=0)
