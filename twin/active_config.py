@@ -59,6 +59,8 @@ def fill_defaults(
     actuator, section = files.actuator, scenario.plant
     _check_groups(scenario, actuator)
     drive = _drive(scenario.drive, actuator.group)
+    if section.thermal.on and drive.supply_V is None:
+        raise InputError("scenario: expected a drive.supply_V with plant.thermal.on, received none")
     if drive.coil_coupling:
         check_coupling(drive, mutual_inductance(actuator))
     plant = _with(

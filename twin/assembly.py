@@ -17,6 +17,8 @@ from spheretwin.control.controller import Controller, Supervision, controller
 from spheretwin.control.estimators.estimator import Estimator, Sampling
 from spheretwin.control.law import Law, NominalModel
 from spheretwin.control.manual_currents import manual
+from spheretwin.electronics.drive import DriveModel
+from spheretwin.electronics.drive_chain import DriveChain
 from spheretwin.electronics.transducers import CurrentSensors
 from spheretwin.faults.schedule import part_names
 from spheretwin.loop import ColumnOffsets
@@ -28,6 +30,7 @@ from spheretwin.models.scatter import scattered_model
 from spheretwin.models.telemetry.signals import Signal, common_signals, offsets, width
 from spheretwin.plant.bristle_friction import BristleFriction, bristle_friction
 from spheretwin.plant.friction import Friction, friction
+from spheretwin.plant.magnet_heat import MagnetHeat, magnet_heat
 from spheretwin.plant.part_scatter import scatter_of
 from spheretwin.plant.rotor import Rotor, RotorSettings
 from spheretwin.plant.step import ENGINES, Plant
@@ -168,15 +171,19 @@ def plant_of(scenario: ResolvedScenario, actuator: Actuator, rotor: Any, buffers
     section, groups = scenario.plant, len(actuator.groups)
     scatter = scatter_of(section, scenario.seed, actuator)
     magnetics = scattered_model(actuator, scatter) if scatter else torque_model(actuator)
+    drive, group_gain = drive_of(scenario, actuator, buffers), np.array(section.group_gain)
+    heat = _heat(scenario, drive)
     return Plant(
         rotor=rotor,
         magnetics=magnetics,
         G=np.empty((3, groups)),
         scratch=scratch_of(magnetics),
-        drive=drive_of(scenario, actuator, buffers),
+        drive=drive,
         friction=_friction(section, actuator),
         bristles=_bristles(section, actuator),
-        group_gain=np.array(section.group_gain),
+        heat=heat,
+        group_gain=group_gain,
+        present_gain=group_gain.copy() if heat else group_gain,
         unmodelled_torque=np.array(section.modelling_torque_Nm),
         hinge_range=actuator.hinge_range_rad,
         substeps=scenario.substeps,
@@ -212,6 +219,13 @@ def _friction(section: ResolvedPlant, actuator: Actuator) -> Friction:
 def _bristles(section: ResolvedPlant, actuator: Actuator) -> BristleFriction | None:
     inertia = _inertia(section, actuator)
     return bristle_friction(section.stiction, section.coulomb_Nm, section.cable, inertia, section.step_s)
+
+
+def _heat(scenario: ResolvedScenario, drive: DriveModel) -> MagnetHeat | None:
+    if not (scenario.plant.thermal.on and isinstance(drive, DriveChain)):
+        return None
+    coil = scenario.drive
+    return magnet_heat(scenario.plant.thermal, drive, coil.ambient_degC, coil.heat_capacity_J_K)
 
 
 def _inertia(section: ResolvedPlant, actuator: Actuator) -> Array:

@@ -18,6 +18,7 @@ from spheretwin.models.base.compiled import part_of_its_caller
 from spheretwin.models.telemetry.signals import ANGLES, Signal
 from spheretwin.plant.bristle_friction import log_cable, log_presliding
 from spheretwin.plant.cable import acts
+from spheretwin.plant.magnet_heat import log_heat
 from spheretwin.scenario.sections import Scenario
 
 
@@ -186,6 +187,21 @@ def write_cable(row: NDArray, controller: Any, sensors: Any, plant: Any) -> None
 CABLE = Channel(lambda groups: CABLE_SIGNALS, lambda scenario: acts(scenario.plant.cable), write_cable)
 
 
+HEAT_SIGNALS = (
+    Signal("stator_temperature_degC", "°C", 1, "at the end of the control period"),
+    Signal("rotor_temperature_degC", "°C", 1, "of the magnets, at the end of the control period"),
+)
+
+
+@part_of_its_caller
+def write_heat(row: NDArray, controller: Any, sensors: Any, plant: Any) -> None:
+    """Write the columns of one tick."""
+    log_heat(plant.heat, row)
+
+
+HEAT = Channel(lambda groups: HEAT_SIGNALS, lambda scenario: scenario.plant.thermal.on, write_heat)
+
+
 REFERENCE_GOVERNOR_SIGNALS = (
     Signal("q_governed_rad", "rad", 3, "desired hinge angles as the governor has them", ANGLES),
     Signal("qdot_governed_rad_s", "rad/s", 3, "desired hinge rates as the governor has them", ANGLES),
@@ -309,6 +325,7 @@ CHANNELS: tuple[Channel, ...] = (
     FRICTION,
     PRESLIDING,
     CABLE,
+    HEAT,
     DRIVE,
     FAULTS,
     WATCHDOG,

@@ -18,6 +18,7 @@ from spheretwin.models.lagrangian import gravity_stiffness, gravity_torque, iner
 from spheretwin.models.mjcf_reader import HINGES
 from spheretwin.models.scatter import Scatter, summed_torque_matrix
 from spheretwin.plant.lagrangian_rotor import LagrangianRotor
+from spheretwin.plant.magnet_heat import remanence
 from spheretwin.plant.part_scatter import scatter_of
 from spheretwin.scenario.files import Files
 from spheretwin.scenario.sections import ResolvedScenario, Scenario
@@ -88,7 +89,7 @@ def linearisation_data(scenario: ResolvedScenario, files: Files, *, nominal: boo
         spring_Nm_rad=spring,
         magnetics=Magnetics(
             files.actuator,
-            np.array(section.group_gain),
+            remanence(section.thermal, drive.ambient_degC) * np.array(section.group_gain),
             scatter_of(section, scenario.seed, files.actuator),
         ),
         nominal_magnetics=nominal_magnetics,

@@ -393,6 +393,32 @@ class TailRmsError(RmsError):
         return self._squares.rms(self._squares.piece(self._squares.rows // 2))
 
 
+class RotorTemperature(Metric):
+    """Largest temperature of the magnets, °C, which only decides about a warning."""
+
+    def __init__(self, planned: PlannedRun) -> None:
+        super().__init__(planned)
+        self._section, self._largest = planned.scenario.plant.thermal, -np.inf
+
+    def add(self, rows: Table) -> None:
+        """Process the rows of one chunk."""
+        if any(signal.name == "rotor_temperature_degC" for signal in rows.signals):
+            self._largest = max(self._largest, float(rows["rotor_temperature_degC"].max()))
+
+    def value(self) -> float | None:
+        """Return the temperature in °C; None without one."""
+        return self._largest if self._largest > -np.inf else None
+
+    def warnings(self) -> list[str]:
+        """Return a warning if magnets may have been demagnetised, which the model does not contain."""
+        if not self._largest > self._section.knee_degC:
+            return []
+        return [
+            f"the magnets reached {self._largest:.1f} °C, above plant.thermal.knee_degC"
+            f" {self._section.knee_degC:g} °C: a lasting loss of remanence is possible and not simulated"
+        ]
+
+
 METRICS: dict[str, type[Metric]] = {
     "max_abs_error_rad": MaxAbsError,
     "rms_error_rad": RmsError,
@@ -405,3 +431,6 @@ METRICS: dict[str, type[Metric]] = {
     "current_variation_A_s": CurrentVariation,
     "copper_loss_J": CopperLoss,
 }
+
+CHECKS: tuple[type[Metric], ...] = (RotorTemperature,)
+"""Quantities that give warnings and no figures."""

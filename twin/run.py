@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from spheretwin.faults.fault_injector import FaultMessages
-from spheretwin.metrics import METRICS, PlannedRun
+from spheretwin.metrics import CHECKS, METRICS, PlannedRun
 from spheretwin.models.actuator import Actuator
 from spheretwin.models.base.errors import InputError, LawError, exception_text, shown
 from spheretwin.models.telemetry.run_record import RunRecord, versions
@@ -273,11 +273,12 @@ class Figures:
 
     def __init__(self, planned: PlannedRun) -> None:
         self._metrics = {name: metric(planned) for name, metric in METRICS.items()}
+        self._all = [*self._metrics.values(), *(check(planned) for check in CHECKS)]
 
     def write(self, rows: Table) -> None:
         """Process the rows of one chunk."""
         if len(rows):
-            for metric in self._metrics.values():
+            for metric in self._all:
                 metric.write(rows)
 
     def note(self, t_s: float, text: str) -> None:
@@ -292,7 +293,7 @@ class Figures:
 
     def warnings(self) -> list[str]:
         """Return warnings that concern the validity of the figures, one line each."""
-        return [line for metric in self._metrics.values() for line in metric.warnings()]
+        return [line for metric in self._all for line in metric.warnings()]
 
 
 def figures_of(run: Run, extra: Mapping[str, UserMetric] | None = None) -> dict[str, Any]:

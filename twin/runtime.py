@@ -233,6 +233,7 @@ class Runtime:
             "the last rates": self._plant.last_qdot,
             "the drive's state": self._plant.drive,
             "the presliding state": self._plant.bristles,
+            "the temperatures of stator and rotor": self._plant.heat,
             LAW_PARAMETERS: controller.parameters,
             LAW_MEMORY: controller.memory,
             "the applied torque": controller.applied_torque,

@@ -123,12 +123,12 @@ class GroupCoils(NamedTuple):
     cold_resistance_ohm: float  # at `REFERENCE_degC`
     resistance_per_K: float
     thermal_resistance_K_W: float
-    ambient_degC: float
     shutdown_degC: float  # infinite if there is none
     settled: float  # share of the way to the final temperature in a control period
     period_s: float
     temperature_degC: NDArray[np.float64]  # (n,) present temperature
     resistance_ohm: NDArray[np.float64]  # (n,) at that temperature
+    surroundings_degC: NDArray[np.float64]  # (1,) ambient temperature, or that of a stator
     contact: NDArray[np.int64]  # (n,) `DRIVEN`, `OPEN` or `SHORTED`, by faults
 
     def state_arrays(self) -> tuple[NDArray[Any], ...]:
@@ -161,12 +161,12 @@ def group_coils(
         cold_resistance_ohm=cold,
         resistance_per_K=section.resistance_per_K,
         thermal_resistance_K_W=section.thermal_resistance_K_W,
-        ambient_degC=section.ambient_degC,
         shutdown_degC=inf if section.shutdown_degC is None else section.shutdown_degC,
         settled=relaxation(period_s / time_constant_s).settled if time_constant_s > 0 else 1.0,
         period_s=period_s,
         temperature_degC=np.full(groups, section.ambient_degC),
         resistance_ohm=np.empty(groups),
+        surroundings_degC=np.full(1, section.ambient_degC),
         contact=np.full(groups, DRIVEN, dtype=np.int64),
     )
     update_resistance(coils)
@@ -194,7 +194,7 @@ def advance_temperature(coil: GroupCoils, copper_J: NDArray[np.float64]) -> None
     """
     for j in range(copper_J.shape[0]):
         power = copper_J[j] / coil.period_s
-        last = coil.ambient_degC + coil.thermal_resistance_K_W * power
+        last = coil.surroundings_degC[0] + coil.thermal_resistance_K_W * power
         coil.temperature_degC[j] += (last - coil.temperature_degC[j]) * coil.settled
     update_resistance(coil)
 

@@ -16,6 +16,7 @@ from spheretwin.models.magnetics import TorqueModel, fill_torque_matrix, rotor_t
 from spheretwin.plant import lagrangian_rotor, mujoco_rotor
 from spheretwin.plant.bristle_friction import BristleFriction, apply_bristles, begin_bristles, log_bristles
 from spheretwin.plant.friction import Friction, slow_down
+from spheretwin.plant.magnet_heat import MagnetHeat, advance_heat, update_gain
 from spheretwin.plant.rotor import EngineKind
 
 ENGINES: dict[str, EngineKind] = {
@@ -66,7 +67,9 @@ class Plant(NamedTuple):
     drive: DriveModel
     friction: Friction
     bristles: BristleFriction | None
+    heat: MagnetHeat | None
     group_gain: NDArray[np.float64]  # (n,) torque per ampere over that of the torque matrix
+    present_gain: NDArray[np.float64]  # (n,) the same with the present remanence; without heat that array
     unmodelled_torque: NDArray[np.float64]  # (3,) N·m on the hinges (paper: ΔG)
     hinge_range: NDArray[np.float64]  # (3, 2) rad
     substeps: int
@@ -128,12 +131,13 @@ def plant_tick(
     hinge_range, half_step_s = plant.hinge_range, 0.5 * plant.step_s
     current, mean_current, effective_current = plant.current, plant.mean_current, plant.effective_current
     gain, unmodelled, friction, friction_q = (
-        plant.group_gain,
+        plant.present_gain,
         plant.unmodelled_torque,
         plant.friction,
         plant.friction_q,
     )
     drive, bristles = plant.drive, plant.bristles
+    update_gain(plant.heat, plant.group_gain, gain)
     begin(drive, command)
     for substep in range(plant.substeps):
         for i in range(3):
@@ -168,7 +172,9 @@ def plant_tick(
         for i in range(3):  # at every step: the stop of a hinge at the end of its range is not simulated
             if not hinge_range[i, 0] <= q[i] <= hinge_range[i, 1]:
                 return LEFT_WORKSPACE
-    if not end(drive):
+    is_cool = end(drive)
+    advance_heat(plant.heat)
+    if not is_cool:
         return FAILSAFE
     for kind in range(rotor.warnings.shape[0]):
         if rotor.warnings[kind] > 0:

@@ -9,6 +9,7 @@ from pydantic import BaseModel, ConfigDict, Field, field_validator
 from spheretwin.control.law import NonNegative, Positive
 from spheretwin.plant.bristle_friction import StictionSection
 from spheretwin.plant.cable import CableSection
+from spheretwin.plant.magnet_heat import ThermalSection
 from spheretwin.plant.part_scatter import PartScatter
 from spheretwin.plant.step import ENGINES
 from spheretwin.scenario.fields import SHIPPED
@@ -62,6 +63,7 @@ class PlantSection(Section):
     )
     stiction: StictionSection = StictionSection()
     cable: CableSection = CableSection()
+    thermal: ThermalSection = ThermalSection()
     group_gain: tuple[Bounded, ...] | None = Field(
         None, description="torque per ampere of each group over that of the torque curve; 1 unless given"
     )

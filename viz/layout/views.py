@@ -187,6 +187,10 @@ _OTHER_VIEWS = frozenset(
         "q_predicted_rad",
         "qdot_predicted_rad_s",
         "friction_Nm",
+        "presliding_rad",
+        "cable_Nm",
+        "stator_temperature_degC",
+        "rotor_temperature_degC",
         "supply_power_W",
     }
 )
@@ -219,8 +223,18 @@ def hardware(plots: Plots) -> rrb.Container:
     if "qdot_estimated_rad_s" in names:
         title = "estimated - true"
         shown.append(plots.about_zero(title, "rad/s", quantity(ESTIMATED_RATE), least=ESTIMATED_RATE.floor))
-    if "friction_Nm" in names:
-        shown.append(plots.whole("friction", "N·m", plots.signal("friction_Nm"), least=0.002))
+    if "rotor_temperature_degC" in names:
+        lines = [plots.signal(f"{body}_temperature_degC") for body in ("stator", "rotor")]
+        shown.append(plots.whole("stator and rotor temperature", "°C", *lines, least=LEAST_degC))
+    shown += [
+        plots.whole(title, unit, plots.signal(name), least=least)
+        for title, unit, name, least in (
+            ("friction", "N·m", "friction_Nm", 0.002),
+            ("elastic rotation in static friction", "rad", "presliding_rad", 1e-4),
+            ("cable", "N·m", "cable_Nm", 0.002),
+        )
+        if name in names
+    ]
     state_views = [plots.states("states of the components"), log()]
     if not shown:
         return rrb.Vertical(*state_views, name="hardware")

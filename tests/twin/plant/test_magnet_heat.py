@@ -1,0 +1,180 @@
+"""Temperatures of windings, stator and rotor: exact solution, order, energy, remanence, snapshots."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.linalg import expm, solve
+
+from spheretwin import scenario as scenarios
+from spheretwin import simulate
+from spheretwin.electronics.coil import advance_temperature
+from spheretwin.electronics.drive_chain import drive_chain
+from spheretwin.electronics.drive_section import ResolvedDrive
+from spheretwin.metrics import PlannedRun
+from spheretwin.models.actuator import load
+from spheretwin.models.base.errors import InputError
+from spheretwin.plant.magnet_heat import ThermalSection, advance_heat, magnet_heat, update_gain
+from spheretwin.run import Figures
+from spheretwin.session import Session
+
+AMBIENT_degC, GROUPS, PERIOD_s = 25.0, 4, 1.0
+WINDING_J_K, WINDING_K_W = 60.0, 4.0
+LOSS_W = np.array([0.0, 2.0, 5.0, 9.0])
+SECTION = ThermalSection(on=True)
+
+
+def heat_of(period_s, section=SECTION):
+    drive = ResolvedDrive(
+        supply_V=24.0,
+        resistance_ohm=1.3,
+        inductance_H=9e-4,
+        current_limit_A=8.0,
+        ambient_degC=AMBIENT_degC,
+        heat_capacity_J_K=WINDING_J_K,
+        thermal_resistance_K_W=WINDING_K_W,
+    )
+    chain = drive_chain(drive, period_s, 1, GROUPS, 0)
+    return chain.coil, magnet_heat(section, chain, AMBIENT_degC, WINDING_J_K)
+
+
+def heated(duration_s, period_s, section=SECTION):
+    """Return the temperatures of stator and rotor at the end of each period, with constant losses."""
+    coil, heat = heat_of(period_s, section)
+    heat.copper_J[:] = LOSS_W * period_s
+    degC = np.empty((round(duration_s / period_s), 2))
+    for row in degC:
+        advance_temperature(coil, heat.copper_J)
+        advance_heat(heat)
+        row[:] = heat.stator_degC[0], heat.rotor_degC[0]
+    return degC, coil, heat
+
+
+def network(section=SECTION):
+    """Return A and b of ``dT/dt = A T + b`` for the windings, the stator and the rotor."""
+    n = GROUPS
+    conductance = np.zeros((n + 2, n + 2))  # to the neighbour
+    conductance[:n, n] = conductance[n, :n] = 1 / WINDING_K_W
+    conductance[n, n + 1] = conductance[n + 1, n] = 1 / section.air_gap_K_W
+    outer = np.zeros(n + 2)
+    outer[n:] = 1 / section.stator_to_ambient_K_W, 1 / section.rotor_to_ambient_K_W
+    capacity = np.array(
+        [WINDING_J_K] * n + [section.stator_heat_capacity_J_K, section.rotor_heat_capacity_J_K]
+    )
+    A = (conductance - np.diag(conductance.sum(axis=1) + outer)) / capacity[:, None]
+    return A, (np.append(LOSS_W, [0.0, 0.0]) + outer * AMBIENT_degC) / capacity
+
+
+def exact(duration_s):
+    A, b = network()
+    final = -solve(A, b)
+    return final + expm(A * duration_s) @ (AMBIENT_degC - final)
+
+
+def test_the_temperatures_converge_to_the_exact_solution_with_order_1():
+    duration_s = 1024.0
+    errors = [
+        np.abs(heated(duration_s, period_s)[0][-1] - exact(duration_s)[GROUPS:]).max()
+        for period_s in (8.0, 4.0, 2.0)
+    ]
+    # The next term is the square of the period over the time constant of a winding, 240 s.
+    np.testing.assert_allclose(np.log2(np.divide(errors[:-1], errors[1:])), 1.0, atol=0.05)
+    # At the control period of 1 ms the error is 2000 times smaller.
+    assert errors[-1] < 0.05
+
+
+def test_the_final_temperatures_are_those_of_the_resistances():
+    degC, coil, _ = heated(2e5, 20.0)
+    final = -solve(*network())
+    # 2e5 s are 60 of the slowest time constants; a step that has settled has no error of its period.
+    np.testing.assert_allclose(degC[-1], final[GROUPS:], rtol=1e-11)
+    np.testing.assert_allclose(coil.temperature_degC, final[:GROUPS], rtol=1e-11)
+
+
+positive = st.floats(0.1, 1e4)
+
+
+# The windings exchange 1 J/K with the stator in this period: a smaller capacity is refused.
+@given(st.floats(2.0, 1e4), positive, positive, positive, positive, st.floats(-50, 150))
+def test_energy_is_conserved(stator_J_K, rotor_J_K, stator_K_W, gap_K_W, rotor_K_W, rotor_degC):
+    section = ThermalSection(
+        on=True,
+        rotor_degC=rotor_degC,
+        stator_heat_capacity_J_K=stator_J_K,
+        rotor_heat_capacity_J_K=rotor_J_K,
+        stator_to_ambient_K_W=stator_K_W,
+        air_gap_K_W=gap_K_W,
+        rotor_to_ambient_K_W=rotor_K_W,
+    )
+    degC, coil, _ = heated(20 * PERIOD_s, PERIOD_s, section)
+    stored = (
+        WINDING_J_K * (coil.temperature_degC - AMBIENT_degC).sum()
+        + stator_J_K * (degC[-1, 0] - AMBIENT_degC)
+        + rotor_J_K * (degC[-1, 1] - rotor_degC)
+    )
+    lost = PERIOD_s * ((degC - AMBIENT_degC) / [stator_K_W, rotor_K_W]).sum()
+    # Rounding of heat capacities times temperatures, over 20 steps.
+    scale = (stator_J_K + rotor_J_K + 1 / stator_K_W + 1 / rotor_K_W + 1 / gap_K_W + 1e3) * 200
+    assert abs(stored + lost - 20 * PERIOD_s * LOSS_W.sum()) < 1e-12 * scale
+
+
+def test_gains_fall_with_the_remanence():
+    gains = np.array([1.0, 0.9, 1.1, 1.0])
+    _, heat = heat_of(1e-3, ThermalSection(on=True, rotor_degC=60.0))
+    present = np.empty(GROUPS)
+    update_gain(heat, gains, present)
+    np.testing.assert_allclose(present, gains * (1 - 0.0011 * 40), rtol=1e-15)
+
+
+SUPPLIED = {"drive.supply_V": 24.0, "plant.engine": "lagrangian", "duration": 0.05}
+
+
+def test_hot_magnets_give_less_torque_for_the_same_currents():
+    manual = {"manual.currents_A": [0.0] * 4 + [1.0] + [0.0] * 13, **SUPPLIED}
+    hot = {"plant.thermal.on": True, "plant.thermal.rotor_degC": 60.0}
+    runs = [simulate("hold", manual | changes).telemetry for changes in ({}, hot)]
+    cold, weak = (run["torque_Nm"][0] for run in runs)
+    np.testing.assert_allclose(weak, (1 - 0.0011 * 40) * cold, rtol=1e-12)
+    assert runs[1]["rotor_temperature_degC"][-1] == pytest.approx(60.0, abs=0.01)
+
+
+def test_a_snapshot_continues_the_temperatures():
+    scenario = scenarios.load("nutation", {**SUPPLIED, "hardware": "prototype", "plant.thermal.on": True})
+    with Session(scenario) as session:
+        session.advance(20)
+        state = session.snapshot()
+        rest = session.advance(20)
+        session.restore(state)
+        assert session.advance(20).values.tobytes() == rest.values.tobytes()
+    stator = rest["stator_temperature_degC"]
+    assert np.all(np.diff(stator) > 0)
+    # A change of the plant keeps the temperatures.
+    with Session(scenario) as session:
+        before = session.advance(20)["stator_temperature_degC"][-1]
+        session.set("plant.payload_kg", 0.01)
+        assert 0 <= session.advance(1)["stator_temperature_degC"][0] - before < 1e-3
+
+
+def test_a_run_above_the_knee_has_a_warning():
+    hot = {**SUPPLIED, "plant.thermal.on": True, "plant.thermal.rotor_degC": 80.5}
+    assert "the magnets reached 80.5 °C, above plant.thermal.knee_degC 80 °C" in warnings_of(hot)
+    assert "magnets" not in warnings_of(hot | {"plant.thermal.rotor_degC": 79.0})
+
+
+def warnings_of(changes):
+    with Session(scenarios.load("hold", changes)) as session:
+        figures = Figures(PlannedRun(session.scenario, load(), 50))
+        figures.write(session.advance(50))
+    return " ".join(figures.warnings())
+
+
+def test_temperatures_need_a_supply():
+    with pytest.raises(InputError, match=r"expected a drive.supply_V with plant.thermal.on, received none"):
+        simulate("hold", {"plant.thermal.on": True})
+
+
+def test_a_stator_that_stores_less_than_the_windings_release_is_refused():
+    with pytest.raises(
+        InputError, match=r"stator_heat_capacity_J_K above 0\.99\d* J/K, .* received 0\.5 J/K"
+    ):
+        heat_of(PERIOD_s, ThermalSection(on=True, stator_heat_capacity_J_K=0.5))
