@@ -131,7 +131,8 @@ class Actuator:
     Attributes
     ----------
     inertia : (3,) array, kg·m²
-        Principal inertias of the rotor about the joint centre.
+        Moments of inertia of the rotor about its axes through the joint centre: the principal ones if its
+        centre of mass is there and its products of inertia are 0.
     pole_axes : (p, 3) array
         Unit vectors, rotor frame, pointing outward.
     pole_polarity : (p,) array
@@ -212,7 +213,7 @@ def from_model(model: mujoco.MjModel, curve: TorqueCurve) -> Actuator:
     R_SR = data.body(body(model, "rotor")).xmat.reshape(3, 3)
     coil_axes = _frozen(_outward_axes(data, coils))
     return Actuator(
-        inertia=_frozen(model.body_inertia[body(model, "rotor")]),
+        inertia=_frozen(_inertia(model, body(model, "rotor"))),
         pole_axes=_frozen(_outward_axes(data, poles) @ R_SR),
         pole_polarity=_frozen(_polarity(model, poles)),
         coil_axes=coil_axes,
@@ -249,6 +250,14 @@ def _frozen(values: NDArray) -> NDArray:
     copy = np.array(values)
     copy.flags.writeable = False
     return copy
+
+
+def _inertia(model: mujoco.MjModel, rotor: int) -> NDArray[np.float64]:
+    """Return the diagonal of the inertia tensor about the origin of a body, along its axes."""
+    R, centre = np.empty(9), model.body_ipos[rotor]
+    mujoco.mju_quat2Mat(R, model.body_iquat[rotor])
+    tensor = R.reshape(3, 3) * model.body_inertia[rotor] @ R.reshape(3, 3).T
+    return np.diag(tensor) + model.body_mass[rotor] * (centre @ centre - centre**2)
 
 
 def _outward_axes(data: mujoco.MjData, sites: list[int]) -> NDArray[np.float64]:

@@ -37,13 +37,14 @@ class Turns(NamedTuple):
 
 
 class InertiaEntries(NamedTuple):
-    """Distinct non-zero entries of the inertia matrix, kg·m²; (beta, gamma) is zero."""
+    """Distinct entries of the inertia matrix, kg·m²."""
 
     alpha: float
     beta: float
     gamma: float
     alpha_beta: float
     alpha_gamma: float
+    beta_gamma: float  # zero for an ideal joint
 
 
 @compiled
@@ -245,6 +246,7 @@ def inertia_entries(at: Turns, inertia: Triple) -> InertiaEntries:
         gamma=J3,
         alpha_beta=(J1 - J2) * at.cb * at.cg * at.sg,
         alpha_gamma=J3 * at.sb,
+        beta_gamma=0.0,
     )
 
 
@@ -295,16 +297,25 @@ def acceleration_entries(
         torque[1] - C_beta[0] * qdot[0] - C_beta[1] * qdot[1] - C_beta[2] * qdot[2] - G[1],
         torque[2] - C_gamma[0] * qdot[0] - C_gamma[1] * qdot[1] - C_gamma[2] * qdot[2] - G[2],
     )
-    return solve_inertia(inertia_entries(at, inertia), net)
+    return solve_inertia(inertia_entries(at, inertia), net, None)
 
 
 @compiled
-def solve_inertia(M: InertiaEntries, torque: Triple) -> Triple:
-    """Solve ``M x = torque`` for an inertia matrix, or any other matrix with the same zero.
+def solve_inertia(M: InertiaEntries, torque: Triple, chain: object | None) -> Triple:
+    """Solve ``M x = torque`` for an inertia matrix, or its sum with a diagonal matrix, also a complex one.
 
-    M is eliminated from its last row upward. It is positive definite, so that no pivoting is needed. As its
-    entry (beta, gamma) is zero, this order divides by two diagonal entries that never vanish.
+    M is eliminated from its last row upward. It is positive definite, so that no pivoting is needed. `chain`
+    is None for an ideal joint, whose entry (beta, gamma) is zero: this order then divides by two diagonal
+    entries that never vanish. Numba omits the branch of a general joint if the type of `chain` is None.
     """
+    if chain is not None:
+        from_alpha, from_beta = M.alpha_gamma / M.gamma, M.beta_gamma / M.gamma
+        coupling, b = M.alpha_beta - from_alpha * M.beta_gamma, M.beta - from_beta * M.beta_gamma
+        on_beta, share = torque[1] - from_beta * torque[2], coupling / b
+        left = M.alpha - from_alpha * M.alpha_gamma - share * coupling
+        alpha = (torque[0] - from_alpha * torque[2] - share * on_beta) / left
+        beta = on_beta / b - share * alpha
+        return alpha, beta, torque[2] / M.gamma - from_alpha * alpha - from_beta * beta
     to_beta, to_gamma = M.alpha_beta / M.beta, M.alpha_gamma / M.gamma
     left = M.alpha - to_beta * M.alpha_beta - to_gamma * M.alpha_gamma
     alpha = (torque[0] - to_beta * torque[1] - to_gamma * torque[2]) / left

@@ -34,6 +34,9 @@ OTHER_GRAVITY = "gravity other than along -z"
 # which the engine requires; the cross-check detects 1e-12.
 NEGLIGIBLE = 1e-6
 
+# Axes and points are exact in the MJCF; rotations from degrees have errors of 1e-15.
+IDEAL_TOLERANCE = 1e-9
+
 # Quaternions of quarter turns have errors of 1e-15.
 QUARTER_TURN_TOLERANCE = 1e-12
 
@@ -62,8 +65,13 @@ class Mjcf:
 
     @cached_property
     def unknown_to_the_lagrangian(self) -> tuple[str, ...]:
-        """Result of `beyond_a_free_rotor` for the loaded model."""
-        return tuple(beyond_a_free_rotor(self.loaded))
+        """Result of `beyond_three_hinges` for the loaded model."""
+        return tuple(beyond_three_hinges(self.loaded))
+
+    @cached_property
+    def has_ideal_joint(self) -> bool:
+        """True if `beyond_an_ideal_joint` returns nothing for the loaded model."""
+        return not beyond_an_ideal_joint(self.loaded)
 
 
 def read(path: Path) -> Mjcf:
@@ -91,16 +99,42 @@ _MODELS: OrderedDict[tuple[Path, str], Mjcf] = OrderedDict()
 
 
 def beyond_a_free_rotor(model: mujoco.MjModel) -> list[str]:
-    """Return the names of physics beyond a rigid rotor on three ideal hinges under gravity along -z.
+    """Return the names of physics beyond a rigid rotor on three ideal hinges under gravity along -z."""
+    return beyond_three_hinges(model) + beyond_an_ideal_joint(model)
 
-    The engine computes all of it, the Lagrangian model none.
+
+def beyond_three_hinges(model: mujoco.MjModel) -> list[str]:
+    """Return the names of physics beyond rigid bodies on three hinges under gravity along -z.
+
+    The engine computes all of it, the equations of motion none.
     """
     names = [name for name, present in _stages(model).items() if present]
     if np.any(model.dof_armature):
         names.append("armature")
     if np.any(model.opt.gravity[:2]) or model.opt.gravity[2] > 0:
         names.append(OTHER_GRAVITY)
-    return names + [f"mass of body {name}" for name in _other_masses(model)]
+    return names
+
+
+def beyond_an_ideal_joint(model: mujoco.MjModel) -> list[str]:
+    """Return the names of mass properties and of hinges that the closed-form equations of motion lack.
+
+    They are for hinges about x, y, z through the joint centre, rings without mass, and a rotor with its
+    centre of mass there and with its own axes as principal axes.
+    """
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    names = [f"mass of body {name}" for name in _other_masses(model, data)]
+    for hinge, axis in enumerate(np.eye(3) if model.njnt == 3 else ()):
+        if not np.allclose([data.xaxis[hinge] - axis, data.xanchor[hinge]], 0.0, atol=IDEAL_TOLERANCE):
+            names.append(f"tilt or offset of hinge {model.joint(hinge).name}")
+    if ROTOR in _body_names(model):
+        rotor = model.body(ROTOR).id
+        if np.any(np.abs(model.body_ipos[rotor]) > IDEAL_TOLERANCE):
+            names.append("centre of mass off the joint centre")
+        if abs(model.body_iquat[rotor][0]) <= 1 - IDEAL_TOLERANCE:
+            names.append("products of inertia")
+    return names
 
 
 def gravity(option: mujoco.MjOption) -> tuple[float, float, float]:
@@ -155,10 +189,8 @@ def _stages(model: mujoco.MjModel) -> dict[str, bool]:
     }
 
 
-def _other_masses(model: mujoco.MjModel) -> Iterator[str]:
+def _other_masses(model: mujoco.MjModel, data: mujoco.MjData) -> Iterator[str]:
     """Yield the names of moving bodies with relevant inertia, except rotor and payload."""
-    data = mujoco.MjData(model)
-    mujoco.mj_kinematics(model, data)
     rotor = model.body(ROTOR).inertia.max() if ROTOR in _body_names(model) else 0.0
     for i, name in enumerate(_body_names(model)):
         moves = model.body_weldid[i] != 0

@@ -68,22 +68,28 @@ def shared(values: NDArray[np.float64], what: str) -> float:
 HINGES = ("alpha", "beta", "gamma")
 LOCKED_DEG = 90.0
 
-# Axes and anchors are along x, y, z and at 0 in the MJCF; rotations from degrees have errors of 1e-15.
+# Rotations from degrees have errors of 1e-15.
 TOLERANCE = 1e-9
+
+# Beyond these a hinge is another hinge, and its rotor is not at the place of the magnetic model.
+LARGEST_TILT_RAD, LARGEST_OFFSET_M = 0.1, 1e-3
 
 
 def check_joint(model: mujoco.MjModel, data: mujoco.MjData) -> None:
-    """Check the joint that the kinematics assume: hinges about x, y, z, in this order, through one point."""
+    """Check the joint: hinges in series about x, y, z through one point, up to errors of manufacture."""
     if model.nv != 3 or model.nq != 3:
         raise InputError(f"model: expected three degrees of freedom, received {model.nv}")
     for i, (name, axis) in enumerate(zip(HINGES, "xyz", strict=True)):
         joint = named(model, mujoco.mjtObj.mjOBJ_JOINT, "joint", name)
         is_hinge = model.jnt_type[joint] == mujoco.mjtJoint.mjJNT_HINGE
-        along = np.allclose(data.xaxis[joint], np.eye(3)[i], atol=TOLERANCE)
-        centred = np.allclose(data.xanchor[joint], 0.0, atol=TOLERANCE)
-        if not (joint == i and is_hinge and along and centred):
+        along = np.linalg.norm(np.cross(data.xaxis[joint], np.eye(3)[i])) <= np.sin(LARGEST_TILT_RAD)
+        offset = data.xanchor[joint] - data.xaxis[joint] * (data.xanchor[joint] @ data.xaxis[joint])
+        centred = np.linalg.norm(offset) <= LARGEST_OFFSET_M and data.xaxis[joint][i] > 0
+        in_series = model.dof_parentid[i] == i - 1
+        if not (joint == i and is_hinge and along and centred and in_series):
             raise InputError(
-                f"model: expected joint {i + 1} to be hinge {name} about {axis} through the origin"
+                f"model: expected joint {i + 1} to be hinge {name} about {axis} through the origin, within"
+                f" {LARGEST_TILT_RAD:g} rad and {LARGEST_OFFSET_M:g} m"
             )
     if np.any(model.qpos0):
         raise InputError(f"model: expected hinges without ref, received {np.degrees(model.qpos0)} degrees")
@@ -95,10 +101,11 @@ def check_joint(model: mujoco.MjModel, data: mujoco.MjData) -> None:
             f" received {mass:g} kg and {inertia:g} kg·m²"
         )
     rotor = body(model, "rotor")
-    upright = abs(model.body_iquat[rotor][0]) > 1 - TOLERANCE
-    if not upright or np.any(np.abs(model.body_ipos[rotor]) > TOLERANCE):
+    upright = np.allclose(data.xmat[rotor], np.eye(3).ravel(), atol=TOLERANCE)
+    if not upright or np.linalg.norm(data.xpos[rotor]) > LARGEST_OFFSET_M:
         raise InputError(
-            "model: expected the rotor's centre of mass at the origin and its principal axes along its own"
+            "model: expected the rotor's frame to be that of the stator at angles of 0, its origin within"
+            f" {LARGEST_OFFSET_M:g} m"
         )
     range_deg = np.degrees(hinge_range(model)[1])
     if np.any(np.abs(range_deg) >= LOCKED_DEG):
@@ -113,7 +120,15 @@ def check_bounded(model: mujoco.MjModel) -> None:
     """Check that the numbers of a model are finite and plausible in their units."""
     arrays = {
         name: getattr(model, name)
-        for name in ("body_mass", "body_inertia", "body_pos", "site_pos", "site_size", "jnt_range")
+        for name in (
+            "body_mass",
+            "body_inertia",
+            "body_ipos",
+            "body_pos",
+            "site_pos",
+            "site_size",
+            "jnt_range",
+        )
     }
     for name, numbers in {**arrays, "gravity": model.opt.gravity}.items():
         if not np.all(np.isfinite(numbers)):

@@ -24,16 +24,18 @@ from spheretwin.faults.schedule import part_names
 from spheretwin.loop import ColumnOffsets
 from spheretwin.models.actuator import Actuator
 from spheretwin.models.base.errors import InputError, SpheretwinError, exception_text, shown
+from spheretwin.models.joint_chain import JointChain
 from spheretwin.models.lagrangian import loaded_inertia
 from spheretwin.models.magnetics import TorqueModel, scratch_of, torque_model
 from spheretwin.models.scatter import scattered_model
 from spheretwin.models.telemetry.signals import Signal, common_signals, offsets, width
-from spheretwin.plant.bristle_friction import BristleFriction, bristle_friction
+from spheretwin.plant.bristle_friction import bristle_friction
 from spheretwin.plant.friction import Friction, friction
 from spheretwin.plant.magnet_heat import MagnetHeat, magnet_heat
+from spheretwin.plant.mass_properties import mass_errors
 from spheretwin.plant.part_scatter import scatter_of
 from spheretwin.plant.rotor import Rotor, RotorSettings
-from spheretwin.plant.step import ENGINES, Plant
+from spheretwin.plant.step import ENGINES, Plant, SkewedJoint
 from spheretwin.scenario.files import Files
 from spheretwin.scenario.plant_sections import ResolvedPlant
 from spheretwin.scenario.sections import ResolvedScenario
@@ -166,21 +168,26 @@ def _compensators_of(scenario: ResolvedScenario, magnetics: TorqueModel) -> Comp
     )
 
 
-def plant_of(scenario: ResolvedScenario, actuator: Actuator, rotor: Any, buffers: SharedBuffers) -> Plant:
+def plant_of(scenario: ResolvedScenario, files: Files, rotor: Any, buffers: SharedBuffers) -> Plant:
     """Return the plant of a resolved scenario with a started rotor and zero currents."""
-    section, groups = scenario.plant, len(actuator.groups)
+    section, actuator, groups = scenario.plant, files.actuator, len(files.actuator.groups)
+    chain, inertia = _rotor_settings(scenario, files).joint_chain(), _inertia(section, actuator)
+    joint = SkewedJoint(chain, np.zeros(3), np.zeros(3)) if chain and not chain.has_ideal_hinges else None
     scatter = scatter_of(section, scenario.seed, actuator)
     magnetics = scattered_model(actuator, scatter) if scatter else torque_model(actuator)
     drive, group_gain = drive_of(scenario, actuator, buffers), np.array(section.group_gain)
     heat = _heat(scenario, drive)
     return Plant(
         rotor=rotor,
+        joint=joint,
         magnetics=magnetics,
         G=np.empty((3, groups)),
         scratch=scratch_of(magnetics),
         drive=drive,
-        friction=_friction(section, actuator),
-        bristles=_bristles(section, actuator),
+        friction=_friction(section, inertia, chain),
+        bristles=bristle_friction(
+            section.stiction, section.coulomb_Nm, section.cable, inertia, section.step_s, chain
+        ),
         heat=heat,
         group_gain=group_gain,
         present_gain=group_gain.copy() if heat else group_gain,
@@ -206,19 +213,15 @@ def plant_of(scenario: ResolvedScenario, actuator: Actuator, rotor: Any, buffers
     )
 
 
-def _friction(section: ResolvedPlant, actuator: Actuator) -> Friction:
+def _friction(section: ResolvedPlant, inertia: Array, chain: JointChain | None) -> Friction:
     return friction(
         np.zeros(3) if section.stiction.on else np.array(section.coulomb_Nm),
         np.array(section.viscous_Nm_s),
         section.friction_smoothing_rad_s,
-        _inertia(section, actuator),
+        inertia,
         section.step_s,
+        chain,
     )
-
-
-def _bristles(section: ResolvedPlant, actuator: Actuator) -> BristleFriction | None:
-    inertia = _inertia(section, actuator)
-    return bristle_friction(section.stiction, section.coulomb_Nm, section.cable, inertia, section.step_s)
 
 
 def _heat(scenario: ResolvedScenario, drive: DriveModel) -> MagnetHeat | None:
@@ -241,15 +244,18 @@ def rotor_of(scenario: ResolvedScenario, files: Files) -> Rotor:
     InputError
         The engine does not support the model.
     """
+    return ENGINES[scenario.plant.engine].set_up(_rotor_settings(scenario, files))
+
+
+def _rotor_settings(scenario: ResolvedScenario, files: Files) -> RotorSettings:
     section = scenario.plant
-    return ENGINES[section.engine].set_up(
-        RotorSettings(
-            model=files.model,
-            actuator=files.actuator,
-            step_s=section.step_s,
-            integrator=section.integrator,
-            modelling_error=section.modelling_error,
-            payload_kg=section.payload_kg,
-            gravity_m_s2=section.gravity_m_s2,
-        )
+    return RotorSettings(
+        model=files.model,
+        actuator=files.actuator,
+        step_s=section.step_s,
+        integrator=section.integrator,
+        modelling_error=section.modelling_error,
+        payload_kg=section.payload_kg,
+        gravity_m_s2=section.gravity_m_s2,
+        mass=mass_errors(section.mass, scenario.seed),
     )

@@ -79,6 +79,11 @@ def linearisation_data(scenario: ResolvedScenario, files: Files, *, nominal: boo
             current_limit_A=sheet.current_limit_A,
         )
     rotor, cable = _lagrangian_rotor(scenario, files), section.cable
+    if rotor.chain:
+        raise InputError(
+            "linear model: expected an ideal joint, received plant.mass or a model file with mass properties"
+            " or hinges that differ from it"
+        )
     spring = np.array(cable.stiffness_Nm_rad)
     return LinearisationData(
         inertia=rotor.inertia,

@@ -105,7 +105,7 @@ class Runtime:
         buffers = shared_buffers(scenario, len(files.actuator.groups))
         supervision = supervision_of(scenario, files.nominal, buffers)
         self._controller = assembly.controller_of(scenario, self.law, magnetics, estimator, supervision)
-        self._plant = assembly.plant_of(scenario, files.actuator, self._rotor.data, buffers)
+        self._plant = assembly.plant_of(scenario, files, self._rotor.data, buffers)
         self._sensors = sensors_of(scenario, buffers)
         self._faults = faults_of(scenario, self._plant, self._sensors, supervision.groups)
         # The loop holds only addresses of its functions: this object keeps the functions alive.

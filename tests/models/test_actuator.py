@@ -89,7 +89,7 @@ def test_shipped_actuator_is_read_once():
         ('user="-1"', 'user="-1.00000001"', "of pole_upper_south0, received -1.00000001"),
         ('name="shaft_tip"', 'name="tip"', '"shaft_tip"'),
         ('pos="0 0 0.12"', 'pos="0 0 nan"', "finite numbers"),
-        ('<inertial pos="0 0 0" mass="1.6"', '<inertial pos="0 0 0.01" mass="1.6"', "centre of mass"),
+        ('<inertial pos="0 0 0" mass="1.6"', '<inertial pos="0 0 1e300" mass="1.6"', "in body_ipos"),
         ('<frame euler="0 28 0">', '<frame euler="0 29 0">', "one coil opposite coil_upper00"),
     ],
 )  # fmt: skip

@@ -200,7 +200,7 @@ def drive_plant(
     groups, section = len(actuator.groups), scenario.plant
     rotor = assembly.rotor_of(scenario, begun.files)  # keep it: the stepped plant has addresses within it
     stepped = rotor.start(np.array(section.initial_rad), np.array(section.initial_rad_s))
-    plant = assembly.plant_of(scenario, actuator, stepped, shared_buffers(scenario, groups))
+    plant = assembly.plant_of(scenario, begun.files, stepped, shared_buffers(scenario, groups))
     states = np.full((len(disturbance) // every + 1, 6), np.nan)
     states[0] = [*section.initial_rad, *section.initial_rad_s]
     output = PlantOutput(np.empty(groups), np.empty(groups), np.empty(3))

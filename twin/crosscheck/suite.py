@@ -78,7 +78,7 @@ def draw_closed_loop(evidence: Evidence) -> Drawing:
         law: crosscheck.Bounded(pair.difference_rad, closed_loop.TRACE_BOUND_rad)
         for law, pair in pairs.items()
     }
-    titles = {"PD": "PD, load 0.5", "AFSM": "AFSM, load 2"}
+    titles = {law: f"{law}, load {2 if law == 'AFSM' else 0.5:g}" for law in pairs}
     figure = crosscheck.closed_loops(
         longest.mujoco["t_s"],
         {titles[law]: pair for law, pair in errors.items()},

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
 from spheretwin import scenario as scenarios
+from spheretwin.crosscheck.dynamics import MASS
 from spheretwin.crosscheck.part import Part
 from spheretwin.models.actuator import Actuator
 from spheretwin.models.base.checks import Check
@@ -218,6 +219,12 @@ SCENARIO = "nutation"
 CONDITIONS: dict[str, dict[str, Any]] = {
     "PD": {"controller.law": "pd", "disturbance.load": 0.5},
     "AFSM": {"controller.law": "afsm"},
+    "PD, general joint": {
+        "controller.law": "pd",
+        "disturbance.load": 0.5,
+        "plant.coulomb_Nm": [2e-3] * 3,
+        **{f"plant.mass.{name}": value for name, value in MASS},
+    },
 }
 
 TRACE_BOUND_rad = 1e-9
@@ -228,6 +235,7 @@ WHY = {
     "AFSM": "rounding and the gimbal rings (1e-12) as under PD, as long as they decide no sign of s: one"
     " flipped sign moves the trace by 1e-5. For that |s| must be below 1e-10 at a tick, where it moves by"
     " 1e-2 from tick to tick: less than once in a thousand runs",
+    "PD, general joint": "a smooth law and smooth friction, as under PD; both engines have the same rings",
 }
 
 # What the step size costs: a smooth law, and no random torque, so that the runs differ in nothing else.

@@ -36,7 +36,8 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field
 
 from spheretwin.models.base.compiled import allocation_free, copy_into
-from spheretwin.models.lagrangian import InertiaEntries, inertia_entries, solve_inertia, triple, turns
+from spheretwin.models.joint_chain import JointChain, inertia_at
+from spheretwin.models.lagrangian import InertiaEntries, solve_inertia, triple
 from spheretwin.plant.cable import CableSection, acts
 from spheretwin.plant.friction import momentum
 
@@ -94,6 +95,7 @@ class BristleFriction(NamedTuple):
     spring: Array  # (3, 3) stiffness of the cable, its neutral pose, its constant torque, by hinge
     implicitness: float  # 1/2 to 1
     inertia: Array  # (3,) kg·m² about the joint centre, modelling error and payload included
+    chain: JointChain | None  # general joint, instead of the inertia; None for an ideal one
     step_s: float
     deflection_rad: Array  # (3, 3) state: by hinge
     stribeck_factor: Array  # (3,) state: of each hinge at the end of the last step
@@ -113,6 +115,7 @@ def bristle_friction(
     cable: CableSection,
     inertia: Array,
     step_s: float,
+    chain: JointChain | None = None,
 ) -> BristleFriction | None:
     """Return the elements of the hinges (alpha, beta, gamma), all without deflection; None without any.
 
@@ -126,6 +129,8 @@ def bristle_friction(
         Principal inertias about the joint centre, modelling error and payload included.
     step_s : float, s
         Physics step.
+    chain : JointChain
+        General joint, whose inertia counts in the motion instead; default: an ideal joint.
     """
     if not (stiction.on or acts(cable)):
         return None
@@ -149,6 +154,7 @@ def bristle_friction(
         spring=np.array([cable.stiffness_Nm_rad, cable.neutral_rad, cable.torque_Nm]),
         implicitness=0.5 + 0.5 * stiff / (stiff + 4.0),
         inertia=np.array(inertia, dtype=np.float64),
+        chain=chain,
         step_s=float(step_s),
         deflection_rad=np.zeros((ELEMENTS, 3)),
         stribeck_factor=np.ones(3),
@@ -223,7 +229,7 @@ def apply_bristles(
     if bristles is None:
         return
     h, g, trial, former = bristles.step_s, bristles.implicitness, bristles.trial, bristles.torque_q
-    M = inertia_entries(turns(triple(middle_q)), triple(bristles.inertia))
+    M = inertia_at(bristles.chain, bristles.inertia, triple(middle_q))
     for i in range(3):
         trial[FACTOR, i] = _stribeck_factor(bristles, i, 2.0 * middle_qdot[i] - last_qdot[i])
         trial[RATE, i] = qdot[i]
@@ -235,14 +241,16 @@ def apply_bristles(
         F0, k0 = _hinge_torque(bristles, 0, iteration >= NEWTON_STEPS)
         F1, k1 = _hinge_torque(bristles, 1, iteration >= NEWTON_STEPS)
         F2, k2 = _hinge_torque(bristles, 2, iteration >= NEWTON_STEPS)
-        p = momentum(M, (qdot[0] - trial[RATE, 0], qdot[1] - trial[RATE, 1], qdot[2] - trial[RATE, 2]))
+        behind = qdot[0] - trial[RATE, 0], qdot[1] - trial[RATE, 1], qdot[2] - trial[RATE, 2]
+        p = momentum(M, behind, bristles.chain)
         residual = (
             p[0] - h * (F0 - former[0, 0] - former[1, 0]),
             p[1] - h * (F1 - former[0, 1] - former[1, 1]),
             p[2] - h * (F2 - former[0, 2] - former[1, 2]),
         )
         a, b, c = M.alpha + g * h * h * k0, M.beta + g * h * h * k1, M.gamma + g * h * h * k2
-        change = solve_inertia(InertiaEntries(a, b, c, M.alpha_beta, M.alpha_gamma), residual)
+        stiff = InertiaEntries(a, b, c, M.alpha_beta, M.alpha_gamma, M.beta_gamma)
+        change = solve_inertia(stiff, residual, bristles.chain)
         largest, size = 0.0, 0.0
         for i in range(3):
             trial[RATE, i] += change[i]

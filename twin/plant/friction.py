@@ -18,7 +18,8 @@ from numpy.typing import NDArray
 
 from spheretwin.models.base.compiled import allocation_free
 from spheretwin.models.base.errors import InputError
-from spheretwin.models.lagrangian import InertiaEntries, Triple, inertia_entries, solve_inertia, triple, turns
+from spheretwin.models.joint_chain import JointChain, inertia_at
+from spheretwin.models.lagrangian import InertiaEntries, Triple, solve_inertia, triple
 
 # Far below any motion; its square is far above the smallest number, so that k(0) is finite.
 SLOWEST_SMOOTHING_rad_s = 1e-12
@@ -37,6 +38,7 @@ class Friction(NamedTuple):
     inertia: NDArray[np.float64]  # (3,) kg·m² about the joint centre, modelling error and payload included
     step_s: float
     acts: bool  # false if there is no friction, which then costs no time
+    chain: JointChain | None  # general joint, instead of the inertia; None for an ideal one
 
 
 def friction(
@@ -45,6 +47,7 @@ def friction(
     smoothing_rate_rad_s: float,
     inertia: NDArray[np.float64],
     step_s: float,
+    chain: JointChain | None = None,
 ) -> Friction:
     """Return the friction on the hinges (alpha, beta, gamma) of a rotor.
 
@@ -60,6 +63,8 @@ def friction(
         Principal inertias about the joint centre, modelling error and payload included.
     step_s : float, s
         Physics step; `slow_down` advances half of it.
+    chain : JointChain
+        General joint, whose inertia counts instead; default: an ideal joint.
 
     Raises
     ------
@@ -74,7 +79,7 @@ def friction(
         )
     acts = bool(np.any(coulomb) or np.any(viscous))
     moments = np.array(inertia, dtype=np.float64)
-    return Friction(coulomb, viscous, float(smoothing_rate_rad_s), moments, float(step_s), acts)
+    return Friction(coulomb, viscous, float(smoothing_rate_rad_s), moments, float(step_s), acts, chain)
 
 
 @allocation_free
@@ -114,25 +119,25 @@ def slow_down(
     """
     t = 0.5 * friction.step_s
     v = triple(qdot)
-    M = inertia_entries(turns(triple(q)), triple(friction.inertia))
-    before = momentum(M, v)
-    middle = solve_inertia(_damped(friction, M, v, 0.5 * t), before)
-    slowed = solve_inertia(_damped(friction, M, middle, _POLE * t), before)
+    M = inertia_at(friction.chain, friction.inertia, triple(q))
+    before = momentum(M, v, friction.chain)
+    middle = solve_inertia(_damped(friction, M, v, 0.5 * t), before, friction.chain)
+    slowed = solve_inertia(_damped(friction, M, middle, _POLE * t), before, friction.chain)
     for i in range(3):
         qdot[i] = (_RESIDUE * slowed[i]).real
-    gained = momentum(M, (qdot[0] - v[0], qdot[1] - v[1], qdot[2] - v[2]))
+    gained = momentum(M, (qdot[0] - v[0], qdot[1] - v[1], qdot[2] - v[2]), friction.chain)
     for i in range(3):
         mean_torque_q[i] += gained[i] / friction.step_s
 
 
 @allocation_free
-def momentum(M: InertiaEntries, v: Triple) -> Triple:
-    """Return ``M v``."""
-    return (
-        M.alpha * v[0] + M.alpha_beta * v[1] + M.alpha_gamma * v[2],
-        M.alpha_beta * v[0] + M.beta * v[1],
-        M.alpha_gamma * v[0] + M.gamma * v[2],
-    )
+def momentum(M: InertiaEntries, v: Triple, chain: JointChain | None) -> Triple:
+    """Return ``M v``; chain is None for an ideal joint."""
+    alpha = M.alpha * v[0] + M.alpha_beta * v[1] + M.alpha_gamma * v[2]
+    beta, gamma = M.alpha_beta * v[0] + M.beta * v[1], M.alpha_gamma * v[0] + M.gamma * v[2]
+    if chain is None:
+        return alpha, beta, gamma
+    return alpha, beta + M.beta_gamma * v[2], gamma + M.beta_gamma * v[1]
 
 
 @allocation_free
@@ -144,6 +149,7 @@ def _damped(friction: Friction, M: InertiaEntries, rates: Triple, time: Any) -> 
         gamma=M.gamma + time * _factor(friction, rates[2], 2),
         alpha_beta=M.alpha_beta,
         alpha_gamma=M.alpha_gamma,
+        beta_gamma=M.beta_gamma,
     )
 
 

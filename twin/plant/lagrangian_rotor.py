@@ -14,14 +14,8 @@ from spheretwin.models import mjcf
 from spheretwin.models.actuator import Actuator
 from spheretwin.models.base.compiled import allocation_free
 from spheretwin.models.base.errors import InputError
-from spheretwin.models.lagrangian import (
-    GRAVITY_m_s2,
-    Triple,
-    acceleration_entries,
-    loaded_inertia,
-    triple,
-    turns,
-)
+from spheretwin.models.joint_chain import JointChain, acceleration_at
+from spheretwin.models.lagrangian import GRAVITY_m_s2, Triple, loaded_inertia, triple
 from spheretwin.plant.rotor import EngineKind, RotorSettings
 
 
@@ -29,8 +23,9 @@ class LagrangianData(NamedTuple):
     """Equations of motion for compiled code; the loop reads and writes the last four fields."""
 
     step_s: float
-    inertia: NDArray[np.float64]  # (3,) kg·m², payload included
-    weight_moment: float  # N·m, m g l of the payload
+    chain: JointChain | None  # general joint; None for an ideal one
+    inertia: NDArray[np.float64]  # (3,) kg·m², payload included, of the ideal joint
+    weight_moment: float  # N·m, m g l of its payload
     q: NDArray[np.float64]  # (3,) rad
     qdot: NDArray[np.float64]  # (3,) rad/s
     torque_q: NDArray[np.float64]  # (3,) N·m on the hinges
@@ -54,11 +49,14 @@ class LagrangianRotor:
         Point mass at the payload mount; 0 for none.
     gravity_m_s2 : float, m/s²
         Gravity on the payload along -z of the stator frame.
+    chain : JointChain
+        General joint with mass properties and gravity, which replaces all of the above but the step;
+        default: an ideal joint.
 
     Raises
     ------
     InputError
-        Another integrator, or a payload whose mount is not on the rotor's third axis.
+        Another integrator, or a payload whose mount is not on the third axis of an ideal joint.
     """
 
     def __init__(
@@ -69,16 +67,18 @@ class LagrangianRotor:
         modelling_error: float = 0.0,
         payload_kg: float = 0.0,
         gravity_m_s2: float = GRAVITY_m_s2,
+        chain: JointChain | None = None,
     ) -> None:
         x, y, height = (float(length) for length in actuator.payload_mount_m)
         if integrator != "RK4":
             raise InputError(f"Lagrangian plant: expected the integrator RK4, received {integrator}")
-        if payload_kg and (x or y):
+        if payload_kg and (x or y) and not chain:
             raise InputError(
                 "Lagrangian plant: expected a payload mount on the rotor's third axis,"
                 f" received one at ({x:g}, {y:g}, {height:g}) m"
             )
         self._step_s = step_s
+        self.chain = chain
         self.inertia = loaded_inertia((1 + modelling_error) * actuator.inertia, payload_kg, height)
         self.weight_moment = payload_kg * gravity_m_s2 * height
 
@@ -96,6 +96,7 @@ class LagrangianRotor:
         self._state = pose, rates
         return LagrangianData(
             step_s=self._step_s,
+            chain=self.chain,
             inertia=self.inertia,
             weight_moment=self.weight_moment,
             q=pose,
@@ -136,8 +137,8 @@ def step(plant: LagrangianData) -> None:
 
 @allocation_free
 def _acceleration(plant: LagrangianData, q: Triple, qdot: Triple) -> Triple:
-    torque, inertia = triple(plant.torque_q), triple(plant.inertia)
-    return acceleration_entries(turns(q), qdot, torque, inertia, plant.weight_moment)
+    torque = triple(plant.torque_q)
+    return acceleration_at(plant.chain, plant.inertia, plant.weight_moment, q, qdot, torque)
 
 
 @allocation_free
@@ -151,7 +152,7 @@ def _set_up(settings: RotorSettings) -> LagrangianRotor:
     unsupported = [name for name in settings.model.unknown_to_the_lagrangian if name not in supported]
     if unsupported:
         raise InputError(
-            "Lagrangian plant: expected a rigid rotor on three ideal hinges, received a model with"
+            "Lagrangian plant: expected rigid bodies on three hinges, received a model with"
             f" {', '.join(unsupported)}; plant.engine mujoco computes it"
         )
     return LagrangianRotor(
@@ -161,6 +162,7 @@ def _set_up(settings: RotorSettings) -> LagrangianRotor:
         settings.modelling_error,
         settings.payload_kg,
         gravity_m_s2=0.0 if gravity_m_s2 is None else gravity_m_s2,
+        chain=settings.joint_chain(),
     )
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import ctypes
-from copy import copy
 from typing import Any, NamedTuple
 
 import mujoco
@@ -14,7 +13,8 @@ from numpy.typing import NDArray
 from spheretwin.models.base.compiled import COMPILES, compiled
 from spheretwin.models.base.mujoco_library import addresses, step_address
 from spheretwin.models.base.numba_internals import external_function
-from spheretwin.models.mjcf import PAYLOAD, ROTOR, Mjcf, idle_stages
+from spheretwin.models.mjcf import Mjcf, idle_stages
+from spheretwin.plant.mass_properties import MassErrors, true_model
 from spheretwin.plant.rotor import EngineKind
 
 INTEGRATORS = {
@@ -58,6 +58,8 @@ class MujocoRotor:
         Point mass at the payload mount; 0 for none.
     gravity_m_s2 : float, m/s²
         Gravity along -z; default: that of the model.
+    mass : MassErrors
+        Differences from the model file; default: none.
     """
 
     def __init__(
@@ -68,21 +70,13 @@ class MujocoRotor:
         modelling_error: float,
         payload_kg: float,
         gravity_m_s2: float | None = None,
+        mass: MassErrors | None = None,
     ) -> None:
-        # Without a payload its empty body is omitted, which saves a twentieth of a step.
-        self.model = copy(mjcf.loaded if payload_kg else mjcf.bare)
+        self.model = true_model(mjcf, modelling_error, payload_kg, gravity_m_s2, mass)
         self.model.opt.timestep = step_s
         self.model.opt.integrator = INTEGRATORS[integrator]
         # A diverged state must stay visible: the automatic reset would replace it by zeros.
         self.model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET) | idle_stages(self.model)
-        if gravity_m_s2 is not None:
-            self.model.opt.disableflags &= ~int(mujoco.mjtDisableBit.mjDSBL_GRAVITY)
-            self.model.opt.gravity[:] = 0.0, 0.0, -gravity_m_s2
-        self.model.body_inertia[self.model.body(ROTOR).id] *= 1 + modelling_error
-        if payload_kg:
-            payload = self.model.body(PAYLOAD).id
-            self.model.body_mass[payload] = payload_kg
-            self.model.body_ipos[payload] = 0.0  # the compiler sets another value for a body without mass
         self.data = mujoco.MjData(self.model)
         mujoco.mj_setConst(self.model, self.data)
 
@@ -142,6 +136,7 @@ MUJOCO = EngineKind(
         settings.modelling_error,
         settings.payload_kg,
         settings.gravity_m_s2,
+        settings.mass,
     ),
     MujocoData,
     step,

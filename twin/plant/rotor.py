@@ -9,7 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spheretwin.models.actuator import Actuator
+from spheretwin.models.joint_chain import JointChain, read_chain
 from spheretwin.models.mjcf import Mjcf
+from spheretwin.plant.mass_properties import MassErrors, true_model
 
 
 class RotorSettings(NamedTuple):
@@ -24,6 +26,16 @@ class RotorSettings(NamedTuple):
     payload_kg: float
     gravity_m_s2: float | None
     """Gravity along -z; None: that of the model."""
+    mass: MassErrors | None = None
+    """Differences of the machine from the model file."""
+
+    def joint_chain(self) -> JointChain | None:
+        """Return the joint of the true rotor; None if the equations of motion in closed form describe it."""
+        off_axis = self.payload_kg and np.any(self.actuator.payload_mount_m[:2])
+        if self.mass is None and self.model.has_ideal_joint and not off_axis:
+            return None
+        error, payload_kg, gravity_m_s2 = self.modelling_error, self.payload_kg, self.gravity_m_s2
+        return read_chain(true_model(self.model, error, payload_kg, gravity_m_s2, self.mass))
 
 
 class Rotor(Protocol):

@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from spheretwin.electronics.drive import DriveModel, advance_currents, begin, end
 from spheretwin.electronics.transducers import CurrentSensors
-from spheretwin.models.base.compiled import copy_into, implements, part_of_its_caller
+from spheretwin.models.base.compiled import allocation_free, copy_into, implements, part_of_its_caller
+from spheretwin.models.joint_chain import JointChain, hinge_torque, ideal_pose
 from spheretwin.models.kinematics import generalised_torque
 from spheretwin.models.magnetics import TorqueModel, fill_torque_matrix, rotor_torque
 from spheretwin.plant import lagrangian_rotor, mujoco_rotor
@@ -57,10 +58,22 @@ GOING, LEFT_WORKSPACE, DIVERGED, FAILSAFE = 0, 1, 2, 3
 FASTEST_RATE_rad_s = 1e6
 
 
+Array = NDArray[np.float64]
+
+
+class SkewedJoint(NamedTuple):
+    """Joint with hinges that are tilted or apart, and its equivalent with ideal hinges."""
+
+    chain: JointChain
+    q: Array  # (3,) rad, angles of ideal hinges with the orientation in the middle of the step
+    qdot: Array  # (3,) rad/s, their rates with the angular velocity there
+
+
 class Plant(NamedTuple):
     """True plant; the controller knows nothing of it."""
 
     rotor: Any  # data of `Rotor.start`
+    joint: SkewedJoint | None  # None for ideal hinges: its code is then not compiled
     magnetics: TorqueModel  # true
     G: NDArray[np.float64]  # (3, n) N·m/A, true torque matrix in the middle of the physics step
     scratch: NDArray[np.float64]  # of `fill_torque_matrix`
@@ -136,7 +149,7 @@ def plant_tick(
         plant.friction,
         plant.friction_q,
     )
-    drive, bristles = plant.drive, plant.bristles
+    drive, bristles, joint = plant.drive, plant.bristles, plant.joint
     update_gain(plant.heat, plant.group_gain, gain)
     begin(drive, command)
     for substep in range(plant.substeps):
@@ -147,13 +160,14 @@ def plant_tick(
             friction_q[i] = 0.0
         if friction.acts:
             slow_down(friction, q, qdot, friction_q)
-        fill_torque_matrix(middle_q, magnetics, G, scratch)
-        advance_currents(drive, command, substep, middle_q, middle_qdot, G, gain, current, mean_current)
+        coil_q, coil_qdot = _equivalent_motion(joint, middle_q, middle_qdot)
+        fill_torque_matrix(coil_q, magnetics, G, scratch)
+        advance_currents(drive, command, substep, coil_q, coil_qdot, G, gain, current, mean_current)
         log_mean_current(mean_current, substep, output.mean_current)
         for j in range(effective_current.shape[0]):
             effective_current[j] = gain[j] * mean_current[j]
         rotor_torque(G, effective_current, torque_S)
-        generalised_torque(middle_q, torque_S, torque_q)
+        _torque_on_hinges(joint, middle_q, torque_S, torque_q)
         for i in range(3):
             torque_q[i] -= disturbance[i] + unmodelled[i]
         begin_bristles(bristles, middle_q, q, qdot, torque_q)
@@ -180,6 +194,25 @@ def plant_tick(
         if rotor.warnings[kind] > 0:
             return DIVERGED
     return GOING
+
+
+@allocation_free
+def _equivalent_motion(joint: SkewedJoint | None, q: Array, qdot: Array) -> tuple[Array, Array]:
+    """Return angles and rates of ideal hinges with the rotor's orientation and angular velocity."""
+    # Numba omits the branch that the type of an argument excludes.
+    if joint is None:
+        return q, qdot
+    ideal_pose(joint.chain, q, qdot, joint.q, joint.qdot)
+    return joint.q, joint.qdot
+
+
+@allocation_free
+def _torque_on_hinges(joint: SkewedJoint | None, q: Array, torque_S: Array, torque_q: Array) -> None:
+    """Compute the generalised torque of a Cartesian torque on the true hinges."""
+    if joint is None:
+        generalised_torque(q, torque_S, torque_q)
+    else:
+        hinge_torque(joint.chain, q, torque_S, torque_q)
 
 
 @part_of_its_caller

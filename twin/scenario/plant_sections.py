@@ -10,6 +10,7 @@ from spheretwin.control.law import NonNegative, Positive
 from spheretwin.plant.bristle_friction import StictionSection
 from spheretwin.plant.cable import CableSection
 from spheretwin.plant.magnet_heat import ThermalSection
+from spheretwin.plant.mass_properties import MassSection
 from spheretwin.plant.part_scatter import PartScatter
 from spheretwin.plant.step import ENGINES
 from spheretwin.scenario.fields import SHIPPED
@@ -67,6 +68,7 @@ class PlantSection(Section):
     group_gain: tuple[Bounded, ...] | None = Field(
         None, description="torque per ampere of each group over that of the torque curve; 1 unless given"
     )
+    mass: MassSection = MassSection()
     poles: PartScatter = PartScatter()
     coils: PartScatter = PartScatter()
     payload_kg: NonNegative = Field(0.0, description="point mass on the shaft's payload mount, kg")

@@ -65,7 +65,7 @@ def test_every_bound_is_kept(told):
 
 def test_every_row_says_what_it_compares_and_why(told):
     rows = json.loads(told[0].stdout)["checks"]
-    assert len({row["name"] for row in rows}) == len(rows) >= 43
+    assert len({row["name"] for row in rows}) == len(rows) >= 45
     for row in rows:
         assert set(row) == {
             "name", "compares", "states", "value", "bound", "at_least", "unit", "ok", "why", "detail",

@@ -14,7 +14,9 @@ FLAGS = '<flag autoreset="disable" contact="disable"/>'
 WORLD = "<worldbody>"
 STATOR = '<geom name="stator" class="rotor_shell" mesh="stator" rgba="0.45 0.50 0.56 1"/>'
 ALPHA = '<joint name="alpha" class="tilt_hinge" axis="1 0 0"/>'
+BETA = '<joint name="beta" class="tilt_hinge" axis="0 1 0"/>'
 GAMMA = '<joint name="gamma" axis="0 0 1"/>'
+ROTOR = '<body name="rotor">'
 INERTIAL = '<inertial pos="0 0 0" mass="1.6" diaginertia="2.219e-3 2.176e-3 2.256e-3"/>'
 TIP = '<site name="shaft_tip" class="marker" pos="0 0 0.12"/>'
 BALL = '<geom name="ball" class="rotor_shell" mesh="ball"/>'
@@ -176,15 +178,6 @@ CASES = {
         + at_the_end('<contact><pair geom1="payload" geom2="post"/></contact>'),
         "contact",
     ),
-    "body on the rotor": Case(after(TIP, LOAD.format("")), "mass of body load"),
-    "body on a ring": Case(
-        after(ALPHA, LOAD.format("")), "mass of body load"
-    ),
-    "body without a name": Case(
-        after(TIP, LOAD.format("").replace('name="load" ', "")), "mass of body number"
-    ),
-    "point mass": Case(after(TIP, POINT), "mass of body point"),
-    "body on the mount": Case(after(MOUNT, LOAD.format("")), "mass of body load"),
     "gravity aslant": Case(
         ((OPTION, f'{OPTION}gravity="5 0 -9.81" '), *after(TIP, LOAD.format(""))),
         "gravity other than along -z",
@@ -279,6 +272,27 @@ INERTIAS = {
 }
 
 
+OBLIQUE = '<geom type="box" size="0.03 0.04 0.045" pos="1e-3 0 2e-3" euler="10 20 0" mass="1.4"/>'
+
+# Mass properties and hinges that the closed-form equations of motion lack, and their names.
+GENERAL = {
+    "body on the rotor": (after(TIP, LOAD.format("")), "mass of body load"),
+    "body on a ring": (after(ALPHA, LOAD.format("")), "mass of body load"),
+    "body without a name": (after(TIP, LOAD.format("").replace('name="load" ', "")), "mass of body number"),
+    "point mass": (after(TIP, POINT), "mass of body point"),
+    "body on the mount": (after(MOUNT, LOAD.format("")), "mass of body load"),
+    "rings with inertia": (
+        ((RING, 'diaginertia="2e-4 1e-4 1.5e-4"/>'), ("2.3e-12", "0.2"), ("4.3e-12", "0.2")),
+        "mass of body outer_ring",
+    ),
+    "rotor off its centre": (((INERTIAL, INERTIAL.replace("0 0 0", "1e-3 -2e-3 1e-3")),), "centre of mass"),
+    "full inertia": (((INERTIAL, '<inertial pos="0 0 0" mass="1.6" fullinertia="2.2e-3 2.3e-3 2.1e-3 1e-4'
+                      ' -2e-4 5e-5"/>'),), "products of inertia"),
+    "oblique box": (((INERTIAL, OBLIQUE),), "products of inertia"),
+    "tilted hinge": (((BETA, BETA.replace("0 1 0", "0.01 1 -0.02")),), "tilt or offset of hinge beta"),
+    "distant hinge": (((BETA, BETA.replace("/>", ' pos="2e-4 0 -3e-4"/>')),), "tilt or offset of hinge beta"),
+}  # fmt: skip
+
 ON_THE_MOUNT = {
     "nothing": ((), ""),
     "site": ((), '<site name="eye"/>'),
@@ -294,10 +308,11 @@ REFUSED = {
         ((EMPTY, EMPTY.replace('"0 0 0"/>', '"1e-3 1e-3 1e-3"/>').replace('pos="1e-3 1e-3 1e-3"', "")),),
         "empty payload mount",
     ),
-    "rotor off its centre": (((INERTIAL, '<geom type="sphere" size="0.04" pos="0 0 0.001" mass="1"/>'),),
-                             "centre of mass at the origin"),
-    "oblique axes": (((INERTIAL, '<geom type="box" size="0.03 0.04 0.045" euler="10 0 0" mass="1"/>'),),
-                     "principal axes along its own"),
+    "rotor turned on its hinge": (((ROTOR, '<body name="rotor" euler="0 0 30">'),), "rotor's frame"),
+    "rotor off its hinges": (((ROTOR, '<body name="rotor" pos="0 0 0.01">'),), "its origin within"),
+    "hinge of another direction": (((BETA, BETA.replace("0 1 0", "0.2 1 0")),), "hinge beta about y"),
+    "hinge against its direction": (((BETA, BETA.replace("0 1 0", "0 -1 0")),), "hinge beta about y"),
+    "hinge far from the centre": (((BETA, BETA.replace("/>", ' pos="0.01 0 0"/>')),), "hinge beta about y"),
     "fourth joint": (after(TIP, LOAD.format("").replace("><geom", '><joint axis="1 0 0"/><geom')),
                      "three degrees of freedom, received 4"),
     "joint of the mount": (((EMPTY, '<joint axis="1 0 0"/>' + MOUNT.replace("/>", ' mass="0.05"/>')),),

@@ -1,0 +1,241 @@
+"""The general joint against Pinocchio, MuJoCo, its energy, and the closed forms of the ideal joint."""
+
+import mujoco
+import numpy as np
+import pinocchio
+import pytest
+
+from spheretwin.models import actuator as actuators
+from spheretwin.models import mjcf
+from spheretwin.models.joint_chain import (
+    acceleration_at,
+    equations,
+    hinge_torque,
+    ideal_pose,
+    inertia_at,
+    read_chain,
+)
+from spheretwin.models.kinematics import rate_jacobian, rotation
+from spheretwin.models.lagrangian import (
+    acceleration,
+    coriolis_matrix,
+    gravity_torque,
+    inertia_matrix,
+    solve_inertia,
+)
+from spheretwin.plant import lagrangian_rotor
+from spheretwin.plant.lagrangian_rotor import LagrangianRotor
+
+# Rounding of some hundred operations on terms that partly cancel; measured: 2e-14.
+ROUNDING = 1e-12
+
+
+def text(numbers):
+    return " ".join(f"{number:.17g}" for number in np.ravel(numbers))
+
+
+def random_inertial(generator):
+    """Mass, centre of mass and a full tensor about it that a body can have."""
+    root = generator.normal(size=(3, 3))
+    second = root @ root.T
+    tensor = 1e-3 * (np.trace(second) * np.eye(3) - second)
+    return generator.uniform(0.2, 2), 0.1 * generator.normal(size=3), tensor
+
+
+def random_machine(seed):
+    """MJCF of a chain of three hinges and a body on its end, with everything anywhere."""
+    generator = np.random.default_rng(seed)
+
+    def inertial():
+        mass, centre, tensor = random_inertial(generator)
+        full = tensor[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]
+        return f'<inertial pos="{text(centre)}" mass="{mass}" fullinertia="{text(full)}"/>'
+
+    bodies = ""
+    for name in ("alpha", "beta", "gamma"):
+        place = f'pos="{text(0.1 * generator.normal(size=3))}" quat="{text(generator.normal(size=4))}"'
+        joint = f'axis="{text(generator.normal(size=3))}" pos="{text(0.1 * generator.normal(size=3))}"'
+        bodies += f'<body {place} name="{name}"><joint name="{name}" {joint}/>{inertial()}'
+    bodies += f'<body pos="0.1 0 0.2">{inertial()}</body>' + "</body>" * 3
+    option = f'<option gravity="{text(10 * generator.normal(size=3))}"/>'
+    return mujoco.MjModel.from_xml_string(f"<mujoco>{option}<worldbody>{bodies}</worldbody></mujoco>")
+
+
+def random_states(count, seed=0):
+    generator = np.random.default_rng(seed)
+    for _ in range(count):
+        yield generator.uniform(-3, 3, 3), generator.uniform(-20, 20, 3)
+
+
+def full(M):
+    return np.array([
+        [M.alpha, M.alpha_beta, M.alpha_gamma],
+        [M.alpha_beta, M.beta, M.beta_gamma],
+        [M.alpha_gamma, M.beta_gamma, M.gamma],
+    ])  # fmt: skip
+
+
+def of(chain, q, qdot):
+    M, bias = equations(chain, tuple(q), tuple(qdot))
+    return full(M), np.array(bias)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_inertia_matrix_and_bias_are_mujoco_s(seed):
+    model = random_machine(seed)
+    data, chain, M = mujoco.MjData(model), read_chain(model), np.empty((3, 3))
+    for q, qdot in random_states(20, seed):
+        data.qpos[:], data.qvel[:] = q, qdot
+        mujoco.mj_forward(model, data)
+        mujoco.mj_fullM(model, data, M)
+        ours, bias = of(chain, q, qdot)
+        np.testing.assert_allclose(ours, M, rtol=0, atol=ROUNDING * np.abs(M).max())
+        np.testing.assert_allclose(bias, data.qfrc_bias, rtol=0, atol=ROUNDING * np.abs(bias).max())
+
+
+def pinocchio_chain(generator):
+    """A random chain built through Pinocchio's own functions, and the same as a `JointChain`.
+
+    The point masses of ours are made by `read_chain` of a model in which every body stands at the origin.
+    """
+    model, at, bodies, here = pinocchio.Model(), 0, "", np.zeros(3)
+    model.gravity.linear = 10 * generator.normal(size=3)
+    for name in ("alpha", "beta", "gamma"):
+        axis, step = generator.normal(size=3), 0.05 * generator.normal(size=3)
+        axis, here = axis / np.linalg.norm(axis), here + step
+        joint = pinocchio.JointModelRevoluteUnaligned(axis)
+        at = model.addJoint(at, joint, pinocchio.SE3(np.eye(3), step), name)
+        mass, centre, tensor = random_inertial(generator)
+        model.appendBodyToJoint(at, pinocchio.Inertia(mass, centre, tensor), pinocchio.SE3.Identity())
+        entries = tensor[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]
+        inertial = f'<inertial pos="{text(here + centre)}" mass="{mass:.17g}" fullinertia="{text(entries)}"/>'
+        bodies += f'<body><joint axis="{text(axis)}" pos="{text(here)}"/>{inertial}'
+    option = f'<option gravity="{text(model.gravity.linear)}"/>'
+    mjcf_text = f"<mujoco>{option}<worldbody>{bodies}{'</body>' * 3}</worldbody></mujoco>"
+    return model, read_chain(mujoco.MjModel.from_xml_string(mjcf_text))
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_inertia_matrix_bias_and_orientation_are_pinocchio_s(seed):
+    model, chain = pinocchio_chain(np.random.default_rng(seed))
+    data, angles, rates = model.createData(), np.empty(3), np.empty(3)
+    for q, qdot in random_states(20, seed):
+        M, bias = of(chain, q, qdot)
+        upper = np.triu(pinocchio.crba(model, data, q))
+        expected = upper + np.triu(upper, 1).T
+        np.testing.assert_allclose(M, expected, rtol=0, atol=ROUNDING * np.abs(expected).max())
+        expected = pinocchio.nonLinearEffects(model, data, q, qdot)
+        np.testing.assert_allclose(bias, expected, rtol=0, atol=ROUNDING * np.abs(expected).max())
+        pinocchio.forwardKinematics(model, data, q, qdot)
+        ideal_pose(chain, q, qdot, angles, rates)
+        np.testing.assert_allclose(rotation(angles), data.oMi[3].rotation, rtol=0, atol=1e-13)
+        velocity = pinocchio.getVelocity(model, data, 3, pinocchio.ReferenceFrame.LOCAL_WORLD_ALIGNED)
+        # Rates near the singularity are large; their product with the Jacobian cancels.
+        size = 1e-13 * max(1.0, np.abs(rates).max())
+        np.testing.assert_allclose(rate_jacobian(angles) @ rates, velocity.angular, rtol=0, atol=size)
+
+
+def test_torque_on_the_hinges_has_the_power_of_the_torque_on_the_rotor():
+    model, chain = pinocchio_chain(np.random.default_rng(7))
+    data, torque_S, torque_q = model.createData(), np.array([0.3, -0.2, 0.5]), np.empty(3)
+    for q, qdot in random_states(20):
+        pinocchio.forwardKinematics(model, data, q, qdot)
+        velocity = pinocchio.getVelocity(model, data, 3, pinocchio.ReferenceFrame.LOCAL_WORLD_ALIGNED)
+        hinge_torque(chain, q, torque_S, torque_q)
+        assert torque_q @ qdot == pytest.approx(torque_S @ velocity.angular, abs=1e-13)
+
+
+def tilted(model, tilt=0.02):
+    model.jnt_axis[1] = np.array([tilt, 1, -tilt]) / np.sqrt(1 + 2 * tilt**2)
+    return model
+
+
+@pytest.fixture(scope="module")
+def shipped():
+    return mjcf.read(actuators.MJCF_PATH).bare
+
+
+def test_ideal_joint_has_the_closed_forms(actuator, shipped):
+    chain, payload_kg, height = read_chain(shipped), 0.05, 0.1
+    spec = mujoco.MjSpec.from_file(str(actuators.MJCF_PATH))
+    spec.body("payload").mass, spec.body("payload").explicitinertial = payload_kg, True
+    loaded = read_chain(spec.compile())
+    heavier = actuator.inertia + payload_kg * height**2 * np.array([1, 1, 0])
+    for machine, inertia, moment in ((chain, actuator.inertia, 0.0), (loaded, heavier, payload_kg * 0.981)):
+        assert machine.has_ideal_hinges
+        for q, qdot in random_states(50):
+            M, bias = of(machine, q, qdot)
+            expected = inertia_matrix(q, inertia)
+            # Rounding 1e-16, and the rings of the engine's model, of 1.1e-15 kg·m² each.
+            np.testing.assert_allclose(M, expected, rtol=0, atol=1e-14 * np.abs(expected).max() + 3e-15)
+            expected = coriolis_matrix(q, qdot, inertia) @ qdot + gravity_torque(q, moment)
+            # The rings are isotropic and add nothing: rounding of the terms, 2e-3 kg·m² times (20 rad/s)².
+            np.testing.assert_allclose(bias, expected, rtol=0, atol=1e-14)
+
+
+def test_static_torque_of_an_offset_centre_is_m_g_r(actuator, shipped):
+    model = mujoco.MjModel.from_xml_path(str(actuators.MJCF_PATH))
+    model.body_sameframe[:] = 0
+    x, y, z = model.body_ipos[model.body("rotor").id] = 1e-3, -2e-3, 3e-3
+    chain, weight = read_chain(model), 1.6 * 9.81
+    # Upright: about x the arm is y, about y it is -x; gamma is vertical.
+    at_rest = of(chain, np.zeros(3), np.zeros(3))[1]
+    np.testing.assert_allclose(at_rest, [weight * y, -weight * x, 0], rtol=0, atol=1e-15)
+    # alpha at 90 degrees turns y up and z to -y: the axis of beta is z, that of gamma -y of the stator.
+    lying = of(chain, np.array([np.pi / 2, 0, 0]), np.zeros(3))[1]
+    np.testing.assert_allclose(lying, [-weight * z, 0, weight * x], rtol=0, atol=1e-15)
+
+
+def test_energy_of_the_free_chain_is_kept_to_the_order_of_the_step(actuator):
+    machine = random_machine(3)
+    chain, data = read_chain(machine), mujoco.MjData(machine)
+    machine.opt.enableflags |= int(mujoco.mjtEnableBit.mjENBL_ENERGY)
+    q0, rates0, steps = np.array([0.3, -0.4, 0.2]), np.array([1.0, -2.0, 1.5]), np.array([4e-3, 2e-3, 1e-3])
+
+    def energy(q, qdot):
+        data.qpos[:], data.qvel[:] = q, qdot
+        mujoco.mj_forward(machine, data)
+        return data.energy.sum()
+
+    drifts = []
+    for step_s in steps:
+        plant = LagrangianRotor(actuator, step_s, chain=chain).start(q0, rates0)
+        for _ in range(round(0.8 / step_s)):
+            lagrangian_rotor.step(plant)
+        drifts.append(abs(energy(plant.q, plant.qdot) - energy(q0, rates0)))
+    order = np.polyfit(np.log(steps), np.log(drifts), 1)[0]
+    # Order four of the state; the energy of a Runge-Kutta step can be one better, never worse.
+    assert 3.7 < order < 5.3
+    assert drifts[-1] < 1e-6 * abs(energy(q0, rates0))
+
+
+def test_full_inertia_matrix_is_solved_as_by_a_library():
+    generator = np.random.default_rng(3)
+    for seed in range(5):
+        chain = read_chain(random_machine(seed))
+        for q, torque in random_states(20, seed):
+            M = inertia_at(chain, np.empty(0), tuple(q))
+            added = generator.uniform(0, 1e-2, 3) * (1 + 1j)
+            M = M._replace(**dict(zip(("alpha", "beta", "gamma"), full(M).diagonal() + added, strict=True)))
+            expected = np.linalg.solve(full(M), torque)
+            # Rounding, with a condition up to some hundreds.
+            size = 1e-12 * np.abs(expected).max()
+            solution = solve_inertia(M, tuple(torque), chain)
+            np.testing.assert_allclose(solution, expected, rtol=0, atol=size)
+
+
+def test_acceleration_is_that_of_the_joint_that_is_given(actuator):
+    q, qdot, torque = np.array([0.2, 0.3, 0.1]), np.array([1.0, 2.0, 3.0]), np.array([0.1, -0.2, 0.3])
+    ideal, motion = (actuator.inertia, 0.05), (tuple(q), tuple(qdot), tuple(torque))
+    closed = acceleration(q, qdot, torque, *ideal)
+    np.testing.assert_array_equal(acceleration_at(None, *ideal, *motion), closed)
+    chain = read_chain(random_machine(1))
+    M, bias = of(chain, q, qdot)
+    # Rounding, with a condition up to some hundreds.
+    general = M @ acceleration_at(chain, *ideal, *motion)
+    np.testing.assert_allclose(general, torque - bias, rtol=0, atol=1e-12)
+
+
+def test_tilted_or_distant_hinges_are_not_ideal(shipped):
+    assert read_chain(shipped).has_ideal_hinges
+    assert not read_chain(tilted(mujoco.MjModel.from_xml_path(str(actuators.MJCF_PATH)))).has_ideal_hinges

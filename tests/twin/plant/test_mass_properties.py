@@ -1,0 +1,348 @@
+"""Mass properties and hinges of the true rotor: what is drawn, what it does, and that both engines agree."""
+
+import mujoco
+import numpy as np
+import pytest
+
+from spheretwin import assembly, linearise
+from spheretwin import scenario as scenarios
+from spheretwin.active_config import initial_config
+from spheretwin.models import actuator as actuators
+from spheretwin.models import mjcf
+from spheretwin.models.base.errors import InputError
+from spheretwin.models.joint_chain import equations, read_chain
+from spheretwin.models.lagrangian import inertia_matrix
+from spheretwin.plant import lagrangian_rotor
+from spheretwin.plant.bristle_friction import (
+    StictionSection,
+    apply_bristles,
+    begin_bristles,
+    bristle_friction,
+)
+from spheretwin.plant.cable import CableSection
+from spheretwin.plant.friction import friction, slow_down
+from spheretwin.plant.lagrangian_rotor import LagrangianRotor
+from spheretwin.plant.mass_properties import MassSection, mass_errors, true_model
+from spheretwin.plant.mujoco_rotor import MujocoRotor, step
+from spheretwin.session import Session
+from spheretwin.simulation import simulate
+
+STEP_S = 5e-4
+EVERYTHING = {
+    "centre_m": (1e-3, -2e-3, 5e-4),
+    "centre_error_m": 1e-3,
+    "products_kg_m2": (1e-4, -5e-5, 2e-5),
+    "product_error_kg_m2": 5e-5,
+    "ring_inertia_kg_m2": ((4e-4, 2e-4, 3e-4), (2e-4, 3e-4, 2e-4)),
+    "axis_tilt_rad": ((0.01, 0.0), (0.0, -0.01), (5e-3, 5e-3)),
+    "axis_tilt_error_rad": 5e-3,
+    "axis_offset_m": ((1e-4, 0.0), (0.0, 2e-4), (1e-4, 1e-4)),
+    "axis_offset_error_m": 1e-4,
+}
+FIELDS = {f"plant.mass.{name}": value for name, value in EVERYTHING.items()}
+
+
+@pytest.fixture(scope="module")
+def shipped():
+    return mjcf.read(actuators.MJCF_PATH)
+
+
+def chain_of(shipped, section, modelling_error=0.0, payload_kg=0.0, gravity_m_s2=9.81, seed=0):
+    errors = mass_errors(section, seed)
+    return read_chain(true_model(shipped, modelling_error, payload_kg, gravity_m_s2, errors))
+
+
+def matrix(M):
+    return np.array([
+        [M.alpha, M.alpha_beta, M.alpha_gamma],
+        [M.alpha_beta, M.beta, M.beta_gamma],
+        [M.alpha_gamma, M.beta_gamma, M.gamma],
+    ])  # fmt: skip
+
+
+def upright(chain):
+    return matrix(equations(chain, (0.0,) * 3, (0.0,) * 3)[0])
+
+
+def plant_of(changes):
+    config = initial_config(scenarios.load("hold", changes), None, None)
+    rotor = assembly.rotor_of(config.scenario, config.files)
+    settings = assembly._rotor_settings(config.scenario, config.files)
+    return rotor.start(np.zeros(3), np.zeros(3)), settings.joint_chain()
+
+
+def test_switched_off_nothing_general_is_in_the_plant(shipped):
+    assert mass_errors(MassSection(), 0) is None
+    assert shipped.has_ideal_joint
+    for engine in ("mujoco", "lagrangian"):
+        with Session(scenarios.load("hold", {"plant.engine": engine, "plant.payload_kg": 0.05})) as session:
+            plant = session._runtime._plant
+            assert plant.joint is plant.friction.chain is None
+            assert getattr(plant.rotor, "chain", None) is None
+
+
+def test_hinges_are_skewed_only_if_they_are(shipped):
+    for fields, skewed in (({"plant.mass.centre_m": [1e-3, 0.0, 0.0]}, False), (FIELDS, True)):
+        with Session(scenarios.load("hold", fields)) as session:
+            plant = session._runtime._plant
+            assert (plant.joint is not None) == skewed
+            assert plant.friction.chain is not None
+
+
+def test_inertia_of_the_rotor_upright_is_the_sum_of_its_parts(actuator, shipped):
+    centre, (xy, xz, yz) = np.array([1e-3, -2e-3, 5e-4]), (1e-4, -5e-5, 2e-5)
+    outer, inner = (4e-4, 2e-4, 3e-4), (2e-4, 3e-4, 2e-4)
+    section = MassSection(
+        centre_m=tuple(centre), products_kg_m2=(xy, xz, yz), ring_inertia_kg_m2=(outer, inner)
+    )
+    expected = 1.2 * np.diag(actuator.inertia) + [[0, xy, xz], [xy, 0, yz], [xz, yz, 0]]
+    expected += 1.6 * (centre @ centre * np.eye(3) - np.outer(centre, centre))
+    expected[0, 0] += outer[0] + inner[0]
+    expected[1, 1] += inner[1]
+    # The moments of a ring about axes on which it does not turn have no effect upright. Rounding, and the
+    # model's own rings of 1e-15.
+    found = upright(chain_of(shipped, section, modelling_error=0.2))
+    np.testing.assert_allclose(found, expected, rtol=0, atol=1e-14)
+
+
+def test_hinges_stand_where_the_fields_say(shipped):
+    tilt, offset = ((0.01, 0.02), (-0.01, 0.03), (0.02, -0.03)), ((1e-4, 2e-4), (-1e-4, 0.0), (3e-4, 1e-4))
+    chain = chain_of(shipped, MassSection(axis_tilt_rad=tilt, axis_offset_m=offset))
+    expected = np.array([[1, 0.01, 0.02], [-0.01, 1, 0.03], [0.02, -0.03, 1]])
+    expected /= np.linalg.norm(expected, axis=1)[:, None]
+    np.testing.assert_allclose(chain.axes, expected, rtol=0, atol=1e-15)
+    expected = [[0, 1e-4, 2e-4], [-1e-4, 0, 0], [3e-4, 1e-4, 0]]
+    np.testing.assert_allclose(chain.points, expected, rtol=0, atol=1e-18)
+
+
+def test_errors_are_uniform_within_their_bounds_and_added_to_the_given_values():
+    section = MassSection(**EVERYTHING)
+    drawn = [mass_errors(section, seed) for seed in range(400)]
+    centres = np.array([machine.centre_m for machine in drawn]) - EVERYTHING["centre_m"]
+    assert np.abs(centres).max() <= EVERYTHING["centre_error_m"]
+    # Mean and spread of 1,200 uniform numbers: three standard deviations of each.
+    assert abs(centres.mean()) < 3 * 1e-3 / np.sqrt(3 * 1200)
+    assert np.std(centres) == pytest.approx(1e-3 / np.sqrt(3), rel=0.05)
+    tilts = np.array([machine.axis_tilt_rad for machine in drawn]) - EVERYTHING["axis_tilt_rad"]
+    assert tilts.shape == (400, 3, 2)
+    assert len(np.unique(tilts)) == tilts.size
+    assert np.abs(tilts).max() <= EVERYTHING["axis_tilt_error_rad"]
+
+
+def test_the_stream_of_a_quantity_does_not_depend_on_the_others():
+    alone = mass_errors(MassSection(axis_offset_error_m=1e-4), 7)
+    together = mass_errors(MassSection(axis_offset_error_m=1e-4, centre_error_m=1e-3), 7)
+    np.testing.assert_array_equal(alone.axis_offset_m, together.axis_offset_m)
+    assert not np.any(alone.centre_m)
+    other = mass_errors(MassSection(axis_offset_error_m=1e-4), 8)
+    assert not np.any(other.axis_offset_m == alone.axis_offset_m)
+
+
+def test_an_offset_centre_hangs_down_and_weighs_m_g_r(shipped):
+    chain = chain_of(shipped, MassSection(centre_m=(1e-3, 0.0, 0.0)))
+    # The weight pulls the side of +x down, which turns beta upward: a negative torque holds it.
+    _, bias = equations(chain, (0.0,) * 3, (0.0,) * 3)
+    np.testing.assert_allclose(bias, [0, -1.6 * 9.81 * 1e-3, 0], rtol=0, atol=1e-15)
+    plant, _ = plant_of({"plant.mass.centre_m": [1e-3, 0.0, 0.0]})
+    for _ in range(20):
+        step(plant)
+    # beta = (m g r / J) t² / 2 at first; the gravity torque changes with cos(beta), in 1e-5 of it.
+    expected = 0.5 * 1.6 * 9.81e-3 / (2.176e-3 + 1.6e-6) * (20 * STEP_S) ** 2
+    assert plant.q[1] == pytest.approx(expected, rel=1e-4)
+
+
+@pytest.mark.parametrize("payload_kg", [0.0, 0.05])
+def test_engines_agree_step_by_step(actuator, shipped, payload_kg):
+    errors, start = (
+        mass_errors(MassSection(**EVERYTHING), 3),
+        (np.array([0.4, -0.3, 0.2]), np.array([1.0, 2, -3])),
+    )
+    engine = MujocoRotor(shipped, STEP_S, "RK4", 0.2, payload_kg, 9.81, errors)
+    chain = read_chain(engine.model)
+    first, second = engine.start(*start), LagrangianRotor(actuator, STEP_S, chain=chain).start(*start)
+    for data in (first, second):
+        data.torque_q[:] = 0.02, -0.05, 0.03
+    for _ in range(400):
+        step(first)
+        lagrangian_rotor.step(second)
+    # Rounding over 400 steps of the same method, on rates of some rad/s.
+    np.testing.assert_allclose(second.q, first.q, rtol=0, atol=1e-12)
+    np.testing.assert_allclose(second.qdot, first.qdot, rtol=0, atol=1e-11)
+
+
+SMOOTH = {"controller.law": "pd", "disturbance.load": 0.5, "duration": 1.0}
+
+
+@pytest.mark.parametrize(
+    "bearings",
+    [
+        {"plant.coulomb_Nm": [5e-3] * 3, "plant.viscous_Nm_s": [1e-4] * 3},
+        {
+            "plant.coulomb_Nm": [5e-3] * 3,
+            "plant.stiction.on": True,
+            "plant.cable.stiffness_Nm_rad": [2e-3] * 3,
+        },
+    ],
+    ids=["smoothed friction", "static friction and cable"],
+)
+def test_closed_loops_on_both_engines_agree(bearings):
+    changes = SMOOTH | FIELDS | bearings
+    runs = [
+        simulate(scenarios.load("nutation", changes | {"plant.engine": engine}))
+        for engine in ("mujoco", "lagrangian")
+    ]
+    first, second = (run.telemetry["q_rad"] for run in runs)
+    # As in the cross-check.
+    np.testing.assert_allclose(second, first, rtol=0, atol=1e-9)
+    ideal = simulate(scenarios.load("nutation", SMOOTH | bearings)).telemetry["q_rad"]
+    assert np.abs(ideal - first).max() > 1e-3
+
+
+def test_true_orientation_drives_the_coils():
+    # The torque of the coils is that of a pose with the orientation of the tilted joint.
+    tilt = {"plant.mass.axis_tilt_rad": ((0.0, 0.0), (0.0, 0.03), (0.0, 0.0)), "plant.engine": "lagrangian"}
+    changes = {"controller.law": "pd", "duration": 0.05, "plant.initial_rad": [0.2, 0.5, 0.3]}
+    tables = [simulate(scenarios.load("hold", changes | more)).telemetry for more in ({}, tilt)]
+    same, other = (table["torque_Nm"][0] for table in tables)
+    np.testing.assert_array_equal(tables[0]["current_command_A"][0], tables[1]["current_command_A"][0])
+    # First order in the tilt of 0.03 rad times sin(beta).
+    assert 1e-3 < np.linalg.norm(other - same) / np.linalg.norm(same) < 0.5
+
+
+def test_friction_gains_no_energy_on_a_general_joint(shipped):
+    chain = chain_of(shipped, MassSection(**EVERYTHING))
+    generator = np.random.default_rng(2)
+    for coulomb in (1e-3, 1.0, 1e3):
+        stage = friction(np.full(3, coulomb), np.full(3, 1e-3), 0.01, np.full(3, 2e-3), STEP_S, chain)
+        for _ in range(100):
+            q, qdot, torque = generator.uniform(-1.3, 1.3, 3), generator.normal(size=3), np.zeros(3)
+            M, before = matrix(equations(chain, tuple(q), (0.0,) * 3)[0]), qdot.copy()
+            slow_down(stage, q, qdot, torque)
+            # Rounding relative to the energy before.
+            assert qdot @ M @ qdot <= before @ M @ before * (1 + 1e-12)
+            assert before @ M @ qdot >= -1e-12 * (before @ M @ before)
+            # The mean torque over the step is the change of momentum.
+            size = 1e-12 * np.abs(M @ before).max() / STEP_S
+            np.testing.assert_allclose(torque * STEP_S, M @ (qdot - before), rtol=0, atol=size * STEP_S)
+
+
+def test_static_friction_gains_no_energy_on_a_general_joint(shipped):
+    chain = chain_of(shipped, MassSection(**EVERYTHING), gravity_m_s2=0.0)
+    section = StictionSection(on=True)
+    stage = bristle_friction(section, (5e-3,) * 3, CableSection(), np.full(3, 2e-3), STEP_S, chain)
+    q, torque = np.array([0.3, -0.4, 0.5]), np.zeros(3)
+    M = matrix(equations(chain, tuple(q), (0.0,) * 3)[0])
+    qdot = np.array([0.2, -0.1, 0.15])
+
+    def energy():
+        springs = 0.5 * np.sum(stage.stiffness_Nm_rad * stage.deflection_rad**2)
+        return 0.5 * qdot @ M @ qdot + springs
+
+    start = last = energy()
+    for _ in range(400):  # the inertia matrix held, as in the proof of `apply_bristles`
+        start_q, start_qdot = q.copy(), qdot.copy()
+        middle = np.array([0.3, -0.4, 0.5])
+        torque[:] = 0.0
+        begin_bristles(stage, middle, q, qdot, torque)
+        qdot += STEP_S * np.linalg.solve(M, torque)
+        q += 0.5 * STEP_S * (qdot + start_qdot)
+        apply_bristles(stage, middle, start_qdot, start_qdot, q, qdot)
+        assert energy() <= last + 1e-12 * start
+        last = energy()
+        assert np.abs(q - start_q).max() < 1e-3
+    assert last < 0.01 * start
+
+
+@pytest.mark.parametrize(
+    ("fields", "text"),
+    [
+        ({"plant.mass.products_kg_m2": [5e-3, 0.0, 0.0]}, "principal inertias above 0"),
+        ({"plant.mass.ring_inertia_kg_m2": [[3e-4, 1e-4, 1e-4], [0.0] * 3]}, "body outer_ring"),
+        ({"plant.mass.axis_tilt_error_rad": 0.1}, "plant.mass.axis_tilt_error_rad"),
+        ({"plant.mass.axis_offset_m": [[1e-2, 0.0], [0.0] * 2, [0.0] * 2]}, "plant.mass.axis_offset_m"),
+    ],
+    ids=["indefinite tensor", "impossible ring", "large tilt", "large offset"],
+)
+def test_impossible_values_are_refused_in_one_line(fields, text):
+    with pytest.raises(InputError, match=text) as caught:
+        Session(scenarios.load("hold", fields))
+    assert "\n" not in str(caught.value)
+
+
+def test_a_ring_needs_a_body(shipped, tmp_path):
+    text = actuators.MJCF_PATH.read_text(encoding="utf-8")
+    text = text.replace('meshdir="assets"', f'meshdir="{actuators.FOLDER / "assets"}"')
+    beta, start = (
+        '<joint name="beta" class="tilt_hinge" axis="0 1 0"/>',
+        text.index('<body name="inner_ring">'),
+    )
+    stop = text.index('<body name="rotor">')
+    merged = text[:start] + text[stop:].replace("</body>", "", 1).replace(
+        '<joint name="gamma"', beta + '<joint name="gamma"'
+    )
+    (path := tmp_path / "merged.xml").write_text(merged, encoding="utf-8")
+    assert mujoco.MjModel.from_xml_path(str(path)).nv == 3
+    ring = {"plant.mass.ring_inertia_kg_m2": [[0.0] * 3, [1e-4] * 3], "plant.mjcf": str(path)}
+    with pytest.raises(InputError, match="received one without a ring at hinge beta"):
+        Session(scenarios.load("hold", ring))
+
+
+def test_a_file_and_the_section_give_the_same_machine(shipped, tmp_path, actuator):
+    text = actuators.MJCF_PATH.read_text(encoding="utf-8")
+    text = text.replace('meshdir="assets"', f'meshdir="{actuators.FOLDER / "assets"}"')
+    inertial = '<inertial pos="0 0 0" mass="1.6" diaginertia="2.219e-3 2.176e-3 2.256e-3"/>'
+    moved = inertial.replace("0 0 0", "1e-3 2e-3 -1e-3")
+    moved = moved.replace("diaginertia", "fullinertia").replace('2.256e-3"', '2.256e-3 1e-4 -5e-5 2e-5"')
+    text = text.replace(inertial, moved).replace('axis="0 1 0"', 'axis="0.02 1 -0.01" pos="1e-4 0 2e-4"')
+    (path := tmp_path / "moved.xml").write_text(text, encoding="utf-8")
+    section = MassSection(
+        centre_m=(1e-3, 2e-3, -1e-3),
+        products_kg_m2=(1e-4, -5e-5, 2e-5),
+        axis_tilt_rad=((0.0, 0.0), (0.02, -0.01), (0.0, 0.0)),
+        axis_offset_m=((0.0, 0.0), (1e-4, 2e-4), (0.0, 0.0)),
+    )
+    ours = chain_of(shipped, section, payload_kg=0.05)
+    theirs = read_chain(true_model(mjcf.read(path), 0.0, 0.05, 9.81, None))
+    q, qdot = (0.3, -0.4, 0.2), (2.0, -1.0, 3.0)
+    for one, other in zip(equations(ours, q, qdot), equations(theirs, q, qdot), strict=True):
+        np.testing.assert_allclose(one, other, rtol=0, atol=1e-13)
+    # The nominal inertia of the file: moments about the axes through the joint centre.
+    centre = np.array([1e-3, 2e-3, -1e-3])
+    expected = actuator.inertia + 1.6 * (centre @ centre - centre**2)
+    np.testing.assert_allclose(actuators.load(path).inertia, expected, rtol=1e-12)
+
+
+def test_a_payload_off_the_axis_is_computed_by_the_equations_of_motion(shipped, tmp_path):
+    text = actuators.MJCF_PATH.read_text(encoding="utf-8")
+    text = text.replace('meshdir="assets"', f'meshdir="{actuators.FOLDER / "assets"}"')
+    text = text.replace('<body name="payload" pos="0 0 0.10">', '<body name="payload" pos="0.01 0.02 0.10">')
+    (path := tmp_path / "aside.xml").write_text(text, encoding="utf-8")
+    changes = SMOOTH | {"plant.mjcf": str(path), "plant.payload_kg": 0.05, "duration": 0.5}
+    tables = [
+        simulate(scenarios.load("nutation", changes | {"plant.engine": engine})).telemetry["q_rad"]
+        for engine in ("mujoco", "lagrangian")
+    ]
+    np.testing.assert_allclose(tables[1], tables[0], rtol=0, atol=1e-9)  # as in the cross-check
+
+
+def test_a_change_during_the_run_acts_and_a_snapshot_restores_it():
+    with Session(scenarios.load("hold", {"plant.engine": "lagrangian"})) as session:
+        session.advance(10)
+        session.set("plant.mass.centre_m", [2e-3, 0.0, 0.0])
+        kept = session.snapshot()
+        first = session.advance(50).values.copy()
+        session.restore(kept)
+        np.testing.assert_array_equal(session.advance(50).values, first)
+        assert np.abs(first).max() > 0
+
+
+def test_a_linear_model_needs_an_ideal_joint():
+    with pytest.raises(InputError, match=r"expected an ideal joint, received plant\.mass"):
+        linearise(scenarios.load("hold", {"plant.mass.centre_m": [1e-3, 0.0, 0.0]}))
+    linearise(scenarios.load("hold", {"plant.mass.centre_m": [1e-3, 0.0, 0.0]}), nominal=True)
+
+
+def test_ideal_inertia_matrix_is_the_closed_form_s(actuator, shipped):
+    np.testing.assert_allclose(
+        upright(read_chain(shipped.bare)), inertia_matrix(np.zeros(3), actuator.inertia), rtol=0, atol=1e-14
+    )
