@@ -1,4 +1,4 @@
-"""Provenance of the results of a study by digests, and the journal of its finished rows."""
+"""Provenance of the results of a study by digests, and the journal of its finished rows or trials."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import json
 import os
 import sys
 import zlib
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import Any, BinaryIO
@@ -104,7 +104,7 @@ MISSING = 0
 
 
 class Journal:
-    """Results of a study, by the numbers of its rows.
+    """Results of a study by the numbers of its rows, or of a tuning by those of its trials.
 
     Parameters
     ----------
@@ -113,7 +113,7 @@ class Journal:
     digest : str
         Digest of everything that results depend on.
     rows : int
-        Number of rows of the study.
+        Number of rows of the study, or largest number of trials.
 
     Attributes
     ----------
@@ -164,16 +164,24 @@ class Journal:
         SpheretwinError
             It could not be written, as on a full disk; earlier results are stored.
         """
+        self.append(row.number, [row.key, *result])
+
+    def append(self, number: int, record: Sequence[Any]) -> None:
+        """Store a record in JSON types under a number; errors as for `add`."""
         offset = self._end
-        self._write(_line([row.number, row.key, *result]))
-        self._offsets[row.number] = offset
+        self._write(_line([number, *record]))
+        self._offsets[number] = offset
 
     def results(self) -> Iterator[tuple[int, Result]]:
         """Finished rows in the order of the study: the number of each, and its result."""
+        return ((number, Result(*record[1:])) for number, record in self.records())
+
+    def records(self) -> Iterator[tuple[int, list[Any]]]:
+        """Yield the records with their numbers, in the order of the numbers."""
         with self.path.open("rb") as file:
             for number in np.flatnonzero(self._offsets):
                 file.seek(int(self._offsets[number]))
-                yield int(number), _result(json.loads(file.readline()))
+                yield int(number), json.loads(file.readline())[1:-1]
 
     def _begin(self, digest: str) -> None:
         with self.path.open("rb") as file:
@@ -256,7 +264,3 @@ def _parsed(line: bytes) -> Any:
         return json.loads(line)
     except ValueError:
         return None
-
-
-def _result(parsed: list[Any]) -> Result:
-    return Result(*parsed[2:-1])

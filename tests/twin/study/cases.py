@@ -1,5 +1,8 @@
 """What the tests of studies share: short studies, and what their journals and tables hold."""
 
+import errno
+import os
+
 import pyarrow.parquet as parquet
 
 from spheretwin.study import run
@@ -48,3 +51,20 @@ def table(folder):
 
 def telemetry(folder):
     return sorted(path.name for path in (folder / TELEMETRY).iterdir())
+
+
+class Full:
+    """A file on a disk that takes so many bytes more."""
+
+    def __init__(self, file, room):
+        self._file, self._room = file, room
+
+    def write(self, data):
+        if self._room <= 0:
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+        written = self._file.write(bytes(data)[: self._room])
+        self._room -= written
+        return written
+
+    def __getattr__(self, name):
+        return getattr(self._file, name)

@@ -1,8 +1,6 @@
 """The journal: what was finished is kept, whatever happens to its file."""
 
-import errno
 import json
-import os
 import subprocess
 import sys
 
@@ -13,7 +11,7 @@ from spheretwin.study import journal
 from spheretwin.study.grid import Grid, Row
 from spheretwin.study.journal import Journal
 from spheretwin.study.row import Result
-from tests.twin.study.cases import found, loads, study, table, values
+from tests.twin.study.cases import Full, found, loads, study, table, values
 
 ROWS = [Row(number, f"{number:016x}", number, {}, None, 0) for number in range(6)]
 
@@ -155,23 +153,6 @@ def test_a_second_writer_is_refused(path):
             held(path)
         other.communicate(b"\n")
     assert len(held(path)[0]) == 6
-
-
-class Full:
-    """A file on a disk that takes so many bytes more."""
-
-    def __init__(self, file, room):
-        self._file, self._room = file, room
-
-    def write(self, data):
-        if self._room <= 0:
-            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
-        written = self._file.write(bytes(data)[: self._room])
-        self._room -= written
-        return written
-
-    def __getattr__(self, name):
-        return getattr(self._file, name)
 
 
 def test_a_full_disk_is_told_and_what_was_finished_is_kept(path):

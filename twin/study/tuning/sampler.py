@@ -2,31 +2,30 @@
 
 The samplers of a trial are created from the study's seed and the trial's number. They receive the trials of
 earlier batches and the earlier proposals of the same batch. A proposal depends on nothing else: neither on
-threads nor on an interruption, a SIGKILL during a proposal included.
+threads nor on an interruption. Optuna has all of it in memory; the journal has the finished trials.
 """
 
 from __future__ import annotations
 
 import hashlib
-import json
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from pathlib import Path
 from types import ModuleType
-from typing import TYPE_CHECKING, Any, BinaryIO, cast
+from typing import TYPE_CHECKING
 
-from spheretwin.models.base.errors import InputError, SpheretwinError, without_breaks
+from spheretwin.models.base.errors import InputError
 from spheretwin.study import optimise as objectives
-from spheretwin.study.journal import lock
 from spheretwin.study.optimise import Gain, Optimise
 from spheretwin.study.tuning.gains import numbers, start_of
 from spheretwin.study.tuning.local_search import proposed
 from spheretwin.study.tuning.trials import Ended, FinishedTrial, Tried
 
 if TYPE_CHECKING:
-    from optuna.storages import BaseStorage
+    from optuna import Trial
+    from optuna.samplers import BaseSampler
 
-NAME = "trials.jsonl"
+# Of NSGA-II: some generations have to fit into as many trials as are usual here.
+POPULATION = 20
 
 
 def optuna() -> ModuleType:
@@ -48,165 +47,56 @@ def optuna() -> ModuleType:
 
 
 @contextmanager
-def opened(path: Path) -> Iterator[BaseStorage]:
-    """Storage in a file, new or continued; Optuna logs warnings alone.
-
-    Raises
-    ------
-    InputError
-        Another process writes it, or it is none.
-    SpheretwinError
-        It could not be written, as on a full disk; earlier trials are stored.
-    """
-    module = optuna()
-    verbosity = module.logging.get_verbosity()
-    module.logging.set_verbosity(module.logging.WARNING)
+def warnings_only() -> Iterator[None]:
+    """Let Optuna log warnings alone."""
+    logging = optuna().logging
+    verbosity = logging.get_verbosity()
+    logging.set_verbosity(logging.WARNING)
     try:
-        with _locked(path) as file:
-            _drop_torn_line(file, path)
-            yield _read(module, path)
-    except OSError as error:
-        raise SpheretwinError(
-            f"study: {path} could not be written, {error.strerror or error}; the trials before are kept"
-        ) from None
+        yield
     finally:
-        module.logging.set_verbosity(verbosity)
-
-
-class _NoLock:
-    """Lock of Optuna, which acquires and releases it at each line: the process holds one for all lines."""
-
-    def acquire(self) -> bool:
-        return True
-
-    def release(self) -> None:
-        pass
-
-
-@contextmanager
-def _locked(path: Path) -> Iterator[BinaryIO]:
-    try:
-        file = path.open("r+b" if path.exists() else "x+b")
-    except OSError as error:
-        raise InputError(f"study: expected a folder for its trials, {without_breaks(error)}") from None
-    with file:
-        try:
-            lock(file)
-        except OSError:
-            raise InputError(
-                f"study: expected one process at a time, received {path}, which another one writes"
-            ) from None
-        yield file
-
-
-def _drop_torn_line(file: BinaryIO, path: Path) -> None:
-    content = file.read()
-    whole = content[: content.rfind(b"\n") + 1]
-    try:
-        if whole:  # Optuna finds any line but the last one itself
-            json.loads(whole[whole[:-1].rfind(b"\n") + 1 :])
-    except ValueError as error:
-        raise _no_trials(path, error) from None
-    file.truncate(len(whole))
-
-
-def _read(module: ModuleType, path: Path) -> BaseStorage:
-    journal = module.storages.journal
-    try:
-        return journal.JournalStorage(journal.JournalFileBackend(str(path), cast(Any, _NoLock())))
-    except OSError:
-        raise
-    except Exception as error:  # whatever its parser meets in a file that is none of its own
-        raise _no_trials(path, error) from None
-
-
-def _no_trials(path: Path, error: Exception) -> InputError:
-    return InputError(
-        f"study: expected trials of Optuna, received {path} ({type(error).__name__});"
-        " remove it, or write into another folder"
-    )
-
-
-if TYPE_CHECKING:
-    from optuna import Trial
-    from optuna.samplers import BaseSampler
-    from optuna.storages import BaseStorage
-    from optuna.trial import FrozenTrial
-
-# Of NSGA-II: some generations have to fit into as many trials as are usual here.
-POPULATION = 20
-
-DIGEST, BY_ROW, REASON = "digest", "each", "reason"
+        logging.set_verbosity(verbosity)
 
 
 class Proposer:
-    """Trials of one law in the storage of Optuna.
+    """Trials of one law in an Optuna study.
 
     Parameters
     ----------
-    storage : BaseStorage
     law : str
-        Name under which its trials are stored.
-    digest : str
-        Of all that its results depend on.
+        Its name is part of the seeds.
     gains : sequence of Gain
     optimise : Optimise
     seed : int
-    rows : int
-        Of each trial.
+    finished : mapping of int to FinishedTrial
+        Trials of earlier runs by number.
 
-    Raises
-    ------
-    InputError
-        The stored trials are those of another study.
+    Attributes
+    ----------
+    finished : dict of int to FinishedTrial
+        All finished trials by number.
     """
 
     def __init__(
         self,
-        storage: BaseStorage,
         law: str,
-        digest: str,
         gains: Sequence[Gain],
         optimise: Optimise,
         seed: int,
-        rows: int,
+        finished: Mapping[int, FinishedTrial],
     ) -> None:
         self._optuna = optuna()
-        self._law, self._gains, self._optimise, self._seed, self._rows = law, gains, optimise, seed, rows
-        self._storage = storage
-        directions = [
-            "minimize" if objective.direction == "minimise" else "maximize"
-            for objective in optimise.objective
-        ]
-        if law in {existing.study_name for existing in storage.get_all_studies()}:
-            self._study = self._optuna.load_study(study_name=law, storage=storage)
-        else:
-            self._study = self._optuna.create_study(study_name=law, storage=storage, directions=directions)
-        trials = self._study.get_trials(deepcopy=False)
-        stored = self._study.user_attrs.get(DIGEST)
-        if stored is None and not trials:
-            self._study.set_user_attr(DIGEST, digest)
-        elif stored != digest:
-            raise InputError(
-                f"study: expected trials of this study with these sources and versions for {law},"
-                " received those of others; remove them, or write into another folder"
-            )
-        start = start_of(gains)
-        if start is not None and not trials:
-            self._study.enqueue_trial(start)
-
-    @property
-    def finished(self) -> list[FinishedTrial]:
-        """Finished trials, by number."""
-        trials = self._study.get_trials(deepcopy=False)
-        return [self._of(trial) for trial in trials if trial.state.is_finished()]
+        self._law, self._gains, self._optimise, self._seed = law, gains, optimise, seed
+        self.finished = dict(finished)
+        directions = ["minimize" if objective.sign > 0 else "maximize" for objective in optimise.objective]
+        self._study = self._optuna.create_study(directions=directions)
 
     @property
     def best(self) -> list[int]:
         """Numbers of the best trial, of the best within each limit, or of the front."""
         completed = {
-            trial.number: trial.tried.values
-            for trial in self.finished
+            number: trial.tried.values
+            for number, trial in sorted(self.finished.items())
             if trial.tried.ended == Ended.COMPLETED
         }
         if len(self._optimise.objective) == 1:
@@ -222,63 +112,56 @@ class Proposer:
                 front.append(number)
         return front
 
-    def propose(self, number: int) -> Trial:
-        """Trial of a number; an earlier proposal of it is repeated. Numbers are proposed in order."""
+    def propose(self, batch: range) -> list[Trial]:
+        """Return the unfinished trials of a batch; batches are proposed in order, from the first on.
+
+        All trials of the batch are proposed before the result of a finished one is known to the samplers.
+        """
+        trials = [self._propose(number) for number in batch]
+        for trial in trials:
+            if trial.number in self.finished:
+                self._tell(trial, self.finished[trial.number].tried)
+        return [trial for trial in trials if trial.number not in self.finished]
+
+    def tell(self, trial: Trial, tried: Tried) -> None:
+        """Take the result of a trial."""
+        self.finished[trial.number] = FinishedTrial(trial.number, trial.params, tried)
+        self._tell(trial, tried)
+
+    def _propose(self, number: int) -> Trial:
+        if fixed := self._fixed(number):
+            self._study.enqueue_trial(fixed)
         self._study.sampler = self._sampler(number)
-        trials = self._study.get_trials(deepcopy=False)
-        waiting = self._optuna.trial.TrialState.WAITING
-        if number < len(trials) and trials[number].state != waiting:
-            study_id = self._storage.get_study_id_from_name(self._law)
-            trial_id = self._storage.get_trial_id_from_study_id_trial_number(study_id, number)
-            trial = self._optuna.trial.Trial(self._study, trial_id)
-        else:
-            if self._optimise.sampler == "local" and number >= len(trials):
-                self._study.enqueue_trial(self._local(number))
-            trial = self._study.ask()
+        trial = self._study.ask()
         for name, (low, high, is_log) in numbers(self._gains).items():
-            # A sampler for each gain: gains that a killed process proposed are not proposed again.
+            # A sampler for each gain: a gain that is known takes nothing from the random stream of the next.
             self._study.sampler = self._sampler(number, name)
             trial.suggest_float(name, low, high, log=is_log)
         return trial
 
-    def tell(self, trial: Trial, tried: Tried) -> None:
-        """Store the result of a trial."""
-        # A killed process may have stored a part of it, and Optuna warns of a second time.
-        before: FrozenTrial = self._study.get_trials(deepcopy=False)[trial.number]
-        state = self._optuna.trial.TrialState
-        trial.set_user_attr(BY_ROW, tried.by_row)
-        if tried.ended == Ended.LOST:
-            trial.set_user_attr(REASON, tried.reason)
-            if not before.constraints:  # known as worse than any that completes
-                trial.set_constraint("completed", 1.0)
-        can_report = len(self._optimise.objective) == 1 and not before.intermediate_values
-        if tried.ended == Ended.PRUNED and can_report:  # Optuna takes no reports of two objectives
-            trial.report(self._signed(tried.values)[0], len(tried.by_row))
-        if tried.ended == Ended.COMPLETED:
-            self._study.tell(trial, self._signed(tried.values))
-        else:
-            self._study.tell(trial, state=state.PRUNED)
-
-    def _local(self, number: int) -> dict[str, float]:
+    def _fixed(self, number: int) -> Mapping[str, float] | None:
+        """Return the gains of a trial that no sampler of Optuna chooses, as far as they are known."""
+        if number in self.finished:
+            return self.finished[number].chosen
+        if number == 0 and (start := start_of(self._gains)):
+            return start
+        if self._optimise.sampler != "local":
+            return None
         first = number - number % self._optimise.together
-        earlier = [trial for trial in self.finished if trial.number < first]
+        earlier = [trial for _, trial in sorted(self.finished.items()) if trial.number < first]
         return proposed(self._gains, self._optimise, f"{self._seed} {self._law}", number, earlier)
 
-    def _signed(self, values: Sequence[float]) -> list[float]:
+    def _tell(self, trial: Trial, tried: Tried) -> None:
         signs = [objective.sign for objective in self._optimise.objective]
-        return [sign * value for sign, value in zip(signs, values, strict=True)]
-
-    def _of(self, trial: FrozenTrial) -> FinishedTrial:
-        attributes: dict[str, Any] = trial.user_attrs
-        by_row = attributes.get(BY_ROW, [])
-        values = [
-            objectives.of_rows(objective, [row[i] for row in by_row], self._rows)
-            for i, objective in enumerate(self._optimise.objective)
-        ]
-        reason = attributes.get(REASON, "" if BY_ROW in attributes else "told of by another program")
-        completed = trial.state == self._optuna.trial.TrialState.COMPLETE
-        ended = Ended.LOST if reason else Ended.COMPLETED if completed else Ended.PRUNED
-        return FinishedTrial(trial.number, trial.params, Tried(ended, reason, values, by_row))
+        values = [sign * value for sign, value in zip(signs, tried.values, strict=True)]
+        if tried.ended == Ended.LOST:
+            trial.set_constraint("completed", 1.0)  # known as worse than any that completes
+        if tried.ended == Ended.PRUNED and len(values) == 1:  # Optuna takes no reports of two objectives
+            trial.report(values[0], len(tried.by_row))
+        if tried.ended == Ended.COMPLETED:
+            self._study.tell(trial, values)
+        else:
+            self._study.tell(trial, state=self._optuna.trial.TrialState.PRUNED)
 
     def _sampler(self, number: int, gain: str = "") -> BaseSampler:
         digest = hashlib.sha256(f"{self._seed} {self._law} {number} {gain}".encode()).digest()

@@ -81,9 +81,9 @@ def run_trial(
         result = rows.run(with_fields(row, fields))
         numbers = [optimise.of_row(objective, figure_of(result, objective)) for objective in objectives]
         if reason := _reason_of_loss(row, result, objectives, numbers):
-            return Tried(Ended.LOST, reason, _values(objectives, by_row, len(conditions)), by_row)
+            return Tried(Ended.LOST, reason, values_of(objectives, by_row, len(conditions)), by_row)
         by_row.append([number for number in numbers if number is not None])
-        values = _values(objectives, by_row, len(conditions))
+        values = values_of(objectives, by_row, len(conditions))
         if len(by_row) < len(conditions) and has_lost(values):
             return Tried(Ended.PRUNED, "", values, by_row)
     return Tried(Ended.COMPLETED, "", values, by_row)
@@ -111,7 +111,8 @@ def _reason_of_loss(
     return ""
 
 
-def _values(objectives: Sequence[Objective], by_row: Sequence[Sequence[float]], rows: int) -> list[float]:
+def values_of(objectives: Sequence[Objective], by_row: Sequence[Sequence[float]], rows: int) -> list[float]:
+    """Objectives of a trial of a number of rows, some of which were run."""
     return [
         optimise.of_rows(objective, [values[i] for values in by_row], rows)
         for i, objective in enumerate(objectives)

@@ -16,14 +16,14 @@ from spheretwin.study import agreement
 from spheretwin.study import optimise as objectives
 from spheretwin.study.engines.threads import run_each
 from spheretwin.study.grid import Grid, Row
-from spheretwin.study.journal import digest_of
+from spheretwin.study.journal import Journal, digest_of
 from spheretwin.study.optimise import Gain, Objective, Optimise
 from spheretwin.study.row import Rows
 from spheretwin.study.study import Study
 from spheretwin.study.tuning import gains, sampler
 from spheretwin.study.tuning import trials as trial
-from spheretwin.study.tuning.sampler import Proposer
-from spheretwin.study.tuning.trials import Ended, FinishedTrial, Tried
+from spheretwin.study.tuning.sampler import Proposer, warnings_only
+from spheretwin.study.tuning.trials import Ended, FinishedTrial, Tried, values_of
 
 if TYPE_CHECKING:
     from optuna import Trial
@@ -87,7 +87,10 @@ def hold_out(
     }
 
 
-NAME = "trials.parquet"
+NAME, JOURNAL = "trials.parquet", "trials.jsonl"
+
+MOST_TRIALS = 10**7
+"""Of all laws: numbers of the journal."""
 
 LawTrials = tuple[str, Sequence[Gain], Sequence[FinishedTrial], Sequence[int]]
 """Name of a law, its gains, its trials, numbers of the best."""
@@ -230,8 +233,7 @@ def tune(
     folder : Path
         For storage and table. Trials of the same study in it are continued.
     trials : int, optional
-        Of each law; the study's unless given. More are the same and some more, where the number before was a
-        multiple of those proposed together.
+        Of each law; the study's unless given. More are the same and some more.
     threads : int, optional
         Number of cores unless given; the result does not depend on it.
     done : callable
@@ -253,19 +255,15 @@ def tune(
     gains.check(study, rows, [(law.gains, law.conditions[0]) for law in laws])
     make_folder(folder)
     planned = trials or optimise.planned
-    with sampler.opened(folder / sampler.NAME) as storage:
-        digest = _digest(rows, optimise)
-        for law in laws:
-            law.proposer = Proposer(
-                storage, law.called, digest, law.gains, optimise, study.seed, len(law.conditions)
-            )
+    digest = _digest(rows, optimise)
+    with warnings_only(), Journal(folder / JOURNAL, digest, MOST_TRIALS) as journal:
+        for place, law in enumerate(laws):
+            law.open(journal, place, len(laws))
         resumed = sum(len(law.proposer.finished) for law in laws)
         try:
             _fill(laws, planned, threads, done, stop_requested)
         finally:
-            trials_of_laws = [
-                (law.called, law.gains, law.proposer.finished, law.proposer.best) for law in laws
-            ]
+            trials_of_laws = [(law.called, law.gains, law.trials, law.proposer.best) for law in laws]
             write(folder / NAME, study, rows, trials_of_laws)
         results = [law.result(threads, stop_requested) for law in laws]
     finished = sum(len(result.trials) for result in results)
@@ -280,9 +278,10 @@ def tune(
 
 
 class _Law:
-    """Runs trials of one law."""
+    """Runs trials of one law and stores them."""
 
     proposer: Proposer
+    _journal: Journal
 
     def __init__(self, study: Study, rows: Rows, law: Mapping[str, Any] | None) -> None:
         self._rows, self._study, self._law = rows, study, law
@@ -291,24 +290,42 @@ class _Law:
         self.gains: tuple[Gain, ...] = gains.gains_of(study, law, rows)
         self.conditions: list[Row] = [row for row in Grid(rows.study) if row.law == law]
 
-    def batches(self, planned: int) -> Iterator[range]:
-        """Numbers of the trials that are proposed together and not all finished."""
-        finished = {trial.number for trial in self.proposer.finished}
+    def open(self, journal: Journal, place: int, laws: int) -> None:
+        """Read the trials of the law, which is at a place among the laws, from a journal."""
+        self._journal, self._place, self._laws = journal, place, laws
+        finished: dict[int, FinishedTrial] = {}
+        for stored, (chosen, ended, reason, by_row) in journal.records():
+            if stored % laws == place:
+                values = values_of(self._optimise.objective, by_row, len(self.conditions))
+                tried = Tried(Ended(ended), reason, values, by_row)
+                finished[stored // laws] = FinishedTrial(stored // laws, chosen, tried)
+        self.proposer = Proposer(self.called, self.gains, self._optimise, self._study.seed, finished)
+
+    @property
+    def trials(self) -> list[FinishedTrial]:
+        """Finished trials, by number."""
+        return [trial for _, trial in sorted(self.proposer.finished.items())]
+
+    def batches(self, planned: int) -> Iterator[list[Trial]]:
+        """Propose the trials, some together; yield the unfinished ones of each batch that has any."""
         for first in range(0, planned, self._optimise.together):
             batch = range(first, min(first + self._optimise.together, planned))
-            if not finished.issuperset(batch):
-                yield batch
+            if proposals := self.proposer.propose(batch):
+                yield proposals
 
     def run(
-        self, batch: range, threads: int | None, stop_requested: Stop, report: Callable[[], None]
+        self,
+        proposals: Sequence[Trial],
+        threads: int | None,
+        stop_requested: Stop,
+        report: Callable[[], None],
     ) -> None:
         """Run the unfinished trials of a batch."""
-        earlier = self.proposer.finished
-        finished = {trial.number for trial in earlier}
+        first = proposals[0].number - proposals[0].number % self._optimise.together
         completed = [
             trial.tried.values
-            for trial in earlier
-            if trial.number < batch.start and trial.tried.ended == Ended.COMPLETED
+            for trial in self.trials
+            if trial.number < first and trial.tried.ended == Ended.COMPLETED
         ]
 
         def has_lost(values: Sequence[float]) -> bool:
@@ -323,16 +340,17 @@ class _Law:
                 self._rows, self.conditions, fields, self._optimise.objective, has_lost, stop_requested
             )
 
-        proposals = [self.proposer.propose(number) for number in batch if number not in finished]
         with closing(run_each(proposals, run, threads)) as results:
             for proposal, tried in results:
                 if tried is not None:
+                    record = [proposal.params, tried.ended, tried.reason, tried.by_row]
+                    self._journal.append(self._laws * proposal.number + self._place, record)
                     self.proposer.tell(proposal, tried)
                     report()
 
     def result(self, threads: int | None, stop_requested: Stop) -> LawResult:
         """Result of the law: its start and its best, with their holdout."""
-        finished = {trial.number: trial for trial in self.proposer.finished}
+        finished = self.proposer.finished
         has_start = gains.start_of(self.gains) is not None and 0 in finished
         numbers = dict.fromkeys([*([0] if has_start else []), *self.proposer.best])
         fields = {number: gains.values(self.gains, finished[number].chosen) for number in numbers}
@@ -347,7 +365,7 @@ class _Law:
             for number in numbers
         }
         best = [reported[number] for number in self.proposer.best]
-        return LawResult(self.called, list(finished.values()), reported[0] if has_start else None, best)
+        return LawResult(self.called, self.trials, reported[0] if has_start else None, best)
 
     def check_plant(self) -> None:
         """Compare the fast plant with MuJoCo on the first row with the gains of the start."""
@@ -370,12 +388,12 @@ def _fill(
         done(finished, total)
 
     for law in laws:
-        for i, batch in enumerate(law.batches(planned)):
+        for i, proposals in enumerate(law.batches(planned)):
             if stop():
                 return
             if i == 0:
                 law.check_plant()
-            law.run(batch, threads, stop, report)
+            law.run(proposals, threads, stop, report)
 
 
 def _digest(rows: Rows, optimise: Optimise) -> str:

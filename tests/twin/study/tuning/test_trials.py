@@ -9,8 +9,9 @@ import sys
 import pytest
 
 from spheretwin.models.base.errors import InputError, SpheretwinError
-from spheretwin.study.tuning import sampler as storage
-from spheretwin.study.tuning.tuning import tune
+from spheretwin.study import journal
+from spheretwin.study.tuning.tuning import JOURNAL, tune
+from tests.twin.study.cases import Full
 from tests.twin.study.tuning.cases import TWO, gain, study
 
 TRIALS = 24
@@ -21,7 +22,7 @@ def table(folder):
 
 
 def lines(folder):
-    return (folder / storage.NAME).read_bytes().splitlines(keepends=True)
+    return (folder / JOURNAL).read_bytes().splitlines(keepends=True)
 
 
 LOCAL = {"sampler": "local", "draws": 10, "perturbations": 14}
@@ -38,7 +39,7 @@ def test_wherever_a_process_was_killed_it_is_gone_on_as_if_it_had_not_been(tmp_p
     for place, end in enumerate(ends):
         folder = tmp_path / str(place)
         folder.mkdir()
-        (folder / storage.NAME).write_bytes(kept[:end])
+        (folder / JOURNAL).write_bytes(kept[:end])
         found = tune(noisy, folder, trials=TRIALS, threads=2)
         assert found.resumed < TRIALS
         assert found.trials == found.of == TRIALS
@@ -50,7 +51,7 @@ def test_every_cut_within_one_batch_is_gone_on_with(tmp_path):
     tune(noisy, tmp_path, trials=16, threads=1)
     whole, kept = table(tmp_path), lines(tmp_path)
     for count in range(len(kept) - 30, len(kept)):
-        (tmp_path / storage.NAME).write_bytes(b"".join(kept[:count]))
+        (tmp_path / JOURNAL).write_bytes(b"".join(kept[:count]))
         tune(noisy, tmp_path, trials=16, threads=1)
         assert table(tmp_path) == whole
 
@@ -103,11 +104,11 @@ def test_what_is_stopped_goes_on(tmp_path):
 def test_what_is_finished_is_not_run_again(tmp_path, monkeypatch):
     noisy = study(tmp_path, **TWO)
     tune(noisy, tmp_path, trials=8)
-    before = (tmp_path / storage.NAME).read_bytes()
+    before = (tmp_path / JOURNAL).read_bytes()
     monkeypatch.setattr("spheretwin.study.tuning.trials.run_trial", None)
     found = tune(noisy, tmp_path, trials=8)
     assert (found.trials, found.resumed) == (8, 8)
-    assert (tmp_path / storage.NAME).read_bytes() == before
+    assert (tmp_path / JOURNAL).read_bytes() == before
 
 
 OTHERS = {
@@ -122,10 +123,12 @@ OTHERS = {
 @pytest.mark.parametrize("other", OTHERS)
 def test_trials_of_another_study_are_refused(tmp_path, other):
     tune(study(tmp_path, **TWO), tmp_path, trials=4)
-    before = (tmp_path / storage.NAME).read_bytes()
-    with pytest.raises(InputError, match=r"expected trials of this study .* received those of others"):
+    before = (tmp_path / JOURNAL).read_bytes()
+    with pytest.raises(
+        InputError, match=r"expected .* to be a journal of this study .* received one of others"
+    ):
         tune(study(tmp_path, **{**TWO, **OTHERS[other]}), tmp_path, trials=4)
-    assert (tmp_path / storage.NAME).read_bytes() == before
+    assert (tmp_path / JOURNAL).read_bytes() == before
 
 
 def test_trials_under_figures_that_were_edited_are_refused(tmp_path):
@@ -133,16 +136,16 @@ def test_trials_under_figures_that_were_edited_are_refused(tmp_path):
     tune(noisy, tmp_path, trials=4)
     with (tmp_path / "figures.py").open("a") as file:
         file.write("# edited\n")
-    with pytest.raises(InputError, match="received those of others"):
+    with pytest.raises(InputError, match="received one of others"):
         tune(noisy, tmp_path, trials=4)
 
 
 @pytest.mark.parametrize("content", [b"no trials\n", b'{"op_code": 0}\n', b"[1, 2]\n{}\n", b"\x00\xff\n"])
 def test_a_file_that_is_none_is_refused(tmp_path, content):
-    (tmp_path / storage.NAME).write_bytes(content)
-    with pytest.raises(InputError, match=r"expected trials of Optuna, received .*trials\.jsonl"):
+    (tmp_path / JOURNAL).write_bytes(content)
+    with pytest.raises(InputError, match=r"expected a journal of a study, received .*trials\.jsonl"):
         tune(study(tmp_path, **TWO), tmp_path, trials=4)
-    assert (tmp_path / storage.NAME).read_bytes() == content
+    assert (tmp_path / JOURNAL).read_bytes() == content
 
 
 def test_a_folder_that_cannot_be_used_is_refused(tmp_path):
@@ -153,16 +156,9 @@ def test_a_folder_that_cannot_be_used_is_refused(tmp_path):
 
 def test_a_full_disk_loses_no_trial(tmp_path, monkeypatch):
     noisy = study(tmp_path, **TWO)
-    optuna = storage.optuna()
-    append, written = optuna.storages.journal.JournalFileBackend.append_logs, iter(range(10**9))
-
-    def full(self, logs):
-        if next(written) > 60:
-            raise OSError(28, "No space left on device")
-        append(self, logs)
-
+    opened = journal._opened
     with monkeypatch.context() as patch:
-        patch.setattr(optuna.storages.journal.JournalFileBackend, "append_logs", full)
+        patch.setattr(journal, "_opened", lambda path: Full(opened(path), 2000))
         with pytest.raises(SpheretwinError, match="could not be written, No space left on device"):
             tune(noisy, tmp_path, trials=TRIALS)
     found = tune(noisy, tmp_path, trials=TRIALS)
@@ -170,15 +166,14 @@ def test_a_full_disk_loses_no_trial(tmp_path, monkeypatch):
     assert found.laws[0].trials == tune(noisy, tmp_path / "once", trials=TRIALS).laws[0].trials
 
 
-def test_any_optuna_opens_the_trials(tmp_path):
-    found = tune(study(tmp_path, **TWO), tmp_path, trials=TRIALS)
-    optuna = storage.optuna()
-    journal = optuna.storages.journal
-    backend = journal.JournalFileBackend(str(tmp_path / storage.NAME))
-    opened = optuna.load_study(study_name="pd", storage=journal.JournalStorage(backend))
-    assert {each.number for each in opened.best_trials} == {
-        each.finished.number for each in found.laws[0].best
-    }
+def test_a_damaged_line_is_run_again(tmp_path):
+    noisy = study(tmp_path, **TWO)
+    tune(noisy, tmp_path, trials=TRIALS)
+    whole, kept = table(tmp_path), lines(tmp_path)
+    kept[5] = kept[5].replace(b"e", b"f", 1)
+    (tmp_path / JOURNAL).write_bytes(b"".join(kept))
+    assert tune(noisy, tmp_path, trials=TRIALS).resumed == TRIALS - 1
+    assert table(tmp_path) == whole
 
 
 def test_without_optuna_the_extra_is_named(tmp_path, monkeypatch):
