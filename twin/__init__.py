@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from spheretwin.scenario.sections import Scenario
     from spheretwin.session import Session
     from spheretwin.simulation import simulate
-    from spheretwin.study import run as sweep
+    from spheretwin.study.runner import run as sweep
 
 # Numba, MuJoCo and the rest are imported with the first name that needs them.
 _MODULES = {
@@ -31,7 +31,7 @@ _MODULES = {
     "Law": ("spheretwin.control.law", "Law"),
     "Run": ("spheretwin.run", "Run"),
     "linearise": ("spheretwin.linear", "linearise"),
-    "sweep": ("spheretwin.study", "run"),
+    "sweep": ("spheretwin.study.runner", "run"),
     "review": ("spheretwin.analysis.review", "review"),
     "read": ("spheretwin.analysis.recorded_run", "open_run"),
     "Bench": ("spheretwin.bench", "Bench"),

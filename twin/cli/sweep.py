@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import argparse
 import contextlib
+import math
 import shlex
 import sys
+from collections.abc import Mapping
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
@@ -17,21 +19,24 @@ from spheretwin.models.base.mujoco_library import timers_stopped
 from spheretwin.models.telemetry.run_record import versions
 from spheretwin.models.telemetry.status import Status
 from spheretwin.study import report, statistics
-from spheretwin.study import run as run_study
 from spheretwin.study.engines import ENGINES
 from spheretwin.study.grid import Grid
 from spheretwin.study.row import Rows
 from spheretwin.study.runner import StudyResult
+from spheretwin.study.runner import run as run_study
 from spheretwin.study.statistics import summary
 from spheretwin.study.study import Study, load, shipped
 from spheretwin.study.tuning import report as tuning_page
 from spheretwin.study.tuning.gains import section_of
 from spheretwin.study.tuning.report import summary as tuning_summary
 from spheretwin.study.tuning.tuning import tune
-from spheretwin.viz.terminal import runs, studies
+from spheretwin.viz.terminal import runs
 from spheretwin.viz.terminal.progress import counted
 
 MOST_THREADS = 1024
+
+MOST_TRIALS = 15
+"""Trials of a front that are printed, evenly along it; the table has all."""
 
 GO_ON = "sweep: finished rows are stored; the same command continues from there"
 
@@ -114,7 +119,10 @@ def run(options: argparse.Namespace) -> bool:
     if options.json:
         print_json({**_outcome_json(outcome), "summary": printed, "versions": versions()})
     else:
-        studies.print_study(study.name, _outcome_json(outcome), printed)
+        runs.print_rows(f"{study.name}: {outcome.rows} of {outcome.of} rows", *report.medians(printed), 1)
+        if outcome.startup_s is not None:
+            print(f"took   {outcome.wall_s:.1f} s, {outcome.startup_s:.1f} s of it to start")
+        print(f"table  {outcome.table}")
         runs.print_written(written)
     if outcome.torn:
         print("spheretwin: sweep: the journal ended in a torn line, which was dropped", file=sys.stderr)
@@ -170,7 +178,8 @@ def _optimised(study: Study, options: argparse.Namespace) -> bool:
     if options.json:
         print_json({**printed, "versions": versions()})
     else:
-        studies.print_tuning(study.name, printed)
+        _print_laws(study.name, printed["laws"])
+        print(f"table  {outcome.table}")
         runs.print_written(written)
     if outcome.trials < outcome.of:
         print(
@@ -179,6 +188,23 @@ def _optimised(study: Study, options: argparse.Namespace) -> bool:
             file=sys.stderr,
         )
     return outcome.trials >= outcome.of
+
+
+def _print_laws(name: str, laws: Mapping[str, Any]) -> None:
+    """Print the start of each law and its best trial, or its front."""
+    for law, of_law in laws.items():
+        front = of_law["best"]
+        step = max(1, math.ceil(len(front) / MOST_TRIALS))
+        head, body = tuning_page.chosen({**of_law, "best": front[::step]})
+        if body:
+            runs.print_rows(f"{name}, {law}", head, body, 1)
+        else:
+            print(f"{name}, {law}: {tuning_page.NONE_COMPLETED}")
+        print(tuning_page.counted(of_law))
+        if step > 1:
+            print(f"{len(front[::step])} of the {len(front)} trials of the front")
+        if len(front) == 1:
+            print(front[0]["command"])
 
 
 def _outcome_json(outcome: StudyResult) -> dict[str, Any]:

@@ -237,7 +237,9 @@ def write(
     """
     study, command = rows.study, f"spheretwin sweep {shlex.quote(source)}"
     figures = list(drawings(rows))
-    sections = ["## Metrics of the rows", "", *_summary(summary), ""]
+    head, body = medians(summary)
+    table = pieces.table(head, body, [False, *(True for _ in summary)])
+    sections = ["## Metrics of the rows", "", *table, ""]
     sections += ["## Figures", "", *map(pieces.figure, figures)] if figures else []
     sections += [*_worst(rows, command), *_failures(rows)]
     sections += ["## Varied fields", "", *_axes(study, rows), ""]
@@ -255,16 +257,15 @@ def _ends(rows: Rows, of: int, total: int) -> str:
     return f"{count} of {of} rows: {ends or 'none'}.{missing}{first}"
 
 
-def _summary(summary: Mapping[str, Any]) -> list[str]:
-    """Median and 95 % range of each figure, a column a law; below them the statuses."""
+def medians(summary: Mapping[str, Any]) -> tuple[list[str], list[list[str]]]:
+    """Headings and rows of a table: median and 95 % range of each figure, then the statuses, by law."""
     figures = [name for name in next(iter(summary.values()), {}) if name != "statuses"]
     statuses = sorted({status for of_law in summary.values() for status in of_law["statuses"]})
     body = [[name, *(_spread(of_law[name]) for of_law in summary.values())] for name in figures]
     body += [
         [name, *(str(of_law["statuses"].get(name, 0)) for of_law in summary.values())] for name in statuses
     ]
-    head = ["median (95 % range) of the completed rows", *summary]
-    return pieces.table(head, body, [False, *(True for _ in summary)])
+    return ["median (95 % range) of the completed rows", *summary], body
 
 
 def _spread(figure: Mapping[str, Any]) -> str:

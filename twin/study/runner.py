@@ -17,7 +17,7 @@ from spheretwin.study.engines.engine import Engine, Order, Work
 from spheretwin.study.grid import Grid
 from spheretwin.study.journal import Journal, digest_of
 from spheretwin.study.row import Rows
-from spheretwin.study.study import Study
+from spheretwin.study.study import Study, load
 
 CHECKED_ROWS = 32
 """Rows of a law of which at least one must make a scenario."""
@@ -105,19 +105,52 @@ class StudyResult(NamedTuple):
     table: Path
 
 
-def run_study(
-    study: Study,
-    folder: Path,
+def run(
+    study: Study | str,
+    out: Path | str | None = None,
     *,
-    engine: str,
-    address: str | None,
-    threads: int | None,
-    limit: int | None,
-    done: Callable[[int, int], None],
-    stop_requested: Callable[[], bool],
+    engine: str = "local",
+    address: str | None = None,
+    threads: int | None = None,
+    limit: int | None = None,
+    done: Callable[[int, int], None] = lambda rows, of: None,
+    stop_requested: Callable[[], bool] = lambda: False,
 ) -> StudyResult:
-    """Run a study, as `spheretwin.study.run` says."""
+    """Run a study.
+
+    Parameters
+    ----------
+    study : Study or str
+        Study, its shipped name, or the path of its TOML file.
+    out : path, optional
+        Folder of journal and table; ``NAME_study`` in the working folder unless given. Rows in a journal of
+        the same study are not run again.
+    engine : str
+        ``local``, threads of this process, or ``ray``; the table does not depend on it.
+    address : str, optional
+        For ``ray``: ``auto``, ``HOST`` or ``HOST:PORT`` of a cluster that this machine is a node of; every
+        node needs the same sources, versions and files. Without it a cluster on this machine is started for
+        the study.
+    threads : int, optional
+        Rows at a time; number of cores unless given. The table does not depend on it.
+    limit : int, optional
+        Run only this number of first rows. The table includes later rows that were finished earlier.
+    done : callable
+        Receives the number of finished rows, and of all rows, after each row.
+    stop_requested : callable
+        After True the running rows are finished, and no other is started.
+
+    Raises
+    ------
+    InputError
+        The study, the scenario or the folder cannot be used.
+    SpheretwinError
+        A row differs between the plants, a file could not be written, or a cluster was lost; finished rows
+        are stored.
+    """
     started = time.perf_counter()
+    study = load(study) if isinstance(study, str) else study
+    folder = Path(out) if out is not None else Path(f"{study.name}_study")
     chosen = _engine(engine, address)
     grid = Grid(study)
     make_folder(folder)

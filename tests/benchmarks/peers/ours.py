@@ -10,11 +10,10 @@ import pyarrow.parquet as parquet
 from problem import Problem, problem
 
 from spheretwin import scenario as scenarios
-from spheretwin import study as studies
 from spheretwin.metrics import METRICS, PlannedRun
 from spheretwin.scenario.sections import Scenario
 from spheretwin.session import Session
-from spheretwin.study import grid, row
+from spheretwin.study import grid, row, runner
 from spheretwin.study.study import Study, made
 
 SCENARIO = "nutation"
@@ -53,7 +52,7 @@ def problems(chosen: Study) -> list[Problem]:
 def carried_out(chosen: Study) -> dict[str, np.ndarray]:
     """Run a study, whole: journal, figures, table. Returns the figures, (rows, 3) each."""
     with tempfile.TemporaryDirectory() as folder:
-        studies.run(chosen, Path(folder))
+        runner.run(chosen, Path(folder))
         table = parquet.read_table(Path(folder) / "table.parquet", columns=list(FIGURES))
     return {name: np.array(table[name].to_pylist()) for name in FIGURES}
 

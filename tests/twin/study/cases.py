@@ -5,8 +5,7 @@ import os
 
 import pyarrow.parquet as parquet
 
-from spheretwin.study import run
-from spheretwin.study.runner import TELEMETRY
+from spheretwin.study.runner import TELEMETRY, run
 from spheretwin.study.study import made
 
 SHORT = {"duration": 0.02}

@@ -6,9 +6,10 @@ import re
 import pytest
 
 from spheretwin.models.base.errors import InputError, SpheretwinError
-from spheretwin.study import agreement, run
+from spheretwin.study import agreement
 from spheretwin.study import table as tables
 from spheretwin.study.engines.threads import AHEAD
+from spheretwin.study.runner import run
 from tests.twin.study.cases import found, loads, rows_of, study, table, values
 
 

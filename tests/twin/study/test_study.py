@@ -3,9 +3,10 @@
 import pytest
 
 from spheretwin.models.base.errors import InputError
-from spheretwin.study import run, runner
+from spheretwin.study import runner
 from spheretwin.study.grid import Grid
 from spheretwin.study.row import Rows
+from spheretwin.study.runner import run
 from spheretwin.study.study import load, shipped
 from tests.twin.study.cases import LOADS, found, study, values
 

@@ -186,7 +186,9 @@ def write(
     sections = ["## Method", "", *_what(study), ""]
     sections += ["## Figures", "", *map(pieces.figure, figures)] if figures else []
     for law, of_law in summary(result, optimise.objective)["laws"].items():
-        sections += [f"## {law}", "", _counted(of_law), "", *_chosen(of_law), ""]
+        head, body = chosen(of_law)
+        table = pieces.table(head, body, [False, *(True for _ in head[1:])]) if body else [NONE_COMPLETED]
+        sections += [f"## {law}", "", counted(of_law), "", *table, ""]
     gains = json.dumps(best(result, optimise.objective), indent=1, ensure_ascii=False)
     lead = [study.description]
     return [
@@ -241,19 +243,26 @@ def _sets(settings: Sequence[Any]) -> str:
     )
 
 
-def _counted(of_law: Mapping[str, Any]) -> str:
+def counted(of_law: Mapping[str, Any]) -> str:
+    """Trials of a law by their statuses, its rows, and the reason of the first that lost."""
     ended = ", ".join(f"{count} {how}" for how, count in of_law["ended"].items() if count)
     lost = f" The first that lost: {of_law['lost']}." if of_law["lost"] else ""
     return f"Trials: {ended or 'none'}; {of_law['rows']} rows were run.{lost}"
 
 
-def _chosen(of_law: Mapping[str, Any]) -> list[str]:
-    """The start, and the best or the front: gains, fields, objectives."""
+NONE_COMPLETED = "No trial completed."
+
+
+def chosen(of_law: Mapping[str, Any]) -> tuple[list[str], list[list[str]]]:
+    """Headings and rows of a table: gains, fields and objectives of the start and of the best or the front.
+
+    Without rows if no trial completed.
+    """
     labelled = [("start", of_law["start"])] if of_law["start"] else []
     labelled += [(str(candidate["trial"]), candidate) for candidate in of_law["best"]]
     values = next((list(candidate["values"]) for _, candidate in labelled if candidate["values"]), None)
     if values is None:
-        return ["No trial completed."]
+        return [], []
     columns = dict.fromkeys(
         [*labelled[0][1]["gains"], *(field for _, candidate in labelled for field in candidate["fields"])]
     )
@@ -264,7 +273,8 @@ def _chosen(of_law: Mapping[str, Any]) -> list[str]:
         numbers = {**candidate["gains"], **candidate["fields"]}
         values_of = map(numbers.get, columns)
         cells = ["off" if value is None else f"{value:.4g}" for value in values_of]
-        for figures in [candidate["values"], *([candidate["fresh"]] if is_fresh else [])]:
-            cells += [f"{figures[name]:.4g}" if figures else "lost" for name in values]
+        groups = [(candidate["values"], candidate["ended"]), (candidate["fresh"], "lost")]
+        for figures, otherwise in groups if is_fresh else groups[:1]:
+            cells += [f"{figures[name]:.4g}" if figures else otherwise for name in values]
         body.append([label, *cells])
-    return pieces.table(head, body, [False, *(True for _ in head[1:])])
+    return head, body

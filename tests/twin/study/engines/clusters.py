@@ -1,6 +1,6 @@
 """A study, and a sweep of it on a Ray cluster."""
 
-from spheretwin import study as studies
+from spheretwin.study import runner
 
 STUDY = """
 name = "small"
@@ -25,7 +25,7 @@ ROWS = 240
 
 
 def run(study, folder, machines, **options):
-    return studies.run(study, folder, engine="ray", address=machines.address, **options)
+    return runner.run(study, folder, engine="ray", address=machines.address, **options)
 
 
 def same_table(folder, wanted):

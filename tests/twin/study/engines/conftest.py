@@ -4,7 +4,7 @@ import os
 
 import pytest
 
-from spheretwin import study as studies
+from spheretwin.study import runner
 from spheretwin.study.engines import ray_cluster
 from spheretwin.study.study import Study, load
 from tests.twin.study.engines.clusters import STUDY
@@ -21,7 +21,7 @@ def study(tmp_path_factory) -> Study:
 def wanted(study, tmp_path_factory):
     """Folder of the same study on the local engine."""
     folder = tmp_path_factory.mktemp("local")
-    studies.run(study, folder)
+    runner.run(study, folder)
     return folder
 
 

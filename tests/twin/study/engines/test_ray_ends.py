@@ -7,9 +7,8 @@ import sys
 
 import pytest
 
-from spheretwin import study as studies
 from spheretwin.models.base.errors import SpheretwinError
-from spheretwin.study import journal
+from spheretwin.study import journal, runner
 from spheretwin.study.engines import engine
 from tests.twin.study.cases import rows_of
 from tests.twin.study.engines.clusters import STUDY, run
@@ -39,10 +38,10 @@ def started(source, folder, *options):
 
 def goes_on_locally(source, folder, before):
     """Run the first rows of a study that was stopped: its results are kept, and the others are added."""
-    found = studies.run(str(source), folder / "out", limit=LIMIT)
+    found = runner.run(str(source), folder / "out", limit=LIMIT)
     assert found.resumed >= 10
     assert (folder / "out" / journal.NAME).read_bytes().startswith(before)
-    studies.run(str(source), folder / "local", limit=LIMIT)
+    runner.run(str(source), folder / "local", limit=LIMIT)
     assert rows_of(folder / "out")[:LIMIT] == rows_of(folder / "local")
 
 

@@ -5,9 +5,8 @@ import sys
 
 import pytest
 
-from spheretwin import study as studies
 from spheretwin.models.base.errors import InputError, SpheretwinError
-from spheretwin.study import journal
+from spheretwin.study import journal, runner
 from spheretwin.study.engines import ray_cluster
 from tests.package_copy import copy_package
 from tests.twin.study.engines.clusters import ROWS, run, same_table
@@ -40,13 +39,13 @@ def test_a_node_with_other_sources_is_refused_in_one_line(study, machines, wante
 
 
 def test_an_address_where_nobody_answers_loses_nothing(study, machines, wanted, tmp_path):
-    studies.run(study, tmp_path, limit=20)
+    runner.run(study, tmp_path, limit=20)
     kept = (tmp_path / journal.NAME).read_bytes()
     with socket.socket() as unused:
         unused.bind(("127.0.0.1", 0))
         address = f"127.0.0.1:{unused.getsockname()[1]}"
         with pytest.raises(InputError, match=f"at {address}, received no answer"):
-            studies.run(study, tmp_path, engine="ray", address=address)
+            runner.run(study, tmp_path, engine="ray", address=address)
     assert (tmp_path / journal.NAME).read_bytes() == kept
     found = run(study, tmp_path, machines)
     assert (found.rows, found.resumed) == (ROWS, 20)
@@ -59,7 +58,7 @@ def test_who_answers_but_is_no_cluster_is_refused(study, tmp_path, monkeypatch):
     with socket.create_server(("127.0.0.1", 0)) as silent:
         address = f"127.0.0.1:{silent.getsockname()[1]}"
         with pytest.raises(InputError, match="received an answer, but none of Ray's within 1 s"):
-            studies.run(study, tmp_path, engine="ray", address=address)
+            runner.run(study, tmp_path, engine="ray", address=address)
 
 
 @pytest.mark.parametrize(
@@ -72,11 +71,11 @@ def test_who_answers_but_is_no_cluster_is_refused(study, tmp_path, monkeypatch):
 )
 def test_what_cannot_be_meant_is_refused(study, tmp_path, options, told):
     with pytest.raises(InputError) as refusal:
-        studies.run(study, tmp_path, **options)
+        runner.run(study, tmp_path, **options)
     assert told in str(refusal.value)
 
 
 def test_an_installation_without_ray_names_the_extra(study, tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "ray", None)
     with pytest.raises(InputError, match=r"expected the extra `spheretwin\[cluster\]`"):
-        studies.run(study, tmp_path, engine="ray")
+        runner.run(study, tmp_path, engine="ray")

@@ -194,7 +194,7 @@ def test_people_get_the_start_the_front_and_where_all_is(small, tmp_path, capsys
     assert cli.main(["sweep", small, "--optimise", "--out", str(tmp_path / "out")]) == cli.DONE
     out, err = capsys.readouterr()
     assert err == ""
-    for word in ("small, pd: ", "small, pid: ", "start", "damping of pid", "fresh", "trials.parquet"):
+    for word in ("small, pd", "small, pid", "start", "damping of pid", "fresh", "trials.parquet"):
         assert word in out
 
 

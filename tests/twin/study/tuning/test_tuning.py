@@ -6,9 +6,9 @@ import pyarrow.parquet as parquet
 import pytest
 
 from spheretwin.control.laws.pid import PID
-from spheretwin.study import run
 from spheretwin.study.grid import Grid
 from spheretwin.study.row import Rows
+from spheretwin.study.runner import run
 from spheretwin.study.study import made
 from spheretwin.study.tuning import gains
 from spheretwin.study.tuning import trials as trial
