@@ -184,10 +184,10 @@ class Run:
         if not len(self.telemetry):
             return ""
         try:
-            from spheretwin.viz.figures import overview
+            from spheretwin.viz.figures import comparison
         except ModuleNotFoundError:
             return ""
-        return overview.as_html(overview.overview(self.telemetry, self._title()))
+        return comparison.as_html(comparison.overview(self.telemetry, self._title()))
 
     def _title(self) -> str:
         simulated_s = len(self.telemetry) * self.scenario.controller.period_s

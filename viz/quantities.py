@@ -239,7 +239,7 @@ MEASURED_ANGLE = by_axis(
 
 def tip_distance(rows: QuantityRows) -> Array:
     """Distance between the tip and the desired tip, (n, 1) in mm."""
-    from spheretwin.viz.scene.motion import shaft_tip  # Rerun is slow to import
+    from spheretwin.viz.scene.entities import shaft_tip  # Rerun is slow to import
 
     actual = shaft_tip(rows.table["q_rad"], rows.actuator)
     desired = shaft_tip(rows.table["q_ref_rad"], rows.actuator)

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from spheretwin.models import actuator as actuators
 from spheretwin.models.actuator import Actuator
-from spheretwin.models.meshes import joint, rotor, stator
+from spheretwin.models.meshes import rotor, stator
 
 if TYPE_CHECKING:
     from trimesh import Trimesh
@@ -106,8 +106,8 @@ def meshes(actuator: Actuator) -> dict[str, Trimesh]:
     """
     solids = {
         "stator": stator.stator(actuator),
-        "outer_ring": joint.outer_ring(),
-        "inner_ring": joint.inner_ring(),
+        "outer_ring": rotor.outer_ring(),
+        "inner_ring": rotor.inner_ring(),
         "ball": rotor.ball(actuator),
         "hoop": rotor.hoop(actuator),
         "shaft": rotor.shaft(actuator),

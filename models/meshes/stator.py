@@ -7,8 +7,13 @@ import numpy as np
 from manifold3d import Manifold
 
 from spheretwin.models.actuator import Actuator
-from spheretwin.models.meshes.joint import FORK_INNER_RADIUS_M, FORK_OUTER_RADIUS_M, fork
-from spheretwin.models.meshes.rotor import SHAFT_RADIUS_M, ball_radius
+from spheretwin.models.meshes.rotor import (
+    FORK_INNER_RADIUS_M,
+    FORK_OUTER_RADIUS_M,
+    SHAFT_RADIUS_M,
+    ball_radius,
+    fork,
+)
 from spheretwin.models.meshes.solids import (
     HOLE_SECTIONS,
     MM,

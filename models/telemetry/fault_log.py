@@ -1,10 +1,13 @@
-"""Faults of a run from its telemetry: start, end and detection of each."""
+"""Changes of columns of telemetry, and the faults of a run: start, end and detection of each."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
-from spheretwin.models.telemetry.changes import ColumnChanges
+import numpy as np
+from numpy.typing import NDArray
+
 from spheretwin.models.telemetry.table import Table
 
 FAULT, GROUP_OUT, TIME_TO_DETECTION = "fault", "group_out", "time_to_detection_s"
@@ -71,3 +74,32 @@ def _group_of(part: str) -> int | None:
     """Return the group of a part such as ``coil.07``; None for a part of no group."""
     number = part.partition(".")[2]
     return int(number) if number.isdecimal() else None
+
+
+class StateChange(NamedTuple):
+    """Change of one entry of a column of states."""
+
+    tick: int
+    """Row of the chunk."""
+    t_s: float
+    entry: int
+    state: int
+    """New state."""
+
+
+class ColumnChanges:
+    """Detector of the changes of columns; before the first row every state is 0."""
+
+    def __init__(self) -> None:
+        self._last: dict[str, NDArray[np.float64]] = {}
+
+    def of(self, rows: Table, name: str) -> list[StateChange]:
+        """Return the changes of a column in one chunk, at least one row, in the order of time."""
+        values = rows[name].reshape(len(rows), -1)
+        last = self._last.get(name, np.zeros(values.shape[1]))
+        self._last[name] = values[-1].copy()
+        before = np.concatenate([last[None], values[:-1]])
+        return [
+            StateChange(int(tick), float(rows["t_s"][tick]), int(entry), int(values[tick, entry]))
+            for tick, entry in zip(*np.nonzero(values != before), strict=True)
+        ]

@@ -24,7 +24,7 @@ from spheretwin.outputs import Outputs
 from spheretwin.scenario import reading
 from spheretwin.session import Session
 from spheretwin.simulation import follow
-from spheretwin.viz.recording.viewer_server import RECORDING
+from spheretwin.viz.recording.live import RECORDING
 from tests.browser import CHROMIUM
 from tests.screenshots.bench import drawn
 from tests.screenshots.viewer import DARK, THEMES, HeadlessViewer

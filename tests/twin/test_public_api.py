@@ -193,8 +193,8 @@ def test_representations_are_short_and_hold_the_figures(run, monkeypatch):
     page = run._repr_html_()
     assert "<th>rms_torque_Nm</th>" in page
     assert page.count("<img ") == 1
-    monkeypatch.setitem(sys.modules, "spheretwin.viz.figures.overview", None)
-    monkeypatch.delattr("spheretwin.viz.figures.overview", raising=False)
+    monkeypatch.setitem(sys.modules, "spheretwin.viz.figures.comparison", None)
+    monkeypatch.delattr("spheretwin.viz.figures.comparison", raising=False)
     assert "<img " not in run._repr_html_()
     assert repr(st.load("hold")) == "Scenario(hold: hold under afsm, ideal hardware, 3 s)"
     with st.Session(st.load("hold", SHORT)) as session:

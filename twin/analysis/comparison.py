@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from spheretwin.analysis.differences import LONGEST_VALUE, common_conditions, scenario_differences
 from spheretwin.analysis.recorded_run import Reviewed, events, of_the_actuator
+from spheretwin.analysis.review import LONGEST_VALUE, common_conditions, scenario_differences
 from spheretwin.analysis.run_summary import amplitudes, peaks
 from spheretwin.metrics import BAND_rad
 from spheretwin.models.actuator import MJCF_PATH

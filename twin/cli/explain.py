@@ -15,7 +15,7 @@ from spheretwin.scenario import reading
 from spheretwin.scenario.fields import every_field, fields_of, unit_of
 from spheretwin.scenario.hardware import HARDWARE, ORIGINS
 from spheretwin.scenario.sections import Scenario
-from spheretwin.viz.terminal.fields import print_facts
+from spheretwin.viz.terminal.texts import print_facts
 
 DEFAULT = "default"
 

@@ -10,7 +10,7 @@ from spheretwin.models.base.errors import InputError, did_you_mean, shown
 from spheretwin.scenario import reading
 from spheretwin.scenario.fields import INDEX, every_field, fields_of, kind_of
 from spheretwin.scenario.sections import Scenario
-from spheretwin.viz.terminal.fields import FieldText, print_fields, print_sections
+from spheretwin.viz.terminal.texts import FieldText, print_fields, print_sections
 
 EXAMPLE = "nutation"
 

@@ -228,7 +228,7 @@ def run_map(options: argparse.Namespace) -> bool:
 
 def _plots() -> ModuleType:
     try:
-        return import_module("spheretwin.viz.figures.torque_maps")
+        return import_module("spheretwin.viz.figures.maps")
     except ModuleNotFoundError as error:
         raise InputError(
             "magnetics map: expected the extra `spheretwin[plots]` to draw figures,"

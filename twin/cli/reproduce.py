@@ -13,14 +13,13 @@ from spheretwin.models.base.errors import InputError, did_you_mean, shown
 from spheretwin.models.base.mujoco_library import timers_stopped
 from spheretwin.models.telemetry.run_record import versions
 from spheretwin.paper import EXPERIMENTS, page
-from spheretwin.paper.page import Chapter, chapter_of
-from spheretwin.paper.rows import rows
+from spheretwin.paper.page import Chapter, chapter_of, rows
 from spheretwin.paper.runner import make_plan, run_with_cache, summarise, unexpected_ends
 from spheretwin.plant.step import ENGINES
 from spheretwin.viz.pages.markdown import prepare
 from spheretwin.viz.terminal import runs as tables
 from spheretwin.viz.terminal.progress import runs
-from spheretwin.viz.terminal.verdicts import Verdict, print_verdicts
+from spheretwin.viz.terminal.texts import Verdict, print_verdicts
 
 SEEDS, MOST = 20, 1000
 ALL = "all"

@@ -116,21 +116,21 @@ def draw_differences(evidence: Evidence) -> Drawing:
 
 def draw_friction(evidence: Evidence) -> Drawing:
     """Friction of a hinge: ours and MuJoCo's."""
-    from spheretwin.viz.figures import hinge_friction
+    from spheretwin.viz.figures import crosscheck
 
-    def measured(bearing: Bearing) -> tuple[hinge_friction.Ramped, hinge_friction.Resting]:
+    def measured(bearing: Bearing) -> tuple[crosscheck.Ramped, crosscheck.Resting]:
         hinge, ramp, coast = bearing.hinge, bearing.ramp, bearing.coast
         level = hinge.coulomb_Nm
         rates = {way: motion.qdot_rad_s for way, motion in coast.motions.items()}
         return (
-            hinge_friction.Ramped(
+            crosscheck.Ramped(
                 ramp.torque_Nm, ramp.rates_rad_s, ramp.ideal_rad_s, level, PUSH * level, bearing.creep_rad_s
             ),
-            hinge_friction.Resting(coast.t_s, rates, coast.ideal_rad_s, hinge.ideal_time_s(START_rad_s)),
+            crosscheck.Resting(coast.t_s, rates, coast.ideal_rad_s, hinge.ideal_time_s(START_rad_s)),
         )
 
     bearings = evidence.of(HingeFriction).bearings
-    figure = hinge_friction.hinge_friction(
+    figure = crosscheck.hinge_friction(
         {
             f"Coulomb {name}, viscous {1e3 * VISCOUS_Nm_s:g} mN·m·s": measured(bearing)
             for name, bearing in bearings.items()

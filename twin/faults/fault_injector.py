@@ -10,7 +10,7 @@ from spheretwin.control.supervision.watchdog import REASONS
 from spheretwin.faults.effects import Effects
 from spheretwin.faults.schedule import NEVER, FaultSchedule
 from spheretwin.models.base.state import arrays_of
-from spheretwin.models.telemetry.changes import ColumnChanges
+from spheretwin.models.telemetry.fault_log import ColumnChanges
 from spheretwin.models.telemetry.table import Table
 
 

@@ -14,7 +14,7 @@ from spheretwin.models import actuator
 from spheretwin.models.telemetry.signals import ANGLES
 from spheretwin.paper.experiment import Case, Experiment, Finding, Outcome, Outcomes, ResultTable, Section
 from spheretwin.paper.laws import BY_LAW
-from spheretwin.paper.rows import of_axis, spread_deg
+from spheretwin.paper.page import of_axis, spread_deg
 from spheretwin.scenario.hardware import HARDWARE
 from spheretwin.viz.pages.markdown import Drawing
 

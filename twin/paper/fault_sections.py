@@ -12,7 +12,7 @@ from spheretwin.models.telemetry.status import Status
 from spheretwin.paper import fault_cases as cases
 from spheretwin.paper.experiment import Outcome, Outcomes, ResultTable, Section
 from spheretwin.paper.fault_outcomes import TWICE, tracks
-from spheretwin.paper.rows import statuses_text
+from spheretwin.paper.page import statuses_text
 from spheretwin.viz.pages.markdown import Drawing
 
 PARTS_METHOD = (

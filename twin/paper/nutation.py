@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from spheretwin.models import actuator as actuators
 from spheretwin.models.telemetry.signals import ANGLES
 from spheretwin.models.telemetry.status import Status
-from spheretwin.paper import rows
+from spheretwin.paper import page
 from spheretwin.paper.experiment import Case, Experiment, Finding, Outcome, Outcomes, ResultTable, Section
 from spheretwin.paper.laws import COMPARED_LAWS, PAPER_LAWS, ComparedLaw
 from spheretwin.paper.sinusoid import EFFORT_HEAD, EFFORT_TITLE, EXPECTED, by_hinge, effort, triple
@@ -78,7 +78,7 @@ def reduce(run: Run) -> NutationData:
         q_ref_rad=table["q_ref_rad"][every].copy(),
         torque_Nm=np.linalg.norm(table["torque_Nm"][every], axis=1),
     )
-    windows = rows.window_maxima(table["error_rad"], WINDOW_s, period_s)
+    windows = page.window_maxima(table["error_rad"], WINDOW_s, period_s)
     return NutationData(windows, trajectory if run.scenario.seed == 0 else None)
 
 
@@ -112,7 +112,7 @@ def errors(runs: Runs) -> Drawing:
     from spheretwin.viz.figures import over_time as figures
 
     by_label = {
-        law.label: figures.ErrorBand(law.law, rows.padded([run.data.windows_rad for run in of_law]))
+        law.label: figures.ErrorBand(law.law, page.padded([run.data.windows_rad for run in of_law]))
         for law, of_law in runs.items()
     }
     window = f"{1e3 * WINDOW_s:g} ms"
@@ -122,8 +122,8 @@ def errors(runs: Runs) -> Drawing:
 
 def paths(runs: Runs) -> Drawing:
     """Paths of the shaft tip of the first seed."""
-    from spheretwin.viz.figures import paths as figures
-    from spheretwin.viz.scene.motion import shaft_tip
+    from spheretwin.viz.figures import over_time as figures
+    from spheretwin.viz.scene.entities import shaft_tip
 
     actuator, desired = actuators.load(), _longest(runs)
     by_label = {
@@ -164,7 +164,7 @@ def sections(outcomes: Outcomes) -> list[Section]:
         (
             law.label,
             law.gains,
-            rows.statuses_text(runs),
+            page.statuses_text(runs),
             *by_hinge(runs, "max_abs_error"),
             triple(1e3 * np.median([run.data.largest_after(FROM_s) for run in runs], axis=0), 1),
         )

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from spheretwin.paper import rival_tables
+from spheretwin.paper import rival_results
 from spheretwin.paper.experiment import Experiment, Outcomes, Section
 from spheretwin.paper.laws import BY_LAW
 from spheretwin.paper.rival_conditions import HARDWARE, Condition, Hardware, cases, study
@@ -114,11 +114,11 @@ def _of_hardware(hardware: Hardware, outcomes: Outcomes) -> list[Section]:
         Section(
             title,
             f"{method} {OBJECTIVES[hardware.name]}",
-            [rival_tables.errors(hardware, outcomes)],
+            [rival_results.errors(hardware, outcomes)],
             [lambda: figure(hardware, outcomes)],
         ),
-        Section(f"{title}: robustness", ROBUSTNESS, [rival_tables.robustness(hardware, outcomes)]),
-        Section(f"{title}: gains", "", [rival_tables.ranges(hardware), rival_tables.gains_table(hardware)]),
+        Section(f"{title}: robustness", ROBUSTNESS, [rival_results.robustness(hardware, outcomes)]),
+        Section(f"{title}: gains", "", [rival_results.ranges(hardware), rival_results.gains_table(hardware)]),
     ]
 
 
@@ -131,5 +131,5 @@ EXPERIMENT = Experiment(
     cases=cases,
     sections=_sections,
     reduce=start_error,
-    findings=rival_tables.findings,
+    findings=rival_results.findings,
 )

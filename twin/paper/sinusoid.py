@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from spheretwin.models.telemetry.signals import ANGLES
 from spheretwin.models.telemetry.status import Status
-from spheretwin.paper import rows
+from spheretwin.paper import page
 from spheretwin.paper.experiment import Case, Experiment, Finding, Outcome, Outcomes, ResultTable, Section
 from spheretwin.paper.laws import COMPARED_LAWS, PAPER_LAWS, ComparedLaw, printed_rad
 from spheretwin.viz.pages.markdown import Drawing
@@ -170,7 +170,7 @@ def _loss_text(runs: Sequence[Outcome]) -> str:
 
 
 def _median_rad(runs: Sequence[Outcome]) -> Array:
-    return np.array([np.median(rows.of_axis(runs, "max_abs_error", axis)) for axis in range(3)])
+    return np.array([np.median(page.of_axis(runs, "max_abs_error", axis)) for axis in range(3)])
 
 
 def _all_complete(runs: Sequence[Outcome]) -> bool:
@@ -211,8 +211,8 @@ def tables(variation: Variation, outcomes: Outcomes) -> list[ResultTable]:
 
 def _largest(condition: Condition, law: ComparedLaw, runs: Sequence[Outcome]) -> tuple[str, ...]:
     paper = printed_rad(law.law, *condition)
-    printed = rows.NONE if paper is None else " / ".join(f"{1e3 * error:.1f}" for error in paper)
-    return law.label, rows.statuses_text(runs), printed, *by_hinge(runs, "max_abs_error")
+    printed = page.NONE if paper is None else " / ".join(f"{1e3 * error:.1f}" for error in paper)
+    return law.label, page.statuses_text(runs), printed, *by_hinge(runs, "max_abs_error")
 
 
 def effort(law: ComparedLaw, runs: Sequence[Outcome]) -> tuple[str, ...]:
@@ -222,21 +222,21 @@ def effort(law: ComparedLaw, runs: Sequence[Outcome]) -> tuple[str, ...]:
         law.label,
         *by_hinge(runs, "rms_error", 2),
         triple(1e3 * tail, 2),
-        rows.spread(rows.figures_named(runs, "rms_torque_Nm"), 3),
-        rows.spread(rows.figures_named(runs, "current_variation_A_s"), 1),
+        page.spread(page.figures_named(runs, "rms_torque_Nm"), 3),
+        page.spread(page.figures_named(runs, "current_variation_A_s"), 1),
     )
 
 
 def by_hinge(runs: Sequence[Outcome], error: str, digits: int = 1) -> tuple[str, ...]:
     """An error of each hinge in mrad, then the medians of all three in degrees."""
-    errors = [rows.of_axis(runs, error, axis) for axis in range(3)]
+    errors = [page.of_axis(runs, error, axis) for axis in range(3)]
     medians = triple(np.degrees(np.median(errors, axis=1)), 2)
-    return *(rows.spread_mrad(of_hinge, digits) for of_hinge in errors), medians
+    return *(page.spread_mrad(of_hinge, digits) for of_hinge in errors), medians
 
 
 def triple(values: Array, digits: int) -> str:
     """Numbers of α, β and γ."""
-    return " / ".join(f"{value:.{digits}f}" if np.isfinite(value) else rows.NONE for value in values)
+    return " / ".join(f"{value:.{digits}f}" if np.isfinite(value) else page.NONE for value in values)
 
 
 METHOD = (

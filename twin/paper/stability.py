@@ -12,7 +12,7 @@ from spheretwin.models.telemetry.table import Table
 from spheretwin.paper.experiment import Case, Experiment, Finding, Outcome, Outcomes, ResultTable, Section
 from spheretwin.paper.laws import COMPARED_LAWS, ComparedLaw
 from spheretwin.paper.lyapunov import Descent, descent
-from spheretwin.paper.rows import NONE
+from spheretwin.paper.page import NONE
 from spheretwin.run import Run
 from spheretwin.viz.pages.markdown import Drawing
 

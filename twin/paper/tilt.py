@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from spheretwin.paper import rows
+from spheretwin.paper import page
 from spheretwin.paper.experiment import Array, Experiment, Finding, Outcome, Outcomes, ResultTable, Section
 from spheretwin.paper.runner import measured_error
 from spheretwin.paper.tilt_cases import BY_LAW, CHANGES, TILT_LAWS, Change, TiltLaw, cases, printed
@@ -30,7 +30,7 @@ Errors = tuple[Array, Array]
 def reduce(run: Run) -> Array:
     """Largest measured |error| of α and β in each window of the figure, (windows, 2) in rad."""
     error = measured_error(run)[:, [ALPHA, BETA]]
-    return rows.window_maxima(error, WINDOW_s, run.scenario.controller.period_s)
+    return page.window_maxima(error, WINDOW_s, run.scenario.controller.period_s)
 
 
 def errors_drawing(windows: Mapping[str, Sequence[Array]]) -> Drawing:
@@ -45,7 +45,7 @@ def errors_drawing(windows: Mapping[str, Sequence[Array]]) -> Drawing:
 
     courses = {
         f"{BY_LAW[law].label} ({paper_text(BY_LAW[law])})": figures.ErrorCourse(
-            law, np.degrees(rows.padded(of_seeds)), BY_LAW[law].paper_deg or 0.0, BY_LAW[law].paper_axes
+            law, np.degrees(page.padded(of_seeds)), BY_LAW[law].paper_deg or 0.0, BY_LAW[law].paper_axes
         )
         for law, of_seeds in windows.items()
     }
@@ -122,9 +122,9 @@ def printed_section(outcomes: Outcomes) -> Section:
 
 
 def _printed_row(law: TiltLaw, runs: Sequence[Outcome]) -> tuple[str, ...]:
-    measured = [rows.spread_deg(rows.of_axis(runs, "measured_max_abs_error", axis)) for axis in (ALPHA, BETA)]
-    true = [rows.spread_deg(rows.of_axis(runs, "max_abs_error", axis)) for axis in range(3)]
-    return law.label, law.gains, rows.statuses_text(runs), law.paper, *measured, *true
+    measured = [page.spread_deg(page.of_axis(runs, "measured_max_abs_error", axis)) for axis in (ALPHA, BETA)]
+    true = [page.spread_deg(page.of_axis(runs, "max_abs_error", axis)) for axis in range(3)]
+    return law.label, law.gains, page.statuses_text(runs), law.paper, *measured, *true
 
 
 def findings(outcomes: Outcomes) -> list[Finding]:
@@ -138,7 +138,7 @@ def _order(outcomes: Outcomes) -> list[Finding]:
     runs = [outcomes.runs(printed(law)) for law in of_paper]
     if not all(runs):
         return []
-    errors = np.array([rows.of_axis(of_law, "measured_max_abs_error", ALPHA) for of_law in runs])
+    errors = np.array([page.of_axis(of_law, "measured_max_abs_error", ALPHA) for of_law in runs])
     right, seeds = int(np.sum(np.all(np.diff(errors, axis=0) < 0, axis=0))), errors.shape[1]
     order = " > ".join(law.label for law in of_paper)
     text = f"the paper's order, {order}, holds for α under {right} of {seeds} seeds"
@@ -152,7 +152,7 @@ def _sizes(outcomes: Outcomes) -> list[Finding]:
         runs = outcomes.runs(printed(law))
         if not law.paper_deg or not runs:
             continue
-        median = float(np.degrees(np.median(rows.of_axis(runs, "measured_max_abs_error", ALPHA))))
+        median = float(np.degrees(np.median(page.of_axis(runs, "measured_max_abs_error", ALPHA))))
         reproduced = reproduced and median <= REACHED * law.paper_deg
         texts.append(f"{law.label} {median:.2f}° (paper {law.paper})")
     if not texts:
@@ -189,7 +189,7 @@ def change_section(outcomes: Outcomes) -> Section:
 def reached(law: TiltLaw, measured: Array, true: Array) -> str:
     """State if a law reaches the paper's figure, from the errors (rad) of all seeds."""
     if law.paper_deg is None:
-        return rows.NONE
+        return page.NONE
     limit = REACHED * np.radians(law.paper_deg)
     if np.median(measured) <= limit:
         return "yes"
@@ -198,7 +198,7 @@ def reached(law: TiltLaw, measured: Array, true: Array) -> str:
 
 def _change_row(change: Change, errors: Errors) -> tuple[str, ...]:
     law = BY_LAW[change.law]
-    return law.label, change.label, reached(law, *errors), law.paper, *map(rows.spread_deg, errors)
+    return law.label, change.label, reached(law, *errors), law.paper, *map(page.spread_deg, errors)
 
 
 def _sufficient_changes(by_change: Sequence[tuple[Change, Errors]]) -> str:
@@ -225,7 +225,7 @@ def _by_law(outcomes: Outcomes, by_change: Sequence[tuple[Change, Errors]]) -> d
 
 
 def _alpha(runs: Sequence[Outcome]) -> Errors:
-    return rows.of_axis(runs, "measured_max_abs_error", ALPHA), rows.of_axis(runs, "max_abs_error", ALPHA)
+    return page.of_axis(runs, "measured_max_abs_error", ALPHA), page.of_axis(runs, "max_abs_error", ALPHA)
 
 
 RATES = (

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from spheretwin.paper.experiment import Case
-from spheretwin.paper.rows import NONE
+from spheretwin.paper.page import NONE
 
 
 class TiltLaw(NamedTuple):

@@ -12,8 +12,8 @@ from spheretwin.viz.recording.currents import CoilCurrents
 from spheretwin.viz.recording.part import RecordingPart, RecordingSubject, scalars, strips, time_index
 from spheretwin.viz.recording.recorder import MOST_ROWS
 from spheretwin.viz.recording.scene3d import Frames, MovingActuator
+from spheretwin.viz.scene.entities import body_quaternions, shaft_tip
 from spheretwin.viz.scene.meshes import WORLD
-from spheretwin.viz.scene.motion import body_quaternions, shaft_tip
 
 Array = NDArray[np.float64]
 

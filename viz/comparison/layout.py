@@ -7,12 +7,11 @@ from typing import NamedTuple
 import rerun.blueprint as rrb
 
 from spheretwin.viz.comparison.ghosts import ROTOR
-from spheretwin.viz.layout.layout import blueprint
+from spheretwin.viz.layout.layout import blueprint, eye
 from spheretwin.viz.layout.plots import time_axis, time_range
 from spheretwin.viz.layout.view import EVENTS, STATES, application_of
-from spheretwin.viz.layout.views import eye
+from spheretwin.viz.scene.entities import TRAIL_S
 from spheretwin.viz.scene.meshes import WORLD
-from spheretwin.viz.scene.motion import TRAIL_S
 
 COMPARE, END, TIP = "compare", "end", "tip"
 """Parts of the paths of entities, after the name of a run."""

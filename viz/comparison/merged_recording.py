@@ -29,18 +29,16 @@ from spheretwin.viz.comparison.layout import (
     application,
     layout,
 )
-from spheretwin.viz.comparison.ranges import PlotRange, quantity_range
-from spheretwin.viz.comparison.runs import ComparedRun, leaders
+from spheretwin.viz.comparison.runs import ComparedRun, PlotRange, leaders, quantity_range
 from spheretwin.viz.layout.extents import labelled
 from spheretwin.viz.layout.styles import MIDDLE, THICK, THIN
 from spheretwin.viz.layout.view import SCENARIO
 from spheretwin.viz.quantities import Quantity, compared_quantities
-from spheretwin.viz.recording.file_pipe import PIPE_PATHS, FilePipe
 from spheretwin.viz.recording.part import RecordingPart, RecordingSubject, drawable, scalars, time_index
-from spheretwin.viz.recording.recorder import MOST_ROWS
+from spheretwin.viz.recording.recorder import MOST_ROWS, PIPE_PATHS, FilePipe
 from spheretwin.viz.recording.signals import Signals
 from spheretwin.viz.recording.status import StateChanges, StateLanes, log_lines
-from spheretwin.viz.scene.static import size_of
+from spheretwin.viz.scene.entities import size_of
 
 
 class SubtreeStream:

@@ -19,8 +19,8 @@ from spheretwin.viz.comparison.merged_recording import recorded
 from spheretwin.viz.layout.layout import blueprint
 from spheretwin.viz.layout.plots import time_axis, time_range
 from spheretwin.viz.layout.view import application_of
+from spheretwin.viz.scene.entities import TRAIL_S, shaft_tip
 from spheretwin.viz.scene.meshes import WORLD
-from spheretwin.viz.scene.motion import TRAIL_S, shaft_tip
 
 Array = NDArray[np.float64]
 

@@ -1,7 +1,9 @@
-"""Currents of all groups over time: a panel a run, a row a group."""
+"""Runs over time: angles, errors and largest current of one, currents of all groups of several."""
 
 from __future__ import annotations
 
+import base64
+import io
 from collections.abc import Sequence
 from typing import Any
 
@@ -11,11 +13,14 @@ from matplotlib.figure import Figure
 
 from spheretwin.models.telemetry.signals import ANGLES
 from spheretwin.models.telemetry.status import Level
-from spheretwin.viz.comparison.ranges import PlotRange, quantity_range
-from spheretwin.viz.comparison.runs import ComparedRun, Spectrum
+from spheretwin.models.telemetry.table import Table
+from spheretwin.viz.comparison.runs import ComparedRun, PlotRange, Spectrum, quantity_range
 from spheretwin.viz.decimation import mean_and_deviation, octave_maxima
 from spheretwin.viz.figures.style import (
+    AXES,
     BROKEN,
+    DASHES,
+    DPI,
     FAINT,
     INK,
     WIDTH_in,
@@ -221,3 +226,45 @@ def _mark_end(panel: Axes, run: ComparedRun, values: Array, limits: tuple[float,
             "zorder": 5,
         }
         panel.plot(run.table["t_s"][-1], last, "X", **mark)
+
+
+def overview(table: Table, title: str) -> Figure:
+    """Draw a run: hinge angles with their references, tracking errors, largest current of all groups.
+
+    Parameters
+    ----------
+    table : Table
+        Telemetry with at least one row.
+    title : str
+    """
+    figure = Figure(figsize=(WIDTH_in, 6.0), layout="constrained")
+    angles, errors, currents = figure.subplots(3, 1, sharex=True)
+    t_s = table["t_s"]
+    for i, (name, colour) in enumerate(zip(ANGLES, AXES, strict=True)):
+        look = {"color": colour, "linestyle": DASHES[i], "linewidth": 1.1}
+        for panel, values in (
+            (angles, np.degrees(table["q_rad"][:, i])),
+            (errors, 1e3 * table["error_rad"][:, i]),
+        ):
+            draw_line(panel, t_s, values, label=name, **look)
+    for i in range(len(ANGLES)):
+        look = {"color": INK, "linewidth": 0.7, "linestyle": (0, (4, 3))}
+        label = None if i else "references"
+        draw_line(angles, t_s, np.degrees(table["q_ref_rad"][:, i]), label=label, **look)
+    largest = np.abs(table["current_A"]).max(axis=1)
+    draw_line(currents, t_s, largest, color=INK, linewidth=1.1)
+    for panel, heading in ((angles, "angle, °"), (errors, "error, mrad"), (currents, "largest current, A")):
+        plain(panel, heading)
+    figure.suptitle(title, fontsize="medium")
+    lines, labels = angles.get_legend_handles_labels()  # references last
+    figure.legend(lines, labels, loc="outside lower left", ncols=4, frameon=False, fontsize="small")
+    currents.set_xlabel("time, s")
+    return figure
+
+
+def as_html(figure: Figure) -> str:
+    """Return an image element that holds the figure as PNG."""
+    content = io.BytesIO()
+    figure.savefig(content, format="png", dpi=DPI / 2, metadata={"Software": None})
+    data = base64.b64encode(content.getvalue()).decode()
+    return f'<img alt="plots of the run" src="data:image/png;base64,{data}">'

@@ -2,16 +2,302 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from functools import lru_cache
 
 import rerun.blueprint as rrb
 
-from spheretwin.viz.layout.extents import Extents
-from spheretwin.viz.layout.plots import Plots
-from spheretwin.viz.layout.view import TIMELINE, View
-from spheretwin.viz.layout.views import VIEWS, run_line
+from spheretwin.models.telemetry.signals import ANGLES, Signal
+from spheretwin.viz.layout.extents import Extents, PlotChannel
+from spheretwin.viz.layout.plots import PlotLine, Plots, quantity, time_range
+from spheretwin.viz.layout.view import (
+    CURRENT_LIMITS,
+    CURRENT_MAP,
+    CURRENT_VARIATION,
+    EVENTS,
+    PHASE_PLANE,
+    SCENARIO,
+    SUMMARY,
+    TIMELINE,
+    VARIATION_LANE,
+    View,
+)
+from spheretwin.viz.quantities import (
+    COPPER_LOSS,
+    COUPLING,
+    DELIVERED,
+    ERROR,
+    ERROR_ANGLE,
+    ESTIMATED_RATE,
+    MARGIN,
+    MEASURED_ANGLE,
+    MOST,
+    TIP_DISTANCE,
+)
 from spheretwin.viz.rerun_internals import EncodedLayout
+from spheretwin.viz.scene import meshes as scene
+from spheretwin.viz.scene.entities import SCALE, TRACES
+
+LEAST_rad, LEAST_rad_s = 0.02, 0.05
+
+ANGLE_SIGNALS = ("q_rad", "q_ref_rad", "q_governed_rad", "q_predicted_rad", "q_measured_rad")
+RATE_SIGNALS = (
+    "qdot_rad_s",
+    "qdot_ref_rad_s",
+    "qdot_governed_rad_s",
+    "qdot_predicted_rad_s",
+    "qdot_estimated_rad_s",
+)
+
+
+ROLES = "● actual, × reference"
+"""Markers of the lines of a hinge; squares mark measurements and estimates, + what a governor makes of it."""
+
+
+def compare(plots: Plots) -> rrb.Container:
+    """Angles and rates of each axis with their references; below, the distance between the shaft's tips."""
+    angles, rates = _lines(plots, ANGLE_SIGNALS), _lines(plots, RATE_SIGNALS)
+    angles_of_each = [
+        plots.whole(f"{name}: {ROLES}", "rad", *angles, least=LEAST_rad, axis=axis)
+        for axis, name in enumerate(ANGLES)
+    ]
+    turning = plots.about_zero(f"rates: {ROLES}", "rad/s", *rates, least=LEAST_rad_s)
+    apart = plots.above_zero(
+        "tip's distance from its reference", "mm", quantity(TIP_DISTANCE), least=TIP_DISTANCE.floor
+    )
+    above = rrb.Horizontal(*angles_of_each)
+    return rrb.Vertical(above, turning, apart, row_shares=[4, 4, 3], name="compare")
+
+
+def _lines(plots: Plots, names: tuple[str, ...]) -> list[PlotLine]:
+    return [plots.signal(name) for name in names if name in plots.view.names]
+
+
+def scenario(plots: Plots) -> rrb.View:
+    """The resolved scenario as text."""
+    return rrb.TextDocumentView(origin=f"/{SCENARIO}", name="scenario")
+
+
+PHASE_TRAIL_S = 1.0
+
+
+def run_line() -> rrb.TextDocumentView:
+    """Name and state of the run in a line."""
+    return rrb.TextDocumentView(origin=f"/{SUMMARY}", name="run", titlebar=False)
+
+
+def current_map(plots: Plots) -> rrb.TimeSeriesView:
+    """Currents as colours: a row for each group, time along it."""
+    limit, groups = plots.view.current_limit_A, plots.view.groups
+    title = f"mean currents, -{limit:g} A blue, +{limit:g} A red; top: variation"
+    lines = PlotLine(CURRENT_MAP, ""), PlotLine(CURRENT_VARIATION, "")
+    return plots.fixed(title, *lines, low=-0.7, high=groups + VARIATION_LANE)
+
+
+def current_bars(plots: Plots) -> rrb.BarChartView:
+    """Currents of the row at the cursor, one bar a group, between the limits."""
+    return rrb.BarChartView(
+        origin="/",
+        contents=[f"/{scene.COILS}", f"/{CURRENT_LIMITS}"],
+        name=f"currents at the cursor [A], by group, ±{plots.view.current_limit_A:g} A",
+        plot_legend=rrb.PlotLegend(visible=False),
+    )
+
+
+def phase_plane(plots: Plots) -> rrb.Spatial2DView:
+    """Rate of the error over what of the sliding variable is the error's, with its last second."""
+    view = rrb.Spatial2DView(
+        origin=f"/{PHASE_PLANE}",
+        name="phase plane: ė up, s - ė right; line s = 0",
+        time_ranges=time_range(PHASE_TRAIL_S),
+    )
+    return plots.square(view, PlotChannel(SLIDING), least=0.1)
+
+
+def log() -> rrb.TextLogView:
+    """Log of events."""
+    columns = rrb.TextLogColumns(text_log_columns=["loglevel", "body"])  # all have one path
+    return rrb.TextLogView(origin=f"/{EVENTS}", name="events", columns=columns)
+
+
+def coils(plots: Plots) -> rrb.Container:
+    """Currents over time; below, those at the cursor, and the copper loss of all coils."""
+    heat = plots.above_zero("heat of all coils", "W", quantity(COPPER_LOSS), least=COPPER_LOSS.floor)
+    below = rrb.Horizontal(current_bars(plots), heat)
+    return rrb.Vertical(current_map(plots), below, row_shares=[1, 1], name="coils")
+
+
+SLIDING = "sliding_s"
+
+LEAST = {"N·m": 0.01, "rad/s": 0.05, "rad": 0.02, "rad/s²": 0.5}
+"""Half of the least range, by unit; other units have one of their own size."""
+
+
+def control(plots: Plots) -> rrb.Container:
+    """Errors of the axes; below, torques of each, the signals of the law and the coupling of the axes."""
+    lines = [plots.signal("torque_command_Nm"), quantity(DELIVERED), plots.signal("disturbance_Nm")]
+    torques = [
+        plots.about_zero(
+            f"torque {name}",
+            "N·m",
+            *lines,
+            least=DELIVERED.floor,
+            axis=axis,
+            key=": ●coils ×command +load",
+        )
+        for axis, name in enumerate(ANGLES)
+    ]
+    rows = rrb.Horizontal(*torques), rrb.Horizontal(*_law_plots(plots))
+    return rrb.Vertical(error_of_each_axis(plots), *rows, name="control")
+
+
+def error_of_each_axis(plots: Plots) -> rrb.TimeSeriesView:
+    """Tracking errors of the three hinges."""
+    return plots.about_zero("error of each axis", "mrad", quantity(ERROR), least=ERROR.floor)
+
+
+def _law_plots(plots: Plots) -> list[rrb.Container | rrb.View]:
+    own = {own_signal.name: own_signal for own_signal in plots.view.own if _is_law_signal(own_signal)}
+    coupling = plots.about_zero("coupling", "N·m", quantity(COUPLING), least=COUPLING.floor)
+    sliding = []
+    if SLIDING in own:
+        del own[SLIDING]
+        sliding = [
+            plots.about_zero("sliding variables s", "rad/s", plots.signal(SLIDING), least=LEAST["rad/s"]),
+            phase_plane(plots),
+        ]
+    units = dict.fromkeys(own_signal.unit for own_signal in own.values())
+    tabs = [coupling, *(_plot(plots, unit, own) for unit in units)]
+    return [*sliding, rrb.Tabs(*tabs, active_tab=0) if len(tabs) > 1 else coupling]
+
+
+def _plot(plots: Plots, unit: str, own: dict[str, Signal]) -> rrb.TimeSeriesView:
+    """Plot of all signals of one unit."""
+    names = [name for name, own_signal in own.items() if own_signal.unit == unit]
+    return plots.whole(", ".join(names), unit, *map(plots.signal, names), least=LEAST.get(unit, 1e-3))
+
+
+def _is_law_signal(of: Signal) -> bool:
+    """True if a signal is one that laws log, and not one of a stage around them."""
+    return of.size <= len(ANGLES) and not of.states and of.name not in _OTHER_VIEWS
+
+
+_OTHER_VIEWS = frozenset(
+    {
+        "q_measured_rad",
+        "qdot_estimated_rad_s",
+        "q_governed_rad",
+        "qdot_governed_rad_s",
+        "q_predicted_rad",
+        "qdot_predicted_rad_s",
+        "friction_Nm",
+        "presliding_rad",
+        "cable_Nm",
+        "stator_temperature_degC",
+        "rotor_temperature_degC",
+        "supply_power_W",
+    }
+)
+"""Signals that other views show."""
+
+
+# Half of the least range of temperatures: the warming of a coil in a short run is negligible.
+LEAST_degC = 5.0
+
+# Half of a range of powers.
+LEAST_W = 1.0
+
+
+def hardware(plots: Plots) -> rrb.Container:
+    """States and events next to the signals of sensors, amplifiers and coils."""
+    names = plots.view.names
+    shown = []
+    if "coil_temperature_degC" in names:
+        line = plots.signal("coil_temperature_degC")
+        shown.append(plots.whole("coil temperature", "°C", line, least=LEAST_degC))
+    if "voltage_limited" in names:
+        title = "time at voltage limit [1]"
+        shown.append(plots.fixed(title, plots.signal("voltage_limited"), low=-0.02, high=1.05))
+    if "supply_power_W" in names:
+        line = plots.signal("supply_power_W")
+        shown.append(plots.whole("supply power", "W", line, least=LEAST_W))
+    if "q_measured_rad" in names:
+        title = "measured - true"
+        shown.append(plots.about_zero(title, "mrad", quantity(MEASURED_ANGLE), least=MEASURED_ANGLE.floor))
+    if "qdot_estimated_rad_s" in names:
+        title = "estimated - true"
+        shown.append(plots.about_zero(title, "rad/s", quantity(ESTIMATED_RATE), least=ESTIMATED_RATE.floor))
+    if "rotor_temperature_degC" in names:
+        lines = [plots.signal(f"{body}_temperature_degC") for body in ("stator", "rotor")]
+        shown.append(plots.whole("stator and rotor temperature", "°C", *lines, least=LEAST_degC))
+    shown += [
+        plots.whole(title, unit, plots.signal(name), least=least)
+        for title, unit, name, least in (
+            ("friction", "N·m", "friction_Nm", 0.002),
+            ("elastic rotation in static friction", "rad", "presliding_rad", 1e-4),
+            ("cable", "N·m", "cable_Nm", 0.002),
+        )
+        if name in names
+    ]
+    state_views = [plots.states("states of the components"), log()]
+    if not shown:
+        return rrb.Vertical(*state_views, name="hardware")
+    chain = rrb.Grid(*shown, grid_columns=2)
+    return rrb.Horizontal(
+        rrb.Vertical(*state_views, row_shares=[3, 2]), chain, column_shares=[2, 3], name="hardware"
+    )
+
+
+EYE_m, LOOKED_AT_m = (0.16, -0.16, 0.22), (0.0, 0.0, 0.012)
+
+
+def eye(size: float) -> rrb.EyeControls3D:
+    """Return the camera from which an actuator of a size, and its surroundings, are visible."""
+    return rrb.EyeControls3D(
+        kind=rrb.Eye3DKind.Orbital,
+        position=[size * coordinate for coordinate in EYE_m],
+        look_target=[size * coordinate for coordinate in LOOKED_AT_m],
+        eye_up=[0, 0, 1],
+    )
+
+
+def actuator_view(size: float) -> rrb.Spatial3DView:
+    """View of all that moves, and of the traces of the last seconds, on the ground of the viewer's theme."""
+    return rrb.Spatial3DView(
+        origin=f"/{scene.WORLD}",
+        name=f"actuator; {SCALE}",
+        line_grid=False,
+        eye_controls=eye(size),
+        overrides={f"/{trace.entity}": time_range(trace.oldest_s, trace.newest_s) for trace in TRACES},
+    )
+
+
+def overview(plots: Plots) -> rrb.Container:
+    """Actuator and currents; next to them errors, torque margin, states and events."""
+    left = rrb.Vertical(actuator_view(plots.view.size), current_map(plots), row_shares=[3, 2])
+    right = rrb.Vertical(
+        plots.above_zero("error as one angle", "°", quantity(ERROR_ANGLE), least=ERROR_ANGLE.floor),
+        error_of_each_axis(plots),
+        plots.fixed(
+            f"torque margin [× command], 0 saturated, to {MOST:g}",
+            quantity(MARGIN),
+            low=-0.05 * MOST,
+            high=1.05 * MOST,
+        ),
+        rrb.Horizontal(plots.states(), log(), column_shares=[1, 1]),
+        row_shares=[3, 3, 2, 4 if any(own_signal.states for own_signal in plots.view.own) else 3],
+    )
+    return rrb.Horizontal(left, right, column_shares=[4, 5], name="overview")
+
+
+VIEWS: dict[str, Callable[[Plots], rrb.Container | rrb.View]] = {
+    "overview": overview,
+    "control": control,
+    "coils": coils,
+    "hardware": hardware,
+    "compare": compare,
+    "scenario": scenario,
+}
 
 # The headline and two lines.
 ROW_SHARES = (1, 9)

@@ -11,10 +11,9 @@ import plotly.graph_objects as plotly
 from plotly.offline import get_plotlyjs
 
 from spheretwin.models.telemetry.signals import ANGLES
-from spheretwin.viz.comparison.ranges import quantity_range
-from spheretwin.viz.comparison.runs import ComparedRun, Spectrum
+from spheretwin.viz.comparison.runs import ComparedRun, Spectrum, quantity_range
 from spheretwin.viz.decimation import envelope, mean_and_deviation, octave_maxima
-from spheretwin.viz.pages import html
+from spheretwin.viz.pages import markdown
 from spheretwin.viz.quantities import Array, Quantity
 from spheretwin.viz.theme import rgb, run_colours
 
@@ -98,17 +97,20 @@ def page(
     figures = {"over-time": over_time, "spectra": spectra}
     content = ", ".join(f'"{name}": {figure.to_json()}' for name, figure in figures.items())
     body = [
-        html.rendered(above),
+        markdown.rendered(above),
         f'<div class="runs" role="group" aria-label="runs">{_switches(runs)}{SCALE}</div>',
-        *(html.rendered(f"## {TITLES[name]}") + f'<div class="plot" id="{name}"></div>' for name in figures),
-        html.rendered(below),
+        *(
+            markdown.rendered(f"## {TITLES[name]}") + f'<div class="plot" id="{name}"></div>'
+            for name in figures
+        ),
+        markdown.rendered(below),
         f"<script>{get_plotlyjs()}</script>",
         # No text of a user's ends the script.
         f"<script>const figures = {{{content}}};".replace("<", "\\u003c").replace("\\u003c", "<", 1),
         f"{SCRIPT}</script>\n",
     ]
     head = f'<meta http-equiv="Content-Security-Policy" content="{POLICY}">\n<style>{STYLE}</style>'
-    return html.whole(title, "\n".join(body), head)
+    return markdown.whole(title, "\n".join(body), head)
 
 
 def _switches(runs: Sequence[ComparedRun]) -> str:

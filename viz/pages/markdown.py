@@ -1,19 +1,144 @@
-"""Page of a command: title, summary, table of contents, sections with tables and figures, and a foot."""
+"""Page of a command: title, summary, table of contents, sections with tables and figures, and a foot.
+
+It is Markdown, and HTML in one file, without fonts, scripts and requests to a host.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+import re
+from collections import Counter
+from collections.abc import Callable, Iterable, Sequence
+from html import escape
 from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
+from markdown_it import MarkdownIt
+from markdown_it.token import Token
+
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.base.files import make_folder, whole_file
 from spheretwin.models.telemetry.run_record import versions
-from spheretwin.viz.pages import html
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+
+# Figures have a white ground in the dark theme too; wide content scrolls within its own box.
+STYLE = """
+:root { color-scheme: light dark; --ink: #24282d; --faint: #d5d9de; --paper: #fff; --soft: #f4f6f8; }
+@media (prefers-color-scheme: dark) {
+  :root { --ink: #dfe3e8; --faint: #3b424b; --paper: #15181c; --soft: #1d2127; }
+}
+* { box-sizing: border-box; }
+body { margin: 0 auto; padding: 1.2rem; max-width: 62rem; color: var(--ink); background: var(--paper);
+  font: 1rem/1.55 system-ui, sans-serif; overflow-wrap: break-word; }
+h1, h2, h3 { line-height: 1.2; margin: 2em 0 0.6em; }
+h1 { margin-top: 0.4em; }
+p { max-width: 46rem; }
+.wide { overflow-x: auto; margin: 1.2rem 0; }
+table { border-collapse: collapse; font-size: 0.92rem; font-variant-numeric: tabular-nums; }
+th, td { padding: 0.35rem 0.7rem; border-bottom: 1px solid var(--faint); text-align: left;
+  vertical-align: top; }
+td[style*="right"] { white-space: nowrap; }
+th { background: var(--soft); }
+th:first-child, td:first-child { padding-left: 0.4rem; }
+main > ul:first-of-type { columns: 2 22rem; padding: 0.8rem 0.8rem 0.8rem 2rem; background: var(--soft); }
+main > ul:first-of-type ul { padding-left: 1.2rem; }
+a { color: inherit; }
+hr { border: 0; border-top: 1px solid var(--faint); margin-top: 3rem; }
+p:has(svg) { max-width: none; overflow-x: auto; }
+svg { display: block; max-width: 100%; min-width: 36rem; height: auto; background: #fff; border-radius: 4px; }
+code { font-family: ui-monospace, monospace; font-size: 0.92em; background: var(--soft); padding: 0 0.2em; }
+pre { overflow: auto; max-height: 16rem; padding: 0.6rem; background: var(--soft); font-size: 0.85rem; }
+pre code { padding: 0; }
+em { color: inherit; opacity: 0.85; }
+@media (max-width: 40rem) { body { padding: 0.8rem; } th, td { padding: 0.3rem 0.45rem; } }
+"""
+
+
+def page(title: str, markdown: str, figures: Path | None = None) -> str:
+    """Whole page.
+
+    Parameters
+    ----------
+    title : str
+        As it is, without markup.
+    markdown : str
+        CommonMark with tables; tags in it are shown, not obeyed.
+    figures : Path, optional
+        Folder of its figures, which are embedded in the page; it refers to their files unless given.
+    """
+    return whole(title, rendered(markdown, figures))
+
+
+def rendered(markdown: str, figures: Path | None = None) -> str:
+    """Return the HTML of Markdown; parameters as in `page`."""
+    reader = MarkdownIt("commonmark", {"html": False}).enable("table")
+    reader.add_render_rule("table_open", _constant('<div class="wide" tabindex="0">\n<table>\n'))
+    reader.add_render_rule("table_close", _constant("</table>\n</div>\n"))
+    tokens = reader.parse(markdown)
+    headings = [i for i, token in enumerate(tokens) if token.type == "heading_open" and token.tag != "h1"]
+    for i, anchor in zip(headings, anchors(tokens[i + 1].content for i in headings), strict=True):
+        tokens[i].attrs["id"] = anchor
+    if figures:
+        reader.add_render_rule("image", lambda _, images, place, *__: _svg(figures, images[place]))
+    return str(reader.renderer.render(tokens, reader.options, {}))
+
+
+def whole(title: str, body: str, head: str = "") -> str:
+    """A page of what it shows.
+
+    Parameters
+    ----------
+    title : str
+        As it is, without markup.
+    body, head : str
+        HTML.
+    """
+    return "\n".join(
+        [
+            "<!doctype html>",
+            '<html lang="en">',
+            "<head>",
+            '<meta charset="utf-8">',
+            '<meta name="viewport" content="width=device-width, initial-scale=1">',
+            f"<title>{escape(title)}</title>",
+            f"<style>{STYLE}</style>",
+            *([head] if head else []),
+            "</head>",
+            "<body>",
+            "<main>",
+            f"{body}</main>",
+            "</body>",
+            "</html>",
+            "",
+        ]
+    )
+
+
+def anchors(titles: Iterable[str]) -> list[str]:
+    """Anchor of each heading, as GitHub makes them; a number tells equal ones apart."""
+    counts: Counter[str] = Counter()
+    names = []
+    for title in titles:
+        name = re.sub(r"[^\w\- ]", "", title.lower()).replace(" ", "-")
+        names.append(f"{name}-{counts[name]}" if counts[name] else name)
+        counts[name] += 1
+    return names
+
+
+def _svg(folder: Path, image: Token) -> str:
+    """Inline SVG of a figure; its identifiers begin with the file's name, as a page has several."""
+    path = folder / str(image.attrs["src"])
+    content = path.read_text(encoding="utf-8")
+    content = re.sub(r'(\bid="|href="#|url\(#)', rf"\g<1>{path.stem}-", content[content.index("<svg") :])
+    return content.replace("<svg", '<svg role="img"', 1)
+
+
+def _constant(text: str) -> Callable[..., str]:
+    """Render rule with the same HTML for every token."""
+    return lambda *_: text
 
 
 class Drawing(NamedTuple):
@@ -117,7 +242,7 @@ def write_page(
     text = "\n".join(lines)
     return [
         save_text(folder / f"{name}.md", text),
-        save_text(folder / f"{name}.html", html.page(title, text, folder)),
+        save_text(folder / f"{name}.html", page(title, text, folder)),
     ]
 
 
@@ -125,7 +250,7 @@ def contents(lines: Sequence[str]) -> list[str]:
     """Table of contents: a list of links to the headings of the second and third level."""
     headings = [line for text in lines for line in text.splitlines() if line.startswith(("## ", "### "))]
     titles = [heading.lstrip("#").strip() for heading in headings]
-    links = [f"[{text}](#{anchor})" for text, anchor in zip(titles, html.anchors(titles), strict=True)]
+    links = [f"[{text}](#{anchor})" for text, anchor in zip(titles, anchors(titles), strict=True)]
     indents = ["" if heading.startswith("## ") else "  " for heading in headings]
     return [*(f"{indent}- {link}" for indent, link in zip(indents, links, strict=True)), ""]
 

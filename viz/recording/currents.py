@@ -14,8 +14,8 @@ from spheretwin.viz.decimation import CompletedBins, FirstRows, TimeBins
 from spheretwin.viz.layout.view import CURRENT_LIMITS, CURRENT_MAP, CURRENT_VARIATION, VARIATION_LANE
 from spheretwin.viz.recording.part import RecordingPart, RecordingSubject, scalars, time_index
 from spheretwin.viz.rerun_internals import ArrowComponent
+from spheretwin.viz.scene.entities import FRAME_RATE_Hz
 from spheretwin.viz.scene.meshes import COILS
-from spheretwin.viz.scene.motion import FRAME_RATE_Hz
 
 Array = NDArray[np.float64]
 

@@ -21,8 +21,8 @@ from spheretwin.models.telemetry.status import Event, Status
 from spheretwin.models.telemetry.table import Table
 from spheretwin.viz.layout.view import CHECKSUM, LIVE_WINDOW_S, OVERVIEW, TIMELINE, TOTAL, View
 from spheretwin.viz.rerun_internals import ArrowComponent
+from spheretwin.viz.scene.entities import size_of
 from spheretwin.viz.scene.meshes import Meshes, read_meshes
-from spheretwin.viz.scene.static import size_of
 
 
 class RowSet(Enum):

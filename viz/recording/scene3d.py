@@ -13,8 +13,7 @@ from spheretwin.models.telemetry.table import Table
 from spheretwin.viz import theme
 from spheretwin.viz.decimation import FirstRows
 from spheretwin.viz.recording.part import RecordingPart, RecordingSubject, strips, time_index
-from spheretwin.viz.scene.meshes import FAILURE, FAILURE_TEXT, TORQUES, WORLD
-from spheretwin.viz.scene.motion import (
+from spheretwin.viz.scene.entities import (
     TORQUE_STYLES,
     TRACES,
     FRAME_RATE_Hz,
@@ -23,10 +22,13 @@ from spheretwin.viz.scene.motion import (
     TipTrace,
     body_quaternions,
     gravity_torque,
+    labels,
     load_torque,
     shaft_tip,
+    size_of,
+    static_scene,
 )
-from spheretwin.viz.scene.static import labels, size_of, static_scene
+from spheretwin.viz.scene.meshes import FAILURE, FAILURE_TEXT, TORQUES, WORLD
 
 LARGEST_rad = 1e6
 """Beyond it a pose is meaningless, and its sine has no correct digits."""

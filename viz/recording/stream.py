@@ -24,8 +24,7 @@ from spheretwin.viz.decimation import RowSelection
 from spheretwin.viz.layout.view import LIVE_WINDOW_S, application
 from spheretwin.viz.recording.currents import CoilCurrents, CurrentMap
 from spheretwin.viz.recording.part import RecordingPart, RecordingSubject, RowSet
-from spheretwin.viz.recording.phase_plane import PhasePlane
-from spheretwin.viz.recording.plots import PlotData
+from spheretwin.viz.recording.plots import PhasePlane, PlotData
 from spheretwin.viz.recording.scene3d import Ending, MovingActuator, Torques, Traces
 from spheretwin.viz.recording.signals import ScenarioText, Signals
 from spheretwin.viz.recording.status import LimitLanes, Log, StateLanes

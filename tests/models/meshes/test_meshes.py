@@ -9,7 +9,7 @@ import trimesh
 
 from spheretwin.models import actuator as actuators
 from spheretwin.models import mjcf
-from spheretwin.models.meshes import joint, mesh_files, rotor, stator
+from spheretwin.models.meshes import mesh_files, rotor, stator
 from spheretwin.models.meshes import mesh_files as assets
 from spheretwin.models.meshes.solids import SMALL_SECTIONS, along
 
@@ -30,8 +30,8 @@ def made(actuator):
 def solids(actuator):
     return {
         "stator": stator.stator(actuator),
-        "outer_ring": joint.outer_ring(),
-        "inner_ring": joint.inner_ring(),
+        "outer_ring": rotor.outer_ring(),
+        "inner_ring": rotor.inner_ring(),
         "ball": rotor.ball(actuator),
         "hoop": rotor.hoop(actuator),
         "shaft": rotor.shaft(actuator),

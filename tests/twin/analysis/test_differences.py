@@ -5,7 +5,7 @@ import json
 import pytest
 
 from spheretwin import cli
-from spheretwin.analysis.differences import differences
+from spheretwin.analysis.review import differences
 from spheretwin.metrics import METRICS
 from tests.twin.analysis.runs import written
 

@@ -1,6 +1,6 @@
 """Fields in which scenarios differ, with their values; conditions on which they agree."""
 
-from spheretwin.analysis.differences import common_conditions, scenario_differences
+from spheretwin.analysis.review import common_conditions, scenario_differences
 
 SCENARIO = {
     "name": "tilt",

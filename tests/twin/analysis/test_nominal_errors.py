@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from spheretwin.analysis.nominal_errors import nominal_errors
 from spheretwin.analysis.recorded_run import read
+from spheretwin.analysis.review import nominal_errors
 from spheretwin.models import actuator as actuators
 from tests.twin.analysis.runs import written
 

@@ -9,7 +9,7 @@ import pytest
 from spheretwin import cli
 from spheretwin.cli import reproduce
 from spheretwin.paper.experiment import Finding
-from spheretwin.viz.terminal.verdicts import Verdict
+from spheretwin.viz.terminal.texts import Verdict
 from tests.twin.paper.cases import IDEAL, LOST, experiment
 
 COMMAND = [sys.executable, "-m", "spheretwin", "reproduce"]

@@ -4,7 +4,7 @@ import numpy as np
 
 from spheretwin.models.telemetry.status import Status
 from spheretwin.paper.experiment import Case, Experiment, Outcome, ResultTable, Section
-from spheretwin.paper.rows import of_axis, spread_deg
+from spheretwin.paper.page import of_axis, spread_deg
 
 SHORT = {"duration": 0.2, "plant.engine": "lagrangian"}
 NOISY = Case("noisy", "tilt", {**SHORT, "hardware": "prototype"}, details={"paper": [0.01, None, None]})

@@ -6,8 +6,7 @@ import pytest
 
 from spheretwin import scenario as scenarios
 from spheretwin.paper import EXPERIMENTS, page
-from spheretwin.paper.page import Chapter
-from spheretwin.paper.rows import rows
+from spheretwin.paper.page import Chapter, rows
 from spheretwin.paper.runner import make_plan, run_plan, unexpected_ends
 
 FACE = {

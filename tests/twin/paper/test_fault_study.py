@@ -30,7 +30,7 @@ from spheretwin.paper.fault_cases import (
     shorted,
 )
 from spheretwin.paper.fault_outcomes import FaultData, reason, reduce, row_fields, tracks
-from spheretwin.paper.rows import rows
+from spheretwin.paper.page import rows
 from spheretwin.paper.runner import make_plan, run_plan, scenario_of, unexpected_ends
 from spheretwin.session import Session
 from spheretwin.simulation import simulate

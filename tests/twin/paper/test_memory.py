@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from spheretwin.paper import runner
-from spheretwin.paper.rows import rows
+from spheretwin.paper.page import rows
 from spheretwin.paper.runner import OutcomeCache, key_of, make_plan, run_plan, scenario_of, summarise
 from tests.twin.paper.cases import IDEAL, NOISY, SHORT, experiment
 

@@ -8,7 +8,7 @@ from spheretwin.paper import nutation
 from spheretwin.paper.experiment import Outcomes
 from spheretwin.paper.laws import COMPARED_LAWS
 from spheretwin.paper.nutation import SAMPLE_s, WINDOW_s, reduce
-from spheretwin.paper.rows import padded
+from spheretwin.paper.page import padded
 from spheretwin.paper.runner import make_plan, run_plan, scenario_of
 from spheretwin.simulation import simulate
 

@@ -5,7 +5,7 @@ import pytest
 
 from spheretwin.models.base.errors import InputError, SpheretwinError
 from spheretwin.models.telemetry.status import Status
-from spheretwin.paper.rows import plants_text
+from spheretwin.paper.page import plants_text
 from spheretwin.paper.runner import EVERY, compare_plants, make_plan, run_plan, scenario_of, summarise
 from spheretwin.study.agreement import BOUND
 from tests.twin.paper.cases import IDEAL, NOISY, experiment

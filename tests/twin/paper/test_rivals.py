@@ -8,14 +8,13 @@ import pytest
 
 from spheretwin.control.laws import LAWS
 from spheretwin.models.telemetry.status import Status
-from spheretwin.paper import page, rival_conditions, rival_tables
+from spheretwin.paper import page, rival_conditions, rival_results
 from spheretwin.paper.experiment import Outcome, Outcomes
 from spheretwin.paper.laws import BY_LAW
-from spheretwin.paper.page import Chapter
+from spheretwin.paper.page import Chapter, rows
 from spheretwin.paper.rival_conditions import FOLDER, HARDWARE, IDEAL, PROTOTYPE, tuned_gains
 from spheretwin.paper.rival_results import results, start_error, within
 from spheretwin.paper.rivals import EXPERIMENT
-from spheretwin.paper.rows import rows
 from spheretwin.paper.runner import make_plan, run_plan, scenario_of, unexpected_ends
 from spheretwin.study.grid import Grid
 from spheretwin.study.row import Rows
@@ -163,13 +162,13 @@ def test_results_are_medians_and_no_numbers_if_a_run_was_lost():
     ],
 )
 def test_findings_say_where_rivals_are_level_or_better(errors, expected):
-    (finding,) = rival_tables.findings(made_up(30.0, errors))
+    (finding,) = rival_results.findings(made_up(30.0, errors))
     assert expected in finding.text
     assert "tuned within 30 A/s" in finding.text
 
 
 def test_nothing_is_found_where_nothing_ran():
-    assert rival_tables.findings(Outcomes()) == []
+    assert rival_results.findings(Outcomes()) == []
     assert EXPERIMENT.sections(Outcomes()) == []
 
 

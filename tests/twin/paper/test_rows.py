@@ -5,7 +5,7 @@ import pytest
 
 from spheretwin.models.telemetry.status import Status
 from spheretwin.paper.experiment import Outcome
-from spheretwin.paper.rows import of_axis, rows, spread_deg, statuses_text
+from spheretwin.paper.page import of_axis, rows, spread_deg, statuses_text
 from spheretwin.paper.runner import make_plan
 from tests.twin.paper.cases import NOISY, allowed, experiment
 

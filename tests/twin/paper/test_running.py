@@ -8,7 +8,7 @@ import pytest
 from spheretwin import scenario as scenarios
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.telemetry.status import Status
-from spheretwin.paper.rows import rows
+from spheretwin.paper.page import rows
 from spheretwin.paper.runner import make_plan, measured_error, run_plan, unexpected_ends
 from spheretwin.simulation import simulate
 from tests.twin.paper.cases import IDEAL, LOST, NOISY, allowed, experiment

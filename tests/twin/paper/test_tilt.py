@@ -6,7 +6,7 @@ import pytest
 from spheretwin import scenario as scenarios
 from spheretwin.control.laws.pid import BANDWIDTH_rad_s
 from spheretwin.paper import tilt
-from spheretwin.paper.rows import padded, rows
+from spheretwin.paper.page import padded, rows
 from spheretwin.paper.runner import make_plan, run_plan
 from spheretwin.paper.tilt_cases import BY_LAW, CHANGES, TILT_LAWS, printed
 from spheretwin.simulation import simulate

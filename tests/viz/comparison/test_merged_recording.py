@@ -24,7 +24,7 @@ from spheretwin.viz.layout.extents import number
 from spheretwin.viz.layout.styles import MIDDLE, THICK, THIN
 from spheretwin.viz.layout.view import TIMELINE
 from spheretwin.viz.quantities import COMPARED_QUANTITIES
-from spheretwin.viz.scene.motion import shaft_tip
+from spheretwin.viz.scene.entities import shaft_tip
 from tests.twin.analysis.runs import written
 
 APART_mrad = 3.0

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from spheretwin.viz.comparison.ranges import quantity_range, settled_range
+from spheretwin.viz.comparison.runs import quantity_range, settled_range
 from tests.viz.comparison.compared import RAMP, VALUE, T_s, run_of
 
 

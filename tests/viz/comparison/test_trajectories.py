@@ -6,7 +6,7 @@ from rerun.chunk import RrdReader
 from spheretwin.viz import theme
 from spheretwin.viz.comparison.trajectories import LawTrajectory, write
 from spheretwin.viz.layout.view import TIMELINE
-from spheretwin.viz.scene.motion import shaft_tip
+from spheretwin.viz.scene.entities import shaft_tip
 
 
 def flight(law, ticks):

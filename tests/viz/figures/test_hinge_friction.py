@@ -5,7 +5,7 @@ import pytest
 from matplotlib.figure import Figure
 from matplotlib.image import imread
 
-from spheretwin.viz.figures import hinge_friction, style
+from spheretwin.viz.figures import crosscheck, style
 
 UP = np.linspace(0, 3e-3, 200)
 TORQUE = np.concatenate([UP, UP[-2::-1]])
@@ -16,13 +16,13 @@ COAST = np.maximum(2 - T, 0)
 
 def bearing(level):
     rates = {"ours": IDEAL + 5 * TORQUE, "theirs": IDEAL + 0.5 * TORQUE}
-    ramped = hinge_friction.Ramped(TORQUE, rates, IDEAL, level, level / 2, {"ours": 5e-3, "theirs": 5e-4})
+    ramped = crosscheck.Ramped(TORQUE, rates, IDEAL, level, level / 2, {"ours": 5e-3, "theirs": 5e-4})
     late = {"ours": COAST + 1e-3, "theirs": COAST + np.where(T > 1.9, 1e-3, 0)}
-    return ramped, hinge_friction.Resting(T, late, COAST, 2.0)
+    return ramped, crosscheck.Resting(T, late, COAST, 2.0)
 
 
 def drawn() -> Figure:
-    return hinge_friction.hinge_friction({"soft": bearing(2e-3), "hard": bearing(2.5e-3)}, "friction")
+    return crosscheck.hinge_friction({"soft": bearing(2e-3), "hard": bearing(2.5e-3)}, "friction")
 
 
 @pytest.fixture
@@ -74,8 +74,8 @@ def test_torque_is_in_mNm_with_the_level_and_the_creep_where_they_are(figure):
 
 def test_rest_lies_below_what_the_axis_shows(figure):
     ideal = next(line for line in figure.axes[0].get_lines() if line.get_label() == "ideal friction")
-    assert min(ideal.get_ydata()) == 0.1 * hinge_friction.SLOWEST_rad_s
-    assert figure.axes[0].get_ylim()[0] == hinge_friction.SLOWEST_rad_s
+    assert min(ideal.get_ydata()) == 0.1 * crosscheck.SLOWEST_rad_s
+    assert figure.axes[0].get_ylim()[0] == crosscheck.SLOWEST_rad_s
 
 
 def test_coasting_is_drawn_beside_ideal_and_its_end_about_the_ideal_stop(figure):

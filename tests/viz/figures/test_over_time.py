@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from spheretwin.viz.figures import conditions, over_time, paths, style
+from spheretwin.viz.figures import conditions, over_time, style
 from spheretwin.viz.figures.style import styles
 from spheretwin.viz.theme import law_colour
 
@@ -76,10 +76,10 @@ def test_paths_are_on_the_same_scales():
     turn = np.linspace(0, 6, 50)
     around = np.stack([90 * np.cos(turn), 20 * np.sin(turn), 100 + turn], axis=1)
     by_label = {
-        "AFSM": paths.TipPath("afsm", around, around, True),
-        "PD": paths.TipPath("pd", around[:9], around, False),
+        "AFSM": over_time.TipPath("afsm", around, around, True),
+        "PD": over_time.TipPath("pd", around[:9], around, False),
     }
-    figure = paths.paths(by_label, "title")
+    figure = over_time.paths(by_label, "title")
     spaces, plans = figure.axes[::2], figure.axes[1::2]
     assert {axes.name for axes in spaces} == {"3d"}
     assert plans[0].get_xlim() == plans[1].get_xlim()

@@ -6,7 +6,7 @@ from matplotlib.colors import to_rgb
 
 import spheretwin as st
 from spheretwin.models.telemetry.signals import ANGLES
-from spheretwin.viz.figures.overview import overview
+from spheretwin.viz.figures.comparison import overview
 from spheretwin.viz.figures.style import AXES
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 
 from spheretwin.viz import theme
-from spheretwin.viz.figures.paths import TipPath, paths
+from spheretwin.viz.figures.over_time import TipPath, paths
 from spheretwin.viz.figures.style import INK
 
 TIP = np.array([[1.0, 2.0, 30.0], [4.0, -5.0, 31.0], [7.0, 8.0, 32.0]])

@@ -4,7 +4,7 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from spheretwin.viz.figures.torque_maps import capability_by_tilt
+from spheretwin.viz.figures.maps import capability_by_tilt
 
 TILT_rad = np.radians([0.0, 10.0, 20.0])
 BEST = np.arange(1.0, 13.0).reshape(3, 2, 2)

@@ -9,6 +9,7 @@ from spheretwin.models.telemetry.signals import COMMON_NAMES, common_signals
 from spheretwin.provenance import facts_of
 from spheretwin.session import Session
 from spheretwin.simulation import follow
+from spheretwin.viz.layout.layout import VIEWS
 from spheretwin.viz.layout.view import (
     AFTER_THE_END,
     STYLES,
@@ -18,7 +19,6 @@ from spheretwin.viz.layout.view import (
     application,
     shown_until_s,
 )
-from spheretwin.viz.layout.views import VIEWS
 from spheretwin.viz.recording import plots
 from spheretwin.viz.recording.recorder import Recorder
 

@@ -6,13 +6,13 @@ from xml.etree import ElementTree
 import pytest
 from matplotlib.figure import Figure
 
-from spheretwin.viz.pages import html, markdown
+from spheretwin.viz.pages import markdown
 
 
 def test_tables_of_markdown_become_tables():
     lines = markdown.table(("law", "α"), [("a | b", "1.5"), ("*c*", "2")], (False, True))
     assert lines == ["| law | α |", "|---|---:|", "| a \\| b | 1.5 |", "| *c* | 2 |"]
-    made = html.page("title", "\n".join(lines))
+    made = markdown.page("title", "\n".join(lines))
     assert made.count("<tr>") == 3
     assert "<td>a | b</td>" in made
     assert '<td style="text-align:right">1.5</td>' in made
@@ -20,7 +20,7 @@ def test_tables_of_markdown_become_tables():
 
 
 def test_tags_are_shown_and_not_obeyed():
-    made = html.page("a < b", "<script>alert(1)</script> and [a link](javascript:alert(1))")
+    made = markdown.page("a < b", "<script>alert(1)</script> and [a link](javascript:alert(1))")
     assert "<title>a &lt; b</title>" in made
     assert "<script" not in made
     assert 'href="javascript' not in made

@@ -3,7 +3,7 @@
 import itertools
 import threading
 
-from spheretwin.viz.recording.viewer_server import Broadcast
+from spheretwin.viz.recording.live import Broadcast
 
 
 def piece(number, size=100):

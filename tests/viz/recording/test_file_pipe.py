@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from spheretwin.viz.recording.file_pipe import FilePipe
+from spheretwin.viz.recording.recorder import FilePipe
 
 # More than any pipe holds (64 kB unless told otherwise), so that a writer waits unless somebody reads.
 BYTES = os.urandom(1 << 20)

@@ -21,7 +21,7 @@ from spheretwin.session import Session
 from spheretwin.simulation import follow
 from spheretwin.viz.layout.plots import Plots
 from spheretwin.viz.layout.view import ENVELOPE, EVENTS, TELEMETRY, View
-from spheretwin.viz.recording.viewer_server import RECORDING
+from spheretwin.viz.recording.live import RECORDING
 from tests.browser import Browser, needs_a_browser
 from tests.viz.recording.panels import columns, rows
 from tests.waiting import wait_for

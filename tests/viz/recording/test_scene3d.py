@@ -20,9 +20,8 @@ from spheretwin.viz.layout.view import TIMELINE
 from spheretwin.viz.recording import stream
 from spheretwin.viz.recording.recorder import Recorder
 from spheretwin.viz.recording.scene3d import Ending, MovingActuator, Torques, Traces
+from spheretwin.viz.scene.entities import SCALE, TRACES, TRAIL_S, AXES_LENGTH_m, METRES_PER_Nm
 from spheretwin.viz.scene.meshes import FAILURE, FAILURE_TEXT, PAYLOAD, TORQUES
-from spheretwin.viz.scene.motion import SCALE, TRACES, TRAIL_S, METRES_PER_Nm
-from spheretwin.viz.scene.static import AXES_LENGTH_m
 
 PAYLOAD_kg = 0.1
 

@@ -11,7 +11,7 @@ import pytest
 
 from spheretwin.models.base.errors import SpheretwinError
 from spheretwin.viz import rerun_internals
-from spheretwin.viz.recording.viewer_server import RECORDING, Broadcast, ViewerServer
+from spheretwin.viz.recording.live import RECORDING, Broadcast, ViewerServer
 from spheretwin.viz.rerun_internals import FILES, HOST, INDEX
 from tests.waiting import wait_for
 

@@ -14,9 +14,16 @@ from scipy.spatial.transform import Rotation
 from spheretwin.models import actuator as actuators
 from spheretwin.models.kinematics import rotation
 from spheretwin.viz import theme
+from spheretwin.viz.scene.entities import (
+    ALONG,
+    body_quaternions,
+    coil_texture,
+    current_scale,
+    current_scale_labels,
+    shaft_tip,
+    size_of,
+)
 from spheretwin.viz.scene.meshes import SECTIONS, WORLD, read_meshes
-from spheretwin.viz.scene.motion import body_quaternions, shaft_tip
-from spheretwin.viz.scene.static import ALONG, coil_texture, current_scale, current_scale_labels, size_of
 
 poses = st.tuples(*[st.floats(-1.4, 1.4)] * 2, st.floats(-40, 40)).map(lambda q: np.array([q]))
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from spheretwin.study.optimise import Gain, Objective, Optimise
-from spheretwin.study.tuning.local_search import NARROWEST, WIDEST, proposed
+from spheretwin.study.tuning.sampler import NARROWEST, WIDEST, proposed
 from spheretwin.study.tuning.trials import Ended, FinishedTrial, Tried
 from spheretwin.study.tuning.tuning import tune
 from tests.twin.study.tuning.cases import TWO, gain, study
