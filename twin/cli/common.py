@@ -17,7 +17,7 @@ from typing import Any
 
 from spheretwin.models import mjcf
 from spheretwin.models.base.checks import Check, broken
-from spheretwin.models.base.files import OPEN_FILES, PartialFile, whole_file
+from spheretwin.models.base.files import OPEN_FILES, PartialFile
 
 
 def print_json(figures: Mapping[str, Any]) -> None:
@@ -34,12 +34,6 @@ def warn(lines: Iterable[str]) -> None:
 def warn_about_model(path: Path) -> None:
     """Print the warnings of the engine about a model file."""
     warn(mjcf.read(path).warnings)
-
-
-def write_text(path: Path, text: str) -> None:
-    """Write a file completely or not at all."""
-    with whole_file(path) as temporary:
-        temporary.write_text(text, encoding="utf-8")
 
 
 def report_broken(source: str, checks: Iterable[Check]) -> bool:

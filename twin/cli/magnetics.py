@@ -4,22 +4,21 @@ from __future__ import annotations
 
 import argparse
 import sys
-from importlib import import_module
 from pathlib import Path
-from types import ModuleType
 from typing import Any
 
-from spheretwin.cli.common import print_json, report_broken, warn, warn_about_model, write_text
+from spheretwin.cli.common import print_json, report_broken, warn, warn_about_model
 from spheretwin.cli.options import Parser, number, whole
 from spheretwin.models import actuator as actuators
 from spheretwin.models import torque_curve
 from spheretwin.models.actuator import MJCF_PATH, TORQUE_CURVE_PATH
 from spheretwin.models.base.errors import InputError
-from spheretwin.models.base.files import check_writable, make_folder
+from spheretwin.models.base.files import check_writable
 from spheretwin.models.design import curve_check, field_check, torque_map
 from spheretwin.models.design.curve_check import ComputedCurve
 from spheretwin.models.design.torque_map import TorqueSurvey
 from spheretwin.models.design.workspace import LARGEST_TILT_DEG
+from spheretwin.viz.pages.markdown import prepare, save_text
 from spheretwin.viz.terminal import magnetics, runs
 from spheretwin.viz.terminal.progress import tracked
 from spheretwin.viz.terminal.tables import print_checks
@@ -148,7 +147,7 @@ def _compute(options: argparse.Namespace) -> bool:
     warn_about_model(options.mjcf)
     warn(computed.warnings)
     if options.out:
-        write_text(options.out, computed.csv)
+        save_text(options.out, computed.csv)
     if options.json:
         print_json(
             {
@@ -208,15 +207,14 @@ def _judge(csv: Path, mjcf: Path, as_json: bool) -> bool:
 
 def run_map(options: argparse.Namespace) -> bool:
     """Run the part; return True if no bound is broken."""
-    plots = _plots() if options.out else None
     actuator = actuators.load(options.mjcf, options.csv)
     if options.out:
-        make_folder(options.out)
+        prepare(options.out)
     surveyed = torque_map.survey(actuator, options.largest_tilt, tracked("torque capability"))
     verdict = torque_map.judge(surveyed, options.need)
     warn_about_model(options.mjcf)
     warn(verdict.warnings)
-    files = _draw(plots, options.out, surveyed) if plots else []
+    files = _draw(options.out, surveyed) if options.out else []
     if options.json:
         print_json({**verdict._asdict(), "figures": [str(path) for path in files]})
     else:
@@ -226,18 +224,9 @@ def run_map(options: argparse.Namespace) -> bool:
     return report_broken("magnetics map", verdict.checks)
 
 
-def _plots() -> ModuleType:
-    try:
-        return import_module("spheretwin.viz.figures.maps")
-    except ModuleNotFoundError as error:
-        raise InputError(
-            "magnetics map: expected the extra `spheretwin[plots]` to draw figures,"
-            f" received an installation without {error.name}"
-        ) from None
-
-
-def _draw(plots: ModuleType, folder: Path, surveyed: TorqueSurvey) -> list[Path]:
-    from spheretwin.viz.figures.style import save  # Matplotlib is optional
+def _draw(folder: Path, surveyed: TorqueSurvey) -> list[Path]:
+    from spheretwin.viz.figures import maps  # Matplotlib is optional
+    from spheretwin.viz.figures.style import save
 
     workspace, on_grid, worst = surveyed.workspace, surveyed.on_grid, surveyed.worst
     limit_A = surveyed.actuator.group.current_limit_A
@@ -247,8 +236,8 @@ def _draw(plots: ModuleType, folder: Path, surveyed: TorqueSurvey) -> list[Path]
         "copper_W_per_Nm2": worst["singular_value"].capability.copper_W_per_Nm2,
     }
     figures = {
-        "capability_map.png": plots.capability_map(workspace, on_grid, limit_A),
-        "capability_by_tilt.png": plots.capability_by_tilt(workspace, on_grid, by_tilt, limit_A),
+        "capability_map.png": maps.capability_map(workspace, on_grid, limit_A),
+        "capability_by_tilt.png": maps.capability_by_tilt(workspace, on_grid, by_tilt, limit_A),
     }
     for name, figure in figures.items():
         save(figure, folder / name)

@@ -12,6 +12,7 @@ from spheretwin.models import torque_curve
 from spheretwin.models.design import curve_check, direct_summation, pole_torque, torque_map
 from spheretwin.models.design import field_check as field_verdict
 from spheretwin.models.torque_curve import TorqueCurve
+from spheretwin.viz.pages import markdown
 from tests.models.design.quadrature import COARSE
 
 ASSETS = str(actuators.FOLDER / "assets")
@@ -275,9 +276,7 @@ def test_bad_input_is_one_line_and_exit_2(capsys, tmp_path, monkeypatch, user_cs
 
 
 def test_missing_matplotlib_is_named_before_the_work(capsys, tmp_path, monkeypatch):
-    for drawing in ("torque_maps", "crosscheck"):
-        monkeypatch.delitem(sys.modules, f"spheretwin.viz.figures.{drawing}", raising=False)
-    monkeypatch.setitem(sys.modules, "matplotlib.figure", None)
+    monkeypatch.setattr(markdown, "find_spec", lambda name: None)
     code, _, err = here(capsys, "map", "--out", tmp_path / "figures")
     assert code == 2
     assert "spheretwin[plots]" in one_line(err)
