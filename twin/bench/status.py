@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -154,29 +154,6 @@ VECTORS = (
 )
 
 
-class ShownRow(NamedTuple):
-    """The row that is shown."""
-
-    row: Table | None
-    """None before the first row."""
-    tick: int
-    period_s: float
-    current_limit_A: float
-
-
-def status_of_row(shown_row: ShownRow, session: Session, **others: Any) -> BenchStatus:
-    """Return the status of a row and other fields; before the first row, that of the session."""
-    return BenchStatus(
-        **others,
-        tick=shown_row.tick,
-        period_s=shown_row.period_s,
-        current_limit_A=shown_row.current_limit_A,
-        **(
-            _at_start(session) if shown_row.row is None else _of_row(shown_row.row, shown_row.current_limit_A)
-        ),
-    )
-
-
 def _of_row(row: Table, limit_A: float) -> dict[str, Any]:
     error_rad = float(np.linalg.norm(row["error_rad"][0]))
     largest_A = float(np.abs(row["current_command_A"][0]).max())
@@ -229,9 +206,8 @@ def bench_status(bench_state: BenchState) -> BenchStatus:
         bench_state.recording,
     )
     session = driver.session
-    return status_of_row(
-        _shown_row(bench_state),
-        session,
+    return BenchStatus(
+        **_shown(bench_state),
         **_names(bench_state),
         running=bench_state.is_active,
         stopped=driver.stopped,
@@ -257,12 +233,17 @@ def bench_status(bench_state: BenchState) -> BenchStatus:
     )
 
 
-def _shown_row(bench_state: BenchState) -> ShownRow:
+def _shown(bench_state: BenchState) -> dict[str, Any]:
+    """Return the row that is shown and its place; before the first row, the start of the session."""
     player, driver = bench_state.player, bench_state.driver
+    row: Table | None
     if player:
-        return ShownRow(player.row, player.place, player.period_s, player.current_limit_A)
-    limit_A = driver.session.scenario.nominal.current_limit_A
-    return ShownRow(driver.row, driver.session.tick, bench_state.period_s, limit_A)
+        row, tick, period_s, limit_A = player.row, player.place, player.period_s, player.current_limit_A
+    else:
+        row, tick, period_s = driver.row, driver.session.tick, bench_state.period_s
+        limit_A = driver.session.scenario.nominal.current_limit_A
+    place = {"tick": tick, "period_s": period_s, "current_limit_A": limit_A}
+    return place | (_at_start(driver.session) if row is None else _of_row(row, limit_A))
 
 
 def _names(bench_state: BenchState) -> dict[str, Any]:

@@ -8,6 +8,7 @@ from math import pi
 import numpy as np
 import viser
 from numpy.typing import ArrayLike, NDArray
+from scipy.spatial.transform import Rotation
 
 from spheretwin.models.actuator import Actuator
 from spheretwin.viz import theme
@@ -168,19 +169,19 @@ class Scene:
             Current of the full colour.
         """
         for axis, hinge in enumerate(self._hinges):
-            hinge.wxyz = _about(axis, q_rad[axis])
+            hinge.wxyz = Rotation.from_euler("xyz"[axis], q_rad[axis]).as_quat(scalar_first=True)
         coloured = self._coil_colours(current_A, limit_A)
         if not np.array_equal(coloured, self.coils.batched_colors):
             self.coils.batched_colors = coloured
         self._ghost.visible = self.handle.visible = desired_rad is not None
         if desired_rad is not None:
-            w = _pose(desired_rad)
-            self._ghost.wxyz = w
-            self.handle.position = _rotated(w, self._actuator.shaft_tip_m)
+            desired = _pose(desired_rad)
+            self._ghost.wxyz = desired.as_quat(scalar_first=True)
+            self.handle.position = desired.as_matrix() @ self._actuator.shaft_tip_m
 
     def trail(self, q_rad: NDArray[np.float64]) -> None:
         """Extend the path of the tip."""
-        self._trail.append(_rotated(_pose(q_rad), self._actuator.shaft_tip_m))
+        self._trail.append(_pose(q_rad).as_matrix() @ self._actuator.shaft_tip_m)
         points = np.array(self._trail, dtype=np.float32)
         if len(points) > 1:
             self._line.points = np.stack([points[:-1], points[1:]], axis=1)
@@ -269,27 +270,6 @@ def _unit(vector: NDArray[np.float64]) -> NDArray[np.float64]:
     return vector[None] / np.linalg.norm(vector)
 
 
-def _about(axis: int, angle_rad: float) -> NDArray[np.float64]:
-    """Quaternion of a turn about x, y or z, scalar first."""
-    quaternion = np.zeros(4)
-    quaternion[0], quaternion[1 + axis] = np.cos(angle_rad / 2), np.sin(angle_rad / 2)
-    return quaternion
-
-
-def _pose(q_rad: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Quaternion of three hinge angles, scalar first: about x, then the turned y, then the turned z."""
-    alpha, beta, gamma = (_about(axis, angle) for axis, angle in enumerate(q_rad))
-    return _product(_product(alpha, beta), gamma)
-
-
-def _product(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Quaternion product: first b, then a."""
-    vector = a[0] * b[1:] + b[0] * a[1:] + np.cross(a[1:], b[1:])
-    return np.array([a[0] * b[0] - a[1:] @ b[1:], *vector])
-
-
-def _rotated(quaternion: NDArray[np.float64], vector: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return a vector rotated by a quaternion."""
-    w, axis = quaternion[0], quaternion[1:]
-    across = 2 * np.cross(axis, vector)
-    return vector + w * across + np.cross(axis, across)
+def _pose(q_rad: NDArray[np.float64]) -> Rotation:
+    """Rotation by three hinge angles: about x, then the turned y, then the turned z."""
+    return Rotation.from_euler("XYZ", q_rad)
