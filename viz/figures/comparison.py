@@ -25,6 +25,7 @@ from spheretwin.viz.figures.style import (
     INK,
     WIDTH_in,
     draw_line,
+    name_axes,
     name_runs,
     panel_column,
     plain,
@@ -101,8 +102,7 @@ def events_figure(runs: Sequence[ComparedRun], title: str) -> Figure:
     axes.set_ylim(len(runs) - 0.5, -0.5)
     plain(axes, "")
     axes.grid(visible=True, axis="x", color=FAINT, alpha=0.35)
-    axes.set_xlabel("time, s")
-    axes.set_title(title, fontsize="medium")
+    name_axes(axes, x="time, s", title=title)
     figure.legend(loc="outside lower center", ncols=3, frameon=False, fontsize="small")
     return figure
 
@@ -123,8 +123,7 @@ def spectra(runs: Sequence[ComparedRun], of_runs: Sequence[Sequence[Spectrum]], 
     figure = Figure(figsize=(WIDTH_in, 7.0), layout="constrained")
     panels = panel_column(figure, len(ANGLES))
     for axis, (panel, name) in enumerate(zip(panels, ANGLES, strict=True)):
-        panel.set_xscale("log")
-        panel.set_yscale("log")
+        panel.set(xscale="log", yscale="log")
         for run, look, of_run in zip(runs, run_styles(runs), of_runs, strict=True):
             spectrum = of_run[axis]
             lines = octave_maxima(spectrum.frequency_Hz, spectrum.amplitude_mrad, LINES_EACH_OCTAVE)

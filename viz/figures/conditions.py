@@ -17,6 +17,7 @@ from spheretwin.viz.figures.style import (
     LawStyle,
     WIDTH_in,
     faint_grid,
+    name_axes,
     on_errors,
     save,
     styles,
@@ -57,8 +58,7 @@ def by_condition(
         for place, (label, series) in enumerate(by_label.items()):
             shift = SHIFT * (place - (len(by_label) - 1) / 2)
             _series(panel, label, series, looks[series.law], hinge, shift)
-        panel.set_title(name, fontsize="medium")
-        panel.set_xlabel(x)
+        name_axes(panel, x=x, title=name)
         panel.set_xticks(next(iter(by_label.values())).values)
     every = [np.ravel(series.error_rad) for series in by_label.values()]
     every += [np.ravel(list(series.paper_rad.values())) for series in by_label.values()]
@@ -201,8 +201,7 @@ def ratios(rows: Sequence[RatioRow], labels: Mapping[str, str], quantity: str, t
     axes.set_xscale("log")
     axes.set_yticks(range(len(rows)), [row.label for row in rows])
     axes.set_ylim(len(rows) - 0.5, -0.5)
-    axes.set_xlabel(quantity)
-    axes.set_title(title, fontsize="medium")
+    name_axes(axes, x=quantity, title=title)
     axes.xaxis.set_major_formatter("{x:g}")
     axes.grid(visible=True, axis="x", color=FAINT, alpha=0.35, linewidth=0.6)
     for y in range(1, len(rows)):
@@ -260,8 +259,7 @@ def estimators(bandwidths_rad_s: Array, curves: Mapping[str, Curve], title: str)
     for axes, quantity in ((above, "RMS error of the rate, rad/s"), (below, "lag of the rate, ms")):
         for colour, curve in zip(SERIES, curves.values(), strict=False):
             axes.axvline(curve.default_rad_s, color=colour, linestyle="--", linewidth=1.2)
-        axes.set_xscale("log")
-        axes.set_yscale("log")
+        axes.set(xscale="log", yscale="log")
         axes.set_ylabel(quantity)
         faint_grid(axes, which="both")
         axes.legend(loc="center left", bbox_to_anchor=(1.01, 0.5))

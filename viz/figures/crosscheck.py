@@ -23,6 +23,7 @@ from spheretwin.viz.figures.style import (
     WIDTH_in,
     common_legend,
     faint_grid,
+    name_axes,
     panel_column,
 )
 
@@ -158,8 +159,7 @@ def convergence(slopes: Mapping[str, Slope], title: str) -> Figure:
         axes.plot(slope.steps_s * 1e3, slope.errors, marker, color=colour, markersize=size,
                   markerfacecolor=hollow, label=f"{name}: order {slope.order:.2f}")  # fmt: skip
         axes.plot(ends * 1e3, factor * ends**slope.order, "--", color=colour, linewidth=1)
-    axes.set_xscale("log")
-    axes.set_yscale("log")
+    axes.set(xscale="log", yscale="log")
     steps_ms = 1e3 * np.unique(np.concatenate([slope.steps_s for slope in slopes.values()]))
     axes.set_xticks(steps_ms, [f"{step:g}" for step in steps_ms])
     axes.minorticks_off()
@@ -241,9 +241,7 @@ def _draw_bound(axes: Axes, bound: float | None, unit: str, colour: str = INK) -
 
 def _finish(axes: Axes, x: str, y: str, title: str) -> None:
     """Set labels and a faint grid; remove the box."""
-    axes.set_xlabel(x)
-    axes.set_ylabel(y)
-    axes.set_title(title, fontsize="medium")
+    name_axes(axes, x=x, y=y, title=title)
     faint_grid(axes)
 
 

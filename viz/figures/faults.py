@@ -16,6 +16,7 @@ from spheretwin.viz.figures.style import (
     INK,
     SERIES,
     WIDTH_in,
+    name_axes,
 )
 
 Array = NDArray[np.float64]
@@ -45,9 +46,7 @@ def shares(by_name: Mapping[str, Mapping[int, float]], x: str, y: str, title: st
     axes.set_ylim(-3, 103)
     axes.grid(visible=True, axis="y", color=FAINT, alpha=0.4, linewidth=0.6)
     axes.spines[["top", "right"]].set_visible(False)
-    axes.set_xlabel(x)
-    axes.set_ylabel(y)
-    axes.set_title(title, fontsize="medium")
+    name_axes(axes, x=x, y=y, title=title)
     axes.legend(frameon=False)
     return figure
 
@@ -70,14 +69,11 @@ def remaining(by_name: Mapping[str, Sequence[float]], x: str, y: str, title: str
         left = 100 * (1 - np.arange(len(rising) + 1) / len(times))
         percent = np.append(left[1:], left[-1])
         axes.step(np.append(rising, end), percent, where="post", color=colour, linewidth=1.4, label=name)
-    axes.set_xscale("log")
-    axes.set_yscale("log")
+    axes.set(xscale="log", yscale="log")
     axes.grid(visible=True, color=FAINT, alpha=0.4, linewidth=0.6)
     axes.spines[["top", "right"]].set_visible(False)
     axes.yaxis.set_major_formatter("{x:g}")
-    axes.set_xlabel(x)
-    axes.set_ylabel(y)
-    axes.set_title(title, fontsize="medium")
+    name_axes(axes, x=x, y=y, title=title)
     axes.legend(frameon=False)
     return figure
 
@@ -110,8 +106,7 @@ def triangles(panels: Mapping[str, Array], label: str, quantity: str, bound: flo
         ticks = range(0, len(panel), EVERY)
         axes.set_xticks(ticks)
         axes.set_yticks(ticks)
-        axes.set_title(name, fontsize="medium")
-        axes.set_xlabel(label)
+        name_axes(axes, x=label, title=name)
         axes.tick_params(length=0)
         axes.spines[:].set_visible(False)
     sides[0].set_ylabel(label)
@@ -148,10 +143,8 @@ def clouds(
         x, y, number = np.array([point for point in points if np.all(np.isfinite(point))]).T
         cloud = axes.scatter(x, y, c=number, norm=scale, cmap=COLOURS, s=7, linewidths=0, rasterized=True)
         _dashed(axes, bounds)
-        axes.set_xscale("log")
-        axes.set_yscale("log")
-        axes.set_title(name, fontsize="medium")
-        axes.set_xlabel(labels[0])
+        axes.set(xscale="log", yscale="log")
+        name_axes(axes, x=labels[0], title=name)
         for axis in (axes.xaxis, axes.yaxis):
             axis.set_major_formatter("{x:g}")
             axis.set_minor_formatter(NullFormatter())

@@ -17,6 +17,7 @@ from spheretwin.viz.figures.style import (
     LawStyle,
     WIDTH_in,
     faint_grid,
+    name_axes,
     panel_column,
     styles,
 )
@@ -73,8 +74,7 @@ def _panel(axes: Axes, panel: FrontPanel, looks: Mapping[str, LawStyle]) -> None
         style = looks[law]
         axes.plot(*values[np.argsort(values[:, 0])].T, style.marker, markersize=_size(style), linewidth=1.3,
                   markeredgewidth=0.4, markeredgecolor="white", zorder=3, **style.line())  # fmt: skip
-    axes.set_xscale("log")
-    axes.set_yscale("log")
+    axes.set(xscale="log", yscale="log")
     _set_limits(axes, panel)
     for name, (law, x, y) in panel.marked.items():
         if x <= axes.get_xlim()[1] and y <= axes.get_ylim()[1]:
@@ -83,8 +83,7 @@ def _panel(axes: Axes, panel: FrontPanel, looks: Mapping[str, LawStyle]) -> None
                       markerfacecolor="white", zorder=5)  # fmt: skip
             axes.annotate(name, (x, y), (-9, -1), textcoords="offset points", ha="right", va="center",
                           fontsize="small", zorder=5)  # fmt: skip
-    axes.set_ylabel(panel.error)
-    axes.set_title(panel.title, fontsize="medium")
+    name_axes(axes, y=panel.error, title=panel.title)
     axes.grid(visible=True, color=FAINT, alpha=0.25, linewidth=0.5)
     axes.set_axisbelow(True)
     axes.spines[["top", "right"]].set_visible(False)
@@ -181,9 +180,7 @@ def front(by_label: Mapping[str, Trials], objectives: Sequence[str], title: str)
             panel.plot(*trials.values[0], "*", color=INK, markersize=13, label=f"{label}, start", zorder=5)
     for which, place in (("x", 0), ("y", 1)):
         _finish(panel, [trials.values[trials.completed, place] for trials in by_label.values()], which)
-    panel.set_xlabel(objectives[0])
-    panel.set_ylabel(objectives[1])
-    panel.set_title(title, fontsize="medium")
+    name_axes(panel, x=objectives[0], y=objectives[1], title=title)
     figure.legend(loc="outside lower center", ncols=4, frameon=False)
     return figure
 

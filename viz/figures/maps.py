@@ -22,6 +22,7 @@ from spheretwin.viz.figures.style import (
     SERIES,
     WIDTH_in,
     faint_grid,
+    name_axes,
 )
 from spheretwin.viz.theme import law_colours
 
@@ -193,9 +194,7 @@ def lines(
         axes.set_xticks(places, list(x), rotation=20, ha="right")
     values = np.concatenate([line.median for line in by_law.values()])
     fit_scale(axes, "y", values)
-    axes.set_xlabel(axis_name)
-    axes.set_ylabel(quantity)
-    axes.set_title(title, fontsize="medium")
+    name_axes(axes, x=axis_name, y=quantity, title=title)
     faint_grid(axes, 0.3, which="both")
     axes.legend(frameon=False)
     return figure
@@ -312,8 +311,7 @@ def capability_by_tilt(
     copper.plot(tilt, high, color=INK, label="worst pose")
     copper.plot(tilt, middle, color=INK, linestyle=":", label="median")
     copper.set_yscale("log")
-    copper.set_ylabel("copper loss, W/(N·m)²")
-    copper.set_xlabel("tilt of the shaft, degrees")
+    copper.set(ylabel="copper loss, W/(N·m)²", xlabel="tilt of the shaft, degrees")
     for axes in (torque, copper):
         axes.grid(alpha=0.3)
         axes.legend()

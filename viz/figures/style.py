@@ -157,6 +157,13 @@ def plain(axes: Axes, y: str) -> None:
     faint_grid(axes)
 
 
+def name_axes(axes: Axes, title: str, x: str = "", y: str = "") -> None:
+    """Set a title of medium size, and the labels of the axes that are given."""
+    axes.set_title(title, fontsize="medium")
+    axes.set_xlabel(x or axes.get_xlabel())
+    axes.set_ylabel(y or axes.get_ylabel())
+
+
 def name_runs(figure: Figure, axes: Axes) -> None:
     """Name below a figure what one of its panels has lines of."""
     lines, labels = axes.get_legend_handles_labels()
