@@ -5,7 +5,7 @@ from __future__ import annotations
 import html
 import json
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from importlib import import_module
@@ -263,16 +263,18 @@ OTHER_KEYS = (
 
 
 class Figures:
-    """Sink that computes every metric of a run.
+    """Sink that computes metrics of a run.
 
     Parameters
     ----------
     planned : PlannedRun
         Facts about the run before its first row.
+    names : iterable of str
+        Metrics; all unless given.
     """
 
-    def __init__(self, planned: PlannedRun) -> None:
-        self._metrics = {name: metric(planned) for name, metric in METRICS.items()}
+    def __init__(self, planned: PlannedRun, names: Iterable[str] = METRICS) -> None:
+        self._metrics = {name: METRICS[name](planned) for name in names}
         self._all = [*self._metrics.values(), *(check(planned) for check in CHECKS)]
 
     def write(self, rows: Table) -> None:

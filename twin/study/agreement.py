@@ -9,12 +9,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from spheretwin.metrics import PlannedRun, RmsError
+from spheretwin.metrics import PlannedRun
 from spheretwin.models.base.errors import SpheretwinError
 from spheretwin.models.telemetry.status import Status
+from spheretwin.run import Figures
 from spheretwin.simulation import follow
 from spheretwin.study.grid import Row
-from spheretwin.study.row import Rows, follower
+from spheretwin.study.row import Rows
 from spheretwin.study.study import FAST, FULL
 
 EVERY = 100
@@ -22,6 +23,8 @@ EVERY = 100
 BOUND = 0.02
 """Largest difference of the rms error of any hinge, of the largest of the three."""
 
+
+RMS_ERROR = "rms_error_rad"
 
 Ending = tuple[Status, list[float]]
 """Status of a run, and the rms error of each hinge, rad."""
@@ -78,9 +81,10 @@ def compare(expected: str, ours: Ending, theirs: Ending, way_out: str) -> float:
 def _rms(rows: Rows, row: Row, engine: str) -> Ending:
     scenario = rows.scenario(row, engine)
     with rows.session(scenario) as session:
-        metric = RmsError(PlannedRun(session.initial_scenario, session.actuator, scenario.ticks))
-        status = follow(session, scenario.ticks, [follower({"rms_error_rad": metric})])
-        return status, metric.value() or []
+        planned = PlannedRun(session.initial_scenario, session.actuator, scenario.ticks)
+        figures = Figures(planned, [RMS_ERROR])
+        status = follow(session, scenario.ticks, [figures])
+        return status, figures.values()[RMS_ERROR] or []
 
 
 def _difference(ours: list[float], theirs: list[float]) -> float:

@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from spheretwin.metrics import METRICS, Metric, PlannedRun
+from spheretwin.metrics import METRICS, PlannedRun
 from spheretwin.models.base.errors import (
     InputError,
     LawError,
@@ -21,10 +21,9 @@ from spheretwin.models.base.errors import (
 )
 from spheretwin.models.base.user_code import is_reference, load_function
 from spheretwin.models.telemetry.parquet import TelemetryFile
-from spheretwin.models.telemetry.status import Status
 from spheretwin.models.telemetry.table import TelemetryBuffer
 from spheretwin.provenance import record_of
-from spheretwin.run import Run, UserMetric, check_names, own_value
+from spheretwin.run import Figures, Run, UserMetric, check_names, own_value
 from spheretwin.scenario import reading
 from spheretwin.scenario.changes import check_events, fields_with, is_tag
 from spheretwin.scenario.fields import INDEX, every_field, new_name
@@ -196,11 +195,9 @@ class Rows:
         return chosen or any(axis.field in ("plant", ENGINE) for axis in self.study.axis)
 
     def _follow(self, row: Row, scenario: Scenario, session: Session) -> Result:
-        metrics = {
-            name: METRICS[name](PlannedRun(session.initial_scenario, session.actuator, scenario.ticks))
-            for name in self.metrics
-        }
-        sinks: list[Sink] = [follower(metrics)]
+        planned = PlannedRun(session.initial_scenario, session.actuator, scenario.ticks)
+        gathered = Figures(planned, self.metrics)
+        sinks: list[Sink] = [gathered]
         buffer = TelemetryBuffer(session.signals, scenario.ticks) if self._own else None
         file = self._file(row, session)
         sinks += [sink for sink in (buffer, file) if sink]
@@ -211,7 +208,7 @@ class Rows:
                 file.close(record_of(session).metadata())
         if session.law_error:
             raise session.law_error
-        figures = {name: metric.value() for name, metric in metrics.items()}
+        figures = gathered.values()
         complaints: list[str] = []
         if buffer:
             run = Run(session.initial_scenario, status, buffer.table, session.loop_s, session.actuator)
@@ -272,27 +269,6 @@ class Rows:
         section = plant if isinstance(plant, Mapping) else {}
         named = section.get("mjcf")
         return fast_engine(named if isinstance(named, str) else None, section.get("integrator", "RK4"))
-
-
-def follower(metrics: Mapping[str, Metric]) -> Sink:
-    """Sink that writes a run into some metrics."""
-    return _Follower(metrics)
-
-
-class _Follower:
-    def __init__(self, metrics: Mapping[str, Metric]) -> None:
-        self._metrics = metrics
-
-    def write(self, rows: Any) -> None:
-        if len(rows):
-            for metric in self._metrics.values():
-                metric.write(rows)
-
-    def note(self, t_s: float, text: str) -> None:
-        pass
-
-    def finish(self, status: Status) -> None:
-        pass
 
 
 def _period(fields: Mapping[str, Any]) -> dict[str, Any]:
