@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
 
 from spheretwin.models.design.curve_check import ComputedCurve, CurvePeak, JudgedCurve, Misfit
 from spheretwin.models.design.field_check import FieldVerdict
-from spheretwin.models.design.torque_map import WorkspaceVerdict, direction_text
+from spheretwin.models.design.torque_map import WeakPose, WorkspaceVerdict, direction_text
 from spheretwin.viz.terminal import tables
+from spheretwin.viz.terminal.runs import print_rows
 
 # A table row for every third tilt: one screen.
 ROW_STRIDE = 3
@@ -20,9 +20,17 @@ FIGURE_NAMES = {
 }
 
 
+CURVE_HEAD = ("figure", "value")
+TILT_HEAD = (
+    "tilt", "least norm", "median of it", "best currents", "median of it", "least σ, N·m/A", "cond.",
+    "copper, W/(N·m)²",
+)  # fmt: skip
+POSE_HEAD = ("by", "worst", "tilt, °", "α, °", "β, °", "γ, °", "direction")
+
+
 def print_computed_curve(computed: ComputedCurve) -> None:
     """Print the results for a computed curve."""
-    _print_curve("torque curve computed from the geometry", [("peak", _peak(computed.peak))])
+    print_rows("torque curve computed from the geometry", CURVE_HEAD, [("peak", _peak(computed.peak))], 1)
 
 
 def print_judged_curve(path: Path, judged: JudgedCurve) -> None:
@@ -37,27 +45,26 @@ def print_judged_curve(path: Path, judged: JudgedCurve) -> None:
         ("difference from it after scaling", _misfit(geometry.scaled, "its peak")),
         ("difference of look-up table and spline", f"{judged.lookup_error:.1e} of the peak"),
     ]
-    _print_curve(f"torque curve {path}", rows)
+    print_rows(f"torque curve {path}", CURVE_HEAD, rows, 1)
 
 
 def print_field(verdict: FieldVerdict) -> None:
     """Print the errors of the torque matrix by tilt, and their sources."""
     console = tables.terminal_console()
     title = f"torque by the curve against the direct sum (largest torque {verdict.largest_torque_Nm:.3f} N·m)"
-    table = tables.new_table(
-        title, "tilt", "poses", "median error", "largest", "of largest torque", "half the points"
-    )
-    for band in verdict.by_tilt:
-        low, high = band.tilt_deg
-        table.add_row(
-            f"{low:.0f}° to {high:.0f}°",
+    head = ("tilt", "poses", "median error", "largest", "of largest torque", "half the points")
+    rows = [
+        (
+            f"{band.tilt_deg[0]:.0f}° to {band.tilt_deg[1]:.0f}°",
             str(band.poses),
             _percent(band.median_relative_error),
             _percent(band.largest_relative_error),
             _percent(band.largest_error_of_largest_torque),
             _percent(band.quadrature_of_largest_torque),
         )
-    tables.print_table(table)
+        for band in verdict.by_tilt
+    ]
+    print_rows(title, head, rows, 1)
     sources = verdict.sources
     console.print(
         "Sources of the error: the direct sum's quadrature"
@@ -69,44 +76,32 @@ def print_field(verdict: FieldVerdict) -> None:
 
 def print_workspace(verdict: WorkspaceVerdict) -> None:
     """Print the torque capability by tilt, and the weakest poses."""
-    table = tables.new_table(
+    rows = [
+        (
+            f"{tilt.tilt_deg:g}°",
+            f"{tilt.least_norm_Nm:.3f}",
+            f"{tilt.least_norm_median_Nm:.3f}",
+            f"{tilt.best_Nm:.3f}",
+            f"{tilt.best_median_Nm:.3f}",
+            f"{tilt.singular_value_Nm_per_A:.4f}",
+            f"{tilt.condition:.2f}",
+            f"{tilt.copper_W_per_Nm2:.0f}",
+        )
+        for i, tilt in enumerate(verdict.by_tilt)
+        if i % ROW_STRIDE == 0 or i == len(verdict.by_tilt) - 1
+    ]
+    title = (
         f"torque in every direction at {verdict.current_limit_A:g} A, N·m:"
-        f" worst and median of {verdict.poses} poses",
-        "tilt",
-        "least norm",
-        "median of it",
-        "best currents",
-        "median of it",
-        "least σ, N·m/A",
-        "cond.",
-        "copper, W/(N·m)²",
+        f" worst and median of {verdict.poses} poses"
     )
-    for i, tilt in enumerate(verdict.by_tilt):
-        if i % ROW_STRIDE == 0 or i == len(verdict.by_tilt) - 1:
-            table.add_row(
-                f"{tilt.tilt_deg:g}°",
-                f"{tilt.least_norm_Nm:.3f}",
-                f"{tilt.least_norm_median_Nm:.3f}",
-                f"{tilt.best_Nm:.3f}",
-                f"{tilt.best_median_Nm:.3f}",
-                f"{tilt.singular_value_Nm_per_A:.4f}",
-                f"{tilt.condition:.2f}",
-                f"{tilt.copper_W_per_Nm2:.0f}",
-            )
-    tables.print_table(table)
-    weak = tables.new_table("weakest poses", "by", "worst", "tilt, °", "α, °", "β, °", "γ, °", "direction")
-    for pose in verdict.weakest:
-        name, key, unit = FIGURE_NAMES[pose.figure]
-        angles = (_tenths(angle) for angle in (pose.tilt_deg, *pose.q_deg))
-        weak.add_row(name, f"{getattr(pose, key):.3g} {unit}", *angles, direction_text(pose.direction))
-    tables.print_table(weak)
+    print_rows(title, TILT_HEAD, rows, 1)
+    print_rows("weakest poses", POSE_HEAD, [_weak_row(pose) for pose in verdict.weakest], 1)
 
 
-def _print_curve(title: str, rows: Sequence[tuple[str, str]]) -> None:
-    table = tables.new_table(title, "figure", "value")
-    for row in rows:
-        table.add_row(*row)
-    tables.print_table(table)
+def _weak_row(pose: WeakPose) -> tuple[str, ...]:
+    name, key, unit = FIGURE_NAMES[pose.figure]
+    angles = (_tenths(angle) for angle in (pose.tilt_deg, *pose.q_deg))
+    return name, f"{getattr(pose, key):.3g} {unit}", *angles, direction_text(pose.direction)
 
 
 def _peak(peak: CurvePeak) -> str:

@@ -12,7 +12,7 @@ from rich.markup import escape
 from spheretwin.models.telemetry.signals import ANGLES
 from spheretwin.models.telemetry.status import named
 from spheretwin.viz.terminal import tables
-from spheretwin.viz.terminal.runs import COLOURS, ERRORS, angle, settled_label
+from spheretwin.viz.terminal.runs import COLOURS, ERRORS, angle, print_rows, settled_label
 from spheretwin.viz.terminal.tables import percent, three_digits
 
 FACTS = ("scenario", "law", "modelling_error", "load", "hardware", "seed", "status", "reason", "simulated_s")
@@ -135,10 +135,8 @@ def print_comparison(
     """
     console, names = tables.terminal_console(), [Path(run["path"]).name for run in runs]
     if fields:
-        table = tables.new_table("fields in which the runs differ", "field", *names)
-        for field, values in fields.items():
-            table.add_row(escape(field), *map(escape, values))
-        tables.print_table(table)
+        rows = [(field, *values) for field, values in fields.items()]
+        print_rows("fields in which the runs differ", ("field", *names), rows, 1)
     else:
         console.print("The scenarios of the runs do not differ.")
     _print_nominal_errors(names, nominal_errors)

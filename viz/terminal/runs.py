@@ -35,10 +35,9 @@ def print_run(
     *,
     band_rad: float,
     faults: Sequence[str] = (),
-    events: Sequence[tuple[float, str]] = (),
     why: str | None = None,
 ) -> None:
-    """Print the results of one run: errors of each axis, currents, speed, faults, events, user metrics.
+    """Print the results of one run: errors of each axis, currents, speed, faults, user metrics.
 
     Parameters
     ----------
@@ -53,8 +52,6 @@ def print_run(
         Settling band, rad.
     faults : sequence of str
         Description of each fault.
-    events : sequence of (s, text)
-        Other events.
     why : str, optional
         Reason for which the run ended early.
     """
@@ -84,8 +81,6 @@ def print_run(
         console.print(f"commands vary by {summary['current_variation_A_s']:.1f} A/s a group")
     for fault in faults:
         console.print(escape(f"fault {fault}"), soft_wrap=True)
-    for t_s, text in events:
-        console.print(escape(f"{t_s:.3f} s  {text}"), soft_wrap=True)
     for name in own:
         console.print(f"{name} {escape(str(summary[name]))}", soft_wrap=True)
     if summary["realtime_factor"] is not None:

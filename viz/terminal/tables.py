@@ -37,7 +37,7 @@ def terminal_console() -> Console:
     return Console(width=WIDTH_WITHOUT_TERMINAL)
 
 
-def new_table(title: str, first: str, *others: str, lines: bool = False) -> Table:
+def new_table(title: str, first: str, *others: str) -> Table:
     """Return a table with a title: labels in the left column, figures in the others.
 
     Without a terminal it is Markdown.
@@ -46,8 +46,6 @@ def new_table(title: str, first: str, *others: str, lines: bool = False) -> Tabl
     ----------
     title, first, others : str
         As they are, without markup; headings of the columns.
-    lines : bool
-        Whether to separate the rows, if they have several lines each.
     """
     console = terminal_console()
     table = Table(
@@ -55,7 +53,6 @@ def new_table(title: str, first: str, *others: str, lines: bool = False) -> Tabl
         title_justify="left",
         box=box.HORIZONTALS if console.is_terminal else box.MARKDOWN,
         pad_edge=not console.is_terminal,
-        show_lines=lines and console.is_terminal,
         min_width=min(cell_len(title), console.width),  # a title is wrapped to its table
     )
     table.add_column(escape(first), overflow="fold")
