@@ -18,6 +18,7 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from pathlib import Path
 from typing import Annotated, Any, NamedTuple, Union
 
 import msgspec
@@ -78,23 +79,16 @@ def with_guard(guard: Callable[[ServerArguments], servers.serve]) -> Iterator[No
 TITLE = b"<title>Viser</title>"
 """Title of the page, as viser serves it."""
 
-# A key that is let go over a button would press it, and the space bar is STOP wherever it is pressed.
-# viser's camera listens to keys too, at the document, after its commands: an arrow moves the twin only.
-# Notifications are at the bottom, where they hide nothing.
-_HEAD = """<style>.mantine-Notifications-root { top: auto !important; bottom: 8px !important; }</style>
-<script>
-for (const kind of ["keydown", "keyup"]) addEventListener(kind, (event) => {
-  if (event.code == "Space" && !/INPUT|TEXTAREA/.test(event.target.tagName)) event.preventDefault();
-}, true);
-document.documentElement.addEventListener("keydown", (event) => {
-  if (/^(Arrow|Key[WASDQE]$)/.test(event.code)) event.stopPropagation();
-});
-</script>"""
-
 
 def with_head(page: bytes, title: str) -> bytes:
-    """Return the page with another title and with the script for keys."""
-    head = f"<head><title>{title}</title>{_HEAD}".encode()
+    """Return the page with another title and with the style and the script of `page_head.html`.
+
+    A key that is let go over a button would press it, and the space bar is STOP wherever it is pressed.
+    viser's camera listens to keys too, at the document, after its commands: an arrow moves the twin only.
+    Notifications are at the bottom, where they hide nothing.
+    """
+    added = Path(__file__).with_name("page_head.html").read_text(encoding="utf-8").rstrip()
+    head = f"<head><title>{title}</title>{added}".encode()
     return page.replace(TITLE, b"").replace(b"<head>", head, 1)
 
 

@@ -23,50 +23,6 @@ POLICY = (
     " font-src data:; form-action 'none'; base-uri 'none'"
 )
 
-STYLE = """
-body { max-width: 84rem; }
-.runs { position: sticky; top: 0; z-index: 2; display: flex; flex-wrap: wrap; gap: 0.4rem;
-  padding: 0.5rem 0; background: var(--paper); }
-.runs button { font: inherit; font-size: 0.9rem; padding: 0.2rem 0.7rem; border-radius: 1rem;
-  border: 1px solid var(--faint); background: var(--soft); color: inherit; cursor: pointer; }
-.runs [data-run]::before { content: ""; display: inline-block; width: 1.2rem; height: 0.25rem;
-  margin-right: 0.5rem; vertical-align: middle; background: var(--run); }
-.runs [data-run][aria-pressed="false"] { opacity: 0.4; text-decoration: line-through; }
-#logarithmic[aria-pressed="true"] { background: var(--faint); }
-.plot { background: #fff; border-radius: 4px; }
-"""
-
-SCRIPT = """
-const config = {displaylogo: false, responsive: true, doubleClick: "reset", plotlyServerURL: "",
-  modeBarButtons: [["zoom2d", "pan2d", "resetScale2d"]]};
-const plots = Object.keys(figures).map((name) => document.getElementById(name));
-for (const plot of plots) {
-  Plotly.newPlot(plot, figures[plot.id].data, figures[plot.id].layout, config);
-}
-for (const button of document.querySelectorAll("[data-run]")) {
-  button.addEventListener("click", () => {
-    const on = button.getAttribute("aria-pressed") === "false";
-    button.setAttribute("aria-pressed", on);
-    for (const plot of plots) {
-      const its = plot.data.flatMap((trace, i) => (trace.meta === button.dataset.run ? [i] : []));
-      Plotly.restyle(plot, {visible: on}, its);
-    }
-  });
-}
-const scale = document.getElementById("logarithmic"), plot = plots[0], axes = plot.layout.meta;
-const ranges = axes.map((axis) => [...plot.layout[axis].range]);
-scale.addEventListener("click", async () => {
-  const on = scale.getAttribute("aria-pressed") === "false";
-  scale.setAttribute("aria-pressed", on);
-  for (const [i, axis] of axes.entries()) {
-    const linear = {[`${axis}.type`]: "linear", [`${axis}.range`]: [...ranges[i]]};
-    await Plotly.relayout(plot, on ? {[`${axis}.type`]: "log", [`${axis}.autorange`]: true} : linear);
-    const [low, high] = plot.layout[axis].range;
-    if (on) await Plotly.relayout(plot, {[`${axis}.range`]: [Math.max(low, high - 4), high]});
-  }
-});
-"""
-
 
 SCALE = (
     '<button type="button" id="logarithmic" aria-pressed="false">logarithmic axis of the error angle</button>'
@@ -107,9 +63,10 @@ def page(
         f"<script>{get_plotlyjs()}</script>",
         # No text of a user's ends the script.
         f"<script>const figures = {{{content}}};".replace("<", "\\u003c").replace("\\u003c", "<", 1),
-        f"{SCRIPT}</script>\n",
+        f"\n{markdown.shipped_text('interactive.js')}</script>\n",
     ]
-    head = f'<meta http-equiv="Content-Security-Policy" content="{POLICY}">\n<style>{STYLE}</style>'
+    style = markdown.shipped_text("interactive.css")
+    head = f'<meta http-equiv="Content-Security-Policy" content="{POLICY}">\n<style>\n{style}</style>'
     return markdown.whole(title, "\n".join(body), head)
 
 

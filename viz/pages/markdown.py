@@ -24,41 +24,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-# Figures have a white ground in the dark theme too; wide content scrolls within its own box.
-STYLE = """
-:root { color-scheme: light dark; --ink: #24282d; --faint: #d5d9de; --paper: #fff; --soft: #f4f6f8; }
-@media (prefers-color-scheme: dark) {
-  :root { --ink: #dfe3e8; --faint: #3b424b; --paper: #15181c; --soft: #1d2127; }
-}
-* { box-sizing: border-box; }
-body { margin: 0 auto; padding: 1.2rem; max-width: 62rem; color: var(--ink); background: var(--paper);
-  font: 1rem/1.55 system-ui, sans-serif; overflow-wrap: break-word; }
-h1, h2, h3 { line-height: 1.2; margin: 2em 0 0.6em; }
-h1 { margin-top: 0.4em; }
-p { max-width: 46rem; }
-.wide { overflow-x: auto; margin: 1.2rem 0; }
-table { border-collapse: collapse; font-size: 0.92rem; font-variant-numeric: tabular-nums; }
-th, td { padding: 0.35rem 0.7rem; border-bottom: 1px solid var(--faint); text-align: left;
-  vertical-align: top; }
-td[style*="right"] { white-space: nowrap; }
-th { background: var(--soft); }
-th:first-child, td:first-child { padding-left: 0.4rem; }
-main > ul:first-of-type { columns: 2 22rem; padding: 0.8rem 0.8rem 0.8rem 2rem; background: var(--soft); }
-main > ul:first-of-type ul { padding-left: 1.2rem; }
-a { color: inherit; }
-hr { border: 0; border-top: 1px solid var(--faint); margin-top: 3rem; }
-p:has(svg) { max-width: none; overflow-x: auto; }
-svg { display: block; max-width: 100%; min-width: 36rem; height: auto; background: #fff; border-radius: 4px; }
-code { font-family: ui-monospace, monospace; font-size: 0.92em; background: var(--soft); padding: 0 0.2em; }
-pre { overflow: auto; max-height: 16rem; padding: 0.6rem; background: var(--soft); font-size: 0.85rem; }
-pre code { padding: 0; }
-em { color: inherit; opacity: 0.85; }
-@media (max-width: 40rem) { body { padding: 0.8rem; } th, td { padding: 0.3rem 0.45rem; } }
-"""
-
-
 def page(title: str, markdown: str, figures: Path | None = None) -> str:
-    """Whole page.
+    """Whole page; its figures have a white ground in the dark theme too, wide content scrolls in its box.
 
     Parameters
     ----------
@@ -70,6 +37,11 @@ def page(title: str, markdown: str, figures: Path | None = None) -> str:
         Folder of its figures, which are embedded in the page; it refers to their files unless given.
     """
     return whole(title, rendered(markdown, figures))
+
+
+def shipped_text(name: str) -> str:
+    """Contents of a style or a script of this folder."""
+    return Path(__file__).with_name(name).read_text(encoding="utf-8")
 
 
 def rendered(markdown: str, figures: Path | None = None) -> str:
@@ -104,7 +76,7 @@ def whole(title: str, body: str, head: str = "") -> str:
             '<meta charset="utf-8">',
             '<meta name="viewport" content="width=device-width, initial-scale=1">',
             f"<title>{escape(title)}</title>",
-            f"<style>{STYLE}</style>",
+            f"<style>\n{shipped_text('page.css')}</style>",
             *([head] if head else []),
             "</head>",
             "<body>",
