@@ -208,16 +208,8 @@ def _print_laws(name: str, laws: Mapping[str, Any]) -> None:
 
 
 def _outcome_json(outcome: StudyResult) -> dict[str, Any]:
-    return {
-        "rows": outcome.rows,
-        "of": outcome.of,
-        "failed": outcome.failed,
-        "resumed": outcome.resumed,
-        "checked": outcome.checked,
-        "wall_s": outcome.wall_s,
-        "startup_s": outcome.startup_s,
-        "table": str(outcome.table),
-    }
+    names = ("rows", "of", "failed", "resumed", "checked", "wall_s", "startup_s")
+    return {**{name: getattr(outcome, name) for name in names}, "table": str(outcome.table)}
 
 
 def _report(

@@ -15,6 +15,7 @@ from spheretwin.metrics import METRICS
 from spheretwin.models.telemetry import checksums
 from spheretwin.models.telemetry.status import Status
 from spheretwin.study.row import FAILED
+from spheretwin.study.table import FIXED
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -26,7 +27,6 @@ Texts = NDArray[np.object_]
 MAIN = "max_abs_error_rad"
 
 TEXTS = ("key", "law", "status", "reason", "error")
-OTHER_COLUMNS = ("row", "key", "seed", "law", "repeat", "status", "reason", "error")
 
 
 class Rows(NamedTuple):
@@ -103,7 +103,7 @@ def _rows(file: pyarrow.parquet.ParquetFile) -> Rows:
     figures = [
         field.name
         for field in schema
-        if field.name not in (*OTHER_COLUMNS, *axes) and not pa.types.is_string(field.type)
+        if field.name not in (*FIXED, *axes) and not pa.types.is_string(field.type)
     ]
     columns = file.read(columns=[*TEXTS, "row", *axes, *figures], use_threads=False)
     texts = {name: np.array(columns[name].to_pylist(), dtype=object) for name in TEXTS}

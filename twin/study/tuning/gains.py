@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -14,6 +13,7 @@ from spheretwin.study.grid import Row
 from spheretwin.study.optimise import ON, Gain, Optimise
 from spheretwin.study.row import Rows
 from spheretwin.study.study import Study
+from spheretwin.study.table import law_text
 from spheretwin.study.tuning.trials import with_fields
 
 
@@ -40,9 +40,7 @@ def section_of(study: Study) -> Optimise:
 
 def called(law: Mapping[str, Any] | None, rows: Rows) -> str:
     """Label of a law in tables: its name alone if it has no other fields."""
-    if law is None:
-        return rows.base.controller.law
-    return str(law["law"]) if set(law) == {"law"} else json.dumps(law, sort_keys=True)
+    return rows.base.controller.law if law is None else law_text(law)
 
 
 def gains_of(study: Study, law: Mapping[str, Any] | None, rows: Rows) -> tuple[Gain, ...]:
