@@ -24,11 +24,9 @@ from spheretwin.study.grid import Grid
 from spheretwin.study.row import Rows
 from spheretwin.study.runner import StudyResult
 from spheretwin.study.runner import run as run_study
-from spheretwin.study.statistics import summary
 from spheretwin.study.study import Study, load, shipped
 from spheretwin.study.tuning import report as tuning_page
 from spheretwin.study.tuning.gains import section_of
-from spheretwin.study.tuning.report import summary as tuning_summary
 from spheretwin.study.tuning.tuning import tune
 from spheretwin.viz.terminal import runs
 from spheretwin.viz.terminal.progress import counted
@@ -114,7 +112,7 @@ def run(options: argparse.Namespace) -> bool:
             stop_requested=stop_requested,
         )
     rows = statistics.read(outcome.table)
-    printed = summary(rows)
+    printed = statistics.summary(rows)
     written = _report(outcome, rows, printed, options)
     if options.json:
         print_json({**_outcome_json(outcome), "summary": printed, "versions": versions()})
@@ -174,7 +172,7 @@ def _optimised(study: Study, options: argparse.Namespace) -> bool:
     written = tuning_page.write(folder, study, outcome, command, options.figure_format)
     if find_spec("matplotlib") is None:
         print("spheretwin: sweep: no figures without the extra `spheretwin[plots]`", file=sys.stderr)
-    printed = tuning_summary(outcome, objectives)
+    printed = tuning_page.summary(outcome, objectives)
     if options.json:
         print_json({**printed, "versions": versions()})
     else:

@@ -8,12 +8,9 @@ from pathlib import Path
 import numpy as np
 
 from spheretwin.crosscheck import coil_driven, dynamics, friction, identities, stiction, trajectories
-from spheretwin.crosscheck import identities as free_rotor
-from spheretwin.crosscheck import trajectories as closed_loop
 from spheretwin.crosscheck.friction import HingeFriction, VISCOUS_Nm_s
 from spheretwin.crosscheck.hinge import PUSH, Bearing, START_rad_s
 from spheretwin.crosscheck.part import STATES, Evidence, Finding, Subject
-from spheretwin.crosscheck.trajectories import Trajectories
 from spheretwin.models import actuator as actuators
 from spheretwin.models.base.checks import Check, broken
 from spheretwin.models.base.errors import InputError
@@ -25,11 +22,11 @@ PARTS = (
     dynamics.PART,
     identities.IDENTITIES,
     trajectories.TRAJECTORIES,
-    free_rotor.FREE_ROTOR,
+    identities.FREE_ROTOR,
     friction.PART,
     stiction.PART,
     coil_driven.PART,
-    closed_loop.CLOSED_LOOP,
+    trajectories.CLOSED_LOOP,
 )
 
 
@@ -71,11 +68,11 @@ def draw_closed_loop(evidence: Evidence) -> Drawing:
     """The same run on two plants."""
     from spheretwin.viz.figures import crosscheck
 
-    pairs = evidence.of(closed_loop.ClosedLoop).pairs
+    pairs = evidence.of(trajectories.ClosedLoop).pairs
     longest = max(pairs.values(), key=lambda pair: len(pair.mujoco))
     errors = {law: (pair.mujoco["error_rad"], pair.lagrangian["error_rad"]) for law, pair in pairs.items()}
     apart = {
-        law: crosscheck.Bounded(pair.difference_rad, closed_loop.TRACE_BOUND_rad)
+        law: crosscheck.Bounded(pair.difference_rad, trajectories.TRACE_BOUND_rad)
         for law, pair in pairs.items()
     }
     titles = {law: f"{law}, load {2 if law == 'AFSM' else 0.5:g}" for law in pairs}
@@ -95,9 +92,8 @@ def draw_convergence(evidence: Evidence) -> Drawing:
     """Orders of convergence."""
     from spheretwin.viz.figures import crosscheck
 
-    slopes = {
-        name: crosscheck.Slope(*measured) for name, measured in evidence.of(Trajectories).convergence.items()
-    }
+    measured = evidence.of(trajectories.Trajectories).convergence
+    slopes = {name: crosscheck.Slope(*slope) for name, slope in measured.items()}
     figure = crosscheck.convergence(slopes, "Order of convergence against DOP853")
     return Drawing("convergence.svg", "Largest error over 5 s at five steps, with the fitted slopes.", figure)
 
@@ -162,7 +158,7 @@ def draw_torque_free(evidence: Evidence) -> Drawing:
     """Drift of what a torque-free rotor keeps."""
     from spheretwin.viz.figures import crosscheck
 
-    rotor = evidence.of(free_rotor.FreeRotor)
+    rotor = evidence.of(identities.FreeRotor)
     axis = {
         "energy": "energy, relative",
         "angular momentum": "angular momentum,\nrelative",
@@ -174,7 +170,7 @@ def draw_torque_free(evidence: Evidence) -> Drawing:
         }
         for quantity, by_spin in rotor.drifts.items()
     }
-    title = f"Torque-free rotor over {free_rotor.DURATION_s:g} s, by spin rate"
+    title = f"Torque-free rotor over {identities.DURATION_s:g} s, by spin rate"
     figure = crosscheck.drifts(rotor.t_s, panels, title)
     caption = "Drift of energy and angular momentum, and attitude against Euler's exact solution at J1 = J2."
     return Drawing("torque_free.svg", caption, figure)
