@@ -203,11 +203,9 @@ def ratios(rows: Sequence[RatioRow], labels: Mapping[str, str], quantity: str, t
     axes.set_ylim(len(rows) - 0.5, -0.5)
     name_axes(axes, x=quantity, title=title)
     axes.xaxis.set_major_formatter("{x:g}")
-    axes.grid(visible=True, axis="x", color=FAINT, alpha=0.35, linewidth=0.6)
+    faint_grid(axes, axis="x")
     for y in range(1, len(rows)):
         axes.axhline(y - 0.5, color=FAINT, linewidth=0.4)
-    axes.set_axisbelow(True)
-    axes.spines[["top", "right"]].set_visible(False)
     figure.legend(loc="outside lower center", ncols=4, frameon=False)
     return figure
 

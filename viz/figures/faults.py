@@ -12,10 +12,10 @@ from matplotlib.ticker import NullFormatter
 from numpy.typing import NDArray
 
 from spheretwin.viz.figures.style import (
-    FAINT,
     INK,
     SERIES,
     WIDTH_in,
+    faint_grid,
     name_axes,
 )
 
@@ -44,8 +44,7 @@ def shares(by_name: Mapping[str, Mapping[int, float]], x: str, y: str, title: st
     numbers = sorted({number for by_number in by_name.values() for number in by_number})
     axes.set_xticks(numbers)
     axes.set_ylim(-3, 103)
-    axes.grid(visible=True, axis="y", color=FAINT, alpha=0.4, linewidth=0.6)
-    axes.spines[["top", "right"]].set_visible(False)
+    faint_grid(axes, 0.4, axis="y")
     name_axes(axes, x=x, y=y, title=title)
     axes.legend(frameon=False)
     return figure
@@ -70,8 +69,7 @@ def remaining(by_name: Mapping[str, Sequence[float]], x: str, y: str, title: str
         percent = np.append(left[1:], left[-1])
         axes.step(np.append(rising, end), percent, where="post", color=colour, linewidth=1.4, label=name)
     axes.set(xscale="log", yscale="log")
-    axes.grid(visible=True, color=FAINT, alpha=0.4, linewidth=0.6)
-    axes.spines[["top", "right"]].set_visible(False)
+    faint_grid(axes, 0.4)
     axes.yaxis.set_major_formatter("{x:g}")
     name_axes(axes, x=x, y=y, title=title)
     axes.legend(frameon=False)
