@@ -186,7 +186,13 @@ def plant_of(scenario: ResolvedScenario, files: Files, rotor: Any, buffers: Shar
         drive=drive,
         friction=_friction(section, inertia, chain),
         bristles=bristle_friction(
-            section.stiction, section.coulomb_Nm, section.cable, inertia, section.step_s, chain
+            section.stiction,
+            section.coulomb_Nm,
+            section.cable,
+            inertia,
+            section.step_s,
+            chain,
+            seed=scenario.seed,
         ),
         heat=heat,
         group_gain=group_gain,

@@ -17,6 +17,7 @@ from spheretwin.models.kinematics import rate_jacobian
 from spheretwin.models.lagrangian import gravity_stiffness, gravity_torque, inertia_matrix
 from spheretwin.models.mjcf_reader import HINGES
 from spheretwin.models.scatter import Scatter, summed_torque_matrix
+from spheretwin.plant.cable import constant_torque_Nm
 from spheretwin.plant.lagrangian_rotor import LagrangianRotor
 from spheretwin.plant.magnet_heat import remanence
 from spheretwin.plant.part_scatter import scatter_of
@@ -89,7 +90,9 @@ def linearisation_data(scenario: ResolvedScenario, files: Files, *, nominal: boo
         inertia=rotor.inertia,
         weight_moment=rotor.weight_moment,
         viscous_Nm_s=np.array(section.viscous_Nm_s),
-        unmodelled_torque_Nm=np.subtract(section.modelling_torque_Nm, cable.torque_Nm)
+        unmodelled_torque_Nm=np.subtract(
+            section.modelling_torque_Nm, constant_torque_Nm(cable, scenario.seed)
+        )
         - spring * cable.neutral_rad,
         spring_Nm_rad=spring,
         magnetics=Magnetics(

@@ -250,6 +250,7 @@ def ratios() -> list[dict[str, object]]:
             "brief loop": brief_loop_seconds,
             "prototype": prototype_seconds("prototype"),
             "ideal": prototype_seconds("ideal"),
+            "machine": prototype_seconds("machine"),
         },
         rounds=9,
     )
@@ -278,6 +279,12 @@ def ratios() -> list[dict[str, object]]:
             inner["prototype"] - inner["ideal"],
             bare,
             at_most=0.17,
+        ),
+        ratio(
+            "loop with every imperfection over that of the prototype",
+            inner["machine"],
+            inner["prototype"],
+            at_most=1.6,
         ),
         ratio("one torque matrix over bare mj_step", inner["G_t"], bare),
         ratio("one bounded allocation at the limit over bare mj_step", inner["bounded"], bare),

@@ -68,6 +68,7 @@ TRUTH = {
     "plant.cable.stiffness_Nm_rad": [2e-3, 2e-3, 1e-3],
     "plant.cable.neutral_rad": [0.1, 0.0, 0.0],
     "plant.cable.torque_Nm": [1e-3, 0.0, 0.0],
+    "plant.cable.torque_error_Nm": [1e-3, 1e-3, 1e-3],
     "plant.cable.hysteresis_Nm": [3e-4, 3e-4, 3e-4],
     "plant.cable.hysteresis_rad": 0.1,
     "plant.thermal.on": True,

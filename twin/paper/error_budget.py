@@ -1,4 +1,4 @@
-"""Error budget of the tilt: cost of each part of the prototype, for every law."""
+"""Error budget of the tilt: cost of each part of the machine, for every law."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from spheretwin.viz.pages.markdown import Drawing
 
 Array = NDArray[np.float64]
 
-PROTOTYPE = HARDWARE["prototype"]
+MACHINE = HARDWARE["machine"]
 
 # What an angle is in volts: no error by itself.
 VOLTS = ("sensors.potentiometer.electrical_angle_rad", "sensors.potentiometer.supply_V")
@@ -36,23 +36,29 @@ COILS = (
     "drive.shutdown_degC",
 )
 ESTIMATOR = ("estimator.kind",)
+BEARINGS = ("plant.coulomb_Nm", "plant.viscous_Nm_s")
 
 WITHOUT_ERROR = ("sensors.current.noise_A", "watchdog.on")
 """Fields of the set that move nothing: no law is handed the currents, and the watchdog does not trip."""
 
-IDEAL, WITH_RATES, ALL = "ideal", "estimator", "all"
+IDEAL, WITH_RATES, ELECTRONICS, ALL = "ideal", "estimator", "prototype", "machine"
 
 NO_LAG: dict[str, Any] = {"drive.time_constant_s": 0.0}
 AMPLE_V = 1e4  # drives 8 A through 0.9 mH in less than a microsecond
 WIDE_rad_s = 1e7  # a ten-thousandth of a control period
 
 
+def _all_of(section: str) -> tuple[str, ...]:
+    """Return the fields of a section of the plant in the set."""
+    return tuple(dotted for dotted in MACHINE if dotted.startswith(f"{section}."))
+
+
 class Stage(NamedTuple):
-    """Set of the prototype's parts."""
+    """Set of parts of the machine."""
 
     name: str
     fields: tuple[str, ...] = ()
-    """Fields with the prototype's value."""
+    """Fields with the machine's value."""
     other_fields: Mapping[str, Any] = {}
     """Fields with another value that the stage needs; none of them is an error."""
     is_random: bool = False
@@ -61,15 +67,15 @@ class Stage(NamedTuple):
     @property
     def base(self) -> str:
         """Name of the stage that it is compared with."""
-        single = self.name not in (WITH_RATES, ALL)
+        single = self.name not in (WITH_RATES, ELECTRONICS, ALL)
         return WITH_RATES if single and set(ESTIMATOR) <= set(self.fields) else IDEAL
 
     @property
     def overrides(self) -> dict[str, Any]:
         """Fields of the scenario."""
-        values = {dotted: PROTOTYPE[dotted] for dotted in self.fields}
-        if self.name == ALL:
-            return values  # the set has a data sheet of its own
+        values = {dotted: MACHINE[dotted] for dotted in self.fields}
+        if self.name in (ELECTRONICS, ALL):
+            return values  # the sets have a data sheet of their own
         return {
             **_nominal(),
             **({} if "drive.supply_V" in {*values, *self.other_fields} else NO_LAG),
@@ -124,7 +130,28 @@ STAGES = (
         other_fields={"drive.supply_V": AMPLE_V, "drive.bandwidth_rad_s": WIDE_rad_s},
         is_random=True,
     ),
-    Stage("friction", ("plant.coulomb_Nm", "plant.viscous_Nm_s")),
+    Stage(
+        "sensor hysteresis",
+        (
+            *VOLTS, *ESTIMATOR, "sensors.potentiometer.hysteresis_rad",
+            "sensors.potentiometer.repeatability_rad", "sensors.encoder.eccentricity_rad",
+        ),
+        is_random=True,
+    ),
+    Stage("friction", BEARINGS),
+    Stage("static friction", (*BEARINGS, *_all_of("plant.stiction"))),
+    Stage("cable", _all_of("plant.cable"), is_random=True),
+    Stage("scatter of poles and coils", (*_all_of("plant.poles"), *_all_of("plant.coils")), is_random=True),
+    Stage(
+        "magnets at 60 °C",
+        ("plant.thermal.on", "drive.supply_V", *COILS),
+        other_fields={"plant.thermal.rotor_degC": 60.0, "drive.bandwidth_rad_s": WIDE_rad_s},
+    ),
+    Stage(
+        "coil coupling",
+        ("drive.coil_coupling", "drive.supply_V", "drive.drop_up_V", "drive.drop_down_V", *COILS),
+        other_fields={"drive.bandwidth_rad_s": WIDE_rad_s},
+    ),
     Stage(
         "voltage limit",
         ("drive.supply_V", "drive.drop_up_V", "drive.drop_down_V", *COILS),
@@ -135,7 +162,8 @@ STAGES = (
         ("drive.bandwidth_rad_s", *COILS),
         other_fields={"drive.supply_V": AMPLE_V},
     ),
-    Stage(ALL, tuple(PROTOTYPE), is_random=True),
+    Stage(ELECTRONICS, tuple(HARDWARE["prototype"]), is_random=True),
+    Stage(ALL, tuple(MACHINE), is_random=True),
 )  # fmt: skip
 
 
@@ -143,8 +171,10 @@ METHOD = (
     "The tables show the largest *true* error. *Ideal* is the motion and the mass alone: true angles"
     " and rates, no delay, no friction, and currents that are their commands at once. The plain lag L/R of"
     " the coils, which runs without amplifiers have, is no part of the prototype, whose amplifiers drive the"
-    " current: it is a row of its own. The voltage limit has amplifiers of no lag of their own on ±24 V less"
-    " their drops; the bandwidth has 2 kHz on ample voltage. No sensor measures a rate: the rows of single"
+    " current: it is a row of its own. Coil coupling and hot magnets need amplifiers with a supply; the"
+    " prototype starts with magnets at the ambient temperature. The voltage limit has amplifiers of no lag"
+    " of their own on ±24 V less their drops; the bandwidth has 2 kHz on ample voltage. No sensor measures a"
+    " rate: the rows of single"
     " sensor errors have the estimator too, and are to be compared with its row. All laws have their default"
     " gains.\n\n"
     "Parts do not add up. A rate that lags pushes harder at a corner, and noise feeds AFSM's adaptation (ξ̂"
@@ -175,11 +205,11 @@ def sections(outcomes: Outcomes) -> list[Section]:
     tables = [_table(outcomes, laws, axis) for axis in range(len(ANGLES))]
     most = "; ".join(filter(None, (_most(outcomes, law) for law in laws)))
     text = f"{METHOD} The single part with the largest change of the error: {most}." if most else METHOD
-    return [Section("Single parts of the prototype", text, tables, [lambda: _drawing(outcomes, laws)])]
+    return [Section("Single parts of the machine", text, tables, [lambda: _drawing(outcomes, laws)])]
 
 
 def findings(outcomes: Outcomes) -> list[Finding]:
-    """The part of the prototype that changes most, under each law."""
+    """The part of the machine that changes most, under each law."""
     most = [text for law in LAWS if (text := _most(outcomes, law))]
     return (
         [Finding(None, f"single part with the largest change of the error: {'; '.join(most)}")]
@@ -197,7 +227,7 @@ def law_name(law: str) -> str:
 def _most(outcomes: Outcomes, law: str) -> str:
     """The single part that changes the error of any hinge the most; empty if not all were run."""
     medians = {stage.name: _medians_deg(outcomes.runs(case(law, stage))) for stage in STAGES}
-    parts = [stage for stage in STAGES if stage.fields and stage.name != ALL]
+    parts = [stage for stage in STAGES if stage.fields and stage.name not in (ELECTRONICS, ALL)]
     changes = np.array([medians[stage.name] - medians[stage.base] for stage in parts])
     if not np.all(np.isfinite(changes)):
         return ""
@@ -208,7 +238,7 @@ def _most(outcomes: Outcomes, law: str) -> str:
 def _table(outcomes: Outcomes, laws: Sequence[str], axis: int) -> ResultTable:
     rows = [(stage.name, *(_cell(outcomes.runs(case(law, stage)), axis) for law in laws)) for stage in STAGES]
     title = f"Largest true |error| of {ANGLES[axis]} in degrees: median over the seeds, and range"
-    return ResultTable(title, ("part of the prototype", *map(law_name, laws)), rows)
+    return ResultTable(title, ("part of the machine", *map(law_name, laws)), rows)
 
 
 def _cell(runs: Sequence[Outcome], axis: int) -> str:
@@ -229,7 +259,7 @@ def _drawing(outcomes: Outcomes, laws: Sequence[str]) -> Drawing:
         for axis, name in enumerate(ANGLES)
     }
     names = [stage.name for stage in STAGES]
-    title, change = "Single parts of the prototype", "change against its base, degrees"
+    title, change = "Single parts of the machine", "change against its base, degrees"
     caption = (
         "Largest true |error|, median over the seeds. Colours: what the part changes, against ideal, or for"
         " single errors of the sensors against the estimator alone."
@@ -249,7 +279,8 @@ def _medians_deg(runs: Sequence[Outcome]) -> Array:
 EXPERIMENT = Experiment(
     name="budget",
     title="The error budget of the tilt",
-    summary="The motion of figure 11 under every law, with each part of the prototype switched on alone.",
+    summary="The motion of figure 11 under every law, with each part of the machine switched on alone, with"
+    " all parts of the prototype, and with all of the machine.",
     cases=cases,
     sections=sections,
     findings=findings,

@@ -73,6 +73,9 @@ EXPECTED = (Status.COMPLETED, Status.LEFT_WORKSPACE, Status.DIVERGED, Status.FAI
 GROUP_GAIN = 0.03
 """Largest deviation of the torque of a group from its nominal value."""
 
+MACHINE = "machine"
+"""Hardware set with every imperfection, and the condition with it."""
+
 STAGE = 977  # of the random stream of the group gains
 
 
@@ -137,6 +140,8 @@ def _delay(delay_s: float) -> dict[str, Any]:
     return {"drive.delay_s": delay_s + 1e-3, "nominal.delay_s": delay_s}
 
 
+CONVERTER_ERRORS: dict[str, Any] = {"sensors.adc.offset_V": 1e-3, "sensors.adc.gain_error": 1e-3}
+
 LIGHT = _load(0.2, 1.0)
 IDEAL = Hardware(
     "ideal",
@@ -165,11 +170,12 @@ PROTOTYPE = Hardware(
     True,
     (
         Condition("without offset and gain errors", {}),
-        Condition("with them", {"sensors.adc.offset_V": 1e-3, "sensors.adc.gain_error": 1e-3}),
+        Condition("with them", CONVERTER_ERRORS),
         Condition("friction 5 mN·m, nominal 2 mN·m", _friction(0.0), perturbed=True),
         Condition("m 0.5", {"plant.modelling_error": 0.5}, perturbed=True),
         Condition("1 ms of unknown delay", _delay(1e-3), perturbed=True),
         Condition("group gains ±3 %", {}, group_gains, perturbed=True),
+        Condition(MACHINE, {"hardware": MACHINE, **CONVERTER_ERRORS}, perturbed=True),
     ),
     tuple(preset for preset in PRESETS if preset not in ("ideal", "fast")),
 )

@@ -11,7 +11,15 @@ from spheretwin.paper import rival_conditions as conditions
 from spheretwin.paper.experiment import Array, Finding, Outcome, Outcomes, ResultTable
 from spheretwin.paper.laws import BY_LAW
 from spheretwin.paper.page import ERRORS, NONE, figures_named
-from spheretwin.paper.rival_conditions import ALLOCATIONS, HARDWARE, Condition, Hardware, study, tuned_gains
+from spheretwin.paper.rival_conditions import (
+    ALLOCATIONS,
+    HARDWARE,
+    MACHINE,
+    Condition,
+    Hardware,
+    study,
+    tuned_gains,
+)
 from spheretwin.run import Run
 
 OUR_LAW = "afsm_eso"
@@ -20,13 +28,15 @@ LEVEL = 1.05
 
 
 class Result(NamedTuple):
-    """A law under one condition: medians; NaN if any run was lost."""
+    """A law under one condition: medians unless stated; NaN if any run was lost."""
 
     law: str
     label: str
     limit_A_s: float | None
     """None of a preset, which was not searched here."""
     largest_rad: float
+    worst_rad: float
+    """The largest one of all seeds."""
     variation_A_s: float
     tail_rad: float
 
@@ -90,15 +100,15 @@ def start_error(run: Run) -> Array:
     return np.where(until, np.abs(error), 0.0).max(axis=0)
 
 
-def _medians(hardware: Hardware, runs: Sequence[Outcome]) -> tuple[float, float, float]:
+def _medians(hardware: Hardware, runs: Sequence[Outcome]) -> tuple[float, float, float, float]:
     if not all(run.is_complete for run in runs):
-        return np.nan, np.nan, np.nan
+        return np.nan, np.nan, np.nan, np.nan
     largest, tail = (
-        np.median([ERRORS[error](run)[list(hardware.hinges)].max() for run in runs])
+        [float(ERRORS[error](run)[list(hardware.hinges)].max()) for run in runs]
         for error in ("max_abs_error", "tail_rms_error")
     )
     variation = np.median(figures_named(runs, "current_variation_A_s"))
-    return float(largest), float(variation), float(tail)
+    return float(np.median(largest)), max(largest), float(variation), float(np.median(tail))
 
 
 ALLOCATION_LABELS = {
@@ -161,6 +171,40 @@ def robustness(hardware: Hardware, outcomes: Outcomes) -> ResultTable:
     rows = _rows(hardware, conditions, outcomes, with_tail=False)
     title = f"{hardware.title}, wrong nominal model: largest error in {_unit(hardware)} / variation in A/s"
     return ResultTable(title, ("limit, A/s", "law", *(condition.name for condition in conditions)), rows, 2)
+
+
+def machine(hardware: Hardware, outcomes: Outcomes) -> list[ResultTable]:
+    """Median and worst error with every imperfection; no table for hardware without this condition."""
+    title = f"{hardware.title} with every imperfection: largest error in {_unit(hardware)}, variation in A/s"
+    return [
+        ResultTable(
+            title,
+            ("limit, A/s", "law", "median", "worst", "variation"),
+            [
+                (
+                    NONE if result.limit_A_s is None else f"{result.limit_A_s:g}",
+                    result.label,
+                    *_spread(result),
+                )
+                for result in sorted(every, key=_by_limit_and_error)
+            ],
+            2,
+        )
+        for condition in hardware.conditions
+        if condition.name == MACHINE and (every := results(hardware, condition, outcomes))
+    ]
+
+
+def _spread(result: Result) -> tuple[str, str, str]:
+    if result.is_lost:
+        return "lost", NONE, NONE
+    median_deg, worst_deg = np.degrees([result.largest_rad, result.worst_rad])
+    return f"{median_deg:.3f}", f"{worst_deg:.3f}", f"{result.variation_A_s:.1f}"
+
+
+def _by_limit_and_error(result: Result) -> tuple[float, bool, float]:
+    limit = np.inf if result.limit_A_s is None else result.limit_A_s
+    return limit, result.is_lost, result.largest_rad
 
 
 def _rows(

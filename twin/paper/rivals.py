@@ -96,6 +96,12 @@ ROBUSTNESS = (
     " from the seed of each run; *lost* means that a run did not complete."
 )
 
+MACHINE_TEXT = (
+    "The same gains on `--hardware machine`, the prototype with scattered poles and coils, static friction, a"
+    " cable, coil coupling, warm magnets and the offset and gain errors of its converter: median and worst of"
+    " the seeds. The laws were tuned without these."
+)
+
 
 def _sections(outcomes: Outcomes) -> list[Section]:
     return [
@@ -118,6 +124,10 @@ def _of_hardware(hardware: Hardware, outcomes: Outcomes) -> list[Section]:
             [lambda: figure(hardware, outcomes)],
         ),
         Section(f"{title}: robustness", ROBUSTNESS, [rival_results.robustness(hardware, outcomes)]),
+        *(
+            Section(f"{title}: every imperfection", MACHINE_TEXT, [table])
+            for table in rival_results.machine(hardware, outcomes)
+        ),
         Section(f"{title}: gains", "", [rival_results.ranges(hardware), rival_results.gains_table(hardware)]),
     ]
 

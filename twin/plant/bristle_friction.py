@@ -38,7 +38,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from spheretwin.models.base.compiled import allocation_free, copy_into
 from spheretwin.models.joint_chain import JointChain, inertia_at
 from spheretwin.models.lagrangian import InertiaEntries, solve_inertia, triple
-from spheretwin.plant.cable import CableSection, acts
+from spheretwin.plant.cable import CableSection, acts, constant_torque_Nm
 from spheretwin.plant.friction import momentum
 
 Array = NDArray[np.float64]
@@ -116,6 +116,7 @@ def bristle_friction(
     inertia: Array,
     step_s: float,
     chain: JointChain | None = None,
+    seed: int = 0,
 ) -> BristleFriction | None:
     """Return the elements of the hinges (alpha, beta, gamma), all without deflection; None without any.
 
@@ -131,6 +132,8 @@ def bristle_friction(
         Physics step.
     chain : JointChain
         General joint, whose inertia counts in the motion instead; default: an ideal joint.
+    seed : int
+        Seed of the run, for the constant torque of the cable.
     """
     if not (stiction.on or acts(cable)):
         return None
@@ -151,7 +154,7 @@ def bristle_friction(
         slip_rad=slip,
         coulomb_share=1.0 / stiction.break_away,
         stribeck_rad_s=stiction.stribeck_rad_s,
-        spring=np.array([cable.stiffness_Nm_rad, cable.neutral_rad, cable.torque_Nm]),
+        spring=np.array([cable.stiffness_Nm_rad, cable.neutral_rad, constant_torque_Nm(cable, seed)]),
         implicitness=0.5 + 0.5 * stiff / (stiff + 4.0),
         inertia=np.array(inertia, dtype=np.float64),
         chain=chain,

@@ -4,7 +4,11 @@ from __future__ import annotations
 
 from typing import Annotated
 
+import numpy as np
+from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field
+
+from spheretwin.electronics.random_streams import UNIFORM, errors
 
 Size = Annotated[float, Field(ge=0, le=100)]
 Signed = Annotated[float, Field(ge=-100, le=100)]
@@ -25,6 +29,11 @@ class CableSection(BaseModel):
         (0.0, 0.0, 0.0),
         description="constant torque of the cable on each hinge, N·m, towards positive angles",
     )
+    torque_error_Nm: tuple[Size, Size, Size] = Field(
+        (0.0, 0.0, 0.0),
+        description="largest further constant torque of the cable on each hinge, N·m, drawn from the seed",
+        json_schema_extra=UNIFORM,
+    )
     hysteresis_Nm: tuple[Size, Size, Size] = Field(
         (0.0, 0.0, 0.0), description="friction in the cable, N·m: half of the difference of both directions"
     )
@@ -35,4 +44,10 @@ class CableSection(BaseModel):
 
 def acts(section: CableSection) -> bool:
     """True if there is a cable."""
-    return any((*section.stiffness_Nm_rad, *section.torque_Nm, *section.hysteresis_Nm))
+    torques_Nm = (*section.torque_Nm, *section.torque_error_Nm, *section.hysteresis_Nm)
+    return any((*section.stiffness_Nm_rad, *torques_Nm))
+
+
+def constant_torque_Nm(section: CableSection, seed: int) -> NDArray[np.float64]:
+    """Return the constant torque on the hinges, (3,) N·m, with the error that is drawn from a seed."""
+    return section.torque_Nm + section.torque_error_Nm * errors(seed, "plant.cable", 3, 1)[:, 0]

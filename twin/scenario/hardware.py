@@ -60,6 +60,31 @@ _BEARINGS = {
     "plant.coulomb_Nm": Origin((2e-3, 2e-3, 2e-3), "assumed: the lower of two estimates, 2 and 5 mN·m"),
     "plant.viscous_Nm_s": Origin((1e-4, 1e-4, 1e-4), "assumed"),
 }
+# The machine around the electronics: tolerances of its parts, and effects that a perfect one lacks.
+_MACHINE = {
+    "sensors.potentiometer.hysteresis_rad": Origin(radians(0.02), "assumed: play of the wiper"),
+    "sensors.potentiometer.repeatability_rad": Origin(
+        radians(0.004), "assumed: data sheet of a precision part, the Novotechnik P2200"
+    ),
+    "sensors.encoder.eccentricity_rad": Origin(1e-3, "assumed: 0.01 mm on a disc of 10 mm radius"),
+    "drive.coil_coupling": Origin(1.0, "computed from the geometry of the coils"),
+    "plant.poles.gain_error": Origin(0.03, "assumed: tolerance of the remanence within a grade"),
+    "plant.poles.angle_error_rad": Origin(3e-3, "assumed: 0.15 mm at 50 mm"),
+    "plant.poles.distance_error_m": Origin(1e-4, "assumed: glued and ground"),
+    "plant.coils.gain_error": Origin(0.01, "assumed: three of 320 turns"),
+    "plant.coils.angle_error_rad": Origin(5e-3, "assumed: 0.3 mm at 60 mm"),
+    "plant.coils.distance_error_m": Origin(2e-4, "assumed"),
+    "plant.stiction.on": Origin(True, "bearings have static friction"),
+    "plant.stiction.break_away": Origin(1.5, "assumed"),
+    "plant.stiction.presliding_rad": Origin(2e-3, "assumed: 10 µm at a radius of 5 mm"),
+    "plant.stiction.damping_ratio": Origin(0.3, "assumed"),
+    "plant.stiction.stribeck_rad_s": Origin(0.05, "assumed"),
+    "plant.cable.stiffness_Nm_rad": Origin((2e-3, 2e-3, 1e-3), "assumed: a thin flexible cable"),
+    "plant.cable.torque_error_Nm": Origin((1e-3, 1e-3, 5e-4), "assumed"),
+    "plant.cable.hysteresis_Nm": Origin((3e-4, 3e-4, 1e-4), "assumed"),
+    "plant.cable.hysteresis_rad": Origin(0.05, "assumed"),
+    "plant.thermal.on": Origin(True, "the magnets are NdFeB"),
+}
 _SOFTWARE = {
     "estimator.kind": Origin("kalman", "assumed: the estimator with the least noise for its lag"),
     "watchdog.on": Origin(True, "assumed: a laboratory does not run such a machine without one"),
@@ -105,9 +130,12 @@ HARDWARE: dict[str, dict[str, Any]] = {
         **PROTOTYPE_NOMINAL,
     },
 }
+HARDWARE["machine"] = {**HARDWARE["prototype"], **_values(_MACHINE)}
 """Hardware sets: fields by dotted name and their values; each field can also be set separately."""
 
-_STATED = {name: field.origin for name, field in {**_SENSORS, **_DRIVE, **_BEARINGS, **_SOFTWARE}.items()}
+_STATED = {
+    name: field.origin for name, field in {**_SENSORS, **_DRIVE, **_BEARINGS, **_MACHINE, **_SOFTWARE}.items()
+}
 
 # Nominal values are those of the machine's own data sheets.
 ORIGINS: dict[str, dict[str, str]] = {

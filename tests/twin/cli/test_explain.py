@@ -130,7 +130,7 @@ def test_the_text_has_the_same_facts_within_80_columns(capsys, monkeypatch):
     [
         (
             ["hardware", "proto"],
-            "expected a hardware set of ideal, prototype, received 'proto'; did you mean prototype?",
+            "expected a hardware set of ideal, prototype, machine, received 'proto'; did you mean prototype?",
         ),
         (["plant.coulomb"], "received 'plant.coulomb'; did you mean plant.coulomb_Nm?"),
         (["law", "afsm", "x"], "expected hardware NAME, scenario NAME or a field, received 'law afsm x'"),

@@ -20,7 +20,7 @@ from spheretwin.plant.bristle_friction import (
     begin_bristles,
     bristle_friction,
 )
-from spheretwin.plant.cable import CableSection
+from spheretwin.plant.cable import CableSection, constant_torque_Nm
 from spheretwin.plant.friction import friction, slow_down
 from spheretwin.plant.lagrangian_rotor import LagrangianRotor
 from spheretwin.plant.mujoco_rotor import MujocoRotor
@@ -433,3 +433,15 @@ def test_there_are_elements_only_with_static_friction_or_a_cable(actuator):
     assert elements(actuator, StictionSection()) is None
     assert elements(actuator, StictionSection(), CableSection(hysteresis_Nm=(0.0, 1e-3, 0.0))) is not None
     assert elements(actuator).stiffness_Nm_rad[: LAST + 1].sum(axis=0) == pytest.approx(STIFFNESS_Nm_rad)
+
+
+def test_the_constant_torque_of_the_cable_is_drawn_from_the_seed():
+    cable = CableSection(torque_Nm=(1e-3, 0.0, -1e-3), torque_error_Nm=(2e-3, 0.0, 1e-3))
+    drawn = np.array([constant_torque_Nm(cable, seed) for seed in range(200)])
+    np.testing.assert_array_equal(constant_torque_Nm(cable, 7), drawn[7])
+    np.testing.assert_array_equal(drawn[:, 1], 0.0)
+    for hinge, mean, bound in ((0, 1e-3, 2e-3), (2, -1e-3, 1e-3)):
+        # Mean of 200 uniform numbers: its standard deviation is 0.041 of the bound.
+        assert abs(drawn[:, hinge] - mean).max() <= bound
+        assert abs(drawn[:, hinge].mean() - mean) < 0.16 * bound
+        assert abs(drawn[:, hinge] - mean).max() > 0.95 * bound
