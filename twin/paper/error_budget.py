@@ -142,6 +142,7 @@ STAGES = (
     Stage("static friction", (*BEARINGS, *_all_of("plant.stiction"))),
     Stage("cable", _all_of("plant.cable"), is_random=True),
     Stage("scatter of poles and coils", (*_all_of("plant.poles"), *_all_of("plant.coils")), is_random=True),
+    Stage("mass properties", _all_of("plant.mass"), is_random=True),
     Stage(
         "magnets at 60 °C",
         ("plant.thermal.on", "drive.supply_V", *COILS),

@@ -74,6 +74,13 @@ _MACHINE = {
     "plant.coils.gain_error": Origin(0.01, "assumed: three of 320 turns"),
     "plant.coils.angle_error_rad": Origin(5e-3, "assumed: 0.3 mm at 60 mm"),
     "plant.coils.distance_error_m": Origin(2e-4, "assumed"),
+    "plant.mass.centre_error_m": Origin(2e-4, "assumed: balanced by hand"),
+    "plant.mass.product_error_kg_m2": Origin(2e-5, "assumed: 1 % of the moments of inertia"),
+    "plant.mass.ring_inertia_kg_m2": Origin(
+        ((1e-4, 2e-4, 1e-4), (1e-4, 1e-4, 1e-4)), "assumed: rings of aluminium, 6 % of the rotor's moments"
+    ),
+    "plant.mass.axis_tilt_error_rad": Origin(2e-3, "assumed: 0.1 mm over 50 mm"),
+    "plant.mass.axis_offset_error_m": Origin(1e-4, "assumed"),
     "plant.stiction.on": Origin(True, "bearings have static friction"),
     "plant.stiction.break_away": Origin(1.5, "assumed"),
     "plant.stiction.presliding_rad": Origin(2e-3, "assumed: 10 µm at a radius of 5 mm"),
