@@ -35,7 +35,7 @@ from spheretwin.plant.magnet_heat import MagnetHeat, magnet_heat
 from spheretwin.plant.mass_properties import mass_errors
 from spheretwin.plant.part_scatter import scatter_of
 from spheretwin.plant.rotor import Rotor, RotorSettings
-from spheretwin.plant.step import ENGINES, Plant, SkewedJoint
+from spheretwin.plant.step import ENGINES, Plant
 from spheretwin.scenario.files import Files
 from spheretwin.scenario.plant_sections import ResolvedPlant
 from spheretwin.scenario.sections import ResolvedScenario
@@ -172,7 +172,8 @@ def plant_of(scenario: ResolvedScenario, files: Files, rotor: Any, buffers: Shar
     """Return the plant of a resolved scenario with a started rotor and zero currents."""
     section, actuator, groups = scenario.plant, files.actuator, len(files.actuator.groups)
     chain, inertia = _rotor_settings(scenario, files).joint_chain(), _inertia(section, actuator)
-    joint = SkewedJoint(chain, np.zeros(3), np.zeros(3)) if chain and not chain.has_ideal_hinges else None
+    joint = chain if chain and not chain.has_ideal_hinges else None
+    middle_q, middle_qdot = np.empty((2, 3))
     scatter = scatter_of(section, scenario.seed, actuator)
     magnetics = scattered_model(actuator, scatter) if scatter else torque_model(actuator)
     drive, group_gain = drive_of(scenario, actuator, buffers), np.array(section.group_gain)
@@ -201,8 +202,10 @@ def plant_of(scenario: ResolvedScenario, files: Files, rotor: Any, buffers: Shar
         hinge_range=actuator.hinge_range_rad,
         substeps=scenario.substeps,
         step_s=section.step_s,
-        middle_q=np.empty(3),
-        middle_qdot=np.empty(3),
+        middle_q=middle_q,
+        middle_qdot=middle_qdot,
+        coil_q=np.empty(3) if joint else middle_q,
+        coil_qdot=np.empty(3) if joint else middle_qdot,
         last_qdot=rotor.qdot.copy(),
         current=np.zeros(groups),
         mean_current=np.zeros(groups),

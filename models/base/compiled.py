@@ -46,7 +46,8 @@ def allocation_free(function: F) -> F:
     """Compile a function, as `compiled` does, that creates no array: it fills its arguments.
 
     It then needs no reference counting, which would be a third of the loop's own time: each array in a tuple
-    is counted up and down, with a locked instruction, whenever the tuple is passed.
+    is counted up and down, with a locked instruction, whenever the tuple is passed. It must not return an
+    array, alone or in a tuple: a caller that counts references would release it.
     """
     return _compiled(function, **_ALLOCATION_FREE)
 

@@ -61,19 +61,11 @@ FASTEST_RATE_rad_s = 1e6
 Array = NDArray[np.float64]
 
 
-class SkewedJoint(NamedTuple):
-    """Joint with hinges that are tilted or apart, and its equivalent with ideal hinges."""
-
-    chain: JointChain
-    q: Array  # (3,) rad, angles of ideal hinges with the orientation in the middle of the step
-    qdot: Array  # (3,) rad/s, their rates with the angular velocity there
-
-
 class Plant(NamedTuple):
     """True plant; the controller knows nothing of it."""
 
     rotor: Any  # data of `Rotor.start`
-    joint: SkewedJoint | None  # None for ideal hinges: its code is then not compiled
+    joint: JointChain | None  # hinges that are tilted or apart; None for ideal ones
     magnetics: TorqueModel  # true
     G: NDArray[np.float64]  # (3, n) N·m/A, true torque matrix in the middle of the physics step
     scratch: NDArray[np.float64]  # of `fill_torque_matrix`
@@ -89,6 +81,8 @@ class Plant(NamedTuple):
     step_s: float
     middle_q: NDArray[np.float64]  # (3,) rad, predicted pose in the middle of the physics step
     middle_qdot: NDArray[np.float64]  # (3,) rad/s, predicted rates there
+    coil_q: Array  # (3,) rad, ideal hinges with the same orientation; with an ideal joint that array
+    coil_qdot: Array  # (3,) rad/s, their rates with the same angular velocity; with an ideal joint that array
     last_qdot: NDArray[np.float64]  # (3,) rad/s at the start of the last physics step
     current: NDArray[np.float64]  # (n,) A, present
     mean_current: NDArray[np.float64]  # (n,) A, over the physics step
@@ -150,6 +144,7 @@ def plant_tick(
         plant.friction_q,
     )
     drive, bristles, joint = plant.drive, plant.bristles, plant.joint
+    coil_q, coil_qdot = plant.coil_q, plant.coil_qdot
     update_gain(plant.heat, plant.group_gain, gain)
     begin(drive, command)
     for substep in range(plant.substeps):
@@ -160,7 +155,7 @@ def plant_tick(
             friction_q[i] = 0.0
         if friction.acts:
             slow_down(friction, q, qdot, friction_q)
-        coil_q, coil_qdot = _equivalent_motion(joint, middle_q, middle_qdot)
+        _update_coil_motion(joint, middle_q, middle_qdot, coil_q, coil_qdot)
         fill_torque_matrix(coil_q, magnetics, G, scratch)
         advance_currents(drive, command, substep, coil_q, coil_qdot, G, gain, current, mean_current)
         log_mean_current(mean_current, substep, output.mean_current)
@@ -197,22 +192,22 @@ def plant_tick(
 
 
 @allocation_free
-def _equivalent_motion(joint: SkewedJoint | None, q: Array, qdot: Array) -> tuple[Array, Array]:
-    """Return angles and rates of ideal hinges with the rotor's orientation and angular velocity."""
+def _update_coil_motion(
+    joint: JointChain | None, q: Array, qdot: Array, coil_q: Array, coil_qdot: Array
+) -> None:
+    """Compute angles and rates of ideal hinges with the rotor's orientation and angular velocity."""
     # Numba omits the branch that the type of an argument excludes.
-    if joint is None:
-        return q, qdot
-    ideal_pose(joint.chain, q, qdot, joint.q, joint.qdot)
-    return joint.q, joint.qdot
+    if joint is not None:
+        ideal_pose(joint, q, qdot, coil_q, coil_qdot)
 
 
 @allocation_free
-def _torque_on_hinges(joint: SkewedJoint | None, q: Array, torque_S: Array, torque_q: Array) -> None:
+def _torque_on_hinges(joint: JointChain | None, q: Array, torque_S: Array, torque_q: Array) -> None:
     """Compute the generalised torque of a Cartesian torque on the true hinges."""
     if joint is None:
         generalised_torque(q, torque_S, torque_q)
     else:
-        hinge_torque(joint.chain, q, torque_S, torque_q)
+        hinge_torque(joint, q, torque_S, torque_q)
 
 
 @part_of_its_caller
