@@ -196,7 +196,7 @@ def examine(subject):
 PART = Part("units", examine)
 """,
         "twin/crosscheck/suite.py",
-        ("    closed_loop.CLOSED_LOOP,\n", "    closed_loop.CLOSED_LOOP,\n    units.PART,\n"),
+        ("    trajectories.CLOSED_LOOP,\n", "    trajectories.CLOSED_LOOP,\n    units.PART,\n"),
         "from spheretwin.crosscheck import units\n",
     ),
     "figure": Addition(

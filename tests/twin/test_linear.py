@@ -266,5 +266,5 @@ def test_a_model_that_the_lagrangian_does_not_know_is_refused(tmp_path):
     assert hinge in text
     text = text.replace('meshdir="assets"', f'meshdir="{actuators.FOLDER / "assets"}"')
     (path := tmp_path / "mine.xml").write_text(text.replace(hinge, hinge[:-2] + ' damping="1e-3"/>'), "utf-8")
-    with pytest.raises(InputError, match=r"three ideal hinges, received a model with .*damp"):
+    with pytest.raises(InputError, match=r"rigid bodies on three hinges, received a model with .*damp"):
         linearise(scenario({"plant.mjcf": str(path)}))

@@ -97,9 +97,9 @@ ROBUSTNESS = (
 )
 
 MACHINE_TEXT = (
-    "The same gains on `--hardware machine`, the prototype with scattered poles and coils, static friction, a"
-    " cable, coil coupling, warm magnets and the offset and gain errors of its converter: median and worst of"
-    " the seeds. The laws were tuned without these."
+    "The same gains on `--hardware machine`: the prototype with scattered poles and coils, errors of its mass"
+    " properties and hinges, static friction, a cable, coupled coils, temperatures, hysteresis of its sensors,"
+    " and the offset and gain errors of its converter. Median and worst of the seeds. No law was tuned for it."
 )
 
 
