@@ -98,8 +98,9 @@ ROBUSTNESS = (
 
 MACHINE_TEXT = (
     "The same gains on `--hardware machine`: the prototype with scattered poles and coils, errors of its mass"
-    " properties and hinges, static friction, a cable, coupled coils, temperatures, hysteresis of its sensors,"
-    " and the offset and gain errors of its converter. Median and worst of the seeds. No law was tuned for it."
+    " properties and hinges, static friction, a cable, coupled coils, temperatures, hysteresis of its"
+    " sensors, and the offset and gain errors of its converter. Median and worst of the seeds. No law was"
+    " tuned for it."
 )
 
 
