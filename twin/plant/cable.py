@@ -50,4 +50,5 @@ def acts(section: CableSection) -> bool:
 
 def constant_torque_Nm(section: CableSection, seed: int) -> NDArray[np.float64]:
     """Return the constant torque on the hinges, (3,) N·m, with the error that is drawn from a seed."""
-    return section.torque_Nm + section.torque_error_Nm * errors(seed, "plant.cable", 3, 1)[:, 0]
+    drawn_Nm = np.array(section.torque_error_Nm) * errors(seed, "plant.cable", 3, 1)[:, 0]
+    return np.array(section.torque_Nm) + drawn_Nm
