@@ -26,7 +26,13 @@ MOST_MARKED = 3
 
 _COMMANDED = ("q_ref_rad", "qdot_ref_rad_s", "torque_command_Nm", "current_command_A")
 _ESTIMATED = ("q_measured_rad", "qdot_estimated_rad_s", "q_predicted_rad", "qdot_predicted_rad_s")
-_SECONDARY = ("disturbance_Nm", "q_governed_rad", "qdot_governed_rad_s", "qddot_governed_rad_s2")
+_SECONDARY = (
+    "disturbance_Nm",
+    "q_governed_rad",
+    "qdot_governed_rad_s",
+    "qddot_governed_rad_s2",
+    "rotor_temperature_degC",  # in a plot with that of the stator
+)
 
 # Lines are drawn in the order of their names: estimates first, as a rim of the true values,
 # and commands last and thin.
@@ -104,7 +110,7 @@ def _names(name: str, labels: tuple[str, ...], unit: str) -> list[str]:
 
 def _short(name: str) -> str:
     """Return the name without its unit, which follows in brackets."""
-    for suffix in ("_rad_s", "_mrad", "_rad", "_Nm", "_deg", "_mm", "_A", "_W", "_s"):
+    for suffix in ("_rad_s", "_mrad", "_rad", "_Nm", "_deg", "_mm", "_degC", "_A", "_W", "_s"):
         if name.endswith(suffix):
             return name.removesuffix(suffix)
     return name
