@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import urllib.parse
+from abc import ABC, abstractmethod
 from collections import deque
 from collections.abc import Iterator
 from contextlib import suppress
@@ -163,12 +164,12 @@ class _Server(ThreadingHTTPServer):
         """Leave the terminal to the run: a viewer was closed amid its request."""
 
 
-class _Handler(BaseHTTPRequestHandler):
+class _Handler(ABC, BaseHTTPRequestHandler):
     """Handler of one request; a subclass defines the content."""
 
+    @abstractmethod
     def answer(self, path: str) -> None:
         """Answer a request for a path."""
-        raise NotImplementedError
 
     def do_GET(self) -> None:
         """Answer, unless a page of another host sent the request under another name of this host."""
