@@ -26,6 +26,7 @@ from spheretwin.plant.mass_properties import MassSection, mass_errors, true_mode
 from spheretwin.plant.mujoco_rotor import MujocoRotor, step
 from spheretwin.session import Session
 from spheretwin.simulation import simulate
+from tests.models.test_joint_chain import full
 
 STEP_S = 5e-4
 EVERYTHING = {
@@ -52,23 +53,13 @@ def chain_of(shipped, section, modelling_error=0.0, payload_kg=0.0, gravity_m_s2
     return read_chain(true_model(shipped, modelling_error, payload_kg, gravity_m_s2, errors))
 
 
-def matrix(M):
-    return np.array([
-        [M.alpha, M.alpha_beta, M.alpha_gamma],
-        [M.alpha_beta, M.beta, M.beta_gamma],
-        [M.alpha_gamma, M.beta_gamma, M.gamma],
-    ])  # fmt: skip
-
-
 def upright(chain):
-    return matrix(equations(chain, (0.0,) * 3, (0.0,) * 3)[0])
+    return full(equations(chain, (0.0,) * 3, (0.0,) * 3)[0])
 
 
-def plant_of(changes):
+def rotor_of(changes):
     config = initial_config(scenarios.load("hold", changes), None, None)
-    rotor = assembly.rotor_of(config.scenario, config.files)
-    settings = assembly._rotor_settings(config.scenario, config.files)
-    return rotor.start(np.zeros(3), np.zeros(3)), settings.joint_chain()
+    return assembly.rotor_of(config.scenario, config.files)
 
 
 def test_switched_off_nothing_general_is_in_the_plant(shipped):
@@ -143,7 +134,8 @@ def test_an_offset_centre_hangs_down_and_weighs_m_g_r(shipped):
     # The weight pulls the side of +x down, which turns beta upward: a negative torque holds it.
     _, bias = equations(chain, (0.0,) * 3, (0.0,) * 3)
     np.testing.assert_allclose(bias, [0, -1.6 * 9.81 * 1e-3, 0], rtol=0, atol=1e-15)
-    plant, _ = plant_of({"plant.mass.centre_m": [1e-3, 0.0, 0.0]})
+    rotor = rotor_of({"plant.mass.centre_m": [1e-3, 0.0, 0.0]})  # the data hold addresses within it
+    plant = rotor.start(np.zeros(3), np.zeros(3))
     for _ in range(20):
         step(plant)
     # beta = (m g r / J) t² / 2 at first; the gravity torque changes with cos(beta), in 1e-5 of it.
@@ -216,7 +208,7 @@ def test_friction_gains_no_energy_on_a_general_joint(shipped):
         stage = friction(np.full(3, coulomb), np.full(3, 1e-3), 0.01, np.full(3, 2e-3), STEP_S, chain)
         for _ in range(100):
             q, qdot, torque = generator.uniform(-1.3, 1.3, 3), generator.normal(size=3), np.zeros(3)
-            M, before = matrix(equations(chain, tuple(q), (0.0,) * 3)[0]), qdot.copy()
+            M, before = full(equations(chain, tuple(q), (0.0,) * 3)[0]), qdot.copy()
             slow_down(stage, q, qdot, torque)
             # Rounding relative to the energy before.
             assert qdot @ M @ qdot <= before @ M @ before * (1 + 1e-12)
@@ -231,7 +223,7 @@ def test_static_friction_gains_no_energy_on_a_general_joint(shipped):
     section = StictionSection(on=True)
     stage = bristle_friction(section, (5e-3,) * 3, CableSection(), np.full(3, 2e-3), STEP_S, chain)
     q, torque = np.array([0.3, -0.4, 0.5]), np.zeros(3)
-    M = matrix(equations(chain, tuple(q), (0.0,) * 3)[0])
+    M = full(equations(chain, tuple(q), (0.0,) * 3)[0])
     qdot = np.array([0.2, -0.1, 0.15])
 
     def energy():
