@@ -39,7 +39,7 @@ reproduce: setup ## run all that the paper shows, over 20 seeds, and leave a pag
 
 # A folder of trials that other sources made is refused; remove it first.
 tune-rivals: setup ## search the gains of the compared laws again, and freeze them
-	for study in rivals_ideal rivals_prototype; do \
+	for study in rivals_ideal rivals_electronics; do \
 		$(BIN)/spheretwin sweep $$study --optimise && cp $${study}_study/gains.json twin/paper/$$study.json || exit 1; \
 	done
 

@@ -3,6 +3,9 @@
 import copy
 import os
 import signal
+import subprocess
+import sys
+from pathlib import Path
 from typing import get_args
 
 import hypothesis
@@ -12,6 +15,7 @@ from pydantic import BaseModel
 
 from spheretwin import scenario as scenarios
 from spheretwin.models import actuator as actuators
+from spheretwin.models.base.compiled import COMPILES
 from spheretwin.models.base.errors import InputError
 
 # Whatever the width of the terminal, and whether or not the tests run in the background of a shell,
@@ -26,6 +30,8 @@ signal.signal(signal.SIGINT, signal.default_int_handler)
 hypothesis.settings.register_profile("reproducible", derandomize=True, deadline=None, max_examples=200)
 hypothesis.settings.load_profile("reproducible")
 
+
+ROOT = Path(__file__).parents[1]
 
 LONG_FILES = (
     "test_ray_cluster.py", "test_ray_ends.py", "test_ray_refusals.py", "test_crosscheck.py", "test_cli.py",
@@ -45,6 +51,23 @@ def pytest_collection_modifyitems(items):
 def pytest_xdist_auto_num_workers():
     """Return two workers more than there are cores: tests that wait for processes leave a core free."""
     return (os.cpu_count() or 1) + 2
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_pyfunc_call(pyfuncitem):
+    """Run a test marked `uncompiled` in a process without a compiler.
+
+    For tests of what a kind of plant holds, not of its numbers: each kind is a minute of compilation, and a
+    few ticks in plain Python are a second.
+    """
+    if not (COMPILES and pyfuncitem.get_closest_marker("uncompiled")):
+        return None
+    command = [sys.executable, "-m", "pytest", "--quiet", "-p", "no:cacheprovider", pyfuncitem.nodeid]
+    environment = {name: value for name, value in os.environ.items() if not name.startswith("PYTEST_")}
+    environment["NUMBA_DISABLE_JIT"] = "1"
+    done = subprocess.run(command, cwd=ROOT, env=environment, capture_output=True, text=True)
+    assert done.returncode == 0, done.stdout + done.stderr
+    return True
 
 
 @pytest.fixture(scope="session")

@@ -52,7 +52,7 @@ def drawn_numbers():
         {"target": "dac.04", "mode": "noise", "value": 0.1},
         {"target": "supply", "mode": "intermittent", "value": 2e-3},
     ]
-    scenario = scenarios.load("hold", {"hardware": "prototype", "seed": 3, "fault": faults})
+    scenario = scenarios.load("hold", {"hardware": "electronics", "seed": 3, "fault": faults})
     with Session(scenario) as session:
         scenario = session.scenario
     plan = FaultSchedule(scenario.fault, 18, 1e-3, 3)

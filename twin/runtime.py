@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -126,9 +128,6 @@ class Runtime:
             assembly.column_offsets(self.signals, self.law),
             loops.Scratch(np.empty((3, 3)), np.empty((6 if scenario.controller.prediction.on else 3, 3))),
         )
-        self._loop = for_types_of(
-            self._functions.loop, NO_INPUTS, *self._parts, np.empty((0, self.row_width))
-        )
 
     @property
     def q_rad(self) -> NDArray[np.float64]:
@@ -144,6 +143,11 @@ class Runtime:
     def reason(self) -> Reason:
         """Reason for which a watchdog has switched off the currents, if it has."""
         return REASONS[int(self._controller.supervision.watchdog.reason[0])]
+
+    @cached_property
+    def loop(self) -> Callable[..., tuple[int, int]]:
+        """Loop for the types of the parts; the first access compiles it."""
+        return for_types_of(self._functions.loop, NO_INPUTS, *self._parts, np.empty((0, self.row_width)))
 
     def apply_faults(self, tick: int) -> int:
         """Apply the faults that are due at a control tick; return the next tick at which they may change."""
@@ -161,7 +165,7 @@ class Runtime:
     def _run(self, inputs: loops.Inputs, log: NDArray[np.float64]) -> tuple[int, int]:
         """Run the loop and store the first exception of a compiled law."""
         if not self._may_raise:
-            return self._loop(inputs, *self._parts, log)
+            return self.loop(inputs, *self._parts, log)
         raised: list[BaseException] = []
 
         def receive(error: BaseException) -> None:
@@ -169,7 +173,7 @@ class Runtime:
             self._controller.torque_q[:] = np.nan  # the law may have written part of a torque
 
         with callback_errors(receive):
-            ticks, code = self._loop(inputs, *self._parts, log)
+            ticks, code = self.loop(inputs, *self._parts, log)
         if raised and self.law_error is None:
             # With a watchdog the loop goes on after the exception, while the currents decay.
             t_s = inputs.t[ticks - int(self._controller.supervision.watchdog.ticks_since_trip[0])]

@@ -156,6 +156,10 @@ class Session:
         """Active law."""
         return self._runtime.law
 
+    def compile(self) -> None:
+        """Compile the loop of the active scenario; otherwise the next `advance` compiles it."""
+        _ = self._runtime.loop
+
     def advance(self, ticks: int) -> Table:
         """Run control ticks.
 
@@ -359,6 +363,7 @@ class Session:
                 self.events += (change,)
 
     def _run(self, inputs: loops.Inputs, log: NDArray[np.float64]) -> int:
+        self.compile()
         started = time.perf_counter()
         try:
             ticks, code = self._runtime.run(inputs, log)

@@ -145,6 +145,7 @@ def follow(
     sinks, pending = list(sinks), list(journal)
     session.check_horizon(_known_to(ticks, pending))
     chunk = _chunk_ticks(session.scenario, live)
+    session.compile()
     started, first = time.perf_counter(), session.t_s
     reported, messages = _report_events(session, 0, sinks), FaultMessages()
     while session.tick < ticks and not session.ended and not stop_requested():

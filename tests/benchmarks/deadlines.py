@@ -17,7 +17,7 @@ from spheretwin.bench import Bench
 TWINS = {
     "lagrangian": {"plant.engine": "lagrangian"},
     "mujoco": {},
-    "prototype": {"hardware": "prototype"},
+    "electronics": {"hardware": "electronics"},
 }
 STOPS = 20
 

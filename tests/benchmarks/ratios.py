@@ -73,13 +73,13 @@ def set_up_seconds() -> float:
     return seconds_of(lambda: Session(scenario))
 
 
-def prototype_seconds(hardware: str) -> Callable[[], float]:
-    """Loop time of a physics step of the tilt on one kind of hardware, s.
+def hardware_seconds(hardware: str) -> Callable[[], float]:
+    """Loop time of a physics step of the tilt on one hardware set, s.
 
-    Friction is the same on both, and rows are written into memory that is there already: the prototype's are
-    twice as wide, and a page of fresh memory takes longer than what is written into it.
+    Bearings are the same on all, and rows are written into memory that is there already: with electronics
+    they are twice as wide, and a page of fresh memory takes longer than what is written into it.
     """
-    bearings = {name: value for name, value in HARDWARE["prototype"].items() if name.startswith("plant.")}
+    bearings = {name: value for name, value in HARDWARE["electronics"].items() if name.startswith("plant.")}
     scenario = scenarios.load("tilt", {"hardware": hardware, **bearings})
     log = np.zeros((scenario.ticks, width(Session(scenario).signals)))
 
@@ -248,9 +248,9 @@ def ratios() -> list[dict[str, object]]:
             "set-up": set_up_seconds,
             "brief run": brief_run_seconds,
             "brief loop": brief_loop_seconds,
-            "prototype": prototype_seconds("prototype"),
-            "ideal": prototype_seconds("ideal"),
-            "machine": prototype_seconds("machine"),
+            "electronics": hardware_seconds("electronics"),
+            "ideal": hardware_seconds("ideal"),
+            "prototype": hardware_seconds("prototype"),
         },
         rounds=9,
     )
@@ -275,15 +275,15 @@ def ratios() -> list[dict[str, object]]:
             "warm command over importing its libraries", processes["silent"], processes["imports"], at_most=2
         ),
         ratio(
-            "the prototype's whole chain over bare mj_step, a physics step",
-            inner["prototype"] - inner["ideal"],
+            "complete electronics over bare mj_step, a physics step",
+            inner["electronics"] - inner["ideal"],
             bare,
             at_most=0.17,
         ),
         ratio(
-            "loop with every imperfection over that of the prototype",
-            inner["machine"],
+            "loop of the complete prototype over that of its electronics",
             inner["prototype"],
+            inner["electronics"],
             at_most=1.6,
         ),
         ratio("one torque matrix over bare mj_step", inner["G_t"], bare),

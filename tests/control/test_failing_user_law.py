@@ -160,7 +160,7 @@ def test_rows_before_a_compiled_law_raised_are_kept(file, tmp_path, capfd):
 
 def test_under_a_watchdog_the_line_has_the_time_of_the_exception(file, capfd):
     """The currents run down first, and the line must not have the time of their end."""
-    watched = ["--watchdog.on", "true", "--watchdog.rundown-s", "0.01"]
+    watched = ["--hardware", "electronics", "--watchdog.rundown-s", "0.01"]
     told = f"spheretwin: law raises: {RAISED['raises']}\n"
     assert printed(capfd, "--controller.law", f"{file}:raises", *watched) == (1, "", told)
 

@@ -72,7 +72,7 @@ TABLE: dict[str, Recorded | Driven] = {
     "control": Recorded({"nutation": "nutation"}, "control", 3.4),
     "coils": Recorded({"loaded": "sinusoid --plant.payload-kg 0.1 --disturbance.load 2"}, "coils", 3.3),
     "hardware": Recorded(
-        {"open": f"tilt --hardware prototype {OPEN}"},
+        {"open": f"tilt --hardware electronics {OPEN}"},
         "hardware",
         4.4,
     ),
@@ -89,8 +89,8 @@ TABLE: dict[str, Recorded | Driven] = {
 
 MORE: dict[str, Recorded | Driven] = {
     "scenario": Recorded({"nutation": "nutation"}, "scenario", 3.4),
-    "open_overview": Recorded({"open": f"tilt --hardware prototype {OPEN}"}, "overview", 4.4),
-    "open_control": Recorded({"open": f"tilt --hardware prototype {OPEN}"}, "control", 4.4),
+    "open_overview": Recorded({"open": f"tilt --hardware electronics {OPEN}"}, "overview", 4.4),
+    "open_control": Recorded({"open": f"tilt --hardware electronics {OPEN}"}, "control", 4.4),
     "failed_control": Recorded({"failing": FAILING}, "control", 1.222),
     "compare_failed": Recorded({"afsm": "sinusoid --disturbance.load 2", "pd": FAILING}, "compare", 1.0),
     "live": Recorded({"nutation": "nutation"}, "overview", 3.4, live=True),

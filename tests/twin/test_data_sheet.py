@@ -25,7 +25,7 @@ from spheretwin.study.study import load
 
 # Every part of a controller is at work: estimator, governor, prediction, feed-forward, detector, watchdog.
 WHOLE = {
-    "hardware": "prototype", "controller.law": "adrc", "detector.detect": True, "duration": 0.2,
+    "hardware": "electronics", "controller.law": "adrc", "detector.detect": True, "duration": 0.2,
     "controller.governor.acceleration_rad_s2": 20.0, "controller.prediction.on": True,
     "controller.feed_forward.friction": 0.8, "controller.feed_forward.inertia": 1.0,
     "sensors.potentiometer.hysteresis_rad": 2e-4,
@@ -198,11 +198,11 @@ def test_the_controller_knows_nothing_of_what_the_robustness_study_draws():
     rows = Rows(study)
     drawn = [rows.scenario(row) for row in islice(Grid(study), 5)]
     assert len({scenario.plant.coulomb_Nm for scenario in drawn}) == 5
-    stated = scenarios.load("sinusoid", {"hardware": "prototype"}).nominal
+    stated = scenarios.load("sinusoid", {"hardware": "electronics"}).nominal
     assert [scenario.nominal for scenario in drawn] == [stated] * 5
 
 
-@pytest.mark.parametrize("hardware", ["ideal", "prototype"])
+@pytest.mark.parametrize("hardware", ["ideal", "electronics"])
 def test_where_the_sheet_is_right_it_equals_the_truth(hardware):
     stated = resolved("hold", hardware=hardware).nominal
     true = resolved("hold", hardware=hardware, **{"nominal.equals_truth": True}).nominal
@@ -255,7 +255,7 @@ def test_set_during_a_run_it_takes_the_truth_of_then():
 
 @pytest.mark.parametrize("knows", [False, True])
 def test_a_resolved_scenario_written_down_is_the_same_when_it_is_read_again(knows, tmp_path):
-    changes = {"hardware": "prototype", "nominal.equals_truth": knows, "plant.coulomb_Nm": [3e-3] * 3}
+    changes = {"hardware": "electronics", "nominal.equals_truth": knows, "plant.coulomb_Nm": [3e-3] * 3}
     scenario = resolved(**changes)
     (tmp_path / "again.toml").write_text(as_toml(scenario))
     again = resolved(str(tmp_path / "again.toml"))
@@ -328,7 +328,7 @@ def test_only_the_nominal_curve_has_a_shipped_file_by_name(tmp_path, half):
 
 
 def test_a_record_of_a_version_without_a_data_sheet_knows_drive_and_sensors_as_they_were():
-    scenario = resolved("hold", hardware="prototype", **{"drive.supply_V": 12.0, "nominal.delay_s": 0.0})
+    scenario = resolved("hold", hardware="electronics", **{"drive.supply_V": 12.0, "nominal.delay_s": 0.0})
     fields = json.loads(scenario.model_dump_json())
     older = (
         "torque_scale", "inertia_kg_m2", "current_limit_A", "coulomb_Nm", "viscous_Nm_s", "time_constant_s",

@@ -186,8 +186,8 @@ def test_a_drive_without_lag_has_no_states_for_it():
 
 
 def test_the_prototype_s_lag_is_that_of_its_amplifiers():
-    model = linearise(scenarios.load("tilt", {"hardware": "prototype"}), lag=True)
-    bandwidth = scenarios.load("tilt", {"hardware": "prototype"}).drive.bandwidth_rad_s
+    model = linearise(scenarios.load("tilt", {"hardware": "electronics"}), lag=True)
+    bandwidth = scenarios.load("tilt", {"hardware": "electronics"}).drive.bandwidth_rad_s
     np.testing.assert_array_equal(model.system.A[6:, 6:], -bandwidth * np.eye(3))
 
 

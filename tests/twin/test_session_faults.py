@@ -36,7 +36,7 @@ PLAN = [
 ]
 
 
-def scenario(hardware="prototype", **changes):
+def scenario(hardware="electronics", **changes):
     return scenarios.load(
         "nutation",
         {
@@ -115,7 +115,7 @@ def same_columns(one, other, ticks=slice(None)):
     ]  # fmt: skip
 
 
-@pytest.mark.parametrize("hardware", ["prototype", "ideal"])
+@pytest.mark.parametrize("hardware", ["electronics", "ideal"])
 @pytest.mark.parametrize(("kind", "mode"), EVERY)
 def test_by_hand_or_by_event_is_as_planned(kind, mode, hardware):
     """And before its start, a planned one leaves every bit of a healthy run's columns as it is.
@@ -149,7 +149,7 @@ def test_by_hand_or_by_event_is_as_planned(kind, mode, hardware):
                 assert same_columns(after, expected[1]) == []
 
 
-@pytest.mark.parametrize("hardware", ["prototype", "ideal"])
+@pytest.mark.parametrize("hardware", ["electronics", "ideal"])
 def test_an_end_by_hand_is_a_planned_end(hardware):
     given = [
         {"target": "coil.03", "mode": "open", "reported_to_controller": True},
@@ -211,7 +211,7 @@ def test_a_run_of_faults_set_on_the_way_is_replayed(tmp_path):
     assert np.count_nonzero(np.nansum(marks, axis=1)) == 180
 
 
-@pytest.mark.parametrize("hardware", ["prototype", "ideal"])
+@pytest.mark.parametrize("hardware", ["electronics", "ideal"])
 @pytest.mark.parametrize("kind", ["amplifier", "dac", "pot", "encoder", "adc", "controller"])
 def test_what_is_held_after_a_restore_is_what_it_was(kind, hardware):
     none = {"hardware": hardware, "fault": [], "detector.detect": False, "duration": 0.2}

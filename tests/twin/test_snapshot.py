@@ -207,7 +207,7 @@ def test_a_snapshot_that_does_not_fit_is_refused_and_nothing_changes(sticky):
 def test_every_part_s_numbers_are_counted_before_anything_is_restored():
     """One number more or fewer anywhere: refused by name, and the session goes on as before."""
     changes = {
-        "hardware": "prototype", "plant.engine": "lagrangian", "detector.detect": True,
+        "hardware": "electronics", "plant.engine": "lagrangian", "detector.detect": True,
         "fault": [{"target": "adc", "mode": "delay", "value": 2e-3, "start_s": 1.0}],
     }  # fmt: skip
     mine = session(**changes)

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from spheretwin.analysis import recorded_run as reviewed
 from spheretwin.bench.command_queue import Queue
-from spheretwin.bench.driver import Driver
+from spheretwin.bench.driver import Driver, compiled_session
 from spheretwin.bench.operators import Operators
 from spheretwin.bench.pace import Pace
 from spheretwin.bench.recording import Recording
@@ -178,7 +178,7 @@ class BenchState:
     """
 
     def __init__(self, scenario: Scenario, operators: Operators) -> None:
-        self.driver, self.operators = Driver(scenario, Session(scenario)), operators
+        self.driver, self.operators = Driver(scenario, compiled_session(scenario)), operators
         self.pace, self.queue, self.recording = Pace(), Queue(), Recording(self.set_note)
         self.player: Player | None = None
         self.running, self.steps = False, 0

@@ -12,7 +12,7 @@ from pydantic import Field, JsonValue
 from spheretwin import scenario as scenarios
 from spheretwin.bench.bench_state import BenchState, Player
 from spheretwin.bench.command_queue import By, Command, Place, Text, command
-from spheretwin.bench.driver import Driver, with_field
+from spheretwin.bench.driver import Driver, compiled_session, with_field
 from spheretwin.bench.modes import Limits
 from spheretwin.bench.operators import Operators
 from spheretwin.bench.pace import FASTEST, SLOWEST
@@ -130,13 +130,13 @@ def _restart(bench_state: BenchState, new_run: NewRun, **arguments: Any) -> None
 
 def _present_scenario(bench_state: BenchState) -> Callable[[], NewRun]:
     settings = bench_state.driver.settings
-    return lambda: (settings, Session(settings))
+    return lambda: (settings, compiled_session(settings))
 
 
 def _load_scenario(bench_state: BenchState, source: str, overrides: dict[str, Any]) -> Callable[[], NewRun]:
     def load() -> NewRun:
         scenario = scenarios.load(source, overrides)
-        return scenario, Session(scenario)
+        return scenario, compiled_session(scenario)
 
     return load
 
@@ -161,7 +161,7 @@ def _trial(bench_state: BenchState, name: str, value: Any) -> Callable[[], None]
         return None
 
     def try_out() -> None:
-        Session(with_field(settings, name, value)).close()
+        compiled_session(with_field(settings, name, value)).close()
         bench_state.tried.add(key)
 
     return try_out

@@ -75,6 +75,13 @@ class DriverSnapshot(NamedTuple):
     row: Table | None
 
 
+def compiled_session(scenario: Scenario) -> Session:
+    """Return a session whose first tick does not wait for the compiler."""
+    session = Session(scenario)
+    session.compile()
+    return session
+
+
 class Driver:
     """Driver of one twin; every change stands in the journal of its session.
 

@@ -19,7 +19,7 @@ ALL, TOP = "all", "run"
 
 COMMON = {
     "duration": "length of the run, s",
-    "hardware": "ideal, or prototype: sensors, electronics, bearings",
+    "hardware": "ideal, electronics (sensors, drive, bearings) or prototype (and imperfections)",
     "controller.law": "control law",
     "trajectory.shape": "kind of trajectory",
     "disturbance.load": "constant load L, in 0.05 N·m on each axis",

@@ -1,4 +1,4 @@
-"""Error budget of the tilt: cost of each part of the machine, for every law."""
+"""Error budget of the tilt: cost of each part of the prototype, for every law."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from spheretwin.viz.pages.markdown import Drawing
 
 Array = NDArray[np.float64]
 
-MACHINE = HARDWARE["machine"]
+PROTOTYPE = HARDWARE["prototype"]
 
 # What an angle is in volts: no error by itself.
 VOLTS = ("sensors.potentiometer.electrical_angle_rad", "sensors.potentiometer.supply_V")
@@ -41,7 +41,7 @@ BEARINGS = ("plant.coulomb_Nm", "plant.viscous_Nm_s")
 WITHOUT_ERROR = ("sensors.current.noise_A", "watchdog.on")
 """Fields of the set that move nothing: no law is handed the currents, and the watchdog does not trip."""
 
-IDEAL, WITH_RATES, ELECTRONICS, ALL = "ideal", "estimator", "prototype", "machine"
+IDEAL, WITH_RATES, ELECTRONICS, ALL = "ideal", "estimator", "electronics", "prototype"
 
 NO_LAG: dict[str, Any] = {"drive.time_constant_s": 0.0}
 AMPLE_V = 1e4  # drives 8 A through 0.9 mH in less than a microsecond
@@ -50,15 +50,15 @@ WIDE_rad_s = 1e7  # a ten-thousandth of a control period
 
 def _all_of(section: str) -> tuple[str, ...]:
     """Return the fields of a section of the plant in the set."""
-    return tuple(dotted for dotted in MACHINE if dotted.startswith(f"{section}."))
+    return tuple(dotted for dotted in PROTOTYPE if dotted.startswith(f"{section}."))
 
 
 class Stage(NamedTuple):
-    """Set of parts of the machine."""
+    """Set of parts of the prototype."""
 
     name: str
     fields: tuple[str, ...] = ()
-    """Fields with the machine's value."""
+    """Fields with the prototype's value."""
     other_fields: Mapping[str, Any] = {}
     """Fields with another value that the stage needs; none of them is an error."""
     is_random: bool = False
@@ -73,7 +73,7 @@ class Stage(NamedTuple):
     @property
     def overrides(self) -> dict[str, Any]:
         """Fields of the scenario."""
-        values = {dotted: MACHINE[dotted] for dotted in self.fields}
+        values = {dotted: PROTOTYPE[dotted] for dotted in self.fields}
         if self.name in (ELECTRONICS, ALL):
             return values  # the sets have a data sheet of their own
         return {
@@ -163,8 +163,8 @@ STAGES = (
         ("drive.bandwidth_rad_s", *COILS),
         other_fields={"drive.supply_V": AMPLE_V},
     ),
-    Stage(ELECTRONICS, tuple(HARDWARE["prototype"]), is_random=True),
-    Stage(ALL, tuple(MACHINE), is_random=True),
+    Stage(ELECTRONICS, tuple(HARDWARE["electronics"]), is_random=True),
+    Stage(ALL, tuple(PROTOTYPE), is_random=True),
 )  # fmt: skip
 
 
@@ -206,11 +206,11 @@ def sections(outcomes: Outcomes) -> list[Section]:
     tables = [_table(outcomes, laws, axis) for axis in range(len(ANGLES))]
     most = "; ".join(filter(None, (_most(outcomes, law) for law in laws)))
     text = f"{METHOD} The single part with the largest change of the error: {most}." if most else METHOD
-    return [Section("Single parts of the machine", text, tables, [lambda: _drawing(outcomes, laws)])]
+    return [Section("Single parts of the prototype", text, tables, [lambda: _drawing(outcomes, laws)])]
 
 
 def findings(outcomes: Outcomes) -> list[Finding]:
-    """The part of the machine that changes most, under each law."""
+    """The part of the prototype that changes most, under each law."""
     most = [text for law in LAWS if (text := _most(outcomes, law))]
     return (
         [Finding(None, f"single part with the largest change of the error: {'; '.join(most)}")]
@@ -239,7 +239,7 @@ def _most(outcomes: Outcomes, law: str) -> str:
 def _table(outcomes: Outcomes, laws: Sequence[str], axis: int) -> ResultTable:
     rows = [(stage.name, *(_cell(outcomes.runs(case(law, stage)), axis) for law in laws)) for stage in STAGES]
     title = f"Largest true |error| of {ANGLES[axis]} in degrees: median over the seeds, and range"
-    return ResultTable(title, ("part of the machine", *map(law_name, laws)), rows)
+    return ResultTable(title, ("part of the prototype", *map(law_name, laws)), rows)
 
 
 def _cell(runs: Sequence[Outcome], axis: int) -> str:
@@ -260,7 +260,7 @@ def _drawing(outcomes: Outcomes, laws: Sequence[str]) -> Drawing:
         for axis, name in enumerate(ANGLES)
     }
     names = [stage.name for stage in STAGES]
-    title, change = "Single parts of the machine", "change against its base, degrees"
+    title, change = "Single parts of the prototype", "change against its base, degrees"
     caption = (
         "Largest true |error|, median over the seeds. Colours: what the part changes, against ideal, or for"
         " single errors of the sensors against the estimator alone."
@@ -280,8 +280,8 @@ def _medians_deg(runs: Sequence[Outcome]) -> Array:
 EXPERIMENT = Experiment(
     name="budget",
     title="The error budget of the tilt",
-    summary="The motion of figure 11 under every law, with each part of the machine switched on alone, with"
-    " all parts of the prototype, and with all of the machine.",
+    summary="The motion of figure 11 under every law, with each part of the prototype switched on alone,"
+    " with all of its electronics, and with all of it.",
     cases=cases,
     sections=sections,
     findings=findings,

@@ -139,8 +139,8 @@ SCENARIO = "nutation"
 BASE: dict[str, Any] = {"disturbance.load": 1.0, "plant.engine": "lagrangian"}
 """m = 0.2 is the scenario's own."""
 
-# Only the prototype has sensors, supply and watchdog.
-PROTOTYPE: dict[str, Any] = {**BASE, "hardware": "prototype"}
+# Only the hardware set of the electronics has sensors, supply and watchdog.
+ELECTRONICS: dict[str, Any] = {**BASE, "hardware": "electronics"}
 OTHER_ENGINE: dict[str, Any] = {"plant.engine": "mujoco"}
 
 SAMPLE = 100
@@ -150,8 +150,8 @@ SAMPLE = 100
 EXPECTED = (Status.COMPLETED, Status.LEFT_WORKSPACE, Status.FAILSAFE)
 
 HEALTHY = Case("healthy", SCENARIO, BASE, {"kind": "healthy", "groups": [], "way": None})
-HEALTHY_PROTOTYPE = Case(
-    "healthy prototype", SCENARIO, PROTOTYPE, {"kind": "healthy", "groups": [], "way": None}
+HEALTHY_ELECTRONICS = Case(
+    "healthy electronics", SCENARIO, ELECTRONICS, {"kind": "healthy", "groups": [], "way": None}
 )
 
 
@@ -165,7 +165,7 @@ def cases() -> list[Case]:
         [[shorted(groups, DETECTING)] for groups in singles()],
         [[on_other_engine(groups, way) for way in OF_GROUPS] for groups in sample()],
     ]
-    return [HEALTHY, HEALTHY_PROTOTYPE, *_in_turn(kinds)]
+    return [HEALTHY, HEALTHY_ELECTRONICS, *_in_turn(kinds)]
 
 
 def of_groups(groups: Groups, way: Way) -> Case:
@@ -198,7 +198,7 @@ def of_part(failure: Failure, way: Way) -> Case:
     return Case(
         name=f"{failure.name}, {way.name}",
         scenario=SCENARIO,
-        fields={**PROTOTYPE, **way.fields, **_planned([fault])},
+        fields={**ELECTRONICS, **way.fields, **_planned([fault])},
         details={
             "kind": "part",
             "groups": [],

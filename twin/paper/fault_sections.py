@@ -16,12 +16,11 @@ from spheretwin.paper.page import statuses_text
 from spheretwin.viz.pages.markdown import Drawing
 
 PARTS_METHOD = (
-    "The prototype, as nothing else has these parts. There are no groups to leave out, so the ways are"
-    " others: *no watchdog*; one that takes the currents away (*release*); one that shorts the coils, which"
-    " brakes (*short*). The number is the error ratio as above, with the healthy prototype as"
-    " reference, median over the seeds. The window of a run that is"
-    " stopped ends there. What is intermittent fails in every other"
-    " stretch of 10 ms, by a coin; what is stuck stays where it was."
+    "Hardware set `electronics`, as ideal hardware has none of these parts. There are no groups to leave out,"
+    " so the ways are others: *no watchdog*; one that takes the currents away (*release*); one that shorts"
+    " the coils, which brakes (*short*). The number is the error ratio as above, with the healthy electronics"
+    " as reference, median over the seeds. The window of a run that is stopped ends there. What is"
+    " intermittent fails in every other stretch of 10 ms, by a coin; what is stuck stays where it was."
 )
 PARTS_HEAD = ("part and mode", *(way.name for way in cases.OF_PARTS), "stopped for", "after the fault, ms")
 
@@ -58,10 +57,10 @@ def _stopped(runs: Sequence[Outcome]) -> tuple[str, str]:
 
 
 def _healthy(outcomes: Outcomes) -> str:
-    errors = [np.degrees(run.data.after_rad) for run in outcomes.runs(cases.HEALTHY_PROTOTYPE)]
+    errors = [np.degrees(run.data.after_rad) for run in outcomes.runs(cases.HEALTHY_ELECTRONICS)]
     if not errors:
         return ""
-    return f" The largest error of the healthy prototype is {np.median(errors):.2f}° (median over the seeds)."
+    return f" The largest error with healthy electronics is {np.median(errors):.2f}° (median over the seeds)."
 
 
 def _watchdog_text(outcomes: Outcomes, failures: Sequence[cases.Failure]) -> str:

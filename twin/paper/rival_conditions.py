@@ -73,7 +73,7 @@ EXPECTED = (Status.COMPLETED, Status.LEFT_WORKSPACE, Status.DIVERGED, Status.FAI
 GROUP_GAIN = 0.03
 """Largest deviation of the torque of a group from its nominal value."""
 
-MACHINE = "machine"
+COMPLETE = "prototype"
 """Hardware set with every imperfection, and the condition with it."""
 
 STAGE = 977  # of the random stream of the group gains
@@ -161,10 +161,10 @@ IDEAL = Hardware(
     ("ideal", "fast"),
 )
 
-PROTOTYPE = Hardware(
-    "prototype",
-    "tilt, prototype",
-    "rivals_prototype",
+ELECTRONICS = Hardware(
+    "electronics",
+    "tilt, prototype's electronics",
+    "rivals_electronics",
     # The encoder of γ has steps that no law can resolve.
     (0, 1),
     True,
@@ -175,11 +175,11 @@ PROTOTYPE = Hardware(
         Condition("m 0.5", {"plant.modelling_error": 0.5}, perturbed=True),
         Condition("1 ms of unknown delay", _delay(1e-3), perturbed=True),
         Condition("group gains ±3 %", {}, group_gains, perturbed=True),
-        Condition(MACHINE, {"hardware": MACHINE, **CONVERTER_ERRORS}, perturbed=True),
+        Condition(COMPLETE, {"hardware": COMPLETE, **CONVERTER_ERRORS}, perturbed=True),
     ),
     tuple(preset for preset in PRESETS if preset not in ("ideal", "fast")),
 )
-HARDWARE = (IDEAL, PROTOTYPE)
+HARDWARE = (IDEAL, ELECTRONICS)
 
 # All that the currents give against the error of the rate, from the first tick on: a rate feedback whose
 # torque is far beyond the limit.

@@ -13,8 +13,8 @@ from spheretwin.paper.laws import BY_LAW
 from spheretwin.paper.page import ERRORS, NONE, figures_named
 from spheretwin.paper.rival_conditions import (
     ALLOCATIONS,
+    COMPLETE,
     HARDWARE,
-    MACHINE,
     Condition,
     Hardware,
     study,
@@ -173,7 +173,7 @@ def robustness(hardware: Hardware, outcomes: Outcomes) -> ResultTable:
     return ResultTable(title, ("limit, A/s", "law", *(condition.name for condition in conditions)), rows, 2)
 
 
-def machine(hardware: Hardware, outcomes: Outcomes) -> list[ResultTable]:
+def complete_prototype(hardware: Hardware, outcomes: Outcomes) -> list[ResultTable]:
     """Median and worst error with every imperfection; no table for hardware without this condition."""
     title = f"{hardware.title} with every imperfection: largest error in {_unit(hardware)}, variation in A/s"
     return [
@@ -191,7 +191,7 @@ def machine(hardware: Hardware, outcomes: Outcomes) -> list[ResultTable]:
             2,
         )
         for condition in hardware.conditions
-        if condition.name == MACHINE and (every := results(hardware, condition, outcomes))
+        if condition.name == COMPLETE and (every := results(hardware, condition, outcomes))
     ]
 
 

@@ -85,7 +85,7 @@ OBJECTIVES = {
         " norm is the allocation of all laws here; a law can be some percent below its row, as it may"
         " share the torque among the hinges in another way."
     ),
-    "prototype": (
+    "electronics": (
         "Objective: the true error of the worse of α and β without the offset and gain errors of the"
         " converter, which no law can observe. All gains of γ, whose encoder is coarse, may be lower by a"
         " common ratio."
@@ -96,9 +96,9 @@ ROBUSTNESS = (
     " from the seed of each run; *lost* means that a run did not complete."
 )
 
-MACHINE_TEXT = (
-    "The same gains on `--hardware machine`: the prototype with scattered poles and coils, errors of its mass"
-    " properties and hinges, static friction, a cable, coupled coils, temperatures, hysteresis of its"
+PROTOTYPE_TEXT = (
+    "The same gains on `--hardware prototype`: the electronics with scattered poles and coils, errors of the"
+    " mass properties and hinges, static friction, a cable, coupled coils, temperatures, hysteresis of its"
     " sensors, and the offset and gain errors of its converter. Median and worst of the seeds. No law was"
     " tuned for it."
 )
@@ -126,8 +126,8 @@ def _of_hardware(hardware: Hardware, outcomes: Outcomes) -> list[Section]:
         ),
         Section(f"{title}: robustness", ROBUSTNESS, [rival_results.robustness(hardware, outcomes)]),
         *(
-            Section(f"{title}: every imperfection", MACHINE_TEXT, [table])
-            for table in rival_results.machine(hardware, outcomes)
+            Section(f"{title}: every imperfection", PROTOTYPE_TEXT, [table])
+            for table in rival_results.complete_prototype(hardware, outcomes)
         ),
         Section(f"{title}: gains", "", [rival_results.ranges(hardware), rival_results.gains_table(hardware)]),
     ]
@@ -136,9 +136,9 @@ def _of_hardware(hardware: Hardware, outcomes: Outcomes) -> list[Section]:
 EXPERIMENT = Experiment(
     name="rivals",
     title="Comparison of the laws, tuned by the same search",
-    summary="Every law tuned with the same budget for the sinusoid on ideal hardware and for the tilt on the"
-    " prototype, within limits on the variation of the currents, and run under other seeds and with a wrong"
-    " nominal model.",
+    summary="Every law tuned with the same budget for the sinusoid on ideal hardware and for the tilt with"
+    " the prototype's electronics, within limits on the variation of the currents, and run under other seeds"
+    " and with a wrong nominal model.",
     cases=cases,
     sections=_sections,
     reduce=start_error,

@@ -1,4 +1,4 @@
-"""Figure 11: the tilt on the prototype, with the printed gains and with single changes."""
+"""Figure 11: the tilt with the prototype's electronics, with the printed gains and with single changes."""
 
 from __future__ import annotations
 
@@ -49,7 +49,9 @@ def errors_drawing(windows: Mapping[str, Sequence[Array]]) -> Drawing:
         )
         for law, of_seeds in windows.items()
     }
-    figure = figures.courses(courses, WINDOW_s, ("α", "β"), "Tilt on the prototype: measured error")
+    figure = figures.courses(
+        courses, WINDOW_s, ("α", "β"), "Tilt with the prototype's electronics: measured error"
+    )
     caption = (
         f"Largest measured |error| within each {1e3 * WINDOW_s:g} ms: median over the seeds, and their range"
         " as a band. Dotted, and in the legend: the largest error of α in the paper's figure."
@@ -202,14 +204,14 @@ def _change_row(change: Change, errors: Errors) -> tuple[str, ...]:
 
 
 def _sufficient_changes(by_change: Sequence[tuple[Change, Errors]]) -> str:
-    """List the changes of each law that reach the paper's figure on the prototype."""
+    """List the changes of each law that reach the paper's figure with the prototype's electronics."""
     labels: dict[str, list[str]] = {}
     for change, errors in by_change:
         law = BY_LAW[change.law]
         if not change.ideal and reached(law, *errors) == "yes":
             labels.setdefault(law.label, []).append(change.label)
     text = "; ".join(f"{law} by {' or '.join(of_law)}" for law, of_law in labels.items())
-    return f" What brings a law there on the prototype: {text}." if text else ""
+    return f" What brings a law there with these electronics: {text}." if text else ""
 
 
 def _by_law(outcomes: Outcomes, by_change: Sequence[tuple[Change, Errors]]) -> dict[str, dict[str, Errors]]:
@@ -243,7 +245,7 @@ def sections(outcomes: Outcomes) -> list[Section]:
 
 EXPERIMENT = Experiment(
     name="figure11",
-    title="Figure 11: the tilt on the prototype",
+    title="Figure 11: the tilt with the prototype's electronics",
     summary="The motion (60): α rises at π/30 rad/s for 2 s, holds 12° and falls, with 0.05 kg on the shaft"
     " and gravity on; sensors, estimator, electronics and bearings are the prototype's.",
     cases=cases,

@@ -50,12 +50,12 @@ TILT_LAWS = (
 BY_LAW = {law.law: law for law in TILT_LAWS}
 
 SCENARIO = "tilt"
-PROTOTYPE: dict[str, Any] = {"hardware": "prototype"}
+ELECTRONICS: dict[str, Any] = {"hardware": "electronics"}
 
 
 def printed(law: TiltLaw) -> Case:
     """The law with the gains of the paper, or with the tuned ones."""
-    return case(law, law.gains, PROTOTYPE)
+    return case(law, law.gains, ELECTRONICS)
 
 
 def case(law: TiltLaw, condition: str, fields: dict[str, Any], is_random: bool = True) -> Case:
@@ -86,7 +86,7 @@ class Change(NamedTuple):
     value: str
     fields: dict[str, Any]
     ideal: bool = False
-    """Whether on ideal hardware instead of the prototype."""
+    """Whether on ideal hardware instead of the prototype's electronics."""
 
     @property
     def label(self) -> str:
@@ -95,7 +95,7 @@ class Change(NamedTuple):
 
     def case(self) -> Case:
         """Case with the change."""
-        hardware = {} if self.ideal else PROTOTYPE
+        hardware = {} if self.ideal else ELECTRONICS
         return case(BY_LAW[self.law], self.label, {**hardware, **self.fields}, is_random=not self.ideal)
 
 

@@ -60,8 +60,8 @@ _BEARINGS = {
     "plant.coulomb_Nm": Origin((2e-3, 2e-3, 2e-3), "assumed: the lower of two estimates, 2 and 5 mN·m"),
     "plant.viscous_Nm_s": Origin((1e-4, 1e-4, 1e-4), "assumed"),
 }
-# The machine around the electronics: tolerances of its parts, and effects that a perfect one lacks.
-_MACHINE = {
+# Tolerances of the mechanical and magnetic parts, and effects that a perfect machine lacks.
+_IMPERFECTIONS = {
     "sensors.potentiometer.hysteresis_rad": Origin(radians(0.02), "assumed: play of the wiper"),
     "sensors.potentiometer.repeatability_rad": Origin(
         radians(0.004), "assumed: data sheet of a precision part, the Novotechnik P2200"
@@ -81,7 +81,7 @@ _MACHINE = {
     ),
     "plant.mass.axis_tilt_error_rad": Origin(2e-3, "assumed: 0.1 mm over 50 mm"),
     "plant.mass.axis_offset_error_m": Origin(1e-4, "assumed"),
-    "plant.stiction.on": Origin(True, "bearings have static friction"),
+    "plant.stiction.on": Origin(True, "property of bearings: static friction"),
     "plant.stiction.break_away": Origin(1.5, "assumed"),
     "plant.stiction.presliding_rad": Origin(2e-3, "assumed: 10 µm at a radius of 5 mm"),
     "plant.stiction.damping_ratio": Origin(0.3, "assumed"),
@@ -90,7 +90,7 @@ _MACHINE = {
     "plant.cable.torque_error_Nm": Origin((1e-3, 1e-3, 5e-4), "assumed"),
     "plant.cable.hysteresis_Nm": Origin((3e-4, 3e-4, 1e-4), "assumed"),
     "plant.cable.hysteresis_rad": Origin(0.05, "assumed"),
-    "plant.thermal.on": Origin(True, "the magnets are NdFeB"),
+    "plant.thermal.on": Origin(True, "property of NdFeB magnets"),
 }
 _SOFTWARE = {
     "estimator.kind": Origin("kalman", "assumed: the estimator with the least noise for its lag"),
@@ -127,21 +127,23 @@ PROTOTYPE_NOMINAL: dict[str, Any] = {
     }.items()
 }
 
+_ELECTRONICS = {
+    **PROTOTYPE_SENSORS,
+    **PROTOTYPE_DRIVE,
+    **PROTOTYPE_BEARINGS,
+    **_values(_SOFTWARE),
+    **PROTOTYPE_NOMINAL,
+}
 HARDWARE: dict[str, dict[str, Any]] = {
     "ideal": {},
-    "prototype": {
-        **PROTOTYPE_SENSORS,
-        **PROTOTYPE_DRIVE,
-        **PROTOTYPE_BEARINGS,
-        **_values(_SOFTWARE),
-        **PROTOTYPE_NOMINAL,
-    },
+    "electronics": _ELECTRONICS,
+    "prototype": {**_ELECTRONICS, **_values(_IMPERFECTIONS)},
 }
-HARDWARE["machine"] = {**HARDWARE["prototype"], **_values(_MACHINE)}
 """Hardware sets: fields by dotted name and their values; each field can also be set separately."""
 
 _STATED = {
-    name: field.origin for name, field in {**_SENSORS, **_DRIVE, **_BEARINGS, **_MACHINE, **_SOFTWARE}.items()
+    name: field.origin
+    for name, field in {**_SENSORS, **_DRIVE, **_BEARINGS, **_IMPERFECTIONS, **_SOFTWARE}.items()
 }
 
 # Nominal values are those of the machine's own data sheets.

@@ -13,7 +13,7 @@ CONDITIONS = [(0.0, 0.0), (0.2, 1.0), (0.5, 0.0), (0.5, 5.0)]
 
 # Sensors whose errors no law can see are left out: offset, gain, residual nonlinearity.
 PROTOTYPE = {
-    "hardware": "prototype",
+    "hardware": "electronics",
     "plant.engine": "lagrangian",
     "sensors.adc.offset_V": 0.0,
     "sensors.adc.gain_error": 0.0,
@@ -133,7 +133,7 @@ def test_on_the_prototype_it_is_more_exact_than_pid_with_a_fifth_of_its_chatter(
 # Seeds that gains were neither searched nor chosen with.
 FRESH = range(100, 120)
 TILTED = {
-    "hardware": "prototype",
+    "hardware": "electronics",
     "plant.engine": "lagrangian",
     "sensors.adc.offset_V": 0.0,
     "sensors.adc.gain_error": 0.0,

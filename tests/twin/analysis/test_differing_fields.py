@@ -41,8 +41,8 @@ def test_gains_are_listed_for_runs_of_one_law_only():
 
 
 def test_fields_implied_by_the_hardware_are_not_listed():
-    other = but(hardware="prototype", sensors={"adc": {"bits": 12}})
-    assert scenario_differences([SCENARIO, other]) == [("hardware", ["ideal", "prototype"])]
+    other = but(hardware="electronics", sensors={"adc": {"bits": 12}})
+    assert scenario_differences([SCENARIO, other]) == [("hardware", ["ideal", "electronics"])]
 
 
 def test_a_missing_field_is_none():
@@ -58,6 +58,6 @@ def test_faults_are_listed_with_their_targets():
 
 def test_common_conditions_are_those_of_every_scenario():
     assert common_conditions([SCENARIO]) == "scenario tilt, L 0, m 0.2, hardware ideal"
-    other = but(disturbance={"load": 2.0}, hardware="prototype")
+    other = but(disturbance={"load": 2.0}, hardware="electronics")
     assert common_conditions([SCENARIO, other]) == "scenario tilt, m 0.2"
     assert common_conditions([{"name": "a"}, {"name": "b"}]) == ""

@@ -175,9 +175,9 @@ def test_a_fixed_field_waits_for_the_reset():
         assert made.state().period_s == 1e-3
         done(made, "reset")
         assert (made.state().pending, made.state().period_s, made.state().tick) == ((), 2e-3, 0)
-        done(made, "set", name="hardware", value="prototype")
+        done(made, "set", name="hardware", value="electronics")
         done(made, "reset")
-        named = scenarios.load("sinusoid", {"hardware": "prototype"})
+        named = scenarios.load("sinusoid", {"hardware": "electronics"})
         fields = {name: value for name, value, _ in made.fields()}
         assert fields["estimator.kind"] == named.estimator.kind
         assert fields["drive.supply_V"] == named.drive.supply_V

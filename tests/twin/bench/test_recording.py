@@ -114,7 +114,7 @@ SETTINGS = [
     ("fault", [{"target": "coil.02", "mode": "open", "start_s": 0.5, "detection": True}]),
     ("trajectory", {"shape": "multisine"}),
     ("name", "mine"),
-    ("hardware", "prototype"),
+    ("hardware", "electronics"),
 ]
 
 

@@ -53,7 +53,7 @@ def test_any_sequence_of_commands_replays_to_the_same_bytes(tmp_path_factory, se
 
 
 @pytest.mark.parametrize(
-    "changes", [{}, {"hardware": "prototype", "plant.engine": "mujoco", "watchdog.on": False}], ids=str
+    "changes", [{}, {"hardware": "electronics", "plant.engine": "mujoco", "watchdog.on": False}], ids=str
 )
 def test_a_recording_begun_during_a_run_replays_to_the_same_bytes(tmp_path, changes):
     path = tmp_path / "run.parquet"

@@ -22,7 +22,7 @@ def setting(name, scenario):
 
 
 @pytest.mark.parametrize("name", shipped())
-@pytest.mark.parametrize("hardware", ["ideal", "prototype"])
+@pytest.mark.parametrize("hardware", ["ideal", "electronics"])
 def test_what_is_shown_of_a_field_is_read_as_what_it_is(name, hardware):
     scenario = scenarios.load(name, {"hardware": hardware})
     known = {dotted: value for dotted, value, _ in fields(scenario)}

@@ -20,12 +20,12 @@ def explained(capsys, *subject):
 
 
 def test_a_hardware_set_has_every_value_with_its_origin(capsys):
-    rows = explained(capsys, "hardware", "prototype")
-    assert list(rows) == list(HARDWARE["prototype"])
-    for name, value in HARDWARE["prototype"].items():
+    rows = explained(capsys, "hardware", "electronics")
+    assert list(rows) == list(HARDWARE["electronics"])
+    for name, value in HARDWARE["electronics"].items():
         given = rows[name]["value"]
         assert (tuple(given) if isinstance(given, list) else given) == value
-        assert rows[name]["origin"] == ORIGINS["prototype"][name]
+        assert rows[name]["origin"] == ORIGINS["electronics"][name]
     assert rows["sensors.adc.bits"]["origin"] == "data sheet of the ADS8364"
     assert rows["drive.resistance_per_K"]["origin"] == "property of copper"
     assert rows["nominal.delay_s"]["origin"] == "computed from the values of the set"
@@ -33,8 +33,9 @@ def test_a_hardware_set_has_every_value_with_its_origin(capsys):
 
 
 def test_every_stated_origin_says_assumed_or_names_its_source():
-    stated = {text for text in ORIGINS["prototype"].values() if not text.startswith("computed")}
-    assert all(text.startswith(("assumed", "data sheet of the ", "property of ")) for text in stated)
+    assert set(ORIGINS["electronics"]) < set(ORIGINS["prototype"])
+    sources = ("assumed", "data sheet of the ", "property of ", "computed from the ")
+    assert all(text.startswith(sources) for text in ORIGINS["prototype"].values())
 
 
 @pytest.mark.parametrize(
@@ -106,12 +107,13 @@ def test_a_scenario_tells_what_it_sets_and_what_follows(capsys, tmp_path):
     assert few == {name: row for name, row in rows.items() if row["origin"] != "default"}
     path = tmp_path / "mine.toml"
     path.write_text(
-        'name = "mine"\nhardware = "prototype"\n[trajectory]\nshape = "hold"\n[plant]\npayload_kg = 0.1\n'
+        'name = "mine"\nhardware = "electronics"\n[trajectory]\nshape = "hold"\n[plant]\npayload_kg = 0.1\n'
     )
     own = explained(capsys, "scenario", str(path))
     assert own["plant.payload_kg"]["origin"] == "scenario mine"
     assert (
-        own["drive.supply_V"]["origin"] == "hardware prototype: assumed; data sheet of the OPA549: 4 to 30 V"
+        own["drive.supply_V"]["origin"]
+        == "hardware electronics: assumed; data sheet of the OPA549: 4 to 30 V"
     )
 
 
@@ -130,7 +132,8 @@ def test_the_text_has_the_same_facts_within_80_columns(capsys, monkeypatch):
     [
         (
             ["hardware", "proto"],
-            "expected a hardware set of ideal, prototype, machine, received 'proto'; did you mean prototype?",
+            "expected a hardware set of ideal, electronics, prototype, received 'proto';"
+            " did you mean prototype?",
         ),
         (["plant.coulomb"], "received 'plant.coulomb'; did you mean plant.coulomb_Nm?"),
         (["law", "afsm", "x"], "expected hardware NAME, scenario NAME or a field, received 'law afsm x'"),

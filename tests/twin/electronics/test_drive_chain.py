@@ -9,7 +9,7 @@ from spheretwin.electronics.amplifier import AmplifierSection, amplifier, drive_
 from spheretwin.electronics.coil import CoilSection, advance_temperature, back_emf, group_coils
 from spheretwin.electronics.converters import DacSection, convert, dac
 from spheretwin.electronics.delay import DelaySection, delay, due, latch
-from spheretwin.scenario.hardware import PROTOTYPE_DRIVE
+from spheretwin.scenario.hardware import HARDWARE, PROTOTYPE_DRIVE
 
 STEP_S, SUBSTEPS, GROUPS, LIMIT_A = 5e-4, 2, 18, 8.0
 PERIOD_S = STEP_S * SUBSTEPS
@@ -214,3 +214,6 @@ def test_the_prototypes_figures_are_fields_of_the_stages():
         assert not known & set(kind.model_fields)
         known |= set(kind.model_fields)
     assert {name.removeprefix("drive.") for name in PROTOTYPE_DRIVE} == known - {"coil_coupling"}
+    assert {
+        name.removeprefix("drive.") for name in HARDWARE["prototype"] if name.startswith("drive.")
+    } == known

@@ -91,7 +91,7 @@ def test_start_error_without_counts_is_refused():
 
 def test_telemetry_shows_the_error_until_the_index_and_snapshots_hold_it():
     fields = {
-        "hardware": "prototype",
+        "hardware": "electronics",
         "sensors.encoder.start_error_rad": 0.05,
         "sensors.encoder.index_rad": 0.1,
         "seed": 3,

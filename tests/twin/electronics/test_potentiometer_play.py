@@ -122,7 +122,7 @@ def test_telemetry_has_the_lead_of_the_wiper_and_snapshots_hold_it():
         "plant.engine": "lagrangian",
         "duration": 1.0,
     }
-    with Session(scenarios.load("nutation", {"hardware": "prototype", **fields})) as session:
+    with Session(scenarios.load("nutation", {"hardware": "electronics", **fields})) as session:
         first = session.advance(150)
         state = session.snapshot()
         second = session.advance(150).values.tobytes()

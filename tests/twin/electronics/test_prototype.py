@@ -338,7 +338,7 @@ def run_and_copy(faults, engine="lagrangian", ticks=TICKS):
     scenario = scenarios.load(
         "nutation",
         {
-            "hardware": "prototype", "seed": SEED, "plant.engine": engine, "plant.step_s": PERIOD_S,
+            "hardware": "electronics", "seed": SEED, "plant.engine": engine, "plant.step_s": PERIOD_S,
             "sensors.adc.oversampling": CONVERSIONS, "watchdog.on": False, "fault": as_tables(faults),
         },
     )  # fmt: skip

@@ -100,7 +100,7 @@ def test_a_supply_limits_how_fast_a_current_rises():
 
 def test_a_coil_too_hot_ends_the_run_safely_and_keeps_it(tmp_path, capsys):
     path = tmp_path / "hot.parquet"
-    arguments = ["--hardware", "prototype", "--drive.shutdown-degC", "20.05", "--telemetry", str(path)]
+    arguments = ["--hardware", "electronics", "--drive.shutdown-degC", "20.05", "--telemetry", str(path)]
     assert cli.main(["simulate", "hold", *arguments]) == 1
     assert "failsafe" in capsys.readouterr().err
     assert path.exists()
@@ -127,7 +127,7 @@ def test_a_session_goes_on_with_commands_on_their_way_and_warm_coils(delay_s):
 def test_chunks_and_threads_of_a_prototype_move_no_bit():
     from concurrent.futures import ThreadPoolExecutor
 
-    scenario = scenarios.load("tilt", {"hardware": "prototype", "duration": 0.3, "seed": 9})
+    scenario = scenarios.load("tilt", {"hardware": "electronics", "duration": 0.3, "seed": 9})
     whole = simulate(scenario).telemetry.values.tobytes()
     with Session(scenario) as session:
         pieces = [session.advance(7).values for _ in range(42)] + [session.advance(6).values]
@@ -143,7 +143,7 @@ def test_the_controller_knows_the_drive_s_delay_and_bandwidth_if_its_sheet_state
             return session.scenario.nominal.delay_s, session.scenario.nominal.time_constant_s
 
     stated = (1e-3, pytest.approx(1 / 12566.370614359172))
-    assert known(hardware="prototype") == known(**{"nominal.equals_truth": True}) == stated
+    assert known(hardware="electronics") == known(**{"nominal.equals_truth": True}) == stated
     assert known() == (0.0, pytest.approx(0.9e-3 / 1.3))  # L/R of the model file
     assert known(**{"nominal.equals_truth": True, "nominal.delay_s": 0.0})[0] == 0.0
 

@@ -19,7 +19,7 @@ MADE = [kind for kind in ESTIMATORS if kind != "ideal"]
 
 
 def prototype(**changes):
-    return scenarios.load("tilt", {"hardware": "prototype", "duration": 0.5, "seed": 3, **changes})
+    return scenarios.load("tilt", {"hardware": "electronics", "duration": 0.5, "seed": 3, **changes})
 
 
 @pytest.mark.parametrize("engine", ["mujoco", "lagrangian"])
@@ -86,11 +86,11 @@ def test_neutral_stages_move_no_bit():
 
 def test_a_field_that_is_set_is_not_set_by_the_hardware(tmp_path):
     (path := tmp_path / "mine.toml").write_text(
-        'hardware = "prototype"\n[trajectory]\nshape = "hold"\n[sensors.adc]\nbits = 12\n'
+        'hardware = "electronics"\n[trajectory]\nshape = "hold"\n[sensors.adc]\nbits = 12\n'
     )
     scenario = scenarios.load(str(path), reading.overrides(["--sensors.encoder.counts", "4096"]))
     assert (scenario.sensors.adc.bits, scenario.sensors.encoder.counts) == (12, 4096)
-    assert scenario.sensors.adc.noise_V == HARDWARE["prototype"]["sensors.adc.noise_V"]
+    assert scenario.sensors.adc.noise_V == HARDWARE["electronics"]["sensors.adc.noise_V"]
     assert scenario.plant.coulomb_Nm == (2e-3, 2e-3, 2e-3)
 
 
@@ -106,7 +106,7 @@ def test_every_set_is_fields_of_a_scenario(name):
 
 def test_a_run_of_the_prototype_is_replayed(tmp_path):
     first, again = tmp_path / "first.parquet", tmp_path / "again.parquet"
-    arguments = ["simulate", "tilt", "--hardware", "prototype", "--duration", "0.3"]
+    arguments = ["simulate", "tilt", "--hardware", "electronics", "--duration", "0.3"]
     assert cli.main([*arguments, "--telemetry", str(first)]) == 0
     assert cli.main(["simulate", "--replay", str(first), "--telemetry", str(again)]) == 0
     assert first.read_bytes() == again.read_bytes()
@@ -119,6 +119,7 @@ def test_hardware_that_is_none_is_refused():
         session.set("hardware", "ideal")
 
 
+@pytest.mark.uncompiled
 def test_a_plain_law_runs_under_it_too():
     from spheretwin.control.law import Law
 

@@ -15,13 +15,13 @@ GROUPS = 18
 START_S = 1.0
 
 
-def scenario(name="nutation", hardware="prototype", **changes):
+def scenario(name="nutation", hardware="electronics", **changes):
     detecting = {"hardware": hardware, "plant.engine": "lagrangian", "detector.detect": True, "seed": 8}
     return scenarios.load(name, {**detecting, **changes})
 
 
 @pytest.mark.parametrize(("mode", "name"), [("open", DETECTED_OPEN), ("short", DETECTED_SHORTED)])
-@pytest.mark.parametrize("hardware", ["prototype", "ideal"])
+@pytest.mark.parametrize("hardware", ["electronics", "ideal"])
 def test_every_group_that_fails_is_found_and_named_and_no_other(hardware, mode, name):
     """In nutation, which asks every group for more than twice the threshold within a tenth of a second."""
     took_s = []
@@ -60,23 +60,23 @@ def supply(volts):
 
 LONG = [
     ("ideal-afsm", "sinusoid", "ideal", MINUTES, {}),
-    ("prototype-afsm", "sinusoid", "prototype", MINUTES, HOT),
+    ("electronics-afsm", "sinusoid", "electronics", MINUTES, HOT),
 ]
 SHORT = [
-    ("pd", "sinusoid", "prototype", 60_000, {"controller.law": "pd"}),
-    ("fuzzy", "sinusoid", "prototype", 60_000, {"controller.law": "adaptive_fuzzy"}),
-    ("nutation", "nutation", "prototype", 5_000, {}),
-    ("weak supply", "sinusoid", "prototype", 60_000, {**supply(8.0), **HOT}),
-    ("hardly a supply", "sinusoid", "prototype", 20_000, {**supply(5.1), **HOT}),
-    ("none to speak of", "hold", "prototype", 5_000, {**supply(4.9), "controller.law": "pd"}),
-    ("bounded", "sinusoid", "prototype", 20_000, {"allocation": "bounded", **HOT}),
-    ("slow amplifiers", "sinusoid", "prototype", 20_000, SLOW | HOT),
-    ("half a period late", "sinusoid", "prototype", 20_000, LATE | HOT),
+    ("pd", "sinusoid", "electronics", 60_000, {"controller.law": "pd"}),
+    ("fuzzy", "sinusoid", "electronics", 60_000, {"controller.law": "adaptive_fuzzy"}),
+    ("nutation", "nutation", "electronics", 5_000, {}),
+    ("weak supply", "sinusoid", "electronics", 60_000, {**supply(8.0), **HOT}),
+    ("hardly a supply", "sinusoid", "electronics", 20_000, {**supply(5.1), **HOT}),
+    ("none to speak of", "hold", "electronics", 5_000, {**supply(4.9), "controller.law": "pd"}),
+    ("bounded", "sinusoid", "electronics", 20_000, {"allocation": "bounded", **HOT}),
+    ("slow amplifiers", "sinusoid", "electronics", 20_000, SLOW | HOT),
+    ("half a period late", "sinusoid", "electronics", 20_000, LATE | HOT),
     (
-        "fast clock", "sinusoid", "prototype", 60_000,
+        "fast clock", "sinusoid", "electronics", 60_000,
         {"controller.period_s": 2e-4, "plant.step_s": 1e-4, **supply(12.0), **HOT},
     ),
-    ("far off zero", "sinusoid", "prototype", 20_000, OFF_ZERO | HOT),
+    ("far off zero", "sinusoid", "electronics", 20_000, OFF_ZERO | HOT),
 ]  # fmt: skip
 
 
@@ -91,7 +91,7 @@ def test_no_healthy_group_is_ever_found(label, name, hardware, ticks, changes):
             assert not table["group_out"].any(), f"{label} at {session.t_s:g} s"
             threshold_A = session._runtime._controller.supervision.detector.threshold_A
             busy += np.count_nonzero(np.abs(table["current_command_A"]) > 2 * threshold_A)
-            if hardware == "prototype":
+            if hardware == "electronics":
                 limited += np.count_nonzero(table["voltage_limited"])
         last = session.tick
     assert busy > 18 * last / 20  # it had something to look at
@@ -173,7 +173,7 @@ def test_detect_of_a_fault_is_the_detector():
 
 def test_a_detector_that_finds_nothing_moves_no_bit():
     """Nor does its noise move any other."""
-    for hardware in ("prototype", "ideal"):
+    for hardware in ("electronics", "ideal"):
         plain = scenario(hardware=hardware, duration=1.0, **{"detector.detect": False})
         one, other = simulate(plain).telemetry, simulate(scenario(hardware=hardware, duration=1.0)).telemetry
         for signal in one.signals:

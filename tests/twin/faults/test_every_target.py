@@ -18,7 +18,7 @@ EACH = pytest.mark.parametrize("name", list(TARGETS))
 
 
 def planned(*faults, **changes):
-    return scenarios.load("nutation", {"hardware": "prototype", "fault": list(faults), **changes})
+    return scenarios.load("nutation", {"hardware": "electronics", "fault": list(faults), **changes})
 
 
 def fault(name, mode, **more):

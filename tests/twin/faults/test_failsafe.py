@@ -20,7 +20,7 @@ RUNDOWN = 30
 WATCHED = {"plant.engine": "lagrangian", "watchdog.on": True, "watchdog.rundown_s": RUNDOWN * 1e-3, "seed": 4}
 
 
-def scenario(name="nutation", hardware="prototype", **changes):
+def scenario(name="nutation", hardware="electronics", **changes):
     return scenarios.load(name, {"hardware": hardware, **WATCHED, **changes})
 
 
@@ -153,7 +153,7 @@ def test_shorted_coils_brake_at_the_rate_of_their_heat_and_a_release_does_not():
             assert lost + field[20] - field[400] == pytest.approx(heated, rel=5e-3)
 
 
-@pytest.mark.parametrize("hardware", ["prototype", "ideal"])
+@pytest.mark.parametrize("hardware", ["electronics", "ideal"])
 @pytest.mark.parametrize("action", ["release", "short"])
 def test_a_fault_that_never_comes_moves_no_bit_of_what_a_watchdog_does(hardware, action):
     early = {"watchdog.edge_margin_rad": 1.25, "watchdog.action": action}
@@ -185,12 +185,12 @@ def test_what_a_watchdog_has_done_is_no_find_of_the_detector():
 @pytest.mark.parametrize("name", shipped())
 @pytest.mark.parametrize("engine", ["lagrangian", "mujoco"])
 def test_it_never_trips_in_a_shipped_scenario_of_the_prototype(name, engine):
-    run = simulate(scenarios.load(name, {"hardware": "prototype", "plant.engine": engine}))
+    run = simulate(scenarios.load(name, {"hardware": "electronics", "plant.engine": engine}))
     assert run.scenario.watchdog.on
     assert run.status == "completed"
     assert not run.telemetry["failsafe_reason"].any()
     off = simulate(
-        scenarios.load(name, {"hardware": "prototype", "plant.engine": engine, "watchdog.on": False})
+        scenarios.load(name, {"hardware": "electronics", "plant.engine": engine, "watchdog.on": False})
     )
     for signal in off.telemetry.signals:
         assert run.telemetry[signal.name].tobytes() == off.telemetry[signal.name].tobytes()
@@ -211,7 +211,7 @@ def test_without_one_the_statuses_are_what_they_were(changes, status):
 
 def test_the_command_says_why_and_keeps_it_all(tmp_path, capsys):
     path = tmp_path / "stopped.parquet"
-    arguments = ["simulate", "nutation", "--hardware", "prototype", "--plant.engine", "lagrangian"]
+    arguments = ["simulate", "nutation", "--hardware", "electronics", "--plant.engine", "lagrangian"]
     arguments += ["--watchdog.edge-margin-rad", "1.3", "--telemetry", str(path)]
     assert cli.main([*arguments, "--json"]) == 1
     told = capsys.readouterr()
@@ -277,14 +277,14 @@ def test_a_trip_within_the_rundown_before_the_end_is_no_completed_run():
 
 def test_a_trip_in_the_last_tick_counts_and_is_told(capsys):
     tripped = int(np.flatnonzero(simulate(scenario(**LATE)).telemetry["failsafe_reason"])[0])
-    arguments = ["simulate", "nutation", "--hardware", "prototype", "--plant.engine", "lagrangian"]
+    arguments = ["simulate", "nutation", "--hardware", "electronics", "--plant.engine", "lagrangian"]
     arguments += ["--fault.0.target", "pot.alpha", "--fault.0.mode", "offset", "--fault.0.start-s", "0.1"]
     arguments += ["--fault.0.value", "0.2", "--watchdog.on", "true", "--seed", "4"]
     for ticks, code, status in ((tripped, 0, "completed"), (tripped + 1, 1, "failsafe")):
         assert cli.main([*arguments, "--duration", f"{ticks * 1e-3:g}"]) == code
         printed = capsys.readouterr()
         out = " ".join(printed.out.split())  # a title is wrapped to its table
-        assert f"nutation under afsm, prototype hardware: {status}" in out
+        assert f"nutation under afsm, electronics hardware: {status}" in out
         assert (Reason.JUMP.text in out) == (Reason.JUMP.text in printed.err) == bool(code)
 
 
@@ -299,7 +299,7 @@ def test_a_study_tells_of_its_failsafe_rows_and_exits_1(tmp_path, capsys):
     source = tmp_path / "late.toml"
     source.write_text(
         'name = "late"\nscenario = "nutation"\n'
-        '[fields]\nhardware = "prototype"\n"plant.engine" = "lagrangian"\n'
+        '[fields]\nhardware = "electronics"\n"plant.engine" = "lagrangian"\n'
         'fault = [{target = "pot.alpha", mode = "offset", start_s = 0.1, value = 0.2}]\n'
         '[[axis]]\nfield = "duration"\nkind = "values"\nvalues = [0.05, 0.13]\n'
     )

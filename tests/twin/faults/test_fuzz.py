@@ -22,7 +22,7 @@ PARTS = [(name, part, mode) for name, target in TARGETS.items() for part in targ
          for mode in target.modes]  # fmt: skip
 
 
-def scenario(hardware="prototype", **changes):
+def scenario(hardware="electronics", **changes):
     fields = {"hardware": hardware, "plant.engine": "lagrangian", "duration": TICKS * PERIOD_S}
     return scenarios.load("nutation", {**fields, **changes})
 
@@ -56,7 +56,7 @@ LOOKED_AFTER = st.fixed_dictionaries(
 )
 
 
-@pytest.mark.parametrize("hardware", ["prototype", "ideal"])
+@pytest.mark.parametrize("hardware", ["electronics", "ideal"])
 @settings(max_examples=150)
 @given(st.lists(faults(), max_size=8), LOOKED_AFTER)
 def test_any_plan_ends_with_a_status_and_numbers(hardware, planned, changes):
@@ -183,7 +183,7 @@ def spoiling(t, reference, measurement, parameters, state, torque):
             state[2] = bad
 
 
-@pytest.mark.parametrize("hardware", ["prototype", "ideal"])
+@pytest.mark.parametrize("hardware", ["electronics", "ideal"])
 @pytest.mark.parametrize("watching", [False, True])
 @settings(max_examples=40)
 @given(st.integers(1, 50), st.integers(0, 3), st.integers(0, 2), BAD)

@@ -16,7 +16,7 @@ COLD = {"drive.resistance_per_K": 0.0, "watchdog.on": False, "plant.engine": "la
 
 
 def prototype(*faults, **changes):
-    fields = {"hardware": "prototype", "fault": list(faults), "plant.step_s": STEP_S, "seed": 2}
+    fields = {"hardware": "electronics", "fault": list(faults), "plant.step_s": STEP_S, "seed": 2}
     return scenarios.load("nutation", {**fields, **COLD, **changes})
 
 

@@ -7,7 +7,7 @@ from spheretwin.paper.experiment import Case, Experiment, Outcome, ResultTable, 
 from spheretwin.paper.page import of_axis, spread_deg
 
 SHORT = {"duration": 0.2, "plant.engine": "lagrangian"}
-NOISY = Case("noisy", "tilt", {**SHORT, "hardware": "prototype"}, details={"paper": [0.01, None, None]})
+NOISY = Case("noisy", "tilt", {**SHORT, "hardware": "electronics"}, details={"paper": [0.01, None, None]})
 IDEAL = Case("ideal", "tilt", SHORT, is_random=False)
 # 5 N·m: PD cannot hold it, and the rotor leaves its workspace.
 LOST = Case(

@@ -37,5 +37,5 @@ def test_lists_tables_texts_and_nothing():
             {"target": "pot.alpha", "mode": "offset", "value": 0.02},
         ],
     }
-    case = Case("many", "tilt", {**fields, "hardware": "prototype"})
+    case = Case("many", "tilt", {**fields, "hardware": "electronics"})
     assert read(command_line(case, "mujoco", 7)) == scenario_of(case, "mujoco", 7)

@@ -97,7 +97,7 @@ def test_every_mode_of_every_shared_part_is_there_with_a_value_where_it_needs_on
     for failure in failures():
         for way in OF_PARTS:
             scenario = scenarios.load("nutation", of_part(failure, way).fields)  # refuses what lacks a value
-            assert scenario.hardware == "prototype"
+            assert scenario.hardware == "electronics"
             assert scenario.fault[0].target == failure.part
 
 

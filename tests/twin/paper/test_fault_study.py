@@ -17,7 +17,7 @@ from spheretwin.paper.fault_cases import (
     BOUNDED,
     DETECTING,
     HEALTHY,
-    HEALTHY_PROTOTYPE,
+    HEALTHY_ELECTRONICS,
     OF_GROUPS,
     OF_PARTS,
     RELEASE,
@@ -40,7 +40,7 @@ MANY, PAIR = (2, 3, 4, 9, 10, 11, 14, 15, 16), (0, 1)
 DROPOUT = next(each for each in failures() if (each.part, each.mode) == ("encoder.gamma", "dropout"))
 STUDY = [
     HEALTHY,
-    HEALTHY_PROTOTYPE,
+    HEALTHY_ELECTRONICS,
     *(of_groups(groups, way) for groups in ((0,), PAIR, MANY) for way in OF_GROUPS),
     *(of_part(DROPOUT, way) for way in OF_PARTS),
     on_other_engine((0,), REPORTED),
@@ -131,7 +131,7 @@ def test_the_reference_has_the_allocation_and_the_window_of_the_faulty_run(found
     case = of_part(DROPOUT, ALONE)
     run = outcomes[case.name][0]
     assert run.status == Status.LEFT_WORKSPACE
-    healthy = simulate(scenario_of(HEALTHY_PROTOTYPE, None, 0)).telemetry["error_rad"]
+    healthy = simulate(scenario_of(HEALTHY_ELECTRONICS, None, 0)).telemetry["error_rad"]
     window = slice(round(run.data.start_s / 1e-3), round(run.data.ended_s / 1e-3))
     assert run.data.healthy_rad == np.abs(healthy[window]).max()
 

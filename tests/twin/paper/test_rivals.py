@@ -12,7 +12,7 @@ from spheretwin.paper import page, rival_conditions, rival_results
 from spheretwin.paper.experiment import Outcome, Outcomes
 from spheretwin.paper.laws import BY_LAW
 from spheretwin.paper.page import Chapter, rows
-from spheretwin.paper.rival_conditions import FOLDER, HARDWARE, IDEAL, PROTOTYPE, tuned_gains
+from spheretwin.paper.rival_conditions import ELECTRONICS, FOLDER, HARDWARE, IDEAL, tuned_gains
 from spheretwin.paper.rival_results import results, start_error, within
 from spheretwin.paper.rivals import EXPERIMENT
 from spheretwin.paper.runner import make_plan, run_plan, scenario_of, unexpected_ends
@@ -50,7 +50,7 @@ def test_every_law_is_searched_with_all_of_its_gains_and_the_same_budget(hardwar
         own = {each for each in own if not (law["law"] == "afsm_eso" and each.startswith("fuzzy"))}
         assert own <= named
         assert {"controller.governor.acceleration_rad_s2", "controller.feed_forward.inertia"} <= fields
-        assert ("controller.feed_forward.friction" in fields) == (hardware is PROTOTYPE)
+        assert ("controller.feed_forward.friction" in fields) == (hardware is ELECTRONICS)
     assert all(gain.reason for gain in study.optimise.gain)
     assert {gain.called for gain in study.optimise.gain if not gain.law} == {
         gain.called for gain in study.optimise.gain if gain.optional
@@ -207,7 +207,7 @@ def test_rows_and_page_have_what_ran(short, tmp_path):
         assert f"({figure})" in written
         for each in load(hardware.study).optimise.gain:
             assert each.reason in written
-    assert written.count("| rivals | ") == len(IDEAL.conditions) + len(PROTOTYPE.conditions)
+    assert written.count("| rivals | ") == len(IDEAL.conditions) + len(ELECTRONICS.conditions)
     assert "full current, bounded allocation" in written
     assert "make tune-rivals" in written
 

@@ -25,7 +25,7 @@ def row(outcomes, case=NOISY):
 def test_row_has_the_public_face():
     told = row(THREE)
     assert (told["figure"], told["case"], told["controller"], told["hardware"]) == (
-        "short", "noisy", "afsm", "prototype",
+        "short", "noisy", "afsm", "electronics",
     )  # fmt: skip
     assert (told["m"], told["L"], told["seeds"]) == (0.0, 0.0, 3)
     assert told["paper"] == [0.01, None, None]

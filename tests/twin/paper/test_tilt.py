@@ -28,7 +28,7 @@ def test_laws_are_the_paper_s_a_tuned_pid_and_ours():
     assert f"{BANDWIDTH_rad_s:g} 1/s" in BY_LAW["pid"].gains
     for law in TILT_LAWS:
         scenario = scenarios.load("tilt", printed(law).fields)
-        assert scenario.hardware == "prototype"
+        assert scenario.hardware == "electronics"
         assert scenario.plant.payload_kg == 0.05
         preset = {"preset": "prototype"} if law.law == "afsm_eso" else {}
         assert scenario.controller == type(scenario.controller)(**preset)  # printed gains are the defaults
@@ -113,7 +113,7 @@ def test_reached_is_by_the_median():
 
 
 def test_windows_contain_the_largest_error_of_each():
-    run = simulate(scenarios.load("tilt", {"duration": 0.095, "hardware": "prototype"}))
+    run = simulate(scenarios.load("tilt", {"duration": 0.095, "hardware": "electronics"}))
     windows = tilt.reduce(run)
     error = np.abs(run.telemetry["q_measured_rad"] - run.telemetry["q_ref_rad"])
     assert windows.shape == (4, 2)  # of 20 ticks each; the rest is less than a window

@@ -139,7 +139,7 @@ def test_hot_magnets_give_less_torque_for_the_same_currents():
 
 
 def test_a_snapshot_continues_the_temperatures():
-    scenario = scenarios.load("nutation", {**SUPPLIED, "hardware": "prototype", "plant.thermal.on": True})
+    scenario = scenarios.load("nutation", {**SUPPLIED, "hardware": "prototype"})
     with Session(scenario) as session:
         session.advance(20)
         state = session.snapshot()

@@ -11,8 +11,8 @@ from spheretwin.scenario.writing import as_command, as_toml
 
 CHANGES = {
     "nothing": {},
-    "hardware": {"hardware": "prototype"},
-    "part of it": {"hardware": "prototype", "sensors.adc.bits": 12, "estimator.kind": "difference"},
+    "hardware": {"hardware": "electronics"},
+    "part of it": {"hardware": "electronics", "sensors.adc.bits": 12, "estimator.kind": "difference"},
     "law": {"controller.law": "pid", "controller.stiffness": [1.0, 2.0, 3.0], "controller.period_s": 2e-3},
     "lists": {
         "fault": [
@@ -21,7 +21,7 @@ CHANGES = {
         ],
         "event": [{"t_s": 1.0, "set": "disturbance", "value": {"load": 2.0}}],
         "disturbance.terms": [{"kind": "constant", "torque_Nm": [0.1, 0, 0]}],
-        "hardware": "prototype",
+        "hardware": "electronics",
     },
     "nested": {"trajectory": {"shape": "steps", "times_s": [1.0], "angles_rad": [[0.1, 0, 0]]}},
     "tables": {
@@ -49,17 +49,17 @@ def test_read_again_it_is_the_same(tmp_path, name, changes):
 
 
 def test_a_file_says_what_a_user_would_and_no_more():
-    scenario = scenarios.load("sinusoid", {"controller.law": "pd", "hardware": "prototype"})
+    scenario = scenarios.load("sinusoid", {"controller.law": "pd", "hardware": "electronics"})
     told = as_toml(scenario)
     assert len(told.splitlines()) < 25
     assert "supply_V" not in told  # the named set says it
     assert as_command(scenario) == (
-        "spheretwin simulate sinusoid --hardware prototype --controller.law pd --estimator.kind kalman"
+        "spheretwin simulate sinusoid --hardware electronics --controller.law pd --estimator.kind kalman"
     )
 
 
 def test_a_field_without_a_value_that_the_named_set_gives_one_is_told_beside_the_others():
-    scenario = scenarios.load("sinusoid", {"hardware": "prototype", "drive.supply_V": None})
+    scenario = scenarios.load("sinusoid", {"hardware": "electronics", "drive.supply_V": None})
     told = as_toml(scenario)
     assert 'hardware = "ideal"' in told
     assert "supply_V" not in told

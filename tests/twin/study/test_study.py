@@ -21,7 +21,7 @@ def test_studies_ship_and_each_has_the_rows_that_it_says():
         "mismatch": 800,
         "paper": 108,
         "rivals_ideal": 20,
-        "rivals_prototype": 20,
+        "rivals_electronics": 20,
         "robustness": 10_000,
         "sensors": 480,
         "tuning": 50,

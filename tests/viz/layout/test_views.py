@@ -29,11 +29,11 @@ RUNS = {
     "pd": ("sinusoid", {"controller.law": "pd"}),
     "pid": ("sinusoid", {"controller.law": "pid"}),
     "observer": ("tilt", {"controller.law": "afsm_eso"}),
-    "prototype": ("hold", {"hardware": "prototype", "fault": [OPEN]}),
+    "electronics": ("hold", {"hardware": "electronics", "fault": [OPEN]}),
     "around": (
         "tilt",
         {
-            "hardware": "prototype",
+            "hardware": "electronics",
             "controller.governor.acceleration_rad_s2": [20.0] * 3,
             "controller.prediction.on": True,
             "controller.feed_forward.inertia": [1.0] * 3,

@@ -251,8 +251,8 @@ FAULT = {"target": "coil.04", "mode": "open", "start_s": 0.0}
 # and plots of them, of which each is told in some ten kilobytes.
 @pytest.mark.parametrize(
     ("changes", "most"),
-    [({}, 1_000_000), ({"hardware": "prototype", "fault": [FAULT]}, 1_150_000)],
-    ids=["ideal", "prototype"],
+    [({}, 1_000_000), ({"hardware": "electronics", "fault": [FAULT]}, 1_150_000)],
+    ids=["ideal", "electronics"],
 )
 def test_what_a_recording_holds_whatever_its_length_is_bounded(tmp_path, changes, most):
     assert size(tmp_path / "tick.rrd", 0.001, **changes) < most

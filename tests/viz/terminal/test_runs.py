@@ -13,7 +13,7 @@ from spheretwin.viz.terminal import tables
 from spheretwin.viz.terminal.runs import COLOURS, print_files, print_run, rerun_command
 
 SUMMARY = {
-    "scenario": {"name": "hold", "hardware": "prototype"},
+    "scenario": {"name": "hold", "hardware": "electronics"},
     "status": "completed",
     "reason": None,
     "max_abs_error_rad": [math.radians(72.26), 0.0301, 1e-9],
@@ -50,7 +50,7 @@ def piped(monkeypatch):
 
 def test_errors_are_printed_in_mrad_and_degrees(capsys):
     lines = printed(capsys)
-    assert lines[0].rstrip() == "hold under pd, prototype hardware: completed"
+    assert lines[0].rstrip() == "hold under pd, electronics hardware: completed"
     assert cells(lines, "largest") == ["1260 (72.3°)", "30.1 (1.72°)", "< 0.001 (< 0.001°)"]
     assert cells(lines, "settled to ±10 mrad after") == ["never", "0.276 s", "0 s"]
 
@@ -58,13 +58,17 @@ def test_errors_are_printed_in_mrad_and_degrees(capsys):
 @pytest.mark.parametrize(
     ("status", "why", "title"),
     [
-        (Status.LEFT_WORKSPACE, None, "hold under pd, prototype hardware: left_workspace at 1.223 s of 10 s"),
+        (
+            Status.LEFT_WORKSPACE,
+            None,
+            "hold under pd, electronics hardware: left_workspace at 1.223 s of 10 s",
+        ),
         (
             Status.FAILSAFE,
             "a coil is too hot",
-            "hold under pd, prototype hardware: failsafe at 1.223 s of 10 s, a coil is too hot",
+            "hold under pd, electronics hardware: failsafe at 1.223 s of 10 s, a coil is too hot",
         ),
-        (Status.INTERRUPTED, None, "hold under pd, prototype hardware: interrupted at 1.223 s of 10 s"),
+        (Status.INTERRUPTED, None, "hold under pd, electronics hardware: interrupted at 1.223 s of 10 s"),
     ],
 )
 def test_the_title_of_a_run_that_failed_says_when_and_why(capsys, status, why, title):
@@ -77,7 +81,7 @@ def test_a_failure_stands_out_in_a_terminal(capsys, monkeypatch):
     assert COLOURS[Status.LEFT_WORKSPACE.level] == "bold red"
     first = printed(capsys, status="left_workspace")[0]
     assert "\x1b[1;31m" in first
-    assert Text.from_ansi(first).plain.startswith("hold under pd, prototype hardware: left_workspace")
+    assert Text.from_ansi(first).plain.startswith("hold under pd, electronics hardware: left_workspace")
     assert tables.terminal_console().is_terminal
 
 

@@ -9,7 +9,7 @@ samples = 120
 telemetry = [7]
 [fields]
 duration = 0.1
-hardware = "prototype"
+hardware = "electronics"
 [[axis]]
 field = "plant.modelling_error"
 kind = "uniform"

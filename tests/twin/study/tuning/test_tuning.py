@@ -120,7 +120,7 @@ def test_the_start_is_what_a_sweep_of_the_study_gives(tmp_path):
         {
             "name": "own",
             "scenario": "tilt",
-            "fields": {"duration": 0.05, "hardware": "prototype"},
+            "fields": {"duration": 0.05, "hardware": "electronics"},
             "law": [{"law": "pid"}],
             "axis": [{"field": "plant.payload_kg", "kind": "values", "values": [0.0, 0.05]}],
             "seeds": 2,
