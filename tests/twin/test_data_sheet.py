@@ -171,6 +171,7 @@ def test_a_change_of_the_truth_does_not_reach_the_controller(dotted, whole):
     same_controller(controller(other), whole)
 
 
+@pytest.mark.uncompiled
 def test_nor_does_a_change_during_the_run():
     with Session(scenarios.load("tilt", WHOLE)) as session:
         known = session.scenario.nominal
@@ -379,6 +380,7 @@ def careless(t, reference, measurement, parameters, state, torque):
     measurement[:] = np.nan
 
 
+@pytest.mark.uncompiled
 def test_a_law_that_overwrites_its_arguments_changes_no_byte():
     changes = {name: value for name, value in WHOLE.items() if name != "controller.law"}
     scenario = scenarios.load("hold", changes)

@@ -10,6 +10,7 @@ for it multiplies any difference by the condition of M, which is (1 + sin β)/(1
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 from typing import NamedTuple
 
@@ -21,7 +22,7 @@ from spheretwin.crosscheck.part import Part
 from spheretwin.models.actuator import Actuator
 from spheretwin.models.base.checks import Check
 from spheretwin.models.base.errors import InputError, without_breaks
-from spheretwin.models.joint_chain import equations, hinge_torque, read_chain
+from spheretwin.models.joint_chain import JointChain, equations, hinge_torque, read_chain
 from spheretwin.models.kinematics import rate_jacobian, rotation
 from spheretwin.models.lagrangian import coriolis_matrix, gravity_torque, inertia_matrix, triple
 from spheretwin.models.mjcf import PAYLOAD, gravity, read
@@ -160,7 +161,7 @@ def compare(mjcf: Path, actuator: Actuator, count: int) -> Dynamics:
             quantity.name: np.concatenate([case[quantity.name] for case in by_case])
             for quantity in QUANTITIES
         }
-    return Dynamics([*checks, _general_joint(mjcf, states)], differences)
+    return Dynamics([*checks, *_general_joint(mjcf, states)], differences)
 
 
 def random_states(count: int) -> States:
@@ -274,26 +275,67 @@ def _differences(
     }
 
 
-def _general_joint(mjcf: Path, states: States) -> Check:
-    """Compare MuJoCo with the equations of motion of a general joint."""
+def _general_joint(mjcf: Path, states: States) -> list[Check]:
+    """Compare MuJoCo and Pinocchio with the equations of motion of a general joint."""
     case = Case("general joint", 0.2, 0.05, mass_errors(MASS, SEED))
-    chain = read_chain(true_model(read(mjcf), case.modelling_error, case.payload_kg, None, case.mass))
-    shares, torque_q = np.empty(len(states.q)), np.empty(3)
-    for i, qddot in enumerate(ask_mujoco(mjcf, case, states).qddot):
-        (aa, bb, cc, ab, ac, bc), bias = equations(chain, triple(states.q[i]), triple(states.qdot[i]))
-        hinge_torque(chain, states.q[i], states.torque_S[i], torque_q)
-        inertial = np.array([[aa, ab, ac], [ab, bb, bc], [ac, bc, cc]]) @ qddot
-        terms = np.array([inertial, bias, -states.torque_q[i], -torque_q])
+    model = true_model(read(mjcf), case.modelling_error, case.payload_kg, None, case.mass)
+    chain, torque_q = read_chain(model), np.empty_like(states.torque_q)
+    for q, torque_S, on_hinges in zip(states.q, states.torque_S, torque_q, strict=True):
+        hinge_torque(chain, q, torque_S, on_hinges)
+    torque_q += states.torque_q
+    qddot_of = {"MuJoCo": ask_mujoco(mjcf, case, states).qddot}
+    with suppress(ImportError):
+        qddot_of["Pinocchio"] = _pinocchio_acceleration(model, states, torque_q)
+    return [
+        Check(
+            name=f"forward dynamics of a general joint: {engine}",
+            compares=f"torque that the q̈ of {engine} leaves over in the equations of motion of tilted and"
+            " distant hinges, rings with inertia and a rotor with any inertia and centre of mass, over the"
+            " sum of its terms",
+            states=len(states.q),
+            value=_largest_left_over(chain, states, torque_q, qddot),
+            bound=BIAS_BOUND,
+            why="rounding, a few 1e-15, with a margin for other processors",
+        )
+        for engine, qddot in qddot_of.items()
+    ]
+
+
+def _largest_left_over(chain: JointChain, states: States, torque_q: Array, qddot: Array) -> float:
+    """Return the largest share of the torque that accelerations (n, 3) leave over."""
+    shares = np.empty(len(states.q))
+    for i, (q, qdot) in enumerate(zip(states.q, states.qdot, strict=True)):
+        (aa, bb, cc, ab, ac, bc), bias = equations(chain, triple(q), triple(qdot))
+        inertial = np.array([[aa, ab, ac], [ab, bb, bc], [ac, bc, cc]]) @ qddot[i]
+        terms = np.array([inertial, bias, -torque_q[i]])
         shares[i] = np.linalg.norm(terms.sum(axis=0)) / _norm(terms).sum()
-    return Check(
-        name="forward dynamics of a general joint: MuJoCo",
-        compares="torque that MuJoCo's q̈ leaves over in the equations of motion of tilted and distant hinges,"
-        " rings with inertia and a rotor with any inertia and centre of mass, over the sum of its terms",
-        states=len(shares),
-        value=float(shares.max()),
-        bound=BIAS_BOUND,
-        why="rounding, a few 1e-15, with a margin for other processors",
-    )
+    return float(shares.max())
+
+
+def _pinocchio_acceleration(model: mujoco.MjModel, states: States, torque_q: Array) -> Array:
+    """Return the accelerations (n, 3) by Pinocchio, built from axes and bodies of a model at the pose 0."""
+    import pinocchio  # of the test group: nothing else needs it
+
+    start = mujoco.MjData(model)
+    mujoco.mj_forward(model, start)
+    chain, here, placed = pinocchio.Model(), np.zeros(3), {0: 0}
+    chain.gravity.linear = model.opt.gravity.copy()
+    for body in range(1, model.nbody):
+        placed[body] = placed[model.body_parentid[body]]
+        if model.body_jntnum[body]:
+            hinge, before = model.body_jntadr[body], here
+            here = start.xanchor[hinge].copy()
+            axis = pinocchio.JointModelRevoluteUnaligned(start.xaxis[hinge].copy())
+            offset = pinocchio.SE3(np.eye(3), here - before)
+            placed[body] = chain.addJoint(placed[body], axis, offset, model.joint(hinge).name)
+        if placed[body] and model.body_mass[body]:
+            turn = start.ximat[body].reshape(3, 3)
+            tensor = turn @ np.diag(model.body_inertia[body]) @ turn.T
+            inertia = pinocchio.Inertia(model.body_mass[body], start.xipos[body] - here, tensor)
+            chain.appendBodyToJoint(placed[body], inertia, pinocchio.SE3.Identity())
+    data = chain.createData()
+    rows = zip(states.q, states.qdot, torque_q, strict=True)
+    return np.array([pinocchio.aba(chain, data, *row) for row in rows])
 
 
 def _check(engine: str, quantity: _Quantity, by_case: list[Array]) -> Check:

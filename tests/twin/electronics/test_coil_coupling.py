@@ -266,6 +266,7 @@ def test_share_scales_the_coupling():
 FIELDS = {"hardware": "prototype", "plant.engine": "lagrangian", "duration": 0.2}
 
 
+@pytest.mark.uncompiled
 def test_run_has_the_coupling_of_its_model_and_snapshots_continue_it():
     with Session(scenarios.load("nutation", FIELDS)) as session:
         first = session.advance(60)

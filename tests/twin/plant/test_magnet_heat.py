@@ -129,6 +129,7 @@ def test_gains_fall_with_the_remanence():
 SUPPLIED = {"drive.supply_V": 24.0, "plant.engine": "lagrangian", "duration": 0.05}
 
 
+@pytest.mark.uncompiled
 def test_hot_magnets_give_less_torque_for_the_same_currents():
     manual = {"manual.currents_A": [0.0] * 4 + [1.0] + [0.0] * 13, **SUPPLIED}
     hot = {"plant.thermal.on": True, "plant.thermal.rotor_degC": 60.0}
@@ -155,6 +156,7 @@ def test_a_snapshot_continues_the_temperatures():
         assert 0 <= session.advance(1)["stator_temperature_degC"][0] - before < 1e-3
 
 
+@pytest.mark.uncompiled
 def test_a_run_above_the_knee_has_a_warning():
     hot = {**SUPPLIED, "plant.thermal.on": True, "plant.thermal.rotor_degC": 80.5}
     assert "the magnets reached 80.5 °C, above plant.thermal.knee_degC 80 °C" in warnings_of(hot)
