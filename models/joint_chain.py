@@ -22,6 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spheretwin.models.base.compiled import allocation_free
+from spheretwin.models.kinematics import generalised_torque
 from spheretwin.models.lagrangian import (
     InertiaEntries,
     Triple,
@@ -189,6 +190,24 @@ def ideal_pose(chain: JointChain, q: Array, qdot: Array, ideal_q: Array, ideal_q
     ideal_qdot[2] = (at.ca * z - at.sa * y) / at.cb
     ideal_qdot[1] = at.ca * y + at.sa * z
     ideal_qdot[0] = x - at.sb * ideal_qdot[2]
+
+
+@allocation_free
+def update_ideal_motion(
+    chain: JointChain | None, q: Array, qdot: Array, ideal_q: Array, ideal_qdot: Array
+) -> None:
+    """Compute `ideal_pose` of a general joint; the results stay as they are if chain is None."""
+    if chain is not None:
+        ideal_pose(chain, q, qdot, ideal_q, ideal_qdot)
+
+
+@allocation_free
+def torque_on_hinges(chain: JointChain | None, q: Array, torque_S: Array, torque_q: Array) -> None:
+    """Compute the torque on the hinges of a torque on the rotor, as `hinge_torque`, of any joint."""
+    if chain is None:
+        generalised_torque(q, torque_S, torque_q)
+    else:
+        hinge_torque(chain, q, torque_S, torque_q)
 
 
 @allocation_free

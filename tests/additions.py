@@ -144,7 +144,7 @@ def step(rotor):
 
 UNCOUPLED = EngineKind("uncoupled", Uncoupled, Integrators, step)
 """,
-        "twin/plant/step.py",
+        "twin/plant/plant_tick.py",
         (
             "        lagrangian_rotor.LAGRANGIAN,\n",
             "        lagrangian_rotor.LAGRANGIAN,\n        stiff.UNCOUPLED,\n",

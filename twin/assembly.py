@@ -34,8 +34,8 @@ from spheretwin.plant.friction import Friction, friction
 from spheretwin.plant.magnet_heat import MagnetHeat, magnet_heat
 from spheretwin.plant.mass_properties import mass_errors
 from spheretwin.plant.part_scatter import scatter_of
+from spheretwin.plant.plant_tick import ENGINES, Plant
 from spheretwin.plant.rotor import Rotor, RotorSettings
-from spheretwin.plant.step import ENGINES, Plant
 from spheretwin.scenario.files import Files
 from spheretwin.scenario.plant_sections import ResolvedPlant
 from spheretwin.scenario.sections import ResolvedScenario

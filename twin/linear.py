@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import importlib
 from dataclasses import dataclass
-from typing import Any, Literal, NamedTuple, cast
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from spheretwin import assembly
 from spheretwin.active_config import initial_config
 from spheretwin.models.actuator import Actuator
 from spheretwin.models.base.errors import InputError, distinct_texts, shown
@@ -17,10 +16,8 @@ from spheretwin.models.kinematics import rate_jacobian
 from spheretwin.models.lagrangian import gravity_stiffness, gravity_torque, inertia_matrix
 from spheretwin.models.mjcf_reader import HINGES
 from spheretwin.models.scatter import Scatter, summed_torque_matrix
-from spheretwin.plant.cable import constant_torque_Nm
-from spheretwin.plant.lagrangian_rotor import LagrangianRotor
-from spheretwin.plant.magnet_heat import remanence
 from spheretwin.plant.part_scatter import scatter_of
+from spheretwin.plant_model import parameters_of
 from spheretwin.scenario.files import Files
 from spheretwin.scenario.sections import ResolvedScenario, Scenario
 
@@ -79,37 +76,25 @@ def linearisation_data(scenario: ResolvedScenario, files: Files, *, nominal: boo
             lag_s=sheet.time_constant_s,
             current_limit_A=sheet.current_limit_A,
         )
-    rotor, cable = _lagrangian_rotor(scenario, files), section.cable
-    if rotor.chain:
+    true = parameters_of(scenario, files)
+    if true.joint:
         raise InputError(
             "linear model: expected an ideal joint, received plant.mass or a model file with mass properties"
             " or hinges that differ from it"
         )
-    spring = np.array(cable.stiffness_Nm_rad)
     return LinearisationData(
-        inertia=rotor.inertia,
-        weight_moment=rotor.weight_moment,
-        viscous_Nm_s=np.array(section.viscous_Nm_s),
-        unmodelled_torque_Nm=np.subtract(
-            section.modelling_torque_Nm, constant_torque_Nm(cable, scenario.seed)
-        )
-        - spring * cable.neutral_rad,
-        spring_Nm_rad=spring,
+        inertia=true.inertia_kg_m2,
+        weight_moment=true.weight_moment_Nm,
+        viscous_Nm_s=true.viscous_Nm_s,
+        unmodelled_torque_Nm=true.constant_torque_Nm,
+        spring_Nm_rad=true.spring_Nm_rad,
         magnetics=Magnetics(
-            files.actuator,
-            remanence(section.thermal, drive.ambient_degC) * np.array(section.group_gain),
-            scatter_of(section, scenario.seed, files.actuator),
+            files.actuator, true.torque_gain, scatter_of(section, scenario.seed, files.actuator)
         ),
         nominal_magnetics=nominal_magnetics,
         lag_s=drive.lag_s,
         current_limit_A=min(sheet.current_limit_A, drive.current_limit_A),
     )
-
-
-def _lagrangian_rotor(scenario: ResolvedScenario, files: Files) -> LagrangianRotor:
-    """Return the rotor with equations of motion in closed form, for any engine of the scenario."""
-    section = scenario.plant.model_copy(update={"engine": "lagrangian", "integrator": "RK4"})
-    return cast("LagrangianRotor", assembly.rotor_of(scenario.model_copy(update={"plant": section}), files))
 
 
 Array = NDArray[np.float64]

@@ -30,7 +30,15 @@ from spheretwin.models.base.compiled import (
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.base.numba_internals import Dispatcher
 from spheretwin.models.telemetry.signals import MOTION_SIGNALS, offsets, width
-from spheretwin.plant.step import DIVERGED, FAILSAFE, GOING, LEFT_WORKSPACE, Plant, PlantOutput, plant_tick
+from spheretwin.plant.plant_tick import (
+    DIVERGED,
+    FAILSAFE,
+    GOING,
+    LEFT_WORKSPACE,
+    Plant,
+    PlantOutput,
+    plant_tick,
+)
 
 Array = NDArray[np.float64]
 

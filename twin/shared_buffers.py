@@ -23,7 +23,7 @@ from spheretwin.faults.fault_injector import FaultInjector
 from spheretwin.faults.schedule import FaultSchedule, noise_streams
 from spheretwin.models.actuator import Actuator
 from spheretwin.models.inductance import mutual_inductance
-from spheretwin.plant.step import Plant
+from spheretwin.plant.plant_tick import Plant
 from spheretwin.scenario.plant_sections import ResolvedNominal
 from spheretwin.scenario.sections import ResolvedScenario, Scenario
 

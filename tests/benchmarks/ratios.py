@@ -20,6 +20,7 @@ import numpy as np
 import plain
 from measuring import fastest, ratio, seconds_of, tell
 
+from spheretwin import plant
 from spheretwin import scenario as scenarios
 from spheretwin.control.allocation.bounded import SCRATCH_ROWS, allocate_bounded
 from spheretwin.disturbances import Draws
@@ -29,6 +30,7 @@ from spheretwin.models.base.compiled import compiled
 from spheretwin.models.magnetics import fill_torque_matrix, scratch_of, torque_matrix, torque_model
 from spheretwin.models.telemetry.signals import width
 from spheretwin.plant.mujoco_rotor import MujocoRotor
+from spheretwin.plant.plant_step import step
 from spheretwin.provenance import facts_of
 from spheretwin.scenario.hardware import HARDWARE
 from spheretwin.scenario.sections import Scenario
@@ -145,6 +147,20 @@ def torque_matrix_seconds() -> float:
     return seconds_of(lambda: _repeat(calls, q, model, G, scratch)) / calls
 
 
+def plant_step_seconds() -> float:
+    """Time of one public step of the plant with friction, called from compiled code, s."""
+    parameters, calls = plant.parameters("nutation", {"hardware": "electronics"}), 100_000
+    state = plant.State(np.zeros(3), np.array([0.0, 0.0, 5.0]))
+    _coast(1, state, np.zeros(18), np.zeros(3), parameters)
+    return seconds_of(lambda: _coast(calls, state, np.zeros(18), np.zeros(3), parameters)) / calls
+
+
+@compiled
+def _coast(calls, state, currents, disturbance, parameters):
+    for _ in range(calls):
+        state = step(state, currents, disturbance, parameters, 5e-4)
+
+
 def bounded_seconds() -> float:
     """Time of one bounded allocation where the limit acts, mean over poses and directions, s."""
     actuator, generator, cases = actuators.load(), np.random.default_rng(0), 2000
@@ -242,6 +258,7 @@ def ratios() -> list[dict[str, object]]:
             "bare": bare_seconds,
             "lagrangian": lagrangian_seconds,
             "G_t": torque_matrix_seconds,
+            "plant step": plant_step_seconds,
             "bounded": bounded_seconds,
             "single": single_tick_seconds,
             "tick": tick_seconds,
@@ -286,6 +303,7 @@ def ratios() -> list[dict[str, object]]:
             inner["electronics"],
             at_most=1.6,
         ),
+        ratio("public plant step over bare mj_step", inner["plant step"], bare, at_most=0.2),
         ratio("one torque matrix over bare mj_step", inner["G_t"], bare),
         ratio("one bounded allocation at the limit over bare mj_step", inner["bounded"], bare),
     ]

@@ -14,7 +14,7 @@ from spheretwin.models.kinematics import rate_jacobian
 from spheretwin.models.lagrangian import acceleration, loaded_inertia
 from spheretwin.models.magnetics import torque_matrix
 from spheretwin.plant.friction import friction, slow_down
-from spheretwin.plant.step import step
+from spheretwin.plant.plant_tick import step_rotor
 
 LOADED = {"plant.modelling_error": 0.2, "plant.payload_kg": 0.05}
 TILTED = np.array([0.3, -0.2, 0.4])
@@ -49,7 +49,7 @@ def test_one_physics_step_of_either_engine_has_the_model_s_derivatives(engine, p
     def after(at):
         stepped = rotor.start(pose + at[:3], at[3:6])
         stepped.torque_q[:] = model.input_at_rest + at[6:]
-        step(stepped)
+        step_rotor(stepped)
         return np.concatenate([stepped.q - pose, stepped.qdot])
 
     np.testing.assert_allclose(after(np.zeros(9)), 0, rtol=0, atol=1e-15)  # it rests: rounding alone

@@ -15,7 +15,7 @@ from spheretwin.models.telemetry.run_record import versions
 from spheretwin.paper import EXPERIMENTS, page
 from spheretwin.paper.page import Chapter, chapter_of, rows
 from spheretwin.paper.runner import make_plan, run_with_cache, summarise, unexpected_ends
-from spheretwin.plant.step import ENGINES
+from spheretwin.plant.plant_tick import ENGINES
 from spheretwin.viz.pages.markdown import prepare
 from spheretwin.viz.terminal import runs as tables
 from spheretwin.viz.terminal.progress import runs

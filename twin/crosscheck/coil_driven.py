@@ -28,7 +28,7 @@ from spheretwin.models.base.checks import Check
 from spheretwin.models.base.compiled import compiled
 from spheretwin.models.base.errors import EngineError
 from spheretwin.models.lagrangian import acceleration
-from spheretwin.plant.step import GOING, PlantOutput, plant_tick
+from spheretwin.plant.plant_tick import GOING, PlantOutput, plant_tick
 from spheretwin.shared_buffers import shared_buffers
 
 Array = NDArray[np.float64]

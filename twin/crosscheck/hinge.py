@@ -31,7 +31,7 @@ from spheretwin.models.mjcf import Mjcf, read
 from spheretwin.plant.friction import Friction, friction, slow_down
 from spheretwin.plant.lagrangian_rotor import LagrangianRotor
 from spheretwin.plant.mujoco_rotor import MujocoRotor
-from spheretwin.plant.step import step
+from spheretwin.plant.plant_tick import step_rotor
 
 Array = NDArray[np.float64]
 
@@ -220,7 +220,7 @@ def _follow(plant: Any, bearing: Friction, torque_Nm: Array, q: Array, qdot: Arr
         plant.torque_q[GAMMA] = torque_Nm[row]
         if bearing.acts:
             slow_down(bearing, plant.q, plant.qdot, on_hinges)
-        step(plant)
+        step_rotor(plant)
         if bearing.acts:
             slow_down(bearing, plant.q, plant.qdot, on_hinges)
         q[row + 1], qdot[row + 1] = plant.q[GAMMA], plant.qdot[GAMMA]

@@ -1,6 +1,6 @@
 """Drive of all groups: a plain current lag or the chain of drive stages, under common functions.
 
-As with the engines in `plant.step`, the loop is compiled only for the drive that a run has.
+As with the engines in `plant.plant_tick`, the loop is compiled only for the drive that a run has.
 """
 
 from __future__ import annotations

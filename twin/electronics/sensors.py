@@ -1,6 +1,6 @@
 """Sensors of the rotor: ideal, or the chain of sensor stages, under common functions.
 
-As with the engines in `plant.step`, the loop is compiled only for the sensors that a run has.
+As with the engines in `plant.plant_tick`, the loop is compiled only for the sensors that a run has.
 """
 
 from __future__ import annotations

@@ -12,7 +12,7 @@ from spheretwin.plant.cable import CableSection
 from spheretwin.plant.magnet_heat import ThermalSection
 from spheretwin.plant.mass_properties import MassSection
 from spheretwin.plant.part_scatter import PartScatter
-from spheretwin.plant.step import ENGINES
+from spheretwin.plant.plant_tick import ENGINES
 from spheretwin.scenario.fields import SHIPPED
 from spheretwin.trajectories.rounding import Bounded, Triple
 

@@ -7,7 +7,7 @@ import pytest
 
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.telemetry.status import BY_CODE, Level, Status, named
-from spheretwin.plant.step import DIVERGED, GOING, LEFT_WORKSPACE
+from spheretwin.plant.plant_tick import DIVERGED, GOING, LEFT_WORKSPACE
 
 
 @pytest.mark.parametrize("status", Status)

@@ -24,7 +24,7 @@ from spheretwin.plant.cable import CableSection, constant_torque_Nm
 from spheretwin.plant.friction import friction, slow_down
 from spheretwin.plant.lagrangian_rotor import LagrangianRotor
 from spheretwin.plant.mujoco_rotor import MujocoRotor
-from spheretwin.plant.step import step
+from spheretwin.plant.plant_tick import step_rotor
 
 STEP_s = 5e-4
 COULOMB_Nm, RATIO, PRESLIDING_rad = 2e-3, 1.5, 1e-3
@@ -57,7 +57,7 @@ def moving(plant, bristles, viscous, torque, q, qdot, bearing, every):
             plant.torque_q[i] = torque[row, i]
         slow_down(viscous, plant.q, plant.qdot, unused)
         begin_bristles(bristles, middle_q, plant.q, plant.qdot, plant.torque_q)
-        step(plant)
+        step_rotor(plant)
         apply_bristles(bristles, middle_q, middle_qdot, last_qdot, plant.q, plant.qdot)
         slow_down(viscous, plant.q, plant.qdot, unused)
         for i in range(3):

@@ -9,8 +9,8 @@ from spheretwin import scenario as scenarios
 from spheretwin.models import actuator as actuators
 from spheretwin.models import mjcf
 from spheretwin.models.telemetry.status import Status
+from spheretwin.plant.plant_tick import ENGINES, step_rotor
 from spheretwin.plant.rotor import RotorSettings
-from spheretwin.plant.step import ENGINES, step
 from spheretwin.session import Session
 from spheretwin.simulation import simulate
 
@@ -52,7 +52,7 @@ def test_every_engine_s_state_is_all_that_its_steps_depend_on(name, actuator):
     def after_steps():
         data.torque_q[:] = [0.01, -0.02, 0.03]
         for _ in range(5):
-            step(data)
+            step_rotor(data)
         return np.concatenate([data.q, data.qdot]).tobytes()
 
     before = rotor.state().copy()

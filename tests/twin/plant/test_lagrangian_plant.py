@@ -25,7 +25,7 @@ from spheretwin.models.lagrangian import (
 )
 from spheretwin.plant import lagrangian_rotor
 from spheretwin.plant import mujoco_rotor as engine
-from spheretwin.plant import step as stepping
+from spheretwin.plant import plant_tick as stepping
 from spheretwin.plant.lagrangian_rotor import LagrangianRotor
 from spheretwin.plant.mujoco_rotor import MujocoRotor
 from spheretwin.simulation import simulate
@@ -211,7 +211,7 @@ def test_one_step_is_mujoco_s(actuator):
     theirs = mujoco_rotor.start(START[:3], START[3:])
     for plant in (ours, theirs):
         plant.torque_q[:] = [0.35, -0.1, -0.1]
-        stepping.step(plant)
+        stepping.step_rotor(plant)
     # Rounding, and the gimbal rings: 1e-12 of an acceleration near 200 rad/s² over 0.5 ms.
     np.testing.assert_allclose(ours.q, theirs.q, atol=1e-15)
     np.testing.assert_allclose(ours.qdot, theirs.qdot, atol=1e-12)
@@ -220,7 +220,7 @@ def test_one_step_is_mujoco_s(actuator):
 @compiled
 def ten_steps(plant):
     for _ in range(10):
-        stepping.step(plant)
+        stepping.step_rotor(plant)
 
 
 @pytest.mark.parametrize("kind", [engine, lagrangian_rotor])
@@ -237,7 +237,7 @@ def test_compiled_code_steps_what_python_steps(actuator, kind):
 
     (_keep, by_python), (_kept, by_compiled) = start(), start()
     for _ in range(10):
-        stepping.step(by_python)
+        stepping.step_rotor(by_python)
     ten_steps(by_compiled)
     np.testing.assert_array_equal(by_compiled.q, by_python.q)
     np.testing.assert_array_equal(by_compiled.qdot, by_python.qdot)

@@ -10,9 +10,8 @@ from numpy.typing import NDArray
 
 from spheretwin.electronics.drive import DriveModel, advance_currents, begin, end
 from spheretwin.electronics.transducers import CurrentSensors
-from spheretwin.models.base.compiled import allocation_free, copy_into, implements, part_of_its_caller
-from spheretwin.models.joint_chain import JointChain, hinge_torque, ideal_pose
-from spheretwin.models.kinematics import generalised_torque
+from spheretwin.models.base.compiled import copy_into, implements, part_of_its_caller
+from spheretwin.models.joint_chain import JointChain, torque_on_hinges, update_ideal_motion
 from spheretwin.models.magnetics import TorqueModel, fill_torque_matrix, rotor_torque
 from spheretwin.plant import lagrangian_rotor, mujoco_rotor
 from spheretwin.plant.bristle_friction import BristleFriction, apply_bristles, begin_bristles, log_bristles
@@ -32,12 +31,12 @@ ENGINES: dict[str, EngineKind] = {
 _STEPS: dict[type, Callable[[Any], None]] = {row.data: row.step for row in ENGINES.values()}
 
 
-def step(rotor: Any) -> None:
+def step_rotor(rotor: Any) -> None:
     """Advance the data of `Rotor.start` by one physics step, from compiled code or from Python."""
     _STEPS[type(rotor)](rotor)
 
 
-@implements(step)
+@implements(step_rotor)
 def _compiled_step(rotor: Any) -> Callable[[Any], None] | None:
     """Select the step for numba by the class of the named tuple."""
     kind: Any = getattr(rotor, "instance_class", None)
@@ -155,18 +154,18 @@ def plant_tick(
             friction_q[i] = 0.0
         if friction.acts:
             slow_down(friction, q, qdot, friction_q)
-        _update_coil_motion(joint, middle_q, middle_qdot, coil_q, coil_qdot)
+        update_ideal_motion(joint, middle_q, middle_qdot, coil_q, coil_qdot)
         fill_torque_matrix(coil_q, magnetics, G, scratch)
         advance_currents(drive, command, substep, coil_q, coil_qdot, G, gain, current, mean_current)
         log_mean_current(mean_current, substep, output.mean_current)
         for j in range(effective_current.shape[0]):
             effective_current[j] = gain[j] * mean_current[j]
         rotor_torque(G, effective_current, torque_S)
-        _torque_on_hinges(joint, middle_q, torque_S, torque_q)
+        torque_on_hinges(joint, middle_q, torque_S, torque_q)
         for i in range(3):
             torque_q[i] -= disturbance[i] + unmodelled[i]
         begin_bristles(bristles, middle_q, q, qdot, torque_q)
-        step(rotor)
+        step_rotor(rotor)
         apply_bristles(bristles, middle_q, middle_qdot, last_qdot, q, qdot)
         log_bristles(bristles, substep, friction_q)
         if friction.acts:
@@ -189,25 +188,6 @@ def plant_tick(
         if rotor.warnings[kind] > 0:
             return DIVERGED
     return GOING
-
-
-@allocation_free
-def _update_coil_motion(
-    joint: JointChain | None, q: Array, qdot: Array, coil_q: Array, coil_qdot: Array
-) -> None:
-    """Compute angles and rates of ideal hinges with the rotor's orientation and angular velocity."""
-    # Numba omits the branch that the type of an argument excludes.
-    if joint is not None:
-        ideal_pose(joint, q, qdot, coil_q, coil_qdot)
-
-
-@allocation_free
-def _torque_on_hinges(joint: JointChain | None, q: Array, torque_S: Array, torque_q: Array) -> None:
-    """Compute the generalised torque of a Cartesian torque on the true hinges."""
-    if joint is None:
-        generalised_torque(q, torque_S, torque_q)
-    else:
-        hinge_torque(joint, q, torque_S, torque_q)
 
 
 @part_of_its_caller

@@ -1,0 +1,175 @@
+"""Public step of the plant: rotor, field and friction under given currents, as a pure function.
+
+It is the physics step of the loop with the Lagrangian rotor, without drive, and with the same compiled parts:
+torque matrix in the middle of the step, smoothed friction split around a Runge-Kutta step of the rotor. The
+step is of second order.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spheretwin.models.base.compiled import allocation_free, compiled
+from spheretwin.models.joint_chain import JointChain, torque_on_hinges, update_ideal_motion
+from spheretwin.models.magnetics import TorqueModel, fill_torque_matrix, rotor_torque
+from spheretwin.plant.friction import Friction, slow_down
+from spheretwin.plant.lagrangian_rotor import LagrangianData
+from spheretwin.plant.lagrangian_rotor import step as step_rotor
+
+Array = NDArray[np.float64]
+
+
+class State(NamedTuple):
+    """State of the plant."""
+
+    q_rad: Array
+    """Hinge angles (3,)."""
+    qdot_rad_s: Array
+    """Hinge rates (3,)."""
+
+
+class Parameters(NamedTuple):
+    """Everything that the step depends on; `_replace` gives a field another value."""
+
+    inertia_kg_m2: Array
+    """Principal moments about the joint centre (3,), payload included; of an ideal joint."""
+    weight_moment_Nm: float
+    """Weight of the payload times its distance from the joint centre; of an ideal joint."""
+    joint: JointChain | None
+    """Hinges, masses and gravity of a general joint, instead of the two fields above; None: ideal."""
+    coulomb_Nm: Array
+    """Coulomb friction of each hinge (3,)."""
+    viscous_Nm_s: Array
+    """Viscous friction of each hinge (3,)."""
+    friction_smoothing_rad_s: float
+    """Rate over which Coulomb friction changes sign."""
+    constant_torque_Nm: Array
+    """Torque on the hinges (3,) that is subtracted as a disturbance is: constant, and of a spring at 0."""
+    spring_Nm_rad: Array
+    """Stiffness of the cable about each hinge (3,)."""
+    torque_gain: Array
+    """Torque of each group over that of the torque matrix (n,): torque scale, gains, remanence."""
+    magnetics: TorqueModel
+    """Poles, groups and torque curve, with their scatter."""
+
+
+@compiled
+def torque_matrix(q: Array, parameters: Parameters) -> Array:
+    """Return the torque matrix at a pose: torque on the rotor, stator frame, of one ampere in each group.
+
+    Parameters
+    ----------
+    q : (3,) array, rad
+        Hinge angles; finite.
+    parameters : Parameters
+
+    Returns
+    -------
+    (3, n) array, N·m/A
+    """
+    groups = parameters.torque_gain.shape[0]
+    G, scratch = np.empty((3, groups)), np.empty((5, parameters.magnetics.line_weights.shape[0] * groups))
+    _fill(q, parameters, np.empty((3, 3)), G, scratch)
+    for j in range(groups):
+        for i in range(3):
+            G[i, j] *= parameters.torque_gain[j]
+    return G
+
+
+@compiled
+def step(state: State, currents: Array, disturbance: Array, parameters: Parameters, dt: float) -> State:
+    """Return the state after one step; nothing is changed in place.
+
+    Parameters
+    ----------
+    state : State
+        Finite, away from beta = ±90 degrees.
+    currents : (n,) array, A
+        Of each group, mean over the step.
+    disturbance : (3,) array, N·m
+        Generalised torque, subtracted in (1).
+    parameters : Parameters
+    dt : float, s
+        Length of the step.
+
+    Returns
+    -------
+    State
+        Of new arrays. The ends of the workspace are not checked.
+    """
+    groups = parameters.torque_gain.shape[0]
+    # Three allocations: with one for each vector the step takes half as long again.
+    G, vectors = np.empty((3, groups)), np.empty((10, max(3, groups)))
+    scratch = np.empty((5, parameters.magnetics.line_weights.shape[0] * groups))
+    q, qdot = state.q_rad.copy(), state.qdot_rad_s.copy()
+    _advance(q, qdot, currents, disturbance, parameters, dt, vectors, G, scratch)
+    return State(q, qdot)
+
+
+@allocation_free
+def _advance(
+    q: Array,
+    qdot: Array,
+    currents: Array,
+    disturbance: Array,
+    parameters: Parameters,
+    dt: float,
+    vectors: Array,
+    G: Array,
+    scratch: Array,
+) -> None:
+    """Advance angles and rates in place; `vectors` (10, n), `G` and `scratch` are working space."""
+    joint, friction_q, warnings = parameters.joint, vectors[3], vectors[4].view(np.int32)
+    middle_q, torque_S, torque_q, effective = vectors[5], vectors[6], vectors[7], vectors[8]
+    for i in range(3):
+        middle_q[i], friction_q[i] = q[i] + 0.5 * dt * qdot[i], 0.0
+    acts = False
+    for i in range(3):
+        acts = acts or parameters.coulomb_Nm[i] > 0 or parameters.viscous_Nm_s[i] > 0
+    friction = Friction(
+        parameters.coulomb_Nm,
+        parameters.viscous_Nm_s,
+        parameters.friction_smoothing_rad_s,
+        parameters.inertia_kg_m2,
+        dt,
+        acts,
+        joint,
+    )
+    if acts:
+        slow_down(friction, q, qdot, friction_q)
+    _fill(middle_q, parameters, vectors, G, scratch)
+    for j in range(G.shape[1]):
+        effective[j] = parameters.torque_gain[j] * currents[j]
+    rotor_torque(G, effective[: G.shape[1]], torque_S)
+    torque_on_hinges(joint, middle_q, torque_S, torque_q)
+    for i in range(3):
+        torque_q[i] -= (
+            disturbance[i] + parameters.constant_torque_Nm[i] + parameters.spring_Nm_rad[i] * middle_q[i]
+        )
+    step_rotor(
+        LagrangianData(
+            dt,
+            joint,
+            parameters.inertia_kg_m2,
+            parameters.weight_moment_Nm,
+            q,
+            qdot,
+            torque_q,
+            warnings,
+        )
+    )
+    if acts:
+        slow_down(friction, q, qdot, friction_q)
+
+
+@allocation_free
+def _fill(q: Array, parameters: Parameters, vectors: Array, G: Array, scratch: Array) -> None:
+    """Fill `G` without gains at a pose; the first three rows of `vectors` are working space."""
+    ideal_q, rates, ideal_rates = vectors[0], vectors[1], vectors[2]
+    for i in range(3):
+        ideal_q[i], rates[i] = q[i], 0.0
+    update_ideal_motion(parameters.joint, q, rates, ideal_q, ideal_rates)
+    fill_torque_matrix(ideal_q, parameters.magnetics, G, scratch)

@@ -1,0 +1,84 @@
+"""Parameters of the public plant step from a scenario."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, cast
+
+import numpy as np
+
+from spheretwin import assembly
+from spheretwin import scenario as scenarios
+from spheretwin.active_config import initial_config
+from spheretwin.models.base.errors import InputError
+from spheretwin.models.magnetics import torque_model
+from spheretwin.models.scatter import scattered_model
+from spheretwin.plant.cable import constant_torque_Nm
+from spheretwin.plant.lagrangian_rotor import LagrangianRotor
+from spheretwin.plant.magnet_heat import remanence
+from spheretwin.plant.part_scatter import scatter_of
+from spheretwin.plant.plant_step import Parameters
+from spheretwin.scenario.files import Files
+from spheretwin.scenario.sections import ResolvedScenario, Scenario
+
+
+def parameters(scenario: Scenario | str, changes: Mapping[str, Any] | None = None) -> Parameters:
+    """Return the parameters of the plant step of a scenario.
+
+    Parameters
+    ----------
+    scenario : Scenario or str
+        From `scenario.load`, or the name or file of one.
+    changes : mapping, optional
+        Fields by dotted name and their values, such as ``{"plant.payload_kg": 0.1}``, for a name or a file.
+
+    Returns
+    -------
+    plant.Parameters
+        Of the true plant, with the errors that the seed draws, and magnets at their initial temperature.
+
+    Raises
+    ------
+    InputError
+        A field is unknown or out of range, changes of a built scenario, static friction, hysteresis of a
+        cable, or a model with physics that the equations of motion do not have.
+    """
+    if isinstance(scenario, str):
+        scenario = scenarios.load(scenario, changes)
+    elif changes:
+        raise InputError("plant parameters: expected changes with the name or file of a scenario alone")
+    config = initial_config(scenario, None, None)
+    section = config.scenario.plant
+    if section.stiction.on or any(section.cable.hysteresis_Nm):
+        raise InputError(
+            "plant parameters: expected smoothed friction and no hysteresis of a cable, whose elements have"
+            " states that the step does not, received plant.stiction or plant.cable.hysteresis_Nm"
+        )
+    return parameters_of(config.scenario, config.files)
+
+
+def parameters_of(scenario: ResolvedScenario, files: Files) -> Parameters:
+    """Return the parameters of a resolved scenario; static friction and hysteresis are left out.
+
+    Raises
+    ------
+    InputError
+        The model has physics that the equations of motion do not have.
+    """
+    section, actuator, cable = scenario.plant, files.actuator, scenario.plant.cable
+    engine = section.model_copy(update={"engine": "lagrangian", "integrator": "RK4"})
+    rotor = cast("LagrangianRotor", assembly.rotor_of(scenario.model_copy(update={"plant": engine}), files))
+    scatter, spring = scatter_of(section, scenario.seed, actuator), np.array(cable.stiffness_Nm_rad)
+    cable_Nm = constant_torque_Nm(cable, scenario.seed) + spring * cable.neutral_rad
+    return Parameters(
+        inertia_kg_m2=rotor.inertia,
+        weight_moment_Nm=rotor.weight_moment,
+        joint=rotor.chain,
+        coulomb_Nm=np.array(section.coulomb_Nm),
+        viscous_Nm_s=np.array(section.viscous_Nm_s),
+        friction_smoothing_rad_s=section.friction_smoothing_rad_s,
+        constant_torque_Nm=np.array(section.modelling_torque_Nm) - cable_Nm,
+        spring_Nm_rad=spring,
+        torque_gain=remanence(section.thermal, scenario.drive.ambient_degC) * np.array(section.group_gain),
+        magnetics=scattered_model(actuator, scatter) if scatter else torque_model(actuator),
+    )
