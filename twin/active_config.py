@@ -86,7 +86,7 @@ def fill_defaults(
         resolved = resolved.model_copy(
             update={"trajectory": UserPath(shape=name_of_user_object(trajectory.name))}
         )
-    _check_pose(plant.initial_rad, actuator)
+    check_pose(plant.initial_rad, actuator)
     _check_faults(resolved.fault, actuator)
     return resolved
 
@@ -218,13 +218,13 @@ def _gravity(section: PlantSection, model: Mjcf) -> float | None:
     return None if any(own[:2]) or own[2] > 0 else 0.0 - own[2]  # 0, not -0
 
 
-def _check_pose(pose: Triple, actuator: Actuator) -> None:
+def check_pose(pose: Triple, actuator: Actuator) -> None:
+    """Raise InputError for a pose beyond the workspace."""
     for hinge, angle, (low, high) in zip(HINGES, pose, actuator.hinge_range_rad, strict=True):
         if not low <= angle <= high:
             least, most, received = distinct_texts(low, high, angle)
             raise InputError(
-                f"scenario: expected a first pose with {hinge} from {least} to {most} rad,"
-                f" received {received}"
+                f"scenario: expected a pose with {hinge} from {least} to {most} rad, received {received}"
             )
 
 

@@ -23,6 +23,7 @@ from spheretwin.models.base.numba_internals import callback_errors
 from spheretwin.models.base.state import check_length, restore_state, save_state, transfer_state
 from spheretwin.models.telemetry.signals import width
 from spheretwin.plant.rotor import Rotor
+from spheretwin.scenario.changes import StateChange
 from spheretwin.scenario.files import Files
 from spheretwin.scenario.sections import ResolvedScenario
 from spheretwin.shared_buffers import faults_of, sensors_of, shared_buffers, supervision_of
@@ -222,6 +223,18 @@ class Runtime:
         same = before.controller.without_compensators() == scenario.controller.without_compensators()
         same = same and assembly.same_nominal_model(before, scenario)
         return self.law if same else assembly.law_of(scenario)
+
+    def set_state(self, change: StateChange) -> None:
+        """Set the given parts of the state of the plant."""
+        plant, rotor = self._plant, self._rotor.data
+        for part, given in (
+            (rotor.q, change.q_rad),
+            (rotor.qdot, change.qdot_rad_s),
+            (plant.last_qdot, change.qdot_rad_s),
+            (plant.current, change.current_A),
+        ):
+            if given is not None:
+                part[:] = given
 
     def state(self) -> RuntimeState:
         """Return the complete state."""

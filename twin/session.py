@@ -10,7 +10,8 @@ from types import TracebackType
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
+from pydantic import ValidationError
 
 from spheretwin import active_config
 from spheretwin import loop as loops
@@ -27,7 +28,8 @@ from spheretwin.models.telemetry.status import BY_CODE, Status
 from spheretwin.models.telemetry.table import Table, allocated, check_rows
 from spheretwin.runtime import Runtime
 from spheretwin.scenario import files as scenario_files
-from spheretwin.scenario.changes import from_now_on, is_fixed, scheduled_changes
+from spheretwin.scenario.changes import STATE, StateChange, from_now_on, is_fixed, scheduled_changes
+from spheretwin.scenario.fields import explain
 from spheretwin.scenario.files import Files
 from spheretwin.scenario.reading import is_dotted
 from spheretwin.scenario.sections import ResolvedScenario, Scenario, UserPath
@@ -225,18 +227,36 @@ class Session:
             The field is unknown or fixed for the run, or the value is out of range; nothing is changed.
         """
         with self._alone():
-            if not is_dotted(name):
-                raise InputError(
-                    f"session: expected a field such as disturbance.load, received {shown(name)}"
-                )
-            if is_fixed(name):
-                raise InputError(f"session: expected a field that may change during a run, received {name}")
-            if isinstance(value, Law) and name != "controller.law":
-                raise InputError(f"session: expected a law for controller.law, received one for {name}")
-            value = from_now_on(name, value, self.t_s)
-            with self._all_or_nothing():
-                self._change(name, value)
-            self.journal += (Change(self.tick, name, active_config.recorded_value(value)),)
+            if name == STATE:
+                self._set_state(value)
+            else:
+                self._set_field(name, value)
+
+    def set_state(
+        self,
+        q_rad: ArrayLike | None = None,
+        qdot_rad_s: ArrayLike | None = None,
+        current_A: ArrayLike | None = None,
+    ) -> None:
+        """Set pose, rates and coil currents of the plant, from the next tick on.
+
+        The change is an entry of the journal, as one of `set`, and is replayed. Controller, estimator, drive
+        and friction keep their states.
+
+        Parameters
+        ----------
+        q_rad, qdot_rad_s : (3,) array, optional
+            Hinge angles and rates; default: unchanged.
+        current_A : (n,) array, optional
+            Of each group; default: unchanged.
+
+        Raises
+        ------
+        InputError
+            Another number of values, one that is not finite, or a pose beyond the workspace.
+        """
+        given = {"q_rad": q_rad, "qdot_rad_s": qdot_rad_s, "current_A": current_A}
+        self.set(STATE, {name: np.asarray(v).tolist() for name, v in given.items() if v is not None})
 
     def snapshot(self) -> Snapshot:
         """Return the complete state of the session."""
@@ -376,6 +396,33 @@ class Session:
         self.tick += ticks
         self._status = BY_CODE[code]
         return ticks
+
+    def _set_field(self, name: str, value: Any) -> None:
+        if not is_dotted(name):
+            raise InputError(f"session: expected a field such as disturbance.load, received {shown(name)}")
+        if is_fixed(name):
+            raise InputError(f"session: expected a field that may change during a run, received {name}")
+        if isinstance(value, Law) and name != "controller.law":
+            raise InputError(f"session: expected a law for controller.law, received one for {name}")
+        value = from_now_on(name, value, self.t_s)
+        with self._all_or_nothing():
+            self._change(name, value)
+        self.journal += (Change(self.tick, name, active_config.recorded_value(value)),)
+
+    def _set_state(self, value: Any) -> None:
+        try:
+            change = StateChange.model_validate(value)
+        except ValidationError as error:
+            raise InputError(f"session: {explain(error, StateChange)}") from None
+        groups = len(self.actuator.groups)
+        if change.current_A is not None and len(change.current_A) != groups:
+            raise InputError(
+                f"session: expected current_A of {groups} groups, received {len(change.current_A)}"
+            )
+        if change.q_rad is not None:
+            active_config.check_pose(change.q_rad, self.actuator)
+        self._runtime.set_state(change)
+        self.journal += (Change(self.tick, STATE, change.model_dump(mode="json", exclude_none=True)),)
 
     def _change(self, name: str, value: Any) -> None:
         before, self._config = self._config, self._config.with_change(name, value)

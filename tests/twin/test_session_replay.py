@@ -21,6 +21,7 @@ CHANGES = [
     (250, "plant.group_gain", np.linspace(0.8, 1.2, 18)),
     (333, "trajectory.amplitude_rad", (0.1, 0.2, 0.1)),
     (400, "allocation", "bounded"),
+    (450, "state", {"q_rad": [0.1, -0.1, 0.5], "current_A": [0.1] * 18}),
     (600, "nominal.torque_scale", np.float64(0.9)),  # after the last tick: it acts on none, but was made
 ]
 

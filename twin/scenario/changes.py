@@ -8,7 +8,7 @@ from dataclasses import replace
 from math import ceil
 from typing import Any
 
-from pydantic import BaseModel
+from pydantic import BaseModel, ConfigDict
 from pydantic_core import to_jsonable_python
 
 from spheretwin.control.laws import LAWS
@@ -17,6 +17,7 @@ from spheretwin.models.telemetry.run_record import Change
 from spheretwin.scenario.fields import Kind, every_field, kind_of, section_kind
 from spheretwin.scenario.reading import is_dotted, override, read, resolve_paths, shipped, validated
 from spheretwin.scenario.sections import Scenario, UserController, kind_of_scenario, scenario_with
+from spheretwin.trajectories.rounding import Triple
 
 # Fields that cannot change during a run.
 FIXED = (
@@ -37,6 +38,20 @@ FIXED = (
 
 
 FAULT = "fault"
+
+STATE = "state"
+"""Name of a change of the state of the plant in a journal; not a field."""
+
+
+class StateChange(BaseModel):
+    """New pose, rates and currents of the plant."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+    q_rad: Triple | None = None
+    qdot_rad_s: Triple | None = None
+    current_A: tuple[float, ...] | None = None
+
 
 TAGS = frozenset(
     kind.discriminator
