@@ -193,7 +193,7 @@ def control_tick(
     else:
         _command_zero(controller, command)
         if watchdog.halt[0] == GO:
-            share = command_manual_currents(controller.manual, controller.current_limit_A, command)
+            share = command_manual_currents(controller.manual, t, controller.current_limit_A, command)
     if controller.applied_torque.on:
         estimate_applied_torque(controller.applied_torque, pose, controller.cached_matrix.G, command)
     return share

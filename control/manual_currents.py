@@ -6,13 +6,16 @@ starts again from its initial state when it resumes control.
 
 from __future__ import annotations
 
-from typing import Annotated, NamedTuple
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, PrivateAttr, model_validator
 
 from spheretwin.models.base.compiled import allocation_free
+from spheretwin.models.telemetry.csv_series import TIME, TimeSeries, reached, read
 
 Array = NDArray[np.float64]
 
@@ -23,7 +26,15 @@ Current = Annotated[float, Field(ge=-LARGEST_A, le=LARGEST_A)]
 
 
 class ManualSection(BaseModel):
-    """Manual currents; the law controls the actuator unless they are given."""
+    """Manual currents; the law controls the actuator unless they are given.
+
+    A file is read when the section is created; later changes of the file have no effect.
+
+    Raises
+    ------
+    InputError
+        The file is not a series of currents.
+    """
 
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
 
@@ -32,32 +43,86 @@ class ManualSection(BaseModel):
         description="current commanded to each group instead of that of the law, A; limited to"
         " nominal.current_limit_A",
     )
+    file: Annotated[str, Field(min_length=1)] | None = Field(
+        None,
+        description=f"CSV of these currents over time, with the columns {TIME}, current_00_A, current_01_A"
+        " and so on; the first row applies before, the last after its time",
+        json_schema_extra={"path": True},
+    )
+    between: Literal["held", "linear"] = Field(
+        "held", description="currents between two rows: the earlier row held, or linear interpolation"
+    )
+
+    _series: TimeSeries | None = PrivateAttr(None)
 
     @property
     def on(self) -> bool:
         """True if currents are given."""
-        return self.currents_A is not None
+        return self.series is not None
+
+    @property
+    def series(self) -> TimeSeries | None:
+        """Currents over time; None if the law controls the actuator."""
+        return self._series
+
+    @model_validator(mode="after")
+    def _read(self) -> ManualSection:
+        if self.file is not None:
+            if self.currents_A is not None:
+                raise ValueError("expected either currents_A or file, received both")
+            self._series = read("manual currents", Path(self.file), current_columns, LARGEST_A)
+        elif self.currents_A is not None:
+            self._series = TimeSeries(np.zeros(1), np.array([self.currents_A]))
+        return self
+
+
+def current_columns(header: Sequence[str]) -> list[str]:
+    """Return the columns of as many groups as a header has columns of currents; of one if it has none."""
+    count = sum(name.startswith("current_") for name in header)
+    return [f"current_{group:02}_A" for group in range(max(count, 1))]
 
 
 class Manual(NamedTuple):
     """Manual currents of a run, for compiled code."""
 
     on: bool
-    currents_A: Array  # (n,)
+    linear: bool
+    t_s: Array  # (m,) rising
+    currents_A: Array  # (m, n)
 
 
 def manual(section: ManualSection, groups: int) -> Manual:
-    """Return the manual currents of a section whose length has been checked."""
-    return Manual(section.on, np.array(section.currents_A or np.zeros(groups), dtype=np.float64))
+    """Return the manual currents of a section whose number of groups has been checked."""
+    series = section.series or TimeSeries(np.zeros(1), np.zeros((1, groups)))
+    return Manual(section.on, section.between == "linear", reached(series.t_s), series.values)
 
 
 @allocation_free
-def command_manual_currents(manual: Manual, limit_A: float, command: Array) -> float:
+def command_manual_currents(manual: Manual, t: float, limit_A: float, command: Array) -> float:
     """Write the currents (n,), A, each limited; return the least share of a current that the limit leaves."""
+    row, after = _rows_at(manual.t_s, t)
+    part = 0.0
+    if manual.linear and after > row:
+        part = (t - manual.t_s[row]) / (manual.t_s[after] - manual.t_s[row])
     share = 1.0
     for j in range(command.shape[0]):
-        desired = manual.currents_A[j]
+        desired = manual.currents_A[row, j]
+        if part > 0:
+            desired += part * (manual.currents_A[after, j] - desired)
         command[j] = min(max(desired, -limit_A), limit_A)
         if command[j] != desired:
             share = min(share, limit_A / abs(desired))
     return share
+
+
+@allocation_free
+def _rows_at(t_s: Array, t: float) -> tuple[int, int]:
+    """Return the rows before and after a time; twice the same row before the first and after the last."""
+    low, high = 0, t_s.shape[0]
+    while low < high:
+        middle = (low + high) // 2
+        if t_s[middle] <= t:
+            low = middle + 1
+        else:
+            high = middle
+    return max(low - 1, 0), min(low, t_s.shape[0] - 1)

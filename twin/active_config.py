@@ -229,11 +229,15 @@ def check_pose(pose: Triple, actuator: Actuator) -> None:
 
 
 def _check_groups(scenario: Scenario, actuator: Actuator) -> None:
-    groups = len(actuator.groups)
-    lists = {"plant.group_gain": scenario.plant.group_gain, "manual.currents_A": scenario.manual.currents_A}
-    for name, given in lists.items():
-        if given is not None and len(given) != groups:
-            raise InputError(f"scenario: expected {name} for {groups} groups, received {len(given)}")
+    groups, gain, series = len(actuator.groups), scenario.plant.group_gain, scenario.manual.series
+    currents = "manual.file" if scenario.manual.file else "manual.currents_A"
+    counts = {
+        "plant.group_gain": groups if gain is None else len(gain),
+        currents: groups if series is None else series.values.shape[1],
+    }
+    for name, count in counts.items():
+        if count != groups:
+            raise InputError(f"scenario: expected {name} for {groups} groups, received {count}")
 
 
 def _check_faults(faults: tuple[Fault, ...], actuator: Actuator) -> None:

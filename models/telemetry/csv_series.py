@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import csv
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -111,7 +111,9 @@ def check_rising(times: Sequence[float]) -> None:
         raise ValueError(f"expected rising times, received {before} then {after} s")
 
 
-def read(what: str, path: Path, columns: Sequence[str], largest: float) -> TimeSeries:
+def read(
+    what: str, path: Path, columns: Sequence[str] | Callable[[Sequence[str]], Sequence[str]], largest: float
+) -> TimeSeries:
     """Read a series: a header, then a row for each time; lines that begin with ``#`` are comments.
 
     Parameters
@@ -120,8 +122,8 @@ def read(what: str, path: Path, columns: Sequence[str], largest: float) -> TimeS
         Name of the file in messages.
     path : Path
         The file. Other columns are ignored.
-    columns : sequence of str
-        Columns in addition to the times, ``t_s``.
+    columns : sequence of str, or callable
+        Columns in addition to the times, ``t_s``; or a function of the columns of the file that returns them.
     largest : float
         Largest magnitude of their numbers.
 
@@ -136,8 +138,9 @@ def read(what: str, path: Path, columns: Sequence[str], largest: float) -> TimeS
         The file cannot be read, lacks a column, or has an invalid row.
     """
     header, *rows = _rows(what, path)
-    names_read = (TIME, *columns)
     names = [name.strip() for name in header.texts]
+    columns = columns(names) if callable(columns) else columns
+    names_read = (TIME, *columns)
     if any(names.count(name) != 1 for name in names_read):
         raise InputError(
             f"{what} {path}: expected each of the columns {', '.join(names_read)} once,"

@@ -3,13 +3,17 @@
 import numpy as np
 import pytest
 
+from spheretwin import cli
 from spheretwin import scenario as scenarios
+from spheretwin.bench import Bench
 from spheretwin.control.manual_currents import Manual, command_manual_currents
 from spheretwin.models.base.errors import InputError
+from spheretwin.models.telemetry.table import read_parquet
 from spheretwin.session import Session
 from spheretwin.simulation import simulate
 
 CURRENTS = [0.1 * (-1) ** group * group for group in range(18)]
+CONSTANT = Manual(True, False, np.zeros(1), np.array([[0.5, -4.0, 10.0]]))
 FAST = {"plant.engine": "lagrangian", "disturbance.random_bound_Nm": 0.0, "disturbance.load": 0.0}
 
 
@@ -29,7 +33,7 @@ def test_each_group_is_commanded_its_current_and_the_law_is_not_called():
 
 def test_no_group_is_commanded_more_than_the_limit():
     command = np.empty(3)
-    share = command_manual_currents(Manual(True, np.array([0.5, -4.0, 10.0])), 2.0, command)
+    share = command_manual_currents(CONSTANT, 0.0, 2.0, command)
     np.testing.assert_array_equal(command, [0.5, -2.0, 2.0])
     assert share == 0.2
     rows = by_hand(**{"nominal.current_limit_A": 0.4}).telemetry
@@ -93,3 +97,56 @@ def test_a_snapshot_by_hand_goes_on_as_it_did():
         session.set("manual.currents_A", None)
         session.restore(before)
         assert session.advance(30).values.tobytes() == first.values.tobytes()
+
+
+def series_file(folder, t_s, currents_A, groups=18):
+    header = ",".join(["t_s", *(f"current_{group:02}_A" for group in range(groups))])
+    rows = [",".join(map(repr, map(float, [t, *row]))) for t, row in zip(t_s, currents_A, strict=True)]
+    (path := folder / "currents.csv").write_text("\n".join([header, *rows]) + "\n")
+    return str(path)
+
+
+def test_currents_of_a_file_are_commanded_at_their_times(tmp_path):
+    generator = np.random.default_rng(3)
+    t_s, currents_A = np.array([0.01, 0.02, 0.0255, 0.04]), generator.uniform(-1, 1, (4, 18))
+    path, ticks = series_file(tmp_path, t_s, currents_A), 1e-3 * np.arange(50)
+    fields = FAST | {"duration": 0.05, "manual.file": path}
+    held = simulate(scenarios.load("sinusoid", fields)).telemetry["current_command_A"]
+    before = [max(sum(t_s <= t + 1e-9) - 1, 0) for t in ticks]
+    np.testing.assert_array_equal(held, currents_A[before])
+    linear = simulate(scenarios.load("sinusoid", fields | {"manual.between": "linear"})).telemetry
+    expected = np.stack([np.interp(ticks, t_s, column) for column in currents_A.T], axis=1)
+    np.testing.assert_allclose(linear["current_command_A"], expected, atol=1e-10)  # times within 1e-12
+    assert np.abs(expected - held).max() > 0.1
+
+
+def test_a_file_of_currents_is_replayed_and_its_limit_counts(tmp_path):
+    first, again = tmp_path / "first.parquet", tmp_path / "again.parquet"
+    path = series_file(tmp_path, [0.0, 0.01], [[0.5] * 18, [-3.0] * 18])
+    flags = ["--duration", "0.03", "--manual.file", path, "--nominal.current-limit-A", "2"]
+    assert cli.main(["simulate", "hold", *flags, "--telemetry", str(first)]) == cli.DONE
+    assert cli.main(["simulate", "--replay", str(first), "--telemetry", str(again)]) == cli.DONE
+    assert first.read_bytes() == again.read_bytes()
+    rows = read_parquet(first)[0]
+    np.testing.assert_array_equal(rows["current_command_A"][[9, 10], 7], [0.5, -2.0])
+    assert rows["allocation_scale"][10] == pytest.approx(2 / 3)
+
+
+@pytest.mark.parametrize(
+    ("changes", "groups", "message"),
+    [
+        ({}, 17, "expected manual.file for 18 groups, received 17"),
+        ({}, 0, "expected each of the columns t_s, current_00_A once"),
+        ({"manual.currents_A": [0.0] * 18}, 18, "expected either currents_A or file, received both"),
+    ],
+)
+def test_a_file_that_does_not_fit_is_refused(tmp_path, changes, groups, message):
+    path = series_file(tmp_path, [0.0], [[0.1] * groups], groups)
+    with pytest.raises(InputError, match=message):
+        Session(scenarios.load("hold", FAST | {"manual.file": path} | changes))
+
+
+def test_the_bench_refuses_a_file_of_currents(tmp_path):
+    path = series_file(tmp_path, [0.0], [[0.1] * 18])
+    with pytest.raises(InputError, match=r"received manual\.file"):
+        Bench(scenarios.load("hold", FAST | {"manual.file": path}))

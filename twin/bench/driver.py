@@ -76,7 +76,15 @@ class DriverSnapshot(NamedTuple):
 
 
 def compiled_session(scenario: Scenario) -> Session:
-    """Return a session whose first tick does not wait for the compiler."""
+    """Return a session whose first tick does not wait for the compiler.
+
+    Raises
+    ------
+    InputError
+        The scenario cannot be used, or has a file of currents, which no mode of the bench applies.
+    """
+    if scenario.manual.file is not None:
+        raise InputError("bench: expected manual.currents_A or none, received manual.file")
     session = Session(scenario)
     session.compile()
     return session
