@@ -66,6 +66,7 @@ SHORT = [
     ("pd", "sinusoid", "electronics", 60_000, {"controller.law": "pd"}),
     ("fuzzy", "sinusoid", "electronics", 60_000, {"controller.law": "adaptive_fuzzy"}),
     ("nutation", "nutation", "electronics", 5_000, {}),
+    ("prototype", "nutation", "prototype", 5_000, {"plant.engine": "lagrangian"}),
     ("weak supply", "sinusoid", "electronics", 60_000, {**supply(8.0), **HOT}),
     ("hardly a supply", "sinusoid", "electronics", 20_000, {**supply(5.1), **HOT}),
     ("none to speak of", "hold", "electronics", 5_000, {**supply(4.9), "controller.law": "pd"}),
