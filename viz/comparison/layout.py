@@ -13,7 +13,7 @@ from spheretwin.viz.layout.view import EVENTS, STATES, application_of
 from spheretwin.viz.scene.entities import TRAIL_S
 from spheretwin.viz.scene.meshes import WORLD
 
-COMPARE, END, TIP = "compare", "end", "tip"
+COMPARE, MARKS, END, TIP = "compare", "marks", "end", "tip"
 """Parts of the paths of entities, after the name of a run."""
 
 RUNS, LEGEND = "runs", "legend"
@@ -92,6 +92,7 @@ def _plot(view: ComparisonView, plot: Plot) -> rrb.TimeSeriesView:
         contents=[
             *reference_lines,
             *(f"/{run}/{COMPARE}/{plot.name}" for run in view.runs),
+            *(f"/{run}/{MARKS}/{plot.name}" for run in view.runs),
             *(f"/{run}/{END}/{plot.name}" for run in view.failed),
         ],
         name=plot.title,

@@ -21,6 +21,7 @@ from spheretwin.viz.comparison.layout import (
     COMPARE,
     END,
     LEGEND,
+    MARKS,
     REFERENCE,
     RUNS,
     TIP,
@@ -173,6 +174,7 @@ def write(path: Path, runs: Sequence[ComparedRun], subjects: Sequence[RecordingS
                 width = THICK if quantity.desired else MIDDLE  # the reference is drawn over it
                 entity = f"{COMPARE}/{quantity.name}"
                 send_line(below, entity, run.label, run.table["t_s"], values, colour, width)
+                _send_marks(below, f"{MARKS}/{quantity.name}", run, values, colour, (place, len(runs)))
                 if run.early_end:
                     _send_end(below, f"{END}/{quantity.name}", run, _visible(values, plot.limits), colour)
         for place in leading:
@@ -239,14 +241,53 @@ def _log_legend(
     """Log the colour and the label of each run below one another: a 2D view's y points down."""
     places = np.arange(len(runs), dtype=np.float64)
     ends = [[[0.0, y], [1.0, y]] for y in places]
-    lines = rr.LineStrips2D(
-        ends,
-        colors=list(colours),
-        labels=[drawable(run.legend) for run in runs],
-        show_labels=True,
-        radii=rr.Radius.ui_points(2.0),
-    )
-    recording.log(LEGEND, lines, static=True)
+    look = {"colors": list(colours), "radii": rr.Radius.ui_points(2.0)}
+    labels = [drawable(run.legend) for run in runs]
+    recording.log(LEGEND, rr.LineStrips2D(ends, labels=labels, show_labels=True, **look), static=True)
+    outlines = [[0.0, y] + 0.12 * _outline(place) for place, y in enumerate(places)]
+    recording.log(f"{LEGEND}/{MARKS}", rr.LineStrips2D(outlines, **look), static=True)
+
+
+_OUTLINES = {"Circle": (24, 0), "Diamond": (4, 0), "Square": (4, 45), "Up": (3, -90), "Down": (3, 90),
+             "Left": (3, 180), "Right": (3, 0)}  # fmt: skip
+"""Marker of each run; corners of its outline in the legend, and the direction of the first one, degrees."""
+
+_MARKS_A_RUN = 12
+
+
+def _outline(place: int) -> Array:
+    """Return the closed outline of the marker of a run in the legend, (n, 2); a cross after the last."""
+    if place % (len(_OUTLINES) + 1) == len(_OUTLINES):
+        return np.array([[-1.0, 0.0], [1.0, 0.0], [0.0, 0.0], [0.0, -1.0], [0.0, 1.0]])
+    corners, first_deg = list(_OUTLINES.values())[place % (len(_OUTLINES) + 1)]
+    angles = np.radians(first_deg + np.linspace(0, 360, corners + 1))
+    return np.stack([np.cos(angles), np.sin(angles)], axis=1)
+
+
+def _send_marks(
+    recording: rr.RecordingStream,
+    entity: str,
+    run: ComparedRun,
+    values: Array,
+    colour: theme.Colour,
+    turn: tuple[int, int],
+) -> None:
+    """Send markers on the line of a run; those of different runs are at different times.
+
+    Parameters
+    ----------
+    turn : (int, int)
+        Place of the run, and number of runs.
+    """
+    place, count = turn
+    shares = (np.arange(_MARKS_A_RUN) + (place + 0.5) / count) / _MARKS_A_RUN
+    rows = np.unique((shares * len(values)).astype(int))
+    rows = rows[np.isfinite(values[rows])]
+    marker = [*_OUTLINES, "Plus"][place % (len(_OUTLINES) + 1)]
+    look = rr.SeriesPoints(names=[run.label], colors=[colour], markers=[marker], marker_sizes=[5.0])
+    recording.log(entity, look, static=True)
+    if len(rows):
+        recording.send_columns(entity, time_index(run.table["t_s"][rows]), [scalars(values[rows], 1)])
 
 
 def _visible(values: Array, limits: tuple[float, float]) -> Array:
