@@ -12,6 +12,7 @@ import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 from rerun.chunk import Chunk
+from rerun.components import MarkerShape
 
 from spheretwin.models.base.files import whole_file
 from spheretwin.models.telemetry.table import Table
@@ -241,15 +242,24 @@ def _log_legend(
     """Log the colour and the label of each run below one another: a 2D view's y points down."""
     places = np.arange(len(runs), dtype=np.float64)
     ends = [[[0.0, y], [1.0, y]] for y in places]
-    look = {"colors": list(colours), "radii": rr.Radius.ui_points(2.0)}
+    shade, radii = list(colours), rr.Radius.ui_points(2.0)
     labels = [drawable(run.legend) for run in runs]
-    recording.log(LEGEND, rr.LineStrips2D(ends, labels=labels, show_labels=True, **look), static=True)
+    recording.log(
+        LEGEND, rr.LineStrips2D(ends, colors=shade, radii=radii, labels=labels, show_labels=True), static=True
+    )
     outlines = [[0.0, y] + 0.12 * _outline(place) for place, y in enumerate(places)]
-    recording.log(f"{LEGEND}/{MARKS}", rr.LineStrips2D(outlines, **look), static=True)
+    recording.log(f"{LEGEND}/{MARKS}", rr.LineStrips2D(outlines, colors=shade, radii=radii), static=True)
 
 
-_OUTLINES = {"Circle": (24, 0), "Diamond": (4, 0), "Square": (4, 45), "Up": (3, -90), "Down": (3, 90),
-             "Left": (3, 180), "Right": (3, 0)}  # fmt: skip
+_OUTLINES = {
+    MarkerShape.Circle: (24, 0),
+    MarkerShape.Diamond: (4, 0),
+    MarkerShape.Square: (4, 45),
+    MarkerShape.Up: (3, -90),
+    MarkerShape.Down: (3, 90),
+    MarkerShape.Left: (3, 180),
+    MarkerShape.Right: (3, 0),
+}
 """Marker of each run; corners of its outline in the legend, and the direction of the first one, degrees."""
 
 _MARKS_A_RUN = 12
@@ -283,7 +293,7 @@ def _send_marks(
     shares = (np.arange(_MARKS_A_RUN) + (place + 0.5) / count) / _MARKS_A_RUN
     rows = np.unique((shares * len(values)).astype(int))
     rows = rows[np.isfinite(values[rows])]
-    marker = [*_OUTLINES, "Plus"][place % (len(_OUTLINES) + 1)]
+    marker = [*_OUTLINES, MarkerShape.Plus][place % (len(_OUTLINES) + 1)]
     look = rr.SeriesPoints(names=[run.label], colors=[colour], markers=[marker], marker_sizes=[5.0])
     recording.log(entity, look, static=True)
     if len(rows):

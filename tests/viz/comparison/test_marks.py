@@ -55,7 +55,15 @@ def corners(place):
 
 def test_outlines_of_the_legend_are_the_markers():
     """In the view y points down."""
-    assert list(merged_recording._OUTLINES) == ["Circle", "Diamond", "Square", "Up", "Down", "Left", "Right"]
+    assert [str(shape) for shape in merged_recording._OUTLINES] == [
+        "Circle",
+        "Diamond",
+        "Square",
+        "Up",
+        "Down",
+        "Left",
+        "Right",
+    ]
     for place in range(7):
         np.testing.assert_allclose(corners(place)[0], corners(place)[-1], atol=1e-12)
         np.testing.assert_allclose(np.hypot(*corners(place).T), 1.0)
