@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
-from math import isfinite
+from math import inf, isfinite
 from typing import Any
 
 
@@ -82,6 +82,15 @@ class Check:
 def broken(checks: Iterable[Check]) -> list[str]:
     """Return the names of the checks that exceed their bound."""
     return [check.name for check in checks if not check.ok]
+
+
+def bound_shares(checks: Iterable[Check]) -> dict[str, float]:
+    """Return value over bound of each check with a value and one bound; infinity if the value is not finite."""
+    return {
+        check.name: check.value / check.bound if isfinite(check.value) else inf
+        for check in checks
+        if check.value is not None and check.bound is not None and check.at_least is None
+    }
 
 
 def _finite(value: float | None) -> float | None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import shlex
 import sys
 from pathlib import Path
 from typing import Any
@@ -16,12 +17,12 @@ from spheretwin.models.base.errors import InputError
 from spheretwin.models.base.files import check_writable
 from spheretwin.models.design import curve_check, field_check, torque_map
 from spheretwin.models.design.curve_check import ComputedCurve
-from spheretwin.models.design.torque_map import TorqueSurvey
 from spheretwin.models.design.workspace import LARGEST_TILT_DEG
+from spheretwin.viz.pages import magnetics
 from spheretwin.viz.pages.markdown import prepare, save_text
-from spheretwin.viz.terminal import magnetics, runs
+from spheretwin.viz.terminal import runs
 from spheretwin.viz.terminal.progress import tracked
-from spheretwin.viz.terminal.tables import print_checks
+from spheretwin.viz.terminal.tables import print_checks, terminal_console
 
 CURVE = "torque curve from 0 to 180 degrees, columns phi_deg,torque_Nm_per_A"
 
@@ -29,6 +30,9 @@ MOST_POSES = 10_000  # some four hours
 
 # At 90 degrees the azimuth of the shaft no longer determines a pose, and the hinges lock.
 STEEPEST_DEG = 85.0
+
+SETTINGS = ("mjcf", "csv", "poses", "seed", "need", "largest_tilt")
+"""Arguments that determine the content of a page."""
 
 
 def declare(parser: Parser) -> None:
@@ -63,6 +67,7 @@ def declare(parser: Parser) -> None:
         metavar="N",
         help="seed of poses and currents (default: 0)",
     )
+    _add_page(check)
     check.set_run(run_check)
 
     capability = _part(
@@ -73,7 +78,6 @@ def declare(parser: Parser) -> None:
         " limit, the torque matrix's smallest singular value and condition number, and the copper loss.",
     )
     _add_curve(capability)
-    capability.add_argument("--out", help="write figures into this folder")
     capability.add_argument(
         "--need",
         type=number("a number above 0", lambda torque: torque > 0),
@@ -87,6 +91,7 @@ def declare(parser: Parser) -> None:
         metavar="DEG",
         help=f"largest tilt of the shaft, degrees (default: {LARGEST_TILT_DEG:g})",
     )
+    _add_page(capability)
     capability.set_run(run_map)
 
 
@@ -108,17 +113,41 @@ def _add_curve(part: Parser) -> None:
     )
 
 
+def _add_page(part: Parser) -> None:
+    part.add_argument("--out", help="write a page with figures into this folder")
+    part.add_argument("--figure-format")
+
+
+def _command(options: argparse.Namespace, part: str) -> str:
+    """Return the command that creates the same page again."""
+    values = {name: getattr(options, name, None) for name in SETTINGS}
+    given = [
+        (f"--{name.replace('_', '-')}", str(value))
+        for name, value in values.items()
+        if value is not None and value != options.parser.get_default(name)
+    ]
+    return shlex.join(["spheretwin", "magnetics", part, *(word for pair in given for word in pair)])
+
+
 def run_check(options: argparse.Namespace) -> bool:
     """Run the part; return True if no bound is broken."""
     actuator = actuators.load(options.mjcf, options.csv)
+    if options.out:
+        prepare(options.out)
     verdict = field_check.judge(actuator, options.poses, options.seed, tracked("direct sums"))
     warn_about_model(options.mjcf)
     warn(verdict.warnings)
+    written = []
+    if options.out:
+        command = _command(options, "check")
+        written = magnetics.write_check(options.out, verdict, command, options.figure_format)
     if options.json:
         print_json(verdict._asdict())
     else:
-        magnetics.print_field(verdict)
+        runs.print_rows(*magnetics.field_table(verdict), 1)
+        terminal_console().print(magnetics.sources_text(verdict))
         print_checks("magnetics check", verdict.checks, options.verbose)
+        runs.print_written(written)
     if verdict.curve_is_of_another_geometry:
         distance = 100 * verdict.sources.curve_between_samples_of_peak
         warn(
@@ -160,7 +189,7 @@ def _compute(options: argparse.Namespace) -> bool:
             }
         )
     elif options.out:
-        magnetics.print_computed_curve(computed)
+        runs.print_rows(*magnetics.computed_curve_table(computed), 1)
         print_checks("magnetics curve", computed.checks, options.verbose)
         runs.print_written([options.out])
     else:
@@ -201,7 +230,7 @@ def _judge(csv: Path, mjcf: Path, as_json: bool) -> bool:
             }
         )
     else:
-        magnetics.print_judged_curve(csv, judged)
+        runs.print_rows(*magnetics.judged_curve_table(csv, judged), 1)
     return True  # user data has no bounds here
 
 
@@ -214,31 +243,15 @@ def run_map(options: argparse.Namespace) -> bool:
     verdict = torque_map.judge(surveyed, options.need)
     warn_about_model(options.mjcf)
     warn(verdict.warnings)
-    files = _draw(options.out, surveyed) if options.out else []
+    written = []
+    if options.out:
+        command = _command(options, "map")
+        written = magnetics.write_map(options.out, surveyed, verdict, command, options.figure_format)
     if options.json:
-        print_json({**verdict._asdict(), "figures": [str(path) for path in files]})
+        print_json(verdict._asdict())
     else:
-        magnetics.print_workspace(verdict)
+        for table in magnetics.workspace_tables(verdict):
+            runs.print_rows(*table, 1)
         print_checks("magnetics map", verdict.checks, options.verbose)
-        runs.print_written(files)
+        runs.print_written(written)
     return report_broken("magnetics map", verdict.checks)
-
-
-def _draw(folder: Path, surveyed: TorqueSurvey) -> list[Path]:
-    from spheretwin.viz.figures import maps  # Matplotlib is optional
-    from spheretwin.viz.figures.style import save
-
-    workspace, on_grid, worst = surveyed.workspace, surveyed.on_grid, surveyed.worst
-    limit_A = surveyed.actuator.group.current_limit_A
-    by_tilt = {
-        "least_norm_Nm": worst["least_norm"].capability.least_norm_Nm,
-        "best_Nm": worst["best"].capability.best_Nm,
-        "copper_W_per_Nm2": worst["singular_value"].capability.copper_W_per_Nm2,
-    }
-    figures = {
-        "capability_map.png": maps.capability_map(workspace, on_grid, limit_A),
-        "capability_by_tilt.png": maps.capability_by_tilt(workspace, on_grid, by_tilt, limit_A),
-    }
-    for name, figure in figures.items():
-        save(figure, folder / name)
-    return [folder / name for name in figures]

@@ -12,9 +12,10 @@ from spheretwin.models.base.errors import InputError, did_you_mean, shown
 
 COMMON: dict[str, dict[str, Any]] = {
     "--figure-format": {
-        "choices": ("svg", "pdf", "png"),
+        "choices": ("svg", "pdf", "png", "pdf-one-column", "pdf-two-columns"),
         "default": "svg",
-        "help": "format in which figures are written in addition to svg",
+        "help": "format in which figures are written in addition to svg; pdf also with the width of one"
+        " column (3.5 in) or of two columns (7.16 in) of a paper",
     },
     "--json": {"action": "store_true"},
     "--mjcf": {"type": Path, "metavar": "FILE.xml", "help": "model file"},

@@ -5,18 +5,15 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
-import numpy as np
-
 from spheretwin.crosscheck import coil_driven, dynamics, friction, identities, stiction, trajectories
 from spheretwin.crosscheck.friction import HingeFriction, VISCOUS_Nm_s
 from spheretwin.crosscheck.hinge import PUSH, Bearing, START_rad_s
 from spheretwin.crosscheck.part import STATES, Evidence, Finding, Subject
 from spheretwin.models import actuator as actuators
-from spheretwin.models.base.checks import Check, broken
+from spheretwin.models.base.checks import bound_shares
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.mjcf import beyond_a_free_rotor, read
-from spheretwin.viz.pages import markdown as pieces
-from spheretwin.viz.pages.markdown import Drawing, write_page
+from spheretwin.viz.pages.markdown import Drawing, write_checks
 
 PARTS = (
     dynamics.PART,
@@ -141,16 +138,11 @@ def draw_friction(evidence: Evidence) -> Drawing:
 
 
 def draw_margins(evidence: Evidence) -> Drawing:
-    """How much of its bound each figure takes up."""
+    """Value over bound of each check."""
     from spheretwin.viz.figures import crosscheck
 
-    shares = {
-        check.name: check.value / check.bound if np.isfinite(check.value) else np.inf
-        for check in evidence.checks
-        if check.value is not None and check.bound is not None and check.at_least is None
-    }
-    figure = crosscheck.margins(shares, "How much of its bound each figure takes up")
-    caption = "Value over bound; orders of convergence and breakaway torques, which have two, are below."
+    figure = crosscheck.margins(bound_shares(evidence.checks), "Share of the bound of each check")
+    caption = "Value over bound. Orders of convergence and breakaway torques have two bounds: see below."
     return Drawing("margins.svg", caption, figure)
 
 
@@ -206,9 +198,6 @@ FIGURES: tuple[Callable[[Evidence], Drawing], ...] = (
 
 NAME = "crosscheck"
 
-HEAD = ("check", "compared quantities", "states", "value", "bound", "passed", "reason for the bound")
-NUMBERS = (False, False, True, True, True, False, False)
-
 
 def write(folder: Path, evidence: Evidence, figure_format: str = "svg") -> list[Path]:
     """Write the page and its figures into a folder; return both forms of the page.
@@ -227,20 +216,10 @@ def write(folder: Path, evidence: Evidence, figure_format: str = "svg") -> list[
     InputError
         A file cannot be written there.
     """
-    drawings = [draw(evidence) for draw in FIGURES]
-    checks, names = evidence.checks, broken(evidence.checks)
-    verdict = f"**Exceeded bounds: {'; '.join(names)}.**" if names else "**No bound is exceeded.**"
-    summary = [
+    lead = (
         "Comparison of the engine (MuJoCo) with the Lagrangian model, which is derived independently, and"
-        f" with Pinocchio: {len(checks)} checks. {verdict}"
-    ]
-    sections = ["## Checks", "", *pieces.table(HEAD, [_row(check) for check in checks], NUMBERS), ""]
-    sections += ["## Figures", "", *map(pieces.figure, drawings)]
+        " with Pinocchio."
+    )
+    drawings = [draw(evidence) for draw in FIGURES]
     command = "spheretwin crosscheck"
-    return write_page(folder, NAME, "Cross-check", summary, sections, drawings, command, figure_format)
-
-
-def _row(check: Check) -> tuple[str, ...]:
-    verdict = "yes" if check.ok else "**no**"
-    figures = f"{check.states:,}", check.value_text(), check.bound_text()
-    return check.name, check.compares, *figures, verdict, check.why
+    return write_checks(folder, NAME, "Cross-check", lead, evidence.checks, drawings, command, figure_format)

@@ -306,11 +306,19 @@ def _field_of_another(path: tuple[str | int, ...], scenario: type[BaseModel]) ->
 UNITS = {
     "_rad_s3": "rad/s³", "_rad_s2": "rad/s²", "_Nm_rad": "N·m/rad", "_kg_m2": "kg·m²", "_rad_s": "rad/s",
     "_Nm_s": "N·m·s", "_m_s2": "m/s²", "_per_K": "1/K", "_degC": "°C", "_ohm": "Ω", "_rad": "rad",
-    "_A_V": "A/V", "_J_K": "J/K", "_K_W": "K/W", "_lsb": "LSB", "_Nm": "N·m", "_kg": "kg", "_Hz": "Hz",
-    "_m": "m", "_s": "s", "_A": "A", "_V": "V", "_H": "H", "duration": "s",
+    "_A_V": "A/V", "_A_s": "A/s", "_J_K": "J/K", "_K_W": "K/W", "_lsb": "LSB", "_Nm": "N·m", "_kg": "kg",
+    "_Hz": "Hz", "_m": "m", "_s": "s", "_A": "A", "_V": "V", "_H": "H", "_J": "J", "duration": "s",
 }  # fmt: skip
 
 
 def unit_of(dotted: str) -> str:
     """Return the unit at the end of the name of a field; empty for a number without unit, and for a text."""
     return next((unit for end, unit in UNITS.items() if dotted.endswith(end)), "")
+
+
+def quantity_text(dotted: str) -> str:
+    """Return the name of a field or a metric in words, with its unit: ``drive delay, s``."""
+    name = re.sub(r"(\.\d+)+$", "", dotted)
+    end = next((end for end in UNITS if end.startswith("_") and name.endswith(end)), "")
+    words = f"{name.removesuffix(end)}{dotted[len(name) :]}".replace("max_abs_", "largest ")
+    return ", ".join(filter(None, (re.sub("[._]", " ", words), unit_of(name))))

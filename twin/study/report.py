@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spheretwin.models.base.errors import shown
+from spheretwin.scenario.fields import quantity_text
 from spheretwin.study.statistics import Array, Rows, ranked, strongest
 from spheretwin.viz.pages import markdown as pieces
 from spheretwin.viz.pages.markdown import Drawing, write_page
@@ -52,12 +53,12 @@ def _lines(rows: Rows, field: str, values: NDArray[Any]) -> Drawing:
     figure = maps.lines(
         {law: _line(rows, law, places, len(x)) for law in rows.law_names},
         x if x.dtype == np.float64 else list(x),
-        field,
+        quantity_text(field),
         _quantity(rows),
         f"{rows.study['name']}: {_quantity(rows)}",
     )
     caption = (
-        f"{_quantity(rows)} by {field}: the line is the median of the completed rows, the band their range."
+        f"Median (line) and range (band) of the completed rows: {_quantity(rows)}, by {quantity_text(field)}."
     )
     return Drawing("report_axis.svg", caption, figure)
 
@@ -69,13 +70,13 @@ def _map(rows: Rows, varied: Mapping[str, NDArray[Any]]) -> Drawing:
     panels = {law: _panel(rows, law, down[1], across[1]) for law in rows.law_names}
     figure = maps.maps(
         panels,
-        (first, second),
+        (quantity_text(first), quantity_text(second)),
         ([_value_text(value) for value in down[0]], [_value_text(value) for value in across[0]]),
         _quantity(rows),
         f"{rows.study['name']}: {_quantity(rows)}",
     )
     caption = (
-        f"{_quantity(rows)} by {first} and {second}, one panel for each law: median of the completed rows."
+        f"Median of the completed rows, one panel for each law: {_quantity(rows)}."
         " A cross marks a cell with a row that did not complete."
     )
     return Drawing("report_map.svg", caption, figure)
@@ -93,32 +94,36 @@ def _many(rows: Rows, numbers: Mapping[str, NDArray[Any]]) -> Iterator[Drawing]:
         law: ranked([values[of_law] for values in numbers.values()], y[of_law])
         for law, of_law in complete.items()
     }
-    order, names = strongest(ranks.values()), list(numbers)
+    order, names = strongest(ranks.values()), list(map(quantity_text, numbers))
     bars = order[:MOST_BARS]
     figure = distributions.ranks(
         [names[place] for place in bars],
         {law: rank._replace(by_value=rank.by_value[bars], by_distance=rank.by_distance[bars])
          for law, rank in ranks.items()},
-        f"{rows.study['name']}: what {_quantity(rows)} goes with",
+        f"{rows.study['name']}: correlation of {_quantity(rows)}, with each axis",
     )  # fmt: skip
     partial = all(rank.is_partial for rank in ranks.values())
-    left = ", when what goes with the other axes is taken away" if partial else ""
+    effects = " The effect of the other axes is removed." if partial else ""
     caption = (
-        f"Spearman's rank correlation of {_quantity(rows)} with the value of each axis, and, as a ring, with"
-        f" its distance from the middle one{left}: the {len(bars)} strongest of {len(names)} axes, over the"
-        " completed rows. What does not matter is in the grey band 95 times of a hundred."
+        f"Spearman's rank correlation of {_quantity(rows)}, with the value of each axis (bar) and with the"
+        f" distance of the value from its median (ring): the {len(bars)} strongest of {len(names)} axes, over"
+        f" the completed rows.{effects} An axis without effect is within the grey band with a probability of"
+        " 95 %."
     )
     yield Drawing("report_ranks.svg", caption, figure)
-    shown = [names[place] for place in order[:MOST_SCATTERS]]
+    shown = [list(numbers)[place] for place in order[:MOST_SCATTERS]]
     figure = distributions.scatters(
-        {name: {law: numbers[name][of_law] for law, of_law in complete.items()} for name in shown},
+        {
+            quantity_text(name): {law: numbers[name][of_law] for law, of_law in complete.items()}
+            for name in shown
+        },
         {law: y[of_law] for law, of_law in complete.items()},
         _quantity(rows),
-        f"{rows.study['name']}: {_quantity(rows)} over its {len(shown)} strongest axes",
+        f"{rows.study['name']}: {_quantity(rows)}, over the {len(shown)} strongest axes",
     )
     caption = (
-        f"{_quantity(rows)} of the completed rows over the {len(shown)} axes that it goes with most:"
-        " a dot a row, a line the median of each tenth."
+        f"Completed rows over the {len(shown)} axes with the strongest correlation: {_quantity(rows)}."
+        " A dot is a row, a line the median of each tenth of the rows."
     )
     yield Drawing("report_strongest.svg", caption, figure)
 
@@ -136,16 +141,17 @@ def _distributions(rows: Rows) -> Drawing:
     }
     numbers = {name: by_law for name, by_law in numbers.items() if _differ(by_law.values())}
     totals = {law: int(np.count_nonzero(rows.laws == law)) for law in rows.law_names}
+    numbers = {quantity_text(name): by_law for name, by_law in numbers.items()}
     figure = distributions.distributions(numbers, totals, f"{rows.study['name']}: distributions")
     caption = (
-        "Share of all rows that were completed with at most this: a curve ends below 1 by the rows that were"
-        " not, or that never settled. Of a figure of each hinge, the largest of the three."
+        "Share of all rows that completed with at most this value. A curve ends below 1 if some rows did not"
+        " complete or never settled. Of a metric of each hinge, the largest of the three values is shown."
     )
     return Drawing("report_spread.svg", caption, figure)
 
 
 def _quantity(rows: Rows) -> str:
-    return f"{rows.main}"
+    return quantity_text(str(rows.main))
 
 
 def _complete(rows: Rows, law: str) -> NDArray[np.bool_]:
@@ -261,9 +267,12 @@ def medians(summary: Mapping[str, Any]) -> tuple[list[str], list[list[str]]]:
     """Headings and rows of a table: median and 95 % range of each figure, then the statuses, by law."""
     figures = [name for name in next(iter(summary.values()), {}) if name != "statuses"]
     statuses = sorted({status for of_law in summary.values() for status in of_law["statuses"]})
-    body = [[name, *(_spread(of_law[name]) for of_law in summary.values())] for name in figures]
+    body = [
+        [quantity_text(name), *(_spread(of_law[name]) for of_law in summary.values())] for name in figures
+    ]
     body += [
-        [name, *(str(of_law["statuses"].get(name, 0)) for of_law in summary.values())] for name in statuses
+        [f"number of rows: {name}", *(str(of_law["statuses"].get(name, 0)) for of_law in summary.values())]
+        for name in statuses
     ]
     return ["median (95 % range) of the completed rows", *summary], body
 
@@ -287,7 +296,7 @@ def _worst(rows: Rows, command: str) -> list[str]:
         [str(rows.numbers[place]), f"`{rows.keys[place]}`", rows.laws[place], f"{values[place]:.4g}"]
         for place in order[:MOST_NAMED]
     ]
-    head = ["row", "key", "law", rows.main]
+    head = ["row", "key", "law", _quantity(rows)]
     table = pieces.table(head, body, [True, False, False, True])
     alone = f"`{command} --row KEY` runs one row and prints its command line."
     return ["## Completed rows with the largest value", "", *table, "", alone, ""]
@@ -322,8 +331,12 @@ def _axes(study: Mapping[str, Any], rows: Rows) -> list[str]:
     """Axes with the values of the finished rows."""
     if not study["axis"]:
         return ["Only the seed differs."]
-    body = [[f"`{axis['field']}`", axis["kind"], _range(rows.axes[axis["field"]])] for axis in study["axis"]]
-    return pieces.table(["field", "kind", "values"], body, [False, False, False])
+    fields = [axis["field"] for axis in study["axis"]]
+    body = [
+        [quantity_text(field), axis["kind"], _range(rows.axes[field]), f"`{field}`"]
+        for field, axis in zip(fields, study["axis"], strict=True)
+    ]
+    return pieces.table(["quantity", "kind", "values", "field"], body, [False] * 4)
 
 
 def _range(values: Any) -> str:

@@ -61,7 +61,7 @@ def margins(values: Mapping[str, float], title: str) -> Figure:
     axes = figure.subplots()
     rows = np.arange(len(values))
     shares = np.clip(list(values.values()), LEAST_SHARE, 1 / LEAST_SHARE)
-    for within, colour, label in ((True, SERIES[0], "kept"), (False, BROKEN, "broken")):
+    for within, colour, label in ((True, SERIES[0], "within the bound"), (False, BROKEN, "exceeds the bound")):
         chosen = (shares <= 1) == within
         if np.any(chosen):
             axes.plot(shares[chosen], rows[chosen], "o", color=colour, markersize=6, label=label)
@@ -110,7 +110,7 @@ def spreads(
     axes.set_yticks(range(len(quantities)), quantities)
     axes.set_ylim(len(quantities) - 0.5, -0.5)
     _finish(axes, "relative difference", "", title)
-    axes.legend(loc="upper left", bbox_to_anchor=(0.0, -0.16), ncols=4)
+    figure.legend(loc="outside lower center", ncols=4)
     return figure
 
 

@@ -79,8 +79,8 @@ def courses(
         panel.set_ylabel(f"|error| of {name}, degrees")
     panels[0].set_title(title, fontsize="medium")
     panels[-1].set_xlabel("time, s")
-    panels[0].legend(loc="lower center", bbox_to_anchor=(0.5, 1.1), ncols=2, frameon=False,
-                     fontsize="small", handlelength=3.2)  # fmt: skip
+    handles, labels = panels[0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside lower center", ncols=2, frameon=False, handlelength=3.2)
     return figure
 
 

@@ -14,6 +14,8 @@ from matplotlib import rc_context
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.legend import Legend
+from matplotlib.text import Text
 from matplotlib.ticker import FixedLocator, NullFormatter, NullLocator
 from numpy.typing import NDArray
 
@@ -31,6 +33,13 @@ INK, FAINT, BROKEN = "#30343a", "#848a93", "#c8102e"
 
 WIDTH_in = 8.0
 DPI = 150
+
+PAPER_WIDTHS_in = {"pdf-one-column": 3.5, "pdf-two-columns": 7.16}
+"""Width of a figure for one column and for two columns of a paper, by the format that requests it."""
+PAPER_SCALE = 0.75
+"""Least scale of heights and text in a paper; the layout moves the axes together for the rest."""
+PAPER_TEXT_pt = 6.0
+"""Least size of text in a paper."""
 
 DASHES: tuple[Any, ...] = (
     "-",
@@ -76,6 +85,43 @@ def save(figure: Figure, path: Path, title: str = "") -> None:
         rc_context({"svg.hashsalt": path.name, "svg.fonttype": "none", "pdf.fonttype": 42}),
     ):
         figure.savefig(temporary, format=kind, dpi=DPI, metadata=metadata)
+
+
+def fit_width(figure: Figure, width_in: float) -> None:
+    """Set the width of a figure for a paper, with legible text: long titles wrap, legends lose columns.
+
+    Parameters
+    ----------
+    figure : Figure
+        With a constrained layout.
+    width_in : float, in
+    """
+    former_in, height_in = figure.get_size_inches()
+    scale = float(np.clip(width_in / former_in, PAPER_SCALE, 1.0))
+    figure.set_size_inches(width_in, scale * height_in)
+    for text in figure.findobj(Text):
+        text.set_fontsize(max(PAPER_TEXT_pt, scale * text.get_fontsize()))
+    titles = list(figure.texts)
+    for axes in figure.axes:
+        axes.tick_params(labelsize=max(PAPER_TEXT_pt, 8.0 * scale))  # also of ticks that are added later
+        titles += [axes.title, axes.xaxis.label, axes.yaxis.label]
+    for title in titles:
+        title.set_wrap(True)
+    for legend in list(figure.legends):
+        _narrow(figure, legend)
+
+
+def _narrow(figure: Figure, legend: Legend) -> None:
+    """Draw a legend below a figure with as many columns as its width has room for."""
+    texts = legend.get_texts()
+    handles, labels, size_pt = legend.legend_handles, [text.get_text() for text in texts], texts[0].get_size()
+    for columns in range(min(len(labels), 5), 0, -1):
+        legend.remove()
+        legend = figure.legend(handles, labels, loc="outside lower center", ncols=columns, frameon=False,
+                               fontsize=size_pt, handlelength=legend.handlelength)  # fmt: skip
+        figure.draw_without_rendering()
+        if legend.get_window_extent().width <= figure.bbox.width:
+            return
 
 
 def faint_grid(axes: Axes, alpha: float = 0.35, **options: Any) -> None:

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from markdown_it import MarkdownIt
 from markdown_it.token import Token
 
+from spheretwin.models.base.checks import Check, broken
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.base.files import make_folder, whole_file
 from spheretwin.models.telemetry.run_record import versions
@@ -202,7 +203,7 @@ def write_page(
     command : str
         Command that creates the page.
     figure_format : str
-        Format in which the figures are written in addition to SVG: svg, pdf or png.
+        Format in which the figures are written in addition to SVG, as in `save_drawings`.
 
     Raises
     ------
@@ -216,6 +217,50 @@ def write_page(
         save_text(folder / f"{name}.md", text),
         save_text(folder / f"{name}.html", page(title, text, folder)),
     ]
+
+
+HEAD = ("check", "compared quantities", "states", "value", "bound", "passed", "reason for the bound")
+NUMBERS = (False, False, True, True, True, False, False)
+
+
+def write_checks(
+    folder: Path,
+    name: str,
+    title: str,
+    lead: str,
+    checks: Sequence[Check],
+    drawings: Sequence[Drawing],
+    command: str,
+    figure_format: str = "svg",
+    sections: Sequence[str] = (),
+) -> list[Path]:
+    """Write a page of checks: the exceeded bounds in the summary, then checks, further sections and figures.
+
+    Parameters
+    ----------
+    lead : str
+        Beginning of the summary.
+    checks : sequence of Check
+    folder, name, title, drawings, command, figure_format, sections
+        As in `write_page`.
+
+    Raises
+    ------
+    InputError
+        A file cannot be written there.
+    """
+    names = broken(checks)
+    verdict = f"**Exceeded bounds: {'; '.join(names)}.**" if names else "**No bound is exceeded.**"
+    lines = ["## Checks", "", *table(HEAD, [_check_row(check) for check in checks], NUMBERS), "", *sections]
+    lines += ["## Figures", "", *map(figure, drawings)]
+    summary = [f"{lead} {len(checks)} checks. {verdict}"]
+    return write_page(folder, name, title, summary, lines, drawings, command, figure_format)
+
+
+def _check_row(check: Check) -> tuple[str, ...]:
+    passed = "yes" if check.ok else "**no**"
+    figures = f"{check.states:,}", check.value_text(), check.bound_text()
+    return check.name, check.compares, *figures, passed, check.why
 
 
 def contents(lines: Sequence[str]) -> list[str]:
@@ -241,7 +286,7 @@ def save_drawings(folder: Path, drawings: Iterable[Drawing], figure_format: str 
     folder : Path
     drawings : iterable of Drawing
     figure_format : str
-        svg, pdf or png.
+        svg, pdf, png, or pdf of a width of `style.PAPER_WIDTHS_in`.
 
     Raises
     ------
@@ -249,11 +294,13 @@ def save_drawings(folder: Path, drawings: Iterable[Drawing], figure_format: str 
         A file cannot be written there.
     """
     for drawing in drawings:
-        from spheretwin.viz.figures.style import save  # without figures, matplotlib may be absent
+        from spheretwin.viz.figures import style  # without figures, matplotlib may be absent
 
-        for suffix in dict.fromkeys(("svg", figure_format)):
-            path = (folder / drawing.file).with_suffix(f".{suffix}")
-            save(drawing.figure, path, drawing.caption)
+        for kind in dict.fromkeys(("svg", figure_format)):
+            if kind in style.PAPER_WIDTHS_in:
+                style.fit_width(drawing.figure, style.PAPER_WIDTHS_in[kind])
+            path = (folder / drawing.file).with_suffix(f".{kind.partition('-')[0]}")
+            style.save(drawing.figure, path, drawing.caption)
 
 
 def save_text(path: Path, text: str) -> Path:

@@ -151,4 +151,4 @@ def test_error_bands_name_axis_unit_and_law():
     figure = courses()
     assert [axes.get_ylabel() for axes in figure.axes] == ["|error| of α, degrees", "|error| of β, degrees"]
     assert figure.axes[-1].get_xlabel() == "time, s"
-    assert [text.get_text() for text in figure.axes[0].get_legend().get_texts()] == ["AFSM", "PID"]
+    assert [text.get_text() for text in figure.legends[0].get_texts()] == ["AFSM", "PID"]

@@ -71,7 +71,7 @@ def test_axes_have_the_colours_of_the_recordings():
 
 def test_a_broken_bound_stands_out():
     colours = {line.get_label(): line.get_color() for line in FIGURES["margins"]().axes[0].get_lines()}
-    assert colours["broken"] == style.BROKEN != colours["kept"]
+    assert colours["exceeds the bound"] == style.BROKEN != colours["within the bound"]
 
 
 def test_a_figure_that_cannot_be_written_is_bad_input(tmp_path):

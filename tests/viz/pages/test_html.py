@@ -5,7 +5,10 @@ from xml.etree import ElementTree
 
 import pytest
 from matplotlib.figure import Figure
+from matplotlib.text import Text
 
+from spheretwin.cli.options import COMMON
+from spheretwin.viz.figures.style import PAPER_TEXT_pt, PAPER_WIDTHS_in, fit_width
 from spheretwin.viz.pages import markdown
 
 
@@ -86,3 +89,50 @@ def test_the_same_page_has_the_same_bytes_in_each_format(tmp_path, kind, start):
     for file in files:
         assert (tmp_path / "a" / file).read_bytes() == (tmp_path / "b" / file).read_bytes()
     assert (tmp_path / "a" / f"first.{kind}").read_bytes().startswith(start)
+
+
+def test_formats_of_a_paper_have_its_widths():
+    assert PAPER_WIDTHS_in == {"pdf-one-column": 3.5, "pdf-two-columns": 7.16}
+    assert set(COMMON["--figure-format"]["choices"]) == {"svg", "pdf", "png", *PAPER_WIDTHS_in}
+
+
+@pytest.mark.parametrize("kind", PAPER_WIDTHS_in)
+def test_pdf_of_a_paper_has_its_width_and_the_svg_that_of_the_page(tmp_path, kind):
+    write(tmp_path / "a", kind)
+    content = (tmp_path / "a" / "first.pdf").read_bytes()
+    width_pt = float(re.search(rb"/MediaBox \[ 0 0 ([\d.]+) ", content)[1])
+    # PDF counts in 1/72 in, and matplotlib rounds to a thousandth.
+    assert width_pt == pytest.approx(72 * PAPER_WIDTHS_in[kind], abs=1e-2)
+    figure_width_in = Figure().get_size_inches()[0]
+    svg = ElementTree.parse(tmp_path / "a" / "first.svg").getroot()
+    assert svg.get("width") == f"{72 * figure_width_in:g}pt"
+
+
+@pytest.mark.parametrize("width_in", PAPER_WIDTHS_in.values())
+def test_text_of_a_paper_is_legible_and_within_the_figure(width_in):
+    figure = Figure(figsize=(10.0, 6.0), layout="constrained")
+    panels = figure.subplots(1, 2)
+    labels = [f"law {number} with a long name" for number in range(8)]
+    for label in labels:
+        panels[0].plot([0, 1], [1, 2], label=label)
+    for panel in panels:
+        panel.set_ylabel("largest error of the hinge, mrad", fontsize="small")
+        panel.set_title("a panel", fontsize="x-small")
+    title = "A title of many words that is longer than the width of one column of a paper can hold in one line"
+    figure.suptitle(title)
+    figure.legend(loc="outside lower center", ncols=8)
+    fit_width(figure, width_in)
+    figure.draw_without_rendering()
+    assert figure.get_size_inches()[0] == width_in
+    (legend,) = figure.legends
+    assert [text.get_text() for text in legend.get_texts()] == labels
+    shown = [text for text in figure.findobj(Text) if text.get_text() and text.get_visible()]
+    assert {title, "largest error of the hinge, mrad", *labels} <= {text.get_text() for text in shown}
+    assert min(text.get_fontsize() for text in shown) >= PAPER_TEXT_pt
+    for text in [*legend.get_texts(), *figure.texts, *(panel.yaxis.label for panel in panels)]:
+        box = text.get_window_extent()
+        # Nothing is cut: a pixel is what the hinting of a letter may take.
+        assert box.x0 >= -1
+        assert box.x1 <= figure.bbox.width + 1
+        assert box.y0 >= -1
+        assert box.y1 <= figure.bbox.height + 1

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from spheretwin.scenario.fields import quantity_text
 from spheretwin.study.optimise import ON, SWITCH, Gain, Objective, Optimise, best_within
 from spheretwin.study.study import Study
 from spheretwin.study.tuning.gains import section_of
@@ -30,16 +31,17 @@ def drawings(name: str, result: TuningResult, objectives: Sequence[Objective]) -
     by_label = {law.law: _trials(law, objectives) for law in result.laws if law.trials}
     if not by_label:
         return []
-    names = [objective.called for objective in objectives]
+    names = [_objective_text(objective.called) for objective in objectives]
     figures = [
         Drawing(
             "trials.svg",
-            "Objectives trial by trial: rings were pruned, and are at least that; crosses lost.",
+            "Objectives of each trial. A ring is a pruned trial, whose objective is at least this value; a"
+            " cross is a lost trial.",
             fronts.progress(by_label, names, f"{name}: trials"),
         )
     ]
     if len(objectives) == 2:
-        caption = "The front: no trial is as good in both objectives and better in one."
+        caption = "Pareto front: no other trial is at least as good in both objectives and better in one."
         figures.append(Drawing("front.svg", caption, fronts.front(by_label, names, f"{name}: front")))
     return figures
 
@@ -201,21 +203,21 @@ def _what(study: Study) -> list[str]:
     """Objectives, method and ranges."""
     optimise = section_of(study)
     ranges = [
-        [gain.called, gain.law or "all", *_range(gain), _sets(gain.settings), gain.reason]
+        [quantity_text(gain.called), gain.law or "all", *_range(gain), _sets(gain.settings), gain.reason]
         for gain in optimise.gain
     ]
     objectives = " and ".join(
-        f"*{objective.called}*, to {objective.direction}" for objective in optimise.objective
+        f"{objective.direction} *{_objective_text(objective.called)}*" for objective in optimise.objective
     )
     fresh = (
-        f" *Fresh* are {optimise.fresh} further seeds, which no trial was chosen by."
+        f" *Fresh* are {optimise.fresh} further seeds, which the choice of the trials did not use."
         if optimise.fresh
         else ""
     )
     return [
         f"Objectives: {objectives}, over {study.seeds} seeds of each point."
         f" Trials are {METHODS[optimise.sampler]}, {optimise.together} at a time."
-        + (" One that can no longer be among the best is pruned." if optimise.prune else "")
+        + (" A trial that can no longer be among the best is pruned." if optimise.prune else "")
         + _limits(optimise)
         + fresh,
         "",
@@ -227,7 +229,14 @@ def _limits(optimise: Optimise) -> str:
     if not optimise.limits:
         return ""
     listed = ", ".join(f"{limit:g}" for limit in optimise.limits)
-    return f" The best trial within each limit on *{optimise.objective[1].called}* is chosen: {listed}."
+    limited = _objective_text(optimise.objective[1].called)
+    return f" The best trial within each limit on *{limited}* is chosen: {listed}."
+
+
+def _objective_text(called: str) -> str:
+    """Return the name of an objective in words, with its unit and its entries."""
+    name, _, entries = called.partition(" of ")
+    return f"{quantity_text(name)} ({entries})" if entries else quantity_text(name)
 
 
 def _range(gain: Gain) -> list[str]:
@@ -236,7 +245,7 @@ def _range(gain: Gain) -> list[str]:
 
 def _sets(settings: Sequence[Any]) -> str:
     return ", ".join(
-        f"{setting.field}"
+        f"`{setting.field}`"
         + (f" · {setting.factor:g}" if setting.factor != 1 else "")
         + (f" (power {setting.power:g})" if setting.power != 1 else "")
         for setting in settings
@@ -267,7 +276,9 @@ def chosen(of_law: Mapping[str, Any]) -> tuple[list[str], list[list[str]]]:
         [*labelled[0][1]["gains"], *(field for _, candidate in labelled for field in candidate["fields"])]
     )
     is_fresh = any(candidate["fresh"] or candidate["fresh_reason"] for _, candidate in labelled)
-    head = ["trial", *columns, *values, *(f"{name}, fresh" for name in values if is_fresh)]
+    names = [_objective_text(name) for name in values]
+    fresh = [f"{name}, fresh" for name in names if is_fresh]
+    head = ["trial", *map(quantity_text, columns), *names, *fresh]
     body = []
     for label, candidate in labelled:
         numbers = {**candidate["gains"], **candidate["fields"]}

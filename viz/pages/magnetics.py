@@ -1,0 +1,234 @@
+"""Results of the magnetic model as tables, for the terminal and for pages, and the pages."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+from spheretwin.models.base.checks import bound_shares
+from spheretwin.models.design.curve_check import ComputedCurve, CurvePeak, JudgedCurve, Misfit
+from spheretwin.models.design.field_check import FieldVerdict
+from spheretwin.models.design.torque_map import TorqueSurvey, WeakPose, WorkspaceVerdict, direction_text
+from spheretwin.viz.pages import markdown
+from spheretwin.viz.pages.markdown import Drawing, write_checks
+
+# A table row for every third tilt: one screen.
+ROW_STRIDE = 3
+
+FIGURE_NAMES = {
+    "least_norm": ("least norm", "least_norm_Nm", "N·m"),
+    "best": ("best", "best_Nm", "N·m"),
+    "singular_value": ("least σ", "singular_value_Nm_per_A", "N·m/A"),
+}
+
+CURVE_HEAD = ("figure", "value")
+FIELD_HEAD = (
+    "tilt", "poses", "median error", "largest", "of largest torque", "half the points",
+)  # fmt: skip
+TILT_HEAD = (
+    "tilt", "least norm", "median of it", "best currents", "median of it", "least σ, N·m/A", "cond.",
+    "copper, W/(N·m)²",
+)  # fmt: skip
+POSE_HEAD = ("by", "worst", "tilt, °", "α, °", "β, °", "γ, °", "direction")
+
+
+class MagneticTable(NamedTuple):
+    """Rows of text under headings; the first column is words."""
+
+    title: str
+    head: Sequence[str]
+    rows: Sequence[Sequence[str]]
+
+
+def computed_curve_table(computed: ComputedCurve) -> MagneticTable:
+    """Return the results for a computed curve."""
+    title = "torque curve computed from the geometry"
+    return MagneticTable(title, CURVE_HEAD, [("peak", _peak(computed.peak))])
+
+
+def judged_curve_table(path: Path, judged: JudgedCurve) -> MagneticTable:
+    """Return the results for a user's curve."""
+    geometry = judged.geometry
+    rows = [
+        ("samples", str(judged.rows)),
+        ("peak", _peak(judged.peak)),
+        ("leave-one-out error of a sample", _misfit(judged.leave_one_out, "peak")),
+        ("difference from the geometry's curve", _misfit(geometry.as_given, "its peak")),
+        ("best factor on the geometry's curve", f"{geometry.scale:.4f}"),
+        ("difference from it after scaling", _misfit(geometry.scaled, "its peak")),
+        ("difference of look-up table and spline", f"{judged.lookup_error:.1e} of the peak"),
+    ]
+    return MagneticTable(f"torque curve {path}", CURVE_HEAD, rows)
+
+
+def field_table(verdict: FieldVerdict) -> MagneticTable:
+    """Return the errors of the torque matrix by tilt."""
+    title = f"torque by the curve against the direct sum (largest torque {verdict.largest_torque_Nm:.3f} N·m)"
+    rows = [
+        (
+            f"{band.tilt_deg[0]:.0f}° to {band.tilt_deg[1]:.0f}°",
+            str(band.poses),
+            _percent(band.median_relative_error),
+            _percent(band.largest_relative_error),
+            _percent(band.largest_error_of_largest_torque),
+            _percent(band.quadrature_of_largest_torque),
+        )
+        for band in verdict.by_tilt
+    ]
+    return MagneticTable(title, FIELD_HEAD, rows)
+
+
+def sources_text(verdict: FieldVerdict) -> str:
+    """Return the sentence on the sources of the errors."""
+    sources = verdict.sources
+    return (
+        "Sources of the error: the direct sum's quadrature"
+        f" (half the points change it by {sources.quadrature_of_largest_torque:.0e} of the largest torque);"
+        f" the curve between its samples ({sources.curve_between_samples_of_peak:.0e} of its peak);"
+        f" the look-up table ({sources.lookup_of_peak:.0e} of the peak)."
+    )
+
+
+def workspace_tables(verdict: WorkspaceVerdict) -> list[MagneticTable]:
+    """Return the torque capability by tilt, and the weakest poses."""
+    rows = [
+        (
+            f"{tilt.tilt_deg:g}°",
+            f"{tilt.least_norm_Nm:.3f}",
+            f"{tilt.least_norm_median_Nm:.3f}",
+            f"{tilt.best_Nm:.3f}",
+            f"{tilt.best_median_Nm:.3f}",
+            f"{tilt.singular_value_Nm_per_A:.4f}",
+            f"{tilt.condition:.2f}",
+            f"{tilt.copper_W_per_Nm2:.0f}",
+        )
+        for i, tilt in enumerate(verdict.by_tilt)
+        if i % ROW_STRIDE == 0 or i == len(verdict.by_tilt) - 1
+    ]
+    title = (
+        f"torque in every direction at {verdict.current_limit_A:g} A, N·m:"
+        f" worst and median of {verdict.poses} poses"
+    )
+    weakest = [_weak_row(pose) for pose in verdict.weakest]
+    return [MagneticTable(title, TILT_HEAD, rows), MagneticTable("weakest poses", POSE_HEAD, weakest)]
+
+
+def write_check(folder: Path, verdict: FieldVerdict, command: str, figure_format: str) -> list[Path]:
+    """Write the page of the comparison with direct sums and its figure; return both forms of the page.
+
+    Parameters
+    ----------
+    folder : Path
+        Exists.
+    verdict : FieldVerdict
+    command, figure_format : str
+        As in `markdown.write_page`.
+
+    Raises
+    ------
+    InputError
+        A file cannot be written there.
+    """
+    from spheretwin.viz.figures import crosscheck  # Matplotlib is optional
+
+    figure = crosscheck.margins(bound_shares(verdict.checks), "Share of the bound of each check")
+    drawing = Drawing("magnetics_margins.svg", "Value over bound of each check.", figure)
+    lead = (
+        "Comparison of the torque matrix with the summed field of all magnets on all windings, in random"
+        " poses and for random currents, and of the methods with published values."
+    )
+    sections = [*_section(field_table(verdict)), sources_text(verdict), ""]
+    return write_checks(folder, "magnetics_check", "Check of the magnetic model", _with_warnings(lead, verdict),
+                        verdict.checks, [drawing], command, figure_format, sections)  # fmt: skip
+
+
+def write_map(
+    folder: Path, surveyed: TorqueSurvey, verdict: WorkspaceVerdict, command: str, figure_format: str
+) -> list[Path]:
+    """Write the page of the torque map and its figures; return both forms of the page.
+
+    Parameters
+    ----------
+    folder : Path
+        Exists.
+    surveyed : TorqueSurvey
+    verdict : WorkspaceVerdict
+        `torque_map.judge` of the survey.
+    command, figure_format : str
+        As in `markdown.write_page`.
+
+    Raises
+    ------
+    InputError
+        A file cannot be written there.
+    """
+    least_norm_Nm = min(tilt.least_norm_Nm for tilt in verdict.by_tilt)
+    best_Nm = min(tilt.best_Nm for tilt in verdict.by_tilt)
+    lead = (
+        f"With at most {verdict.current_limit_A:g} A in each group, up to a tilt of"
+        f" {verdict.largest_tilt_deg:g}°, least-norm currents give at least {least_norm_Nm:.3f} N·m in every"
+        f" direction; the best currents give at least {best_Nm:.3f} N·m."
+    )
+    sections = [line for table in workspace_tables(verdict) for line in _section(table)]
+    return write_checks(folder, "magnetics_map", "Torque capability", _with_warnings(lead, verdict),
+                        verdict.checks, _maps(surveyed), command, figure_format, sections)  # fmt: skip
+
+
+def _maps(surveyed: TorqueSurvey) -> list[Drawing]:
+    from spheretwin.viz.figures import maps  # Matplotlib is optional
+
+    workspace, on_grid, worst = surveyed.workspace, surveyed.on_grid, surveyed.worst
+    limit_A = surveyed.actuator.group.current_limit_A
+    by_tilt = {
+        "least_norm_Nm": worst["least_norm"].capability.least_norm_Nm,
+        "best_Nm": worst["best"].capability.best_Nm,
+        "copper_W_per_Nm2": worst["singular_value"].capability.copper_W_per_Nm2,
+    }
+    return [
+        Drawing(
+            "capability_by_tilt.svg",
+            "Torque that is available in every direction, and copper loss, against the tilt of the shaft.",
+            maps.capability_by_tilt(workspace, on_grid, by_tilt, limit_A),
+        ),
+        Drawing(
+            "capability_map.svg",
+            "Worst value over all directions of torque and all spins; radius: tilt of the shaft in degrees,"
+            " angle: its azimuth.",
+            maps.capability_map(workspace, on_grid, limit_A),
+        ),
+    ]
+
+
+def _section(table: MagneticTable) -> list[str]:
+    """Lines of a section with one table."""
+    numbers = [place > 0 for place in range(len(table.head))]
+    heading = f"## {table.title[0].upper()}{table.title[1:]}"
+    return [heading, "", *markdown.table(table.head, table.rows, numbers), ""]
+
+
+def _with_warnings(lead: str, verdict: FieldVerdict | WorkspaceVerdict) -> str:
+    return " ".join([lead, *(f"Warning: {warning}." for warning in verdict.warnings)])
+
+
+def _weak_row(pose: WeakPose) -> tuple[str, ...]:
+    name, key, unit = FIGURE_NAMES[pose.figure]
+    angles = (_tenths(angle) for angle in (pose.tilt_deg, *pose.q_deg))
+    return name, f"{getattr(pose, key):.3g} {unit}", *angles, direction_text(pose.direction)
+
+
+def _peak(peak: CurvePeak) -> str:
+    return f"{peak.peak_Nm_per_A:.5f} N·m/A at {peak.peak_deg:.2f}°"
+
+
+def _misfit(misfit: Misfit, unit: str) -> str:
+    rms, worst = 100 * misfit.rms, 100 * misfit.worst
+    return f"rms {rms:.2g} %, at most {worst:.2g} % of {unit} (at {misfit.worst_deg:.2f}°)"
+
+
+def _tenths(value: float) -> str:
+    return f"{round(value, 1) + 0.0:.1f}"  # no negative zero
+
+
+def _percent(share: float) -> str:
+    return f"{100 * share:.3f} %"
