@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -21,6 +21,7 @@ from spheretwin.paper.rival_conditions import (
     tuned_gains,
 )
 from spheretwin.run import Run
+from spheretwin.scenario.fields import quantity_text
 
 OUR_LAW = "afsm_eso"
 LEVEL = 1.05
@@ -123,7 +124,7 @@ def ranges(hardware: Hardware) -> ResultTable:
     rows: list[tuple[str, ...]] = [
         (
             BY_LAW[gain.law].label if gain.law else "all laws",
-            gain.called.removeprefix("controller."),
+            _gain_name(gain.called),
             gain.reason,
             f"{gain.low:g}",
             f"{gain.high:g}",
@@ -136,41 +137,46 @@ def ranges(hardware: Hardware) -> ResultTable:
 
 
 def gains_table(hardware: Hardware) -> ResultTable:
-    """Gains of the search."""
+    """Gains of the search, by law and limit."""
+    by_law = {(tuned.law, tuned.limit_A_s): tuned.gains for tuned in tuned_gains(hardware.study)}
+    names = {(law, name) for (law, _), gains in by_law.items() for name in gains}
     rows: list[tuple[str, ...]] = [
-        (f"{gains.limit_A_s:g}", BY_LAW[gains.law].label, _as_text(gains.gains))
-        for gains in tuned_gains(hardware.study)
+        (
+            BY_LAW[law].label,
+            _gain_name(name),
+            *(_gain_text(by_law.get((law, limit)), name) for limit in hardware.limits_A_s),
+        )
+        for law, name in sorted(names, key=lambda gain: (list(BY_LAW).index(gain[0]), gain[1]))
     ]
-    return ResultTable(f"Gains found, {hardware.title}", ("limit, A/s", "law", "gains"), rows, 3)
+    head = ("law", "gain", *(f"limit {limit:g} A/s" for limit in hardware.limits_A_s))
+    return ResultTable(f"Gains found, {hardware.title}", head, rows, 2)
 
 
-def _as_text(gains: Mapping[str, float | None]) -> str:
-    by_name = {name.removeprefix("controller."): value for name, value in gains.items()}
-    return ", ".join(
-        f"{name} {'off' if value is None else f'{value:.4g}'}" for name, value in by_name.items()
-    )
+def _gain_name(called: str) -> str:
+    return quantity_text(called.removeprefix("controller."))
 
 
-def errors(hardware: Hardware, outcomes: Outcomes) -> ResultTable:
-    """Error, variation and tail of every law within each limit, and the limit that the currents set."""
+def _gain_text(gains: Mapping[str, float | None] | None, name: str) -> str:
+    if gains is None:
+        return NONE
+    value = gains[name]
+    return "off" if value is None else f"{value:.4g}"
+
+
+def errors(hardware: Hardware, outcomes: Outcomes) -> list[ResultTable]:
+    """Largest error, variation and RMS error of every law within each limit, and the limit of the currents."""
     conditions = [condition for condition in hardware.conditions if not condition.perturbed]
-    rows = _rows(hardware, conditions, outcomes, with_tail=True)
+    largest, *others = _tables(hardware, hardware.title, conditions, outcomes)
     if not hardware.in_degrees:
-        rows += _current_limits(conditions, outcomes)
-    unit = _unit(hardware)
-    title = (
-        f"{hardware.title}: largest error in {unit} / variation in A/s / tail RMS in {_tail_unit(hardware)}"
-    )
-    return ResultTable(title, ("limit, A/s", "law", *(condition.name for condition in conditions)), rows, 2)
+        largest.rows.extend(_current_limits(conditions, outcomes))
+    return [largest, *others]
 
 
-def robustness(hardware: Hardware, outcomes: Outcomes) -> ResultTable:
-    """Error and variation under a wrong nominal model, with the gains of the table before."""
+def robustness(hardware: Hardware, outcomes: Outcomes) -> list[ResultTable]:
+    """Largest error and variation under a wrong nominal model, with the gains of the tables before."""
     first = hardware.conditions[0]
     conditions = [first, *(condition for condition in hardware.conditions if condition.perturbed)]
-    rows = _rows(hardware, conditions, outcomes, with_tail=False)
-    title = f"{hardware.title}, wrong nominal model: largest error in {_unit(hardware)} / variation in A/s"
-    return ResultTable(title, ("limit, A/s", "law", *(condition.name for condition in conditions)), rows, 2)
+    return _tables(hardware, f"{hardware.title}, wrong nominal model", conditions, outcomes)[:2]
 
 
 def complete_prototype(hardware: Hardware, outcomes: Outcomes) -> list[ResultTable]:
@@ -207,102 +213,100 @@ def _by_limit_and_error(result: Result) -> tuple[float, bool, float]:
     return limit, result.is_lost, result.largest_rad
 
 
-def _rows(
-    hardware: Hardware, conditions: Sequence[Condition], outcomes: Outcomes, with_tail: bool
-) -> list[tuple[str, ...]]:
-    """A row a law, by limit and, within it, by the error under the first condition."""
+def _tables(
+    hardware: Hardware, title: str, conditions: Sequence[Condition], outcomes: Outcomes
+) -> list[ResultTable]:
+    """A table for each measure: a row for each law, by limit and by the error under the first condition."""
+    unit = _unit(hardware)
+    measures: dict[str, Callable[[Result], str]] = {
+        f"largest error, {unit}": lambda result: _angle(hardware, result.largest_rad),
+        "variation of the commands, A/s": lambda result: f"{result.variation_A_s:.1f}",
+        f"RMS error of the second half, {unit}": lambda result: _angle(hardware, result.tail_rad),
+    }
     by_condition = [results(hardware, condition, outcomes) for condition in conditions]
     by_law = [{(result.limit_A_s, result.label): result for result in of_one} for of_one in by_condition]
-    rows: list[tuple[str, ...]] = []
-    for limit in hardware.limits_A_s:
-        ordered = within(by_condition[0], limit)
-        rows += [_row(hardware, f"{limit:g}", result, by_law, with_tail) for result in ordered]
-        tuned = {result.law for result in ordered}
-        rows += [
-            (f"{limit:g}", law.label, "none within the limit", *[NONE] * (len(conditions) - 1))
-            for name, law in BY_LAW.items()
-            if tuned and name not in tuned
+    head = ("limit, A/s", "law", *(condition.name for condition in conditions))
+
+    def rows(text: Callable[[Result], str]) -> list[tuple[str, ...]]:
+        return [
+            (
+                "as shipped" if limit is None else f"{limit:g}",
+                label,
+                *(_cell(of_one.get((limit, label)), text) for of_one in by_law),
+            )
+            for limit, label in _order(hardware, by_condition[0])
         ]
-    presets = [result for result in by_condition[0] if result.limit_A_s is None]
-    return rows + [_row(hardware, "as shipped", result, by_law, with_tail) for result in presets]
+
+    return [ResultTable(f"{title}: {name}", head, rows(text), 2) for name, text in measures.items()]
 
 
-def _row(
-    hardware: Hardware,
-    limit: str,
-    of_law: Result,
-    by_law: Sequence[dict[tuple[float | None, str], Result]],
-    with_tail: bool,
-) -> tuple[str, ...]:
-    key = of_law.limit_A_s, of_law.label
-    cells = [_cell(hardware, of_one[key], with_tail) if key in of_one else NONE for of_one in by_law]
-    return (limit, of_law.label, *cells)
+def _order(hardware: Hardware, of_first: Sequence[Result]) -> list[tuple[float | None, str]]:
+    """Limits and laws of the rows: tuned laws by their error, those without gains in the limit, presets."""
+    order: list[tuple[float | None, str]] = []
+    for limit in hardware.limits_A_s:
+        tuned = [result.label for result in within(of_first, limit)]
+        others = [law.label for law in BY_LAW.values() if tuned and law.label not in tuned]
+        order += [(limit, label) for label in (*tuned, *others)]
+    return order + [(None, result.label) for result in of_first if result.limit_A_s is None]
 
 
-def _cell(hardware: Hardware, result: Result, with_tail: bool) -> str:
-    if result.is_lost:
-        return "lost"
-    cells = [_angle(hardware, result.largest_rad), f"{result.variation_A_s:.1f}"]
-    if with_tail:
-        tail = np.degrees(result.tail_rad) if hardware.in_degrees else 1e4 * result.tail_rad
-        cells.append(f"{tail:.3f}" if hardware.in_degrees else f"{tail:.2f}")
-    return " / ".join(cells)
+def _cell(result: Result | None, text: Callable[[Result], str]) -> str:
+    if result is None:
+        return NONE
+    return "lost" if result.is_lost else text(result)
 
 
 def _angle(hardware: Hardware, value_rad: float) -> str:
-    return f"{np.degrees(value_rad):.4f}" if hardware.in_degrees else f"{1e3 * value_rad:.2f}"
+    return f"{np.degrees(value_rad):.4f}" if hardware.in_degrees else f"{1e3 * value_rad:.3f}"
 
 
 def _unit(hardware: Hardware) -> str:
     return "degrees" if hardware.in_degrees else "mrad"
 
 
-def _tail_unit(hardware: Hardware) -> str:
-    return "degrees" if hardware.in_degrees else "1e-4 rad"
-
-
 def _current_limits(conditions: Sequence[Condition], outcomes: Outcomes) -> list[tuple[str, ...]]:
     limits = [current_limits_rad(condition, outcomes) for condition in conditions]
     return [
-        ("physical", label, *(f"{1e3 * limit[name]:.2f}" if name in limit else NONE for limit in limits))
+        ("physical", label, *(f"{1e3 * limit[name]:.3f}" if name in limit else NONE for limit in limits))
         for name, label in ALLOCATION_LABELS.items()
         if any(name in limit for limit in limits)
     ]
 
 
 def findings(outcomes: Outcomes) -> list[Finding]:
-    """Best law within each limit, and which laws are level with or better than our own."""
+    """Law with the smallest error within each limit, and laws that are level with or better than our own."""
     return [
-        Finding(None, f"{hardware.title}, {condition.name}, largest error: {'; '.join(parts)}")
+        Finding(None, f"{hardware.title}, {condition.name}: {'; '.join(statements)}")
         for hardware in HARDWARE
         for condition in hardware.conditions
-        if (parts := _by_limit(hardware, condition, outcomes))
+        if (statements := _by_limit(hardware, condition, outcomes))
     ]
 
 
 def _by_limit(hardware: Hardware, condition: Condition, outcomes: Outcomes) -> list[str]:
+    """Statements on the order of the laws, each with the limits for which it is true."""
     complete = [result for result in results(hardware, condition, outcomes) if not result.is_lost]
-    return [
-        f"tuned within {limit:g} A/s {_comparison(hardware, ordered)}"
-        for limit in hardware.limits_A_s
-        if (ordered := within(complete, limit))
-    ]
+    limits: dict[str, list[str]] = {}
+    for limit in hardware.limits_A_s:
+        if ordered := within(complete, limit):
+            limits.setdefault(_comparison(ordered), []).append(f"{limit:g}")
+    return [f"within {_listed(texts)} A/s {statement}" for statement, texts in limits.items()]
 
 
-def _comparison(hardware: Hardware, ordered: Sequence[Result]) -> str:
-    """Order of some laws against our own; the least error first."""
-    unit, own_label = _unit(hardware), BY_LAW[OUR_LAW].label
-    texts = {
-        result.law: f"{result.label} ({_angle(hardware, result.largest_rad)} {unit})" for result in ordered
-    }
-    if OUR_LAW not in texts:
-        return f"{texts[ordered[0].law]} is best, and {own_label} lost the rotor or is beyond the limit"
-    errors = {result.law: result.largest_rad for result in ordered}
-    ours = errors.pop(OUR_LAW)
-    better = [texts[law] for law, error in errors.items() if LEVEL * error < ours]
-    level = [texts[law] for law, error in errors.items() if ours / LEVEL <= error <= LEVEL * ours]
-    parts = [f"{name}: {', '.join(laws)}" for name, laws in (("better", better), ("level", level)) if laws]
-    if not parts:
-        nearest = f", before {texts[next(iter(errors))]}" if errors else ""
-        return f"{texts[OUR_LAW]} is best{nearest}"
-    return f"{texts[OUR_LAW]} is not alone; {'; '.join(parts)}"
+def _comparison(ordered: Sequence[Result]) -> str:
+    """Compare some laws, the least error first, with our own."""
+    own = BY_LAW[OUR_LAW].label
+    errors = {result.label: result.largest_rad for result in ordered}
+    ours = errors.pop(own, None)
+    if ours is None:
+        return f"{ordered[0].label} has the smallest error, and {own} loses the rotor or exceeds the limit"
+    better = [law for law, error in errors.items() if LEVEL * error < ours]
+    level = [law for law, error in errors.items() if ours / LEVEL <= error <= LEVEL * ours]
+    if better:
+        text = f"{_listed(better)} {'have' if len(better) > 1 else 'has'} a smaller error than {own}"
+        return f"{text}, which is level with {_listed(level)}" if level else text
+    return f"{own} is level with {_listed(level)}" if level else f"{own} has the smallest error"
+
+
+def _listed(names: Sequence[str]) -> str:
+    return " and ".join(filter(None, (", ".join(names[:-1]), names[-1])))

@@ -10,17 +10,17 @@ from spheretwin.paper import rival_results
 from spheretwin.paper.experiment import Experiment, Outcomes, Section
 from spheretwin.paper.laws import BY_LAW
 from spheretwin.paper.rival_conditions import HARDWARE, Condition, Hardware, cases, study
-from spheretwin.paper.rival_results import current_limits_rad, results, start_error
+from spheretwin.paper.rival_results import LEVEL, current_limits_rad, results, start_error
 from spheretwin.viz.pages.markdown import Drawing
 
 if TYPE_CHECKING:
     from spheretwin.viz.figures.fronts import FrontPanel
 
 CAPTION = (
-    "A marker is a law with the gains that the search found within one limit on the variation, median over"
-    " the seeds; a line joins the limits. Hollow: presets as shipped."
+    "Marker: a law with the gains that the search found within one limit on the variation, median over the"
+    " seeds. Line: the limits of one law. Hollow marker: preset as shipped."
 )
-FULL_CURRENT = " Grey lines: full current at the start, least norm (upper) and bounded (lower)."
+FULL_CURRENT = " Grey lines: error with full current at the start, least norm (upper) and bounded (lower)."
 
 
 def figure(hardware: Hardware, outcomes: Outcomes) -> Drawing:
@@ -70,30 +70,32 @@ def _panel(hardware: Hardware, condition: Condition, outcomes: Outcomes) -> Fron
 
 
 METHOD = (
-    "Every law is tuned with the same budget: {draws} points of a Sobol sequence over all of its gains, then"
-    " {perturbations} perturbations of the best within each limit on the variation of the currents, under the"
-    " same seed for all. The reference governor and the feed-forward of inertia and friction are gains of"
-    " every law: each may be off. The gains are frozen in the package; `make tune-rivals` searches them"
-    " again. The figures below are medians over the seeds of this page, which the search did not use."
+    "The search gives every law the same budget: {draws} points of a Sobol sequence over all of its gains,"
+    " then {perturbations} perturbations of the best point within each limit on the variation of the"
+    " currents. All laws have the same seed. The reference governor and the feed-forward of inertia and"
+    " friction are gains of every law, and each may be off. The package contains the gains;"
+    " `make tune-rivals` repeats the search. The tables show medians over the seeds of this page, which the"
+    f" search did not use. Two laws are *level* if their errors differ by at most {100 * (LEVEL - 1):.0f} %."
+    " A dash in a table stands for a law without gains within the limit."
 )
 OBJECTIVES = {
     "ideal": (
-        "Objective: the geometric mean of the largest errors at m = 0.2, L = 1 and at m = 0.5, L = 5, with"
-        " the same gains; the limit holds at m = 0.2, L = 1. m = 0, L = 0 was not tuned for. *Full current*"
-        " is what ±8 A allow at the start, where the reference has a rate and the rotor is at rest: the"
-        " largest error until the rates agree, with all of the current against the error of the rate. Least"
-        " norm is the allocation of all laws here; a law can be some percent below its row, as it may"
-        " share the torque among the hinges in another way."
+        "The search minimises the geometric mean of the largest errors at m = 0.2, L = 1 and at m = 0.5,"
+        " L = 5, with the same gains; the limit applies at m = 0.2, L = 1. No law was tuned for m = 0,"
+        " L = 0. *Full current* is the smallest error that ±8 A allow at the start, where the reference has"
+        " a rate and the rotor is at rest: the largest error until the rates agree, with the full current"
+        " against the rate error. All laws here use the least-norm allocation. A law can have a slightly"
+        " smaller error than the row of the least norm, as its torque can have another direction."
     ),
     "electronics": (
-        "Objective: the true error of the worse of α and β without the offset and gain errors of the"
-        " converter, which no law can observe. All gains of γ, whose encoder is coarse, may be lower by a"
-        " common ratio."
+        "The search minimises the larger true error of α and β without the offset and gain errors of the"
+        " converter, which no law can observe. All gains of γ, whose encoder has coarse steps, may be"
+        " reduced by a common ratio."
     ),
 }
 ROBUSTNESS = (
-    "The same gains while the controller's nominal model is wrong. None was tuned for. Group gains are drawn"
-    " from the seed of each run; *lost* means that a run did not complete."
+    "The same gains with a wrong nominal model of the controller. No law was tuned for it. Group gains are"
+    " drawn from the seed of each run. *Lost*: a run did not complete."
 )
 
 PROTOTYPE_TEXT = (
@@ -121,10 +123,10 @@ def _of_hardware(hardware: Hardware, outcomes: Outcomes) -> list[Section]:
         Section(
             title,
             f"{method} {OBJECTIVES[hardware.name]}",
-            [rival_results.errors(hardware, outcomes)],
+            rival_results.errors(hardware, outcomes),
             [lambda: figure(hardware, outcomes)],
         ),
-        Section(f"{title}: robustness", ROBUSTNESS, [rival_results.robustness(hardware, outcomes)]),
+        Section(f"{title}: robustness", ROBUSTNESS, rival_results.robustness(hardware, outcomes)),
         *(
             Section(f"{title}: every imperfection", PROTOTYPE_TEXT, [table])
             for table in rival_results.complete_prototype(hardware, outcomes)
@@ -136,9 +138,9 @@ def _of_hardware(hardware: Hardware, outcomes: Outcomes) -> list[Section]:
 EXPERIMENT = Experiment(
     name="rivals",
     title="Comparison of the laws, tuned by the same search",
-    summary="Every law tuned with the same budget for the sinusoid on ideal hardware and for the tilt with"
-    " the prototype's electronics, within limits on the variation of the currents, and run under other seeds"
-    " and with a wrong nominal model.",
+    summary="A search with the same budget tuned every law for the sinusoid on ideal hardware and for the"
+    " tilt with the electronics of the prototype, within limits on the variation of the currents. The laws run with these gains"
+    " under other seeds and with a wrong nominal model.",
     cases=cases,
     sections=_sections,
     reduce=start_error,

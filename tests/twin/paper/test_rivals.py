@@ -16,6 +16,7 @@ from spheretwin.paper.rival_conditions import ELECTRONICS, FOLDER, HARDWARE, IDE
 from spheretwin.paper.rival_results import results, start_error, within
 from spheretwin.paper.rivals import EXPERIMENT
 from spheretwin.paper.runner import make_plan, run_plan, scenario_of, unexpected_ends
+from spheretwin.scenario.fields import quantity_text
 from spheretwin.study.grid import Grid
 from spheretwin.study.row import Rows
 from spheretwin.study.study import load
@@ -155,16 +156,66 @@ def test_results_are_medians_and_no_numbers_if_a_run_was_lost():
 @pytest.mark.parametrize(
     ("errors", "expected"),
     [
-        ({"afsm_eso": (1e-3,), "adrc": (2e-3,)}, "AFSM-ESO (1.00 mrad) is best, before ADRC (2.00 mrad)"),
-        ({"afsm_eso": (1e-3,), "adrc": (1.04e-3,)}, "is not alone; level: ADRC (1.04 mrad)"),
-        ({"afsm_eso": (1e-3,), "adrc": (0.9e-3,)}, "is not alone; better: ADRC (0.90 mrad)"),
-        ({"adrc": (0.9e-3,)}, "ADRC (0.90 mrad) is best, and AFSM-ESO lost the rotor or is beyond the limit"),
+        ({"afsm_eso": (1e-3,), "adrc": (2e-3,)}, "AFSM-ESO has the smallest error"),
+        ({"afsm_eso": (1e-3,), "adrc": (1.04e-3,)}, "AFSM-ESO is level with ADRC"),
+        ({"afsm_eso": (1e-3,), "adrc": (0.9e-3,)}, "ADRC has a smaller error than AFSM-ESO"),
+        (
+            {"afsm_eso": (1e-3,), "adrc": (0.9e-3,), "pid": (0.8e-3,), "lqi": (1.01e-3,)},
+            "tuned PID and ADRC have a smaller error than AFSM-ESO, which is level with LQI",
+        ),
+        (
+            {"adrc": (0.9e-3,)},
+            "ADRC has the smallest error, and AFSM-ESO loses the rotor or exceeds the limit",
+        ),
     ],
 )
 def test_findings_say_where_rivals_are_level_or_better(errors, expected):
     (finding,) = rival_results.findings(made_up(30.0, errors))
-    assert expected in finding.text
-    assert "tuned within 30 A/s" in finding.text
+    assert finding.text == f"{IDEAL.title}, {IDEAL.conditions[0].name}: within 30 A/s {expected}"
+
+
+def test_limits_with_the_same_order_are_one_statement():
+    outcomes = Outcomes(
+        made_up(7.2, {"afsm_eso": (1e-3,), "adrc": (2e-3,)})
+        | made_up(30.0, {"afsm_eso": (2e-3,), "adrc": (3e-3,)})
+    )
+    (finding,) = rival_results.findings(outcomes)
+    assert finding.text.endswith(": within 7.2 and 30 A/s AFSM-ESO has the smallest error")
+
+
+def test_tables_have_one_number_a_cell_in_the_unit_of_their_title():
+    outcomes = made_up(30.0, {"pid": (2e-3, 4e-3, 9e-3), "adrc": (1e-3, 1e-3, 1e-3)})
+    largest, variation, tail = rival_results.errors(IDEAL, outcomes)
+    assert [table.title for table in (largest, variation, tail)] == [
+        f"{IDEAL.title}: largest error, mrad",
+        f"{IDEAL.title}: variation of the commands, A/s",
+        f"{IDEAL.title}: RMS error of the second half, mrad",
+    ]
+    assert largest.head == ("limit, A/s", "law", "m 0.2, L 1", "m 0.5, L 5", "m 0, L 0")
+    rows = [table.rows[:2] for table in (largest, variation, tail)]
+    assert rows[0] == [("30", "ADRC", "1.000", "–", "–"), ("30", "tuned PID", "4.000", "–", "–")]
+    assert [row[2] for row in rows[1]] == ["30.0", "30.0"]
+    assert [row[2] for row in rows[2]] == ["0.100", "0.400"]
+    # Laws that did not run, and so have no number, follow.
+    assert [row[1] for row in largest.rows[2:]] == [
+        law.label for law in BY_LAW.values() if law.law not in ("adrc", "pid")
+    ]
+    assert all(set(row[2:]) == {"–"} for row in largest.rows[2:])
+
+
+def test_gains_have_a_row_each_and_a_column_for_each_limit():
+    table = rival_results.gains_table(IDEAL)
+    assert table.head == ("law", "gain", *(f"limit {limit:g} A/s" for limit in IDEAL.limits_A_s))
+    assert len({row[:2] for row in table.rows}) == len(table.rows)
+    cells = {row[:2]: row[2:] for row in table.rows}
+    for tuned in tuned_gains(IDEAL.study):
+        for name, value in tuned.gains.items():
+            words = quantity_text(name.removeprefix("controller."))
+            cell = cells[BY_LAW[tuned.law].label, words][IDEAL.limits_A_s.index(tuned.limit_A_s)]
+            assert cell == ("off" if value is None else f"{value:.4g}")
+    assert sum(cell != "–" for row in cells.values() for cell in row) == sum(
+        len(tuned.gains) for tuned in tuned_gains(IDEAL.study)
+    )
 
 
 def test_nothing_is_found_where_nothing_ran():
