@@ -1,4 +1,4 @@
-"""What the paper shows, run again: one experiment a file or folder, and the page of what they found."""
+"""Experiments of the paper, run again: one file each, and the page of their results."""
 
 from spheretwin.paper import (
     error_budget,

@@ -185,12 +185,12 @@ METHOD = (
 
 
 def cases() -> list[Case]:
-    """Every stage under every law."""
+    """Cases of every stage under every law."""
     return [case(law, stage) for law in LAWS for stage in STAGES]
 
 
 def case(law: str, stage: Stage) -> Case:
-    """A stage under a law."""
+    """Case of a stage under a law."""
     return Case(
         name=f"{law}: {stage.name}",
         scenario="tilt",
@@ -201,7 +201,7 @@ def case(law: str, stage: Stage) -> Case:
 
 
 def sections(outcomes: Outcomes) -> list[Section]:
-    """A table for each hinge, and one figure."""
+    """Section with a table for each hinge, and one figure."""
     laws = [law for law in LAWS if any(outcomes.runs(case(law, stage)) for stage in STAGES)]
     tables = [_table(outcomes, laws, axis) for axis in range(len(ANGLES))]
     most = "; ".join(filter(None, (_most(outcomes, law) for law in laws)))
@@ -210,7 +210,7 @@ def sections(outcomes: Outcomes) -> list[Section]:
 
 
 def findings(outcomes: Outcomes) -> list[Finding]:
-    """The part of the prototype that changes most, under each law."""
+    """Finding on the part of the prototype with the largest change of the error, under each law."""
     most = [text for law in LAWS if (text := _most(outcomes, law))]
     return (
         [Finding(None, f"single part with the largest change of the error: {'; '.join(most)}")]
@@ -226,7 +226,7 @@ def law_name(law: str) -> str:
 
 
 def _most(outcomes: Outcomes, law: str) -> str:
-    """The single part that changes the error of any hinge the most; empty if not all were run."""
+    """Name the part with the largest change of the error of any hinge; empty if not all were run."""
     medians = {stage.name: _medians_deg(outcomes.runs(case(law, stage))) for stage in STAGES}
     parts = [stage for stage in STAGES if stage.fields and stage.name not in (ELECTRONICS, ALL)]
     changes = np.array([medians[stage.name] - medians[stage.base] for stage in parts])
@@ -271,7 +271,7 @@ def _drawing(outcomes: Outcomes, laws: Sequence[str]) -> Drawing:
 
 
 def _medians_deg(runs: Sequence[Outcome]) -> Array:
-    """(3,) in degrees; NaN without a run."""
+    """Median of the largest errors, (3,) in degrees; NaN without a run."""
     if not runs:
         return np.full(3, np.nan)
     return np.degrees(np.median([run.max_abs_error for run in runs], axis=0))

@@ -107,7 +107,7 @@ class Section(NamedTuple):
     """Paragraphs in Markdown."""
     tables: Sequence[ResultTable] = ()
     drawings: Sequence[Callable[[], Drawing]] = ()
-    """Figures, drawn only if a page is written."""
+    """Functions that draw the figures; only a page calls them."""
 
 
 class Finding(NamedTuple):

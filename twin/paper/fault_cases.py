@@ -1,4 +1,4 @@
-"""The cases of the fault study: the nutation with m = 0.2 and L = 1, healthy and with every fault."""
+"""Cases of the fault study: the nutation with m = 0.2 and L = 1, healthy and with every fault."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ class Failure(NamedTuple):
 
 
 def failures() -> list[Failure]:
-    """Every mode of every part that all groups share, if it needs no value or has one in `VALUES`."""
+    """Modes of the parts that all groups share, if a mode needs no value or has one in `VALUES`."""
     return [
         Failure(part, mode, *VALUES.get((target.name, mode), (None, "")))
         for target in TARGETS.values()
@@ -92,19 +92,19 @@ def random_groups() -> tuple[Groups, ...]:
 
 @cache
 def singles() -> tuple[Groups, ...]:
-    """Every group alone."""
+    """Sets of one group."""
     return tuple((group,) for group in range(count()))
 
 
 @cache
 def pairs() -> tuple[Groups, ...]:
-    """Every two groups."""
+    """Sets of two groups."""
     return tuple(combinations(range(count()), 2))
 
 
 @cache
 def count() -> int:
-    """Coil groups of the actuator."""
+    """Number of coil groups of the actuator."""
     return len(actuator.load().groups)
 
 
@@ -118,10 +118,10 @@ class Way(NamedTuple):
     """Fields of the scenario."""
 
 
-UNREPORTED = Way("not told")
-REPORTED = Way("told", {"reported_to_controller": True})
+UNREPORTED = Way("not reported")
+REPORTED = Way("reported", {"reported_to_controller": True})
 DETECTING = Way("detecting", {"detection": True})
-BOUNDED = Way("told, bounded", {"reported_to_controller": True}, {"allocation": "bounded"})
+BOUNDED = Way("reported, bounded", {"reported_to_controller": True}, {"allocation": "bounded"})
 
 OF_GROUPS = (UNREPORTED, REPORTED, DETECTING, BOUNDED)
 """For open groups: they are not reported, reported to the allocation, or detected. The last way reports
@@ -144,7 +144,7 @@ ELECTRONICS: dict[str, Any] = {**BASE, "hardware": "electronics"}
 OTHER_ENGINE: dict[str, Any] = {"plant.engine": "mujoco"}
 
 SAMPLE = 100
-"""One set in so many runs on MuJoCo too."""
+"""One of this number of sets also runs on MuJoCo."""
 
 # Every status but that of diverged numbers.
 EXPECTED = (Status.COMPLETED, Status.LEFT_WORKSPACE, Status.FAILSAFE)
@@ -169,18 +169,18 @@ def cases() -> list[Case]:
 
 
 def of_groups(groups: Groups, way: Way) -> Case:
-    """Open groups in one way."""
+    """Case of open groups in one way."""
     kind = {1: "single", 2: "pair"}.get(len(groups), "drawn")
     return _of_coils(groups, way, "open", kind)
 
 
 def shorted(groups: Groups, way: Way) -> Case:
-    """Groups shorted at their ends in one way."""
+    """Case of groups with shorted ends in one way."""
     return _of_coils(groups, way, "short", "short")
 
 
 def on_other_engine(groups: Groups, way: Way) -> Case:
-    """The same on MuJoCo."""
+    """Case of open groups in one way, on MuJoCo."""
     case = of_groups(groups, way)
     return case._replace(
         name=f"{case.name}, MuJoCo",
@@ -191,7 +191,7 @@ def on_other_engine(groups: Groups, way: Way) -> Case:
 
 
 def of_part(failure: Failure, way: Way) -> Case:
-    """A failure of what all groups share, in one way."""
+    """Case of a failure of a part that all groups share, in one way."""
     fault: dict[str, Any] = {"target": failure.part, "mode": failure.mode}
     if failure.value is not None:
         fault["value"] = failure.value
@@ -213,12 +213,12 @@ def of_part(failure: Failure, way: Way) -> Case:
 
 
 def sets() -> list[Groups]:
-    """Every single group, every pair, every random set."""
+    """Sets of one group, of two groups and random sets."""
     return [*singles(), *pairs(), *random_groups()]
 
 
 def sample() -> list[Groups]:
-    """Sets that run on MuJoCo too."""
+    """Sets that also run on MuJoCo."""
     return sets()[::SAMPLE]
 
 

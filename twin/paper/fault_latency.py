@@ -16,14 +16,14 @@ from spheretwin.paper.fault_outcomes import tracks
 from spheretwin.paper.fault_sections import percent, runs_by_set
 
 METHOD = (
-    "*Latency* is the time from the start of a fault to the tick from which on the allocation leaves the"
-    " group out. Faults that are not detected before the run ends count as infinite in the quantiles. The"
+    "*Latency* is the time from the start of a fault to the first tick at which the allocation excludes the"
+    " group. Faults that are not detected before the run ends count as infinite in the quantiles. The"
     " *driven ticks* of an open group are the control ticks after the fault at which its commanded current"
-    " is above the threshold of the detector. At all others it is idle: within the threshold an open group"
-    " carries what a healthy one does, and cannot be told from it. An idle group cannot be observed, so"
-    " the latency is the wait for driven ticks.\n\n"
-    "The *cost* of the delay is the error after the fault (as above) less that of the run that is told,"
-    " with the same groups, seed and start."
+    " is above the threshold of the detector. At all other ticks the group is idle: an open group within the"
+    " threshold cannot be distinguished from a healthy one. The latency is therefore the time until enough"
+    " driven ticks have passed.\n\n"
+    "The *cost* of the delay is the error after the fault (as above) minus that of the run with a reported"
+    " fault of the same groups, seed and start."
 )
 HEAD = (
     "groups", "faults", "latency, ms: median", "90 %", "95 %", "99 %", "longest detected", "not detected",

@@ -234,7 +234,7 @@ def reason(outcome: Outcome) -> str | None:
     if data.is_reported:
         by_least_norm = f", {data.remaining.least_norm:.2f} by least norm" if data.least_norm else ""
         return f"{data.remaining.torque:.2f} of the torque needed is left{by_least_norm}"
-    return f"{data.remaining.least_share:.3f} of the torque asked for comes"
+    return f"{data.remaining.least_share:.3f} of the commanded torque is delivered"
 
 
 def row_fields(outcomes: Sequence[Outcome]) -> Mapping[str, Any]:

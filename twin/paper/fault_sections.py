@@ -26,10 +26,10 @@ PARTS_HEAD = ("part and mode", *(way.name for way in cases.OF_PARTS), "stopped f
 
 
 def parts_section(outcomes: Outcomes) -> Section:
-    """How every mode of every part ends in its three ways."""
+    """Result of every mode of every part in its three ways."""
     failures = [failure for failure in cases.failures() if outcomes.runs(cases.of_part(failure, cases.ALONE))]
     rows = [_parts_row(outcomes, failure) for failure in failures]
-    title = "Failures that start at a drawn time: how the runs ended, and their error ratio"
+    title = "Failures that start at a random time: status of the runs, and their error ratio"
     return Section(
         "Sensors, supply and controller",
         f"{PARTS_METHOD}{_healthy(outcomes)}{_watchdog_text(outcomes, failures)}",
@@ -154,14 +154,15 @@ def torque_left(points: Mapping[str, Sequence[tuple[float, float, int]]]) -> Dra
 
 GROUPS_METHOD = (
     "Coils on ideal hardware, the least-norm allocation with its limit of 8 A unless it says *bounded* (all"
-    " that the limit allows). *Not told*: nobody knows. *Told*: the allocation leaves the groups out from the"
-    " tick on at which they open. *Detecting*: it leaves out what the detector has found by itself.\n\n"
-    "The fault starts at a control tick drawn from the seed, evenly over the whole run; all ways of a set"
+    " that the limit allows). *Not reported*: the controller has no information about the fault. *Reported*:"
+    " the allocation excludes the groups from the tick at which they open. *Detecting*: the allocation"
+    " excludes the groups that the detector identifies.\n\n"
+    "The fault starts at a random control tick of the run, which depends on the seed; all ways of a set"
     " share it. The *error ratio* is the largest error of any hinge from the start of the fault to the end of"
     " the run, divided by the same error of the healthy run with the same seed, allocation and window. A run"
     f" *tracks* if it completes and its error ratio is at most {TWICE:g}.\n\n"
-    f"Every group and every pair runs with every seed; {cases.RANDOM_SETS} larger sets, drawn once, run with"
-    " one each."
+    f"Every group and every pair runs with every seed; {cases.RANDOM_SETS} larger random sets run with"
+    " one seed each."
 )
 GROUPS_HEAD = (
     "open groups", "way", "sets", "runs", "completed", "track",
@@ -252,7 +253,7 @@ def few(outcomes: Outcomes, way: cases.Way) -> list[Outcome]:
 
 
 def percent(true: Sequence[bool]) -> str:
-    """Share, in full only where it is whole."""
+    """Percentage; 0 and 100 only if the share is exactly that."""
     share = 100 * sum(true) / len(true)
     return f"{share:.0f} %" if share in (0, 100) else f"{np.clip(share, 0.1, 99.9):.1f} %"
 
@@ -284,7 +285,7 @@ def _goal(outcomes: Outcomes) -> str:
 
 
 def _shares(outcomes: Outcomes) -> dict[str, dict[int, float]]:
-    """By way and number of open groups, share of the runs that track."""
+    """Share of the runs that track, by way and number of open groups."""
     return {way.name: _share_by_number(runs_by_set(outcomes, cases.sets(), way)) for way in cases.OF_GROUPS}
 
 

@@ -14,18 +14,18 @@ from spheretwin.paper.fault_outcomes import reduce, row_fields, tracks
 from spheretwin.paper.fault_sections import RunsBySet, few, runs_by_set
 
 METHOD = (
-    "Along the path of the healthy run, every 10 ms from the fault on: the *rank* and least singular value of"
-    " the torque matrix without the open groups; the *torque left over the torque needed*, that is, the"
-    " largest torque that any currents within the limit give in the direction of the torque that the healthy"
-    " run needed there, over that torque, and the same of least-norm currents; and, for those who are not"
-    " told, the *share that comes* of a torque that all groups are asked for, in the worst direction (the"
-    " least eigenvalue of G_left G_leftᵀ (G Gᵀ)⁻¹). The least along the path is told."
+    "These quantities are computed along the path of the healthy run, every 10 ms after the fault, and the"
+    " tables contain their least values: the *rank* and least singular value of the torque matrix without"
+    " the open groups; the *torque left over the torque needed*, which is the largest torque of any currents"
+    " within the limit in the direction of the torque of the healthy run, over that torque, and the same for"
+    " least-norm currents; and, for faults that are not reported, the *delivered share* of a torque that is"
+    " commanded of all groups, in the worst direction (the least eigenvalue of G_left G_leftᵀ (G Gᵀ)⁻¹)."
 )
 CAUSES_HEAD = (
-    "way", "figure", "sets", "do not track", "track: least", "do not: largest", "apart at", "told rightly",
+    "way", "figure", "sets", "do not track", "track: least", "do not: largest", "threshold", "correct side",
 )  # fmt: skip
 SMALL = (
-    "open groups", "way", "seeds that do not track", "how the worst ended", "error ratio",
+    "open groups", "way", "seeds that do not track", "status of the worst", "error ratio",
     "rank", "least singular value, N·m/A", "torque left / needed", "by least norm",
 )  # fmt: skip
 JUDGED = (
@@ -34,7 +34,7 @@ JUDGED = (
     (cases.DETECTING, ("torque", "torque left / needed")),
     (cases.DETECTING, ("least_norm", "the same by least norm")),
     (cases.BOUNDED, ("torque", "torque left / needed")),
-    (cases.UNREPORTED, ("least_share", "share that comes")),
+    (cases.UNREPORTED, ("least_share", "delivered share")),
 )
 """Figures that may separate the runs of a way that track from the others."""
 
@@ -77,7 +77,7 @@ def causes_section(outcomes: Outcomes) -> Section:
 
 
 def split(good: Sequence[float], bad: Sequence[float]) -> Split:
-    """The figure that parts the good, above it, from the bad with the fewest errors."""
+    """Threshold that separates the good figures, above it, from the bad ones with the fewest errors."""
     values = np.concatenate([good, bad])
     order = np.argsort(values, kind="stable")
     is_good = (np.arange(len(values)) < len(good))[order]
@@ -91,7 +91,7 @@ def split(good: Sequence[float], bad: Sequence[float]) -> Split:
 
 
 def _causes_row(by_set: RunsBySet, way: cases.Way, figure: str, label: str) -> tuple[str, ...]:
-    good, bad = _parted({groups: runs[:1] for groups, runs in by_set.items()}, figure)
+    good, bad = _by_tracking({groups: runs[:1] for groups, runs in by_set.items()}, figure)
     best = split(good, bad)
     return (
         way.name, label, str(len(good) + len(bad)), str(len(bad)),
@@ -100,8 +100,8 @@ def _causes_row(by_set: RunsBySet, way: cases.Way, figure: str, label: str) -> t
     )  # fmt: skip
 
 
-def _parted(by_set: RunsBySet, figure: str) -> tuple[list[float], list[float]]:
-    """A figure of the runs that track, and of those that do not."""
+def _by_tracking(by_set: RunsBySet, figure: str) -> tuple[list[float], list[float]]:
+    """Return a figure of the runs that track, and of those that do not."""
     good: list[float] = []
     bad: list[float] = []
     for runs in by_set.values():
@@ -128,15 +128,15 @@ def _ranks(by_way: dict[str, RunsBySet]) -> str:
 
 def _causes_verdict(by_set: RunsBySet, way: cases.Way) -> str:
     """Count the runs that track with at least and with less than the needed torque."""
-    good, bad = _parted(by_set, "torque")
+    good, bad = _by_tracking(by_set, "torque")
     if not good:
         return ""
     enough = [value >= 1 for value in good].count(True)
     enough_bad = [value >= 1 for value in bad].count(True)
     less, less_bad = len(good) - enough, len(bad) - enough_bad
     return (
-        f" {way.name.capitalize()}: where at least the torque needed is left, {enough} of"
-        f" {enough + enough_bad} runs track; where less is, {less} of {less + less_bad}."
+        f" {way.name.capitalize()}: {enough} of {enough + enough_bad} runs with at least the needed torque"
+        f" track, and {less} of {less + less_bad} runs with less."
     )
 
 
@@ -171,7 +171,7 @@ BOUND_rad = 1e-9
 closed loop holds the difference small."""
 
 ENGINES_HEAD = (
-    "way", "sets", "ended alike", "track alike", "apart where they track, rad", "where they complete, rad",
+    "way", "sets", "same status", "same tracking", "difference if they track, rad", "if they complete, rad",
 )  # fmt: skip
 
 
@@ -179,9 +179,9 @@ def engines_section(outcomes: Outcomes) -> Section:
     """Differences between the engines."""
     rows = [row for way in cases.OF_GROUPS if (row := _engines_row(outcomes, way))]
     text = (
-        f"The study runs by the equations of motion, the faster engine. One set in {cases.SAMPLE} runs on"
-        " MuJoCo too, with the first seed. The largest errors of runs that track are to agree within"
-        f" {BOUND_rad:g} rad; of others, that they end alike is all that is asked."
+        f"The study runs on the Lagrangian engine, the faster one. One of {cases.SAMPLE} sets also runs on"
+        " MuJoCo, with the first seed. Runs that track must have largest errors that differ by at most"
+        f" {BOUND_rad:g} rad; other runs must end with the same status."
     )
     title = "Largest error of each hinge on the two engines"
     return Section(
@@ -196,7 +196,7 @@ def agree(one: Outcome, other: Outcome) -> bool:
 
 
 def difference_rad(one: Outcome, other: Outcome) -> float:
-    """Between the largest errors of any hinge, of the whole run or after the fault."""
+    """Difference of the largest errors of any hinge, of the complete run or after the fault."""
     whole = np.abs(one.max_abs_error - other.max_abs_error).max()
     return float(max(whole, abs(one.data.after_rad - other.data.after_rad)))
 
@@ -214,7 +214,7 @@ def _engines_verdict(outcomes: Outcomes) -> str:
     both = [pair for way in cases.OF_GROUPS for pair in engine_pairs(outcomes, way)]
     if not both:
         return ""
-    return f" {sum(agree(*pair) for pair in both)} of {len(both)} do."
+    return f" {sum(agree(*pair) for pair in both)} of {len(both)} agree."
 
 
 def _engines_row(outcomes: Outcomes, way: cases.Way) -> tuple[str, ...] | None:
@@ -255,9 +255,9 @@ def findings(outcomes: Outcomes) -> list[Finding]:
 
 EXPERIMENT = Experiment(
     name="faults",
-    title="Parts that fail in mid-flight",
-    summary="The nutation (59) under AFSM with m = 0.2 and L = 1; from a time on that is drawn over the whole"
-    " run, coil groups are open, or a sensor, the supply or the controller fails.",
+    title="Parts that fail during the run",
+    summary="The nutation (59) under AFSM with m = 0.2 and L = 1. At a random time of the run coil groups open,"
+    " or a sensor, the supply or the controller fails.",
     cases=cases.cases,
     sections=sections,
     reduce=reduce,

@@ -58,7 +58,7 @@ class NutationData(NamedTuple):
 
 
 def case(law: ComparedLaw) -> Case:
-    """The nutation under a law."""
+    """Case of the nutation under a law."""
     return Case(
         name=f"{law.law}: m 0.2, L 2",
         scenario=SCENARIO,
@@ -103,7 +103,7 @@ def angles(runs: Runs) -> Drawing:
         )
         for law, (first, *_) in runs.items()
     }
-    caption = "Angles q and what was asked of them, q_d, of the first seed."
+    caption = "Angles q and their references q_d, first seed."
     return Drawing("figure8_angles.svg", caption, figures.angles(by_label, ANGLES, TITLE))
 
 
@@ -146,13 +146,13 @@ def _longest(runs: Runs) -> Trajectory:
 
 
 METHOD = (
-    "The rotor spins at 2π rad/s while its axis gyrates ever wider, to 1 rad at the end. It starts from rest"
-    " and the reference with its full rate: the largest error of γ is made in the first tenths of a second"
-    f" under every law that keeps the rotor, so that the largest from {FROM_s:g} s on stands beside it. The"
-    " paper shows curves of q and q_d and prints no number."
+    "The rotor spins at 2π rad/s while its axis gyrates with a growing amplitude, up to 1 rad. The rotor"
+    " starts from rest and the reference with its full rate. Under every law that keeps the rotor, the error"
+    f" of γ is therefore largest in the first tenths of a second; the last column has the largest error after"
+    f" {FROM_s:g} s. The paper shows curves of q and q_d and prints no number."
 )
 HEAD = (
-    "law", "gains", "how it ended", "α, mrad", "β, mrad", "γ, mrad", "in degrees",
+    "law", "gains", "status", "α, mrad", "β, mrad", "γ, mrad", "in degrees",
     f"from {FROM_s:g} s on, mrad",
 )  # fmt: skip
 

@@ -65,7 +65,7 @@ def write(
     command: str,
     figure_format: str = "svg",
 ) -> list[Path]:
-    """Write the page, its figures and its recordings into a folder; returns both forms of the page and these.
+    """Write the page, its figures and its recordings; return both forms of the page and the recordings.
 
     Parameters
     ----------
@@ -115,7 +115,7 @@ def _results(chapters: Sequence[Chapter]) -> tuple[list[str], list[str]]:
         if finding.reproduced is not None
     ]
     further = [(name, f"{finding.text}.") for name, finding in findings if finding.reproduced is None]
-    summary, lines = [f"{len(chapters)} experiments, {len(findings)} findings."], []
+    summary, lines = [f"Experiments: {len(chapters)}; findings: {len(findings)}."], []
     if of_paper:
         count = sum(bool(finding.reproduced) for _, finding in findings)
         table = pieces.table(("experiment", "verdict", "result"), of_paper, (False,) * 3)

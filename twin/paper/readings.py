@@ -35,7 +35,7 @@ class Reading(NamedTuple):
 
     @property
     def label(self) -> str:
-        """With its control rate."""
+        """Name with the control rate."""
         return f"{self.name}, {self.rate_Hz / 1e3:g} kHz"
 
 
@@ -51,7 +51,7 @@ AS_SHIPPED = READINGS[0]
 
 
 def cases() -> list[Case]:
-    """Every reading under every law and condition of which a number is printed."""
+    """Cases of every reading under every law and condition of which a number is printed."""
     every = [
         case(reading, law, *condition)
         for reading in READINGS
@@ -62,7 +62,7 @@ def cases() -> list[Case]:
 
 
 def case(reading: Reading, law: ComparedLaw, m: float, L: float) -> Case:
-    """A law under a reading and a condition; what has no λ is the same as shipped."""
+    """Case of a law under a reading and a condition; a law without λ is the same as shipped."""
     if reading.surface_slope is not None and law.law == "pd":
         return case(AS_SHIPPED, law, m, L)
     fields: dict[str, Any] = {
@@ -86,12 +86,12 @@ def case(reading: Reading, law: ComparedLaw, m: float, L: float) -> Case:
 
 
 METHOD = (
-    "Equation (41) gives u without saying of what. Read as a torque, K over the inertia is 9000 1/s, and a"
-    " control period of 1 ms no longer follows it; read as an acceleration, the torque is u times the nominal"
-    " inertia of the axis. Each reading runs all laws and conditions of which the paper prints numbers, one"
-    " seed each, with the printed gains unless it says otherwise (PD has λ as its stiffness, and keeps it)."
-    " The *score* is the root mean square of ln(ours / printed) over all of these numbers: 0 would be all of"
-    " them, 0.69 a factor of two. Of a run that ended early, the error until then counts."
+    "Equation (41) does not state the quantity of u. If u is a torque, K over the inertia is 9000 1/s, too fast"
+    " for a control period of 1 ms; if u is an acceleration, the torque is u times the nominal inertia of the"
+    " axis. Each reading runs all laws and conditions of which the paper prints numbers, with one seed and the"
+    " printed gains unless its name says otherwise (PD has λ as its stiffness, and keeps it). The *score* is"
+    " the root mean square of ln(ours / printed) over all of these numbers: 0 if all agree, 0.69 for a factor"
+    " of two. The error of a run that ended early is that until its end."
 )
 
 
@@ -215,8 +215,8 @@ def _draw(results: Sequence[ReadingResult]) -> Drawing:
     labels = {law.law: law.label for law in PAPER_LAWS}
     title = f"Readings of (41) against the {results[0].ratios.size} printed errors"
     caption = (
-        "Largest error over the printed one, a marker a hinge and condition, under each reading of (41);"
-        " the line at 1 is the paper."
+        "Largest error over the printed one under each reading of (41), a marker for each hinge and condition."
+        " Dashed line: the paper."
     )
     figure = figures.ratios(rows, labels, "largest |error| over the printed one", title)
     return Drawing("readings_ratios.svg", caption, figure)

@@ -193,7 +193,7 @@ ALLOCATIONS = ("least_norm", "bounded")
 
 
 def cases() -> list[Case]:
-    """Every tuned law under every condition, then presets, and the limit that the currents set."""
+    """Cases of every tuned law under every condition, then of presets and of the full current."""
     return [
         case
         for hardware in HARDWARE
@@ -207,20 +207,20 @@ def cases() -> list[Case]:
 
 
 def tuned_case(hardware: Hardware, condition: Condition, gains: TunedGains) -> Case:
-    """A law with the gains of one limit under one condition."""
+    """Case of a law with the gains of one limit under one condition."""
     fields = {"controller.law": gains.law, **gains.fields}
     reported = {"limit_A_s": gains.limit_A_s, "gains": dict(gains.gains)}
     return _case(hardware, condition, gains.label, fields, reported)
 
 
 def preset_case(hardware: Hardware, condition: Condition, preset: str) -> Case:
-    """AFSM-ESO with a preset, as shipped."""
+    """Case of AFSM-ESO with a preset, as shipped."""
     fields = {"controller.law": "afsm_eso", "controller.preset": preset}
     return _case(hardware, condition, f"preset {preset}", fields, {"preset": preset})
 
 
 def limit_case(condition: Condition, allocation: str) -> Case:
-    """All that the currents give at the start of the sinusoid."""
+    """Case with the full current at the start of the sinusoid."""
     fields = {**FULL_CURRENT, "allocation": allocation}
     return _case(IDEAL, condition, f"full current, {allocation}", fields, {"limit": allocation})
 

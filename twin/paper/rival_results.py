@@ -48,7 +48,7 @@ class Result(NamedTuple):
 
 
 def results(hardware: Hardware, condition: Condition, outcomes: Outcomes) -> list[Result]:
-    """All that ran under a condition: tuned laws by limit, then presets."""
+    """Results under a condition: tuned laws by limit, then presets."""
     tuned = [
         (
             gains.law,

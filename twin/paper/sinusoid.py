@@ -64,12 +64,12 @@ FIGURE7 = Variation(
 
 
 def cases(variation: Variation) -> list[Case]:
-    """Every law under every condition, condition by condition."""
+    """Cases of every law under every condition, condition by condition."""
     return [case(law, condition) for condition in variation.conditions for law in COMPARED_LAWS]
 
 
 def case(law: ComparedLaw, condition: Condition) -> Case:
-    """A law under a condition."""
+    """Case of a law under a condition."""
     paper = printed_rad(law.law, *condition)
     return Case(
         name=f"{law.law}: m {condition.m:g}, L {condition.L:g}",
@@ -177,7 +177,7 @@ def _all_complete(runs: Sequence[Outcome]) -> bool:
     return all(run.is_complete for run in runs)
 
 
-LARGEST = ("law", "how it ended", "printed, mrad", "α, mrad", "β, mrad", "γ, mrad", "in degrees")
+LARGEST = ("law", "status", "printed, mrad", "α, mrad", "β, mrad", "γ, mrad", "in degrees")
 EFFORT_TITLE = "RMS error, and what it costs: RMS torque, and variation of the commands a group and second"
 EFFORT_HEAD = (
     "law", "α, mrad", "β, mrad", "γ, mrad", "in degrees", "second half, mrad", "torque, N·m",

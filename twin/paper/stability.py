@@ -46,7 +46,7 @@ MARGINS = (DELAY, HEAVIER, LIGHTER, SLOWER, FASTER)
 
 
 def cases() -> list[Case]:
-    """Loads, ten minutes and margins for every law."""
+    """Cases of loads, ten minutes and margins for every law."""
     of_margins = {case.name: case for law in LAWS for quantity in MARGINS for case in margin(law, quantity)}
     return [
         *(reaching(law, load) for law in LAWS for load in LOADS),
@@ -56,17 +56,17 @@ def cases() -> list[Case]:
 
 
 def reaching(law: ComparedLaw, load: float) -> Case:
-    """From rest under a load."""
+    """Case from rest under a load."""
     return _case(law, f"L {load:g}", {"disturbance.load": load}, (Status.COMPLETED,))
 
 
 def drift(law: ComparedLaw) -> Case:
-    """Ten minutes."""
+    """Case of ten minutes."""
     return _case(law, f"{LONG_s:g} s", {"duration": LONG_s}, EXPECTED)
 
 
 def margin(law: ComparedLaw, quantity: Margin) -> list[Case]:
-    """A law under every step of a margin."""
+    """Cases of a law at every step of a margin."""
     conditions = [_worse(quantity, step) for step in quantity.steps]
     return [_case(law, *condition, EXPECTED)._replace(comparable=False) for condition in conditions]
 
@@ -153,25 +153,26 @@ def _span_of(table: Table, ticks: slice, period_s: float) -> Span:
 
 
 HOLDS_rad = 0.01
-"""A law holds where its run completes and errs by less, RMS over the second half, on every hinge: a twentieth
+"""A law holds if its run completes with a smaller RMS error over the second half on every hinge: a twentieth
 of the amplitude."""
 
 REACHING = (
-    f"The first time at which |λe + ė| of every hinge is below {REACHED_rad_s:g} rad/s, with the λ of (58),"
-    f" {SLOPE:g} 1/s, for every law. V is the function (44) along the run: θ* is fitted to what each axis"
-    " needed, ξ* is the largest rest of that fit, and ζ* is 0. It is weak evidence, as nearly all of V is the"
-    " error of the parameters; the proof has V falling always, and says nothing of a sampled loop."
+    f"*Reached* is the first time at which |λe + ė| of every hinge is below {REACHED_rad_s:g} rad/s, with the λ"
+    f" of (58), {SLOPE:g} 1/s, for every law. V is the function (44) along the run: θ* is a fit of the torque"
+    " that each axis needed, ξ* is the largest residual of that fit, and ζ* is 0. The evidence is weak, as"
+    " nearly all of V is the error of the parameters; the proof says that V never rises in continuous time,"
+    " and nothing about a sampled loop."
 )
 DRIFT = (
-    f"The sinusoid for {LONG_s:g} s. ξ̂ and ζ̂ of AFSM only ever grow, as printed; what the last minute costs"
-    " beside the first says what comes of it."
+    f"The sinusoid for {LONG_s:g} s. ξ̂ and ζ̂ of AFSM never decrease, as printed; the table compares the last"
+    " minute with the first."
 )
 MARGIN = (
-    "One thing made worse, step by step, on the sinusoid with m = 0.2 and L = 1 (but where m itself is what"
-    " is changed); the law is told of none. It *holds* as long as the run completes with an RMS error of less"
-    f" than {1e3 * HOLDS_rad:g} mrad on every hinge over the second half. Told are the last step at which it"
-    " holds, all before it held too, and the first at which it does not. Beyond its margin a loop amplifies"
-    " what rounding leaves: these rows are in no sample that is compared with MuJoCo."
+    "One condition is made worse step by step, on the sinusoid with m = 0.2 and L = 1 (except for m itself),"
+    " and the law has no information about it. The law *holds* if the run completes with an RMS error of less"
+    f" than {1e3 * HOLDS_rad:g} mrad on every hinge over the second half. The table has the last step up to"
+    " which the law holds, and the first at which it does not. Beyond its margin a loop amplifies rounding"
+    " errors: these rows are not in the sample that is compared with MuJoCo."
 )
 
 
@@ -196,7 +197,7 @@ def holds(outcome: Outcome) -> bool:
 
 
 def ends_of(held: Sequence[bool]) -> tuple[int | None, int | None]:
-    """Indices of the last step up to which a law holds at all, and of the first at which it does not."""
+    """Return the indices of the last step up to which a law always holds, and of the first without."""
     first = held.index(False) if False in held else None
     last = (len(held) if first is None else first) - 1
     return (last if last >= 0 else None), first

@@ -57,7 +57,7 @@ LONGEST = Step(2e-3, 2e-3)
 
 
 def cases() -> list[Case]:
-    """Every law in every scenario at every step; the default step first."""
+    """Cases of every law in every scenario at every step; the default step first."""
     by_default = sorted((*STEPS, LONGEST), key=lambda step: step.step_s != DEFAULT_s)
     every = [
         case(law, scenario, shorter)
@@ -70,12 +70,12 @@ def cases() -> list[Case]:
 
 
 def fine(step: Step) -> Step:
-    """Reference of a step."""
+    """Fine step that is the reference of a step."""
     return Step(FINE_s, step.period_s)
 
 
 def case(law: str, scenario: str, step: Step) -> Case:
-    """A law in a scenario at a step."""
+    """Case of a law in a scenario at a step."""
     return Case(
         name=f"{law}, {scenario}: {1e3 * step.step_s:g} ms, control {1e3 * step.period_s:g} ms",
         scenario=scenario,
@@ -108,7 +108,7 @@ def difference_rad(outcomes: Outcomes, law: str, scenario: str, step: Step) -> f
 
 
 def sections(outcomes: Outcomes) -> list[Section]:
-    """A table for each scenario."""
+    """Sections with a table for each scenario."""
     return [
         Section("Error over the physics step", METHOD, [_table(outcomes, scenario) for scenario in SCENARIOS])
     ]

@@ -81,12 +81,12 @@ def changes_drawing(by_law: Mapping[str, Mapping[str, Errors]]) -> Drawing:
         for law, errors in by_law.items()
     ]
     figure = figures.lines(groups, "largest |error| of α, degrees", "One change at a time")
-    caption = "Largest |error| of α: median over the seeds, and range; filled as measured, hollow as it is."
+    caption = "Largest |error| of α: median over the seeds, and range. Filled: measured. Hollow: true."
     return Drawing("figure11_changes.svg", caption, figure)
 
 
 def estimators_drawing() -> Drawing:
-    """The estimators over their bandwidths."""
+    """Errors and lags of the estimators over their bandwidths."""
     from spheretwin.control.estimators.noise_and_lag import compare
     from spheretwin.viz.figures import conditions as figures
 
@@ -97,14 +97,14 @@ def estimators_drawing() -> Drawing:
 
 
 MEASURED = (
-    "The paper's figure has what its sensors told, so this one shows the *measured* error, and the table the"
-    " true one too. A residual nonlinearity of a potentiometer and an offset of its converter add to the true"
-    " error and cannot be seen in the measured one; noise does the opposite. γ is counted in steps of 0.18°,"
-    " which hide its error. PD has no integral and sags under the mass. In the"
-    " paper it errs by as much on β; here nothing pushes there."
+    "The paper's figure shows errors of sensors, so this figure shows the *measured* error; the table also has"
+    " the true one. The nonlinearity of a potentiometer and the offset of its converter add to the true error"
+    " alone, noise to the measured error alone. The encoder of γ has steps of 0.18°, which hide its error. PD"
+    " has no integral and sags under the mass. In the paper its error of β is as large as that of α; here no"
+    " torque acts on β."
 )
 PRINTED_HEAD = (
-    "law", "gains", "how it ended", "paper", "α measured", "β measured", "α true", "β true", "γ true",
+    "law", "gains", "status", "paper", "α measured", "β measured", "α true", "β true", "γ true",
 )  # fmt: skip
 
 
@@ -164,15 +164,15 @@ def _sizes(outcomes: Outcomes) -> list[Finding]:
 
 
 ONE_THING = (
-    "Everything is as above but for one thing. The values come from scans: of a gain the one whose error is"
-    " the paper's, or where none is, as of corners and estimators, the one with the least. *Reached* means"
-    f" that the median over the seeds is at most {REACHED:g} times the paper's figure, which is read from a"
-    " plot; where only the true error gets there, it says so. On ideal hardware (true angles and rates, no"
-    " delay, no friction, coils behind their lag L/R alone) the printed gains leave what the corners of the"
-    " reference cost: its rate jumps, and none of the laws feeds an acceleration forward. Neither a better"
-    " estimator nor true rates take that away."
+    "Each row changes one thing. The values come from scans: the gain with the paper's error, or the value"
+    " with the least error if none has it, as of corners and estimators. *Reached* means that the median over"
+    f" the seeds is at most {REACHED:g} times the paper's figure, which is read from a plot; *by the true"
+    " error* means that the measured error does not reach it. On ideal hardware (true angles and rates, no"
+    " delay, no friction, coils with the lag L/R alone) the remaining error comes from the corners of the"
+    " reference: its rate jumps, and no law has a feed-forward of the acceleration. A better estimator or"
+    " true rates do not reduce it."
 )
-CHANGE_HEAD = ("law", "changed alone", "paper's reached", "paper", "α measured", "α true")
+CHANGE_HEAD = ("law", "single change", "paper's reached", "paper", "α measured", "α true")
 
 
 def change_section(outcomes: Outcomes) -> Section:
@@ -231,9 +231,9 @@ def _alpha(runs: Sequence[Outcome]) -> Errors:
 
 
 RATES = (
-    "No sensor of the prototype measures a rate. A wider bandwidth lets more noise through, a narrower one"
-    " lags more: the figure has both, for the paper's sinusoid with the noise of the potentiometers. The"
-    " runs above have the Kalman filter at its default, unless they say otherwise."
+    "No sensor of the prototype measures a rate. A wider bandwidth passes more noise, a narrower one has a"
+    " larger lag: the figure shows both for the paper's sinusoid with the noise of the potentiometers. The"
+    " runs above use the Kalman filter with its default bandwidth, unless a row states another one."
 )
 
 

@@ -54,7 +54,7 @@ ELECTRONICS: dict[str, Any] = {"hardware": "electronics"}
 
 
 def printed(law: TiltLaw) -> Case:
-    """The law with the gains of the paper, or with the tuned ones."""
+    """Case of a law with the gains of the paper, or with the tuned ones."""
     return case(law, law.gains, ELECTRONICS)
 
 
@@ -100,12 +100,12 @@ class Change(NamedTuple):
 
 
 def _rounding(law: str, rad_s2: float) -> Change:
-    """The corners of the reference, where its rate jumps, rounded; below 0.153 they would run together."""
+    """Change to rounded corners of the reference, where its rate jumps; below 0.153 they would overlap."""
     return Change(law, "corners rounded at", f"{rad_s2:g} rad/s²", {"trajectory.rounding_rad_s2": rad_s2})
 
 
 def _governed(law: str) -> Change:
-    """The acceleration of the reference limited, and the torque of the inertia fed forward."""
+    """Change to a limited acceleration of the reference with feed-forward of the inertia."""
     fields = {"controller.governor.acceleration_rad_s2": 20.0, "controller.feed_forward.inertia": 1.0}
     return Change(law, "reference within", "20 rad/s², inertia fed forward", fields)
 
@@ -159,5 +159,5 @@ CHANGES = (
 
 
 def cases() -> list[Case]:
-    """Each law as printed, then every single change."""
+    """Cases of each law as printed, then of every single change."""
     return [*map(printed, TILT_LAWS), *(change.case() for change in CHANGES)]

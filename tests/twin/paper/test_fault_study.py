@@ -101,7 +101,7 @@ def test_single_group_and_pair_track_where_told_or_found_and_else_not(found):
             assert 0.9 < told["error_ratio_range"][0] <= told["error_ratio_range"][1] < 1.15
         untold = row(found, of_groups(groups, UNREPORTED))
         assert untold["tracks"] == 0
-        assert "of the torque asked for comes" in untold["reason"]
+        assert "of the commanded torque is delivered" in untold["reason"]
 
 
 def test_errors_are_those_of_the_healthy_run_with_the_same_seed(found):
