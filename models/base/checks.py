@@ -85,7 +85,7 @@ def broken(checks: Iterable[Check]) -> list[str]:
 
 
 def bound_shares(checks: Iterable[Check]) -> dict[str, float]:
-    """Return value over bound of each check with a value and one bound; infinity if the value is not finite."""
+    """Return value over bound of each check with a value and one bound; infinity without a finite value."""
     return {
         check.name: check.value / check.bound if isfinite(check.value) else inf
         for check in checks

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import shlex
 import sys
 from pathlib import Path
 from typing import Any
@@ -30,9 +29,6 @@ MOST_POSES = 10_000  # some four hours
 
 # At 90 degrees the azimuth of the shaft no longer determines a pose, and the hinges lock.
 STEEPEST_DEG = 85.0
-
-SETTINGS = ("mjcf", "csv", "poses", "seed", "need", "largest_tilt")
-"""Arguments that determine the content of a page."""
 
 
 def declare(parser: Parser) -> None:
@@ -118,17 +114,6 @@ def _add_page(part: Parser) -> None:
     part.add_argument("--figure-format")
 
 
-def _command(options: argparse.Namespace, part: str) -> str:
-    """Return the command that creates the same page again."""
-    values = {name: getattr(options, name, None) for name in SETTINGS}
-    given = [
-        (f"--{name.replace('_', '-')}", str(value))
-        for name, value in values.items()
-        if value is not None and value != options.parser.get_default(name)
-    ]
-    return shlex.join(["spheretwin", "magnetics", part, *(word for pair in given for word in pair)])
-
-
 def run_check(options: argparse.Namespace) -> bool:
     """Run the part; return True if no bound is broken."""
     actuator = actuators.load(options.mjcf, options.csv)
@@ -139,7 +124,7 @@ def run_check(options: argparse.Namespace) -> bool:
     warn(verdict.warnings)
     written = []
     if options.out:
-        command = _command(options, "check")
+        command = f"spheretwin magnetics check --poses {options.poses} --seed {options.seed}"
         written = magnetics.write_check(options.out, verdict, command, options.figure_format)
     if options.json:
         print_json(verdict._asdict())
@@ -245,7 +230,8 @@ def run_map(options: argparse.Namespace) -> bool:
     warn(verdict.warnings)
     written = []
     if options.out:
-        command = _command(options, "map")
+        need = f" --need {options.need:g}" if options.need else ""
+        command = f"spheretwin magnetics map --largest-tilt {options.largest_tilt:g}{need}"
         written = magnetics.write_map(options.out, surveyed, verdict, command, options.figure_format)
     if options.json:
         print_json(verdict._asdict())

@@ -13,7 +13,8 @@ from spheretwin.models import actuator as actuators
 from spheretwin.models.base.checks import bound_shares
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.mjcf import beyond_a_free_rotor, read
-from spheretwin.viz.pages.markdown import Drawing, write_checks
+from spheretwin.viz.pages import markdown as pieces
+from spheretwin.viz.pages.markdown import Drawing, write_page
 
 PARTS = (
     dynamics.PART,
@@ -216,10 +217,11 @@ def write(folder: Path, evidence: Evidence, figure_format: str = "svg") -> list[
     InputError
         A file cannot be written there.
     """
-    lead = (
-        "Comparison of the engine (MuJoCo) with the Lagrangian model, which is derived independently, and"
-        " with Pinocchio."
-    )
     drawings = [draw(evidence) for draw in FIGURES]
+    summary = [
+        "Comparison of the engine (MuJoCo) with the Lagrangian model, which is derived independently, and"
+        f" with Pinocchio. {pieces.verdict(evidence.checks)}"
+    ]
+    sections = [*pieces.checks_section(evidence.checks), "## Figures", "", *map(pieces.figure, drawings)]
     command = "spheretwin crosscheck"
-    return write_checks(folder, NAME, "Cross-check", lead, evidence.checks, drawings, command, figure_format)
+    return write_page(folder, NAME, "Cross-check", summary, sections, drawings, command, figure_format)

@@ -256,8 +256,8 @@ def findings(outcomes: Outcomes) -> list[Finding]:
 EXPERIMENT = Experiment(
     name="faults",
     title="Parts that fail during the run",
-    summary="The nutation (59) under AFSM with m = 0.2 and L = 1. At a random time of the run coil groups open,"
-    " or a sensor, the supply or the controller fails.",
+    summary="The nutation (59) under AFSM with m = 0.2 and L = 1. At a random time coil groups open, or a"
+    " sensor, the supply or the controller fails.",
     cases=cases.cases,
     sections=sections,
     reduce=reduce,

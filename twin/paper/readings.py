@@ -86,12 +86,12 @@ def case(reading: Reading, law: ComparedLaw, m: float, L: float) -> Case:
 
 
 METHOD = (
-    "Equation (41) does not state the quantity of u. If u is a torque, K over the inertia is 9000 1/s, too fast"
-    " for a control period of 1 ms; if u is an acceleration, the torque is u times the nominal inertia of the"
-    " axis. Each reading runs all laws and conditions of which the paper prints numbers, with one seed and the"
-    " printed gains unless its name says otherwise (PD has λ as its stiffness, and keeps it). The *score* is"
-    " the root mean square of ln(ours / printed) over all of these numbers: 0 if all agree, 0.69 for a factor"
-    " of two. The error of a run that ended early is that until its end."
+    "Equation (41) does not state the quantity of u. If u is a torque, K over the inertia is 9000 1/s, too"
+    " fast for a control period of 1 ms; if u is an acceleration, the torque is u times the nominal inertia"
+    " of the axis. Each reading runs all laws and conditions of which the paper prints numbers, with one seed"
+    " and the printed gains unless its name says otherwise (PD has λ as its stiffness, and keeps it). The"
+    " *score* is the root mean square of ln(ours / printed) over all of these numbers: 0 if all agree, 0.69"
+    " for a factor of two. The error of a run that ended early is that until its end."
 )
 
 
@@ -215,8 +215,8 @@ def _draw(results: Sequence[ReadingResult]) -> Drawing:
     labels = {law.law: law.label for law in PAPER_LAWS}
     title = f"Readings of (41) against the {results[0].ratios.size} printed errors"
     caption = (
-        "Largest error over the printed one under each reading of (41), a marker for each hinge and condition."
-        " Dashed line: the paper."
+        "Largest error over the printed one under each reading of (41), a marker for each hinge and"
+        " condition. Dashed line: the paper."
     )
     figure = figures.ratios(rows, labels, "largest |error| over the printed one", title)
     return Drawing("readings_ratios.svg", caption, figure)

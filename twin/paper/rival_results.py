@@ -164,7 +164,7 @@ def _gain_text(gains: Mapping[str, float | None] | None, name: str) -> str:
 
 
 def errors(hardware: Hardware, outcomes: Outcomes) -> list[ResultTable]:
-    """Largest error, variation and RMS error of every law within each limit, and the limit of the currents."""
+    """Largest error, variation and RMS error of every law within each limit; errors at full current."""
     conditions = [condition for condition in hardware.conditions if not condition.perturbed]
     largest, *others = _tables(hardware, hardware.title, conditions, outcomes)
     if not hardware.in_degrees:

@@ -157,7 +157,7 @@ HOLDS_rad = 0.01
 of the amplitude."""
 
 REACHING = (
-    f"*Reached* is the first time at which |λe + ė| of every hinge is below {REACHED_rad_s:g} rad/s, with the λ"
+    f"*Reached* is the first time at which |λe + ė| of every hinge is below {REACHED_rad_s:g} rad/s, with λ"
     f" of (58), {SLOPE:g} 1/s, for every law. V is the function (44) along the run: θ* is a fit of the torque"
     " that each axis needed, ξ* is the largest residual of that fit, and ζ* is 0. The evidence is weak, as"
     " nearly all of V is the error of the parameters; the proof says that V never rises in continuous time,"

@@ -97,7 +97,7 @@ def estimators_drawing() -> Drawing:
 
 
 MEASURED = (
-    "The paper's figure shows errors of sensors, so this figure shows the *measured* error; the table also has"
+    "The paper's figure shows errors of sensors, so this figure has the *measured* error; the table also has"
     " the true one. The nonlinearity of a potentiometer and the offset of its converter add to the true error"
     " alone, noise to the measured error alone. The encoder of γ has steps of 0.18°, which hide its error. PD"
     " has no integral and sags under the mass. In the paper its error of β is as large as that of α; here no"

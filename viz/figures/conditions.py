@@ -19,7 +19,6 @@ from spheretwin.viz.figures.style import (
     faint_grid,
     name_axes,
     on_errors,
-    save,
     styles,
 )
 
@@ -208,9 +207,6 @@ def ratios(rows: Sequence[RatioRow], labels: Mapping[str, str], quantity: str, t
         axes.axhline(y - 0.5, color=FAINT, linewidth=0.4)
     figure.legend(loc="outside lower center", ncols=4, frameon=False)
     return figure
-
-
-__all__ = ["Curve", "estimators", "save"]
 
 
 LEAST_LAG_s = 1e-5  # lower bound of the axis: negligible compared with a period of 1 ms

@@ -61,7 +61,10 @@ def margins(values: Mapping[str, float], title: str) -> Figure:
     axes = figure.subplots()
     rows = np.arange(len(values))
     shares = np.clip(list(values.values()), LEAST_SHARE, 1 / LEAST_SHARE)
-    for within, colour, label in ((True, SERIES[0], "within the bound"), (False, BROKEN, "exceeds the bound")):
+    for within, colour, label in (
+        (True, SERIES[0], "within the bound"),
+        (False, BROKEN, "exceeds the bound"),
+    ):
         chosen = (shares <= 1) == within
         if np.any(chosen):
             axes.plot(shares[chosen], rows[chosen], "o", color=colour, markersize=6, label=label)

@@ -73,8 +73,11 @@ def courses(
     panels = figure.subplots(len(axes_names), 1, sharex=True, sharey=True, squeeze=False)[:, 0]
     looks = styles([course.law for course in by_label.values()])
     for axis, (panel, name) in enumerate(zip(panels, axes_names, strict=True)):
-        for label, course in by_label.items():
-            _course(panel, label, course, looks[course.law], window_s, axis)
+        for place, (label, course) in enumerate(by_label.items()):
+            values, style = np.maximum(course.errors_deg[:, :, axis], LEAST_deg), looks[course.law]
+            _band(panel, label, values, style, window_s, place / len(by_label))
+            if axis in course.paper_axes:
+                panel.axhline(course.paper_deg, color=style.colour, linestyle=":", linewidth=1.4, zorder=1)
         _on_logarithmic(panel, "y")
         panel.set_ylabel(f"|error| of {name}, degrees")
     panels[0].set_title(title, fontsize="medium")
@@ -117,18 +120,32 @@ def lines(groups: Sequence[ErrorGroup], quantity: str, title: str) -> Figure:
     return figure
 
 
-def _course(
-    panel: Axes, label: str, course: ErrorCourse, style: LawStyle, window_s: float, axis: int
-) -> None:
-    errors, colour = np.maximum(course.errors_deg[:, :, axis], LEAST_deg), style.colour
-    whole = ~np.any(np.isnan(errors), axis=0)  # where every seed still runs
-    t_s = window_s * (np.arange(errors.shape[1])[whole] + 0.5)
-    low, middle, high = np.quantile(errors[:, whole], [0, 0.5, 1], axis=0)
-    panel.fill_between(t_s, low, high, color=colour, alpha=0.18, linewidth=0)
+def _band(
+    panel: Axes, label: str, values: Array, style: LawStyle, window_s: float, shift: float
+) -> tuple[Array, Array]:
+    """Draw the median over the seeds as a line and their range as a band while every seed runs.
+
+    Parameters
+    ----------
+    panel : Axes
+    label : str
+    values : (seeds, windows) array
+    style : LawStyle
+    window_s : float, s
+    shift : float
+        Shift of the markers along the line, as a share of their distance.
+
+    Returns
+    -------
+    t_s, median : (n,) arrays
+    """
+    running = ~np.any(np.isnan(values), axis=0)
+    low, middle, high = np.quantile(values[:, running], [0, 0.5, 1], axis=0)
+    t_s, every = window_s * (np.flatnonzero(running) + 0.5), max(1, values.shape[1] // MARKS)
+    panel.fill_between(t_s, low, high, color=style.colour, alpha=0.2, linewidth=0)
     panel.plot(t_s, middle, linewidth=1.3, marker=style.marker, markersize=4.5, label=label,
-               markevery=max(1, errors.shape[1] // MARKS), **style.line())  # fmt: skip
-    if axis in course.paper_axes:
-        panel.axhline(course.paper_deg, color=colour, linestyle=":", linewidth=1.4, zorder=1)
+               markevery=(int(shift * every), every), **style.line())  # fmt: skip
+    return t_s, middle
 
 
 def _spread(panel: Axes, y: float, values: Array, colour: str, inside: str) -> None:
@@ -187,14 +204,8 @@ def errors(by_label: Mapping[str, ErrorBand], window_s: float, hinges: Sequence[
     longest = max(course.error_rad.shape[1] for course in by_label.values())
     for hinge, (panel, name) in enumerate(zip(panels, hinges, strict=True)):
         for place, (label, course) in enumerate(by_label.items()):
-            style, of_seeds = looks[course.law], np.maximum(1e3 * course.error_rad[:, :, hinge], LEAST_mrad)
-            running = ~np.any(np.isnan(of_seeds), axis=0)
-            low, middle, high = np.quantile(of_seeds[:, running], [0, 0.5, 1], axis=0)
-            t_s = window_s * (np.flatnonzero(running) + 0.5)
-            every = max(1, longest // MARKS)
-            panel.fill_between(t_s, low, high, color=style.colour, alpha=0.2, linewidth=0)
-            panel.plot(t_s, middle, linewidth=1.3, marker=style.marker, markersize=4.5, label=label,
-                       markevery=(place * every // len(by_label), every), **style.line())  # fmt: skip
+            values, style = np.maximum(1e3 * course.error_rad[:, :, hinge], LEAST_mrad), looks[course.law]
+            t_s, middle = _band(panel, label, values, style, window_s, place / len(by_label))
             if len(t_s) < longest and len(t_s):
                 panel.plot(t_s[-1], middle[-1], "x", color=style.colour, markersize=9, markeredgewidth=2)
         on_errors([panel], LEAST_mrad, 1.3 * highest)

@@ -114,7 +114,8 @@ def fit_width(figure: Figure, width_in: float) -> None:
 def _narrow(figure: Figure, legend: Legend) -> None:
     """Draw a legend below a figure with as many columns as its width has room for."""
     texts = legend.get_texts()
-    handles, labels, size_pt = legend.legend_handles, [text.get_text() for text in texts], texts[0].get_size()
+    handles = [handle for handle in legend.legend_handles if handle]
+    labels, size_pt = [text.get_text() for text in texts], texts[0].get_size()
     for columns in range(min(len(labels), 5), 0, -1):
         legend.remove()
         legend = figure.legend(handles, labels, loc="outside lower center", ncols=columns, frameon=False,

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import NamedTuple
 
 from spheretwin.models.base.checks import bound_shares
 from spheretwin.models.design.curve_check import ComputedCurve, CurvePeak, JudgedCurve, Misfit
 from spheretwin.models.design.field_check import FieldVerdict
 from spheretwin.models.design.torque_map import TorqueSurvey, WeakPose, WorkspaceVerdict, direction_text
 from spheretwin.viz.pages import markdown
-from spheretwin.viz.pages.markdown import Drawing, write_checks
+from spheretwin.viz.pages.markdown import Drawing, write_page
 
 # A table row for every third tilt: one screen.
 ROW_STRIDE = 3
@@ -22,32 +21,27 @@ FIGURE_NAMES = {
     "singular_value": ("least σ", "singular_value_Nm_per_A", "N·m/A"),
 }
 
+TITLES = {"check": "Check of the magnetic model", "map": "Torque capability over the workspace"}
 CURVE_HEAD = ("figure", "value")
-FIELD_HEAD = (
-    "tilt", "poses", "median error", "largest", "of largest torque", "half the points",
-)  # fmt: skip
+FIELD_HEAD = ("tilt", "poses", "median error", "largest", "of largest torque", "half the points")
 TILT_HEAD = (
-    "tilt", "least norm", "median of it", "best currents", "median of it", "least σ, N·m/A", "cond.",
+    "tilt", "least norm", "median of it", "best currents", "median of it", "least σ, N·m/A", "condition",
     "copper, W/(N·m)²",
 )  # fmt: skip
-POSE_HEAD = ("by", "worst", "tilt, °", "α, °", "β, °", "γ, °", "direction")
+TILT_FORMATS = ("{:g}°", "{:.3f}", "{:.3f}", "{:.3f}", "{:.3f}", "{:.4f}", "{:.2f}", "{:.0f}")
+POSE_HEAD = ("quantity", "worst", "tilt, °", "α, °", "β, °", "γ, °", "direction")
+
+TitledTable = tuple[str, Sequence[str], Sequence[Sequence[str]]]
+"""Title, headings and rows; the first column is words."""
 
 
-class MagneticTable(NamedTuple):
-    """Rows of text under headings; the first column is words."""
-
-    title: str
-    head: Sequence[str]
-    rows: Sequence[Sequence[str]]
-
-
-def computed_curve_table(computed: ComputedCurve) -> MagneticTable:
+def computed_curve_table(computed: ComputedCurve) -> TitledTable:
     """Return the results for a computed curve."""
     title = "torque curve computed from the geometry"
-    return MagneticTable(title, CURVE_HEAD, [("peak", _peak(computed.peak))])
+    return title, CURVE_HEAD, [("peak", _peak(computed.peak))]
 
 
-def judged_curve_table(path: Path, judged: JudgedCurve) -> MagneticTable:
+def judged_curve_table(path: Path, judged: JudgedCurve) -> TitledTable:
     """Return the results for a user's curve."""
     geometry = judged.geometry
     rows = [
@@ -59,24 +53,17 @@ def judged_curve_table(path: Path, judged: JudgedCurve) -> MagneticTable:
         ("difference from it after scaling", _misfit(geometry.scaled, "its peak")),
         ("difference of look-up table and spline", f"{judged.lookup_error:.1e} of the peak"),
     ]
-    return MagneticTable(f"torque curve {path}", CURVE_HEAD, rows)
+    return f"torque curve {path}", CURVE_HEAD, rows
 
 
-def field_table(verdict: FieldVerdict) -> MagneticTable:
+def field_table(verdict: FieldVerdict) -> TitledTable:
     """Return the errors of the torque matrix by tilt."""
     title = f"torque by the curve against the direct sum (largest torque {verdict.largest_torque_Nm:.3f} N·m)"
     rows = [
-        (
-            f"{band.tilt_deg[0]:.0f}° to {band.tilt_deg[1]:.0f}°",
-            str(band.poses),
-            _percent(band.median_relative_error),
-            _percent(band.largest_relative_error),
-            _percent(band.largest_error_of_largest_torque),
-            _percent(band.quadrature_of_largest_torque),
-        )
-        for band in verdict.by_tilt
+        (f"{tilt_deg[0]:.0f}° to {tilt_deg[1]:.0f}°", str(poses), *map(_percent, errors))
+        for tilt_deg, poses, *errors in verdict.by_tilt
     ]
-    return MagneticTable(title, FIELD_HEAD, rows)
+    return title, FIELD_HEAD, rows
 
 
 def sources_text(verdict: FieldVerdict) -> str:
@@ -90,19 +77,10 @@ def sources_text(verdict: FieldVerdict) -> str:
     )
 
 
-def workspace_tables(verdict: WorkspaceVerdict) -> list[MagneticTable]:
+def workspace_tables(verdict: WorkspaceVerdict) -> list[TitledTable]:
     """Return the torque capability by tilt, and the weakest poses."""
     rows = [
-        (
-            f"{tilt.tilt_deg:g}°",
-            f"{tilt.least_norm_Nm:.3f}",
-            f"{tilt.least_norm_median_Nm:.3f}",
-            f"{tilt.best_Nm:.3f}",
-            f"{tilt.best_median_Nm:.3f}",
-            f"{tilt.singular_value_Nm_per_A:.4f}",
-            f"{tilt.condition:.2f}",
-            f"{tilt.copper_W_per_Nm2:.0f}",
-        )
+        [form.format(value) for form, value in zip(TILT_FORMATS, tilt, strict=True)]
         for i, tilt in enumerate(verdict.by_tilt)
         if i % ROW_STRIDE == 0 or i == len(verdict.by_tilt) - 1
     ]
@@ -110,8 +88,10 @@ def workspace_tables(verdict: WorkspaceVerdict) -> list[MagneticTable]:
         f"torque in every direction at {verdict.current_limit_A:g} A, N·m:"
         f" worst and median of {verdict.poses} poses"
     )
-    weakest = [_weak_row(pose) for pose in verdict.weakest]
-    return [MagneticTable(title, TILT_HEAD, rows), MagneticTable("weakest poses", POSE_HEAD, weakest)]
+    return [
+        (title, TILT_HEAD, rows),
+        ("weakest poses", POSE_HEAD, [_weak_row(pose) for pose in verdict.weakest]),
+    ]
 
 
 def write_check(folder: Path, verdict: FieldVerdict, command: str, figure_format: str) -> list[Path]:
@@ -138,9 +118,8 @@ def write_check(folder: Path, verdict: FieldVerdict, command: str, figure_format
         "Comparison of the torque matrix with the summed field of all magnets on all windings, in random"
         " poses and for random currents, and of the methods with published values."
     )
-    sections = [*_section(field_table(verdict)), sources_text(verdict), ""]
-    return write_checks(folder, "magnetics_check", "Check of the magnetic model", _with_warnings(lead, verdict),
-                        verdict.checks, [drawing], command, figure_format, sections)  # fmt: skip
+    sections = [*_section(*field_table(verdict)), sources_text(verdict), ""]
+    return _write(folder, "check", lead, verdict, sections, [drawing], command, figure_format)
 
 
 def write_map(
@@ -170,9 +149,8 @@ def write_map(
         f" {verdict.largest_tilt_deg:g}°, least-norm currents give at least {least_norm_Nm:.3f} N·m in every"
         f" direction; the best currents give at least {best_Nm:.3f} N·m."
     )
-    sections = [line for table in workspace_tables(verdict) for line in _section(table)]
-    return write_checks(folder, "magnetics_map", "Torque capability", _with_warnings(lead, verdict),
-                        verdict.checks, _maps(surveyed), command, figure_format, sections)  # fmt: skip
+    sections = [line for table in workspace_tables(verdict) for line in _section(*table)]
+    return _write(folder, "map", lead, verdict, sections, _maps(surveyed), command, figure_format)
 
 
 def _maps(surveyed: TorqueSurvey) -> list[Drawing]:
@@ -200,15 +178,24 @@ def _maps(surveyed: TorqueSurvey) -> list[Drawing]:
     ]
 
 
-def _section(table: MagneticTable) -> list[str]:
+def _write(
+    folder: Path, part: str, lead: str, verdict: FieldVerdict | WorkspaceVerdict, sections: Sequence[str],
+    drawings: Sequence[Drawing], command: str, figure_format: str,
+) -> list[Path]:  # fmt: skip
+    """Write the page of a part: warnings and exceeded bounds are in its summary."""
+    warnings = [f"Warning: {warning}." for warning in verdict.warnings]
+    summary = [" ".join([lead, markdown.verdict(verdict.checks), *warnings])]
+    lines = [*markdown.checks_section(verdict.checks), *sections]
+    lines += ["## Figures", "", *map(markdown.figure, drawings)]
+    return write_page(
+        folder, f"magnetics_{part}", TITLES[part], summary, lines, drawings, command, figure_format
+    )
+
+
+def _section(title: str, head: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:
     """Lines of a section with one table."""
-    numbers = [place > 0 for place in range(len(table.head))]
-    heading = f"## {table.title[0].upper()}{table.title[1:]}"
-    return [heading, "", *markdown.table(table.head, table.rows, numbers), ""]
-
-
-def _with_warnings(lead: str, verdict: FieldVerdict | WorkspaceVerdict) -> str:
-    return " ".join([lead, *(f"Warning: {warning}." for warning in verdict.warnings)])
+    numbers = [place > 0 for place in range(len(head))]
+    return [f"## {title[0].upper()}{title[1:]}", "", *markdown.table(head, rows, numbers), ""]
 
 
 def _weak_row(pose: WeakPose) -> tuple[str, ...]:

@@ -223,44 +223,21 @@ HEAD = ("check", "compared quantities", "states", "value", "bound", "passed", "r
 NUMBERS = (False, False, True, True, True, False, False)
 
 
-def write_checks(
-    folder: Path,
-    name: str,
-    title: str,
-    lead: str,
-    checks: Sequence[Check],
-    drawings: Sequence[Drawing],
-    command: str,
-    figure_format: str = "svg",
-    sections: Sequence[str] = (),
-) -> list[Path]:
-    """Write a page of checks: the exceeded bounds in the summary, then checks, further sections and figures.
-
-    Parameters
-    ----------
-    lead : str
-        Beginning of the summary.
-    checks : sequence of Check
-    folder, name, title, drawings, command, figure_format, sections
-        As in `write_page`.
-
-    Raises
-    ------
-    InputError
-        A file cannot be written there.
-    """
+def verdict(checks: Sequence[Check]) -> str:
+    """Sentence on the bounds that checks exceed."""
     names = broken(checks)
-    verdict = f"**Exceeded bounds: {'; '.join(names)}.**" if names else "**No bound is exceeded.**"
-    lines = ["## Checks", "", *table(HEAD, [_check_row(check) for check in checks], NUMBERS), "", *sections]
-    lines += ["## Figures", "", *map(figure, drawings)]
-    summary = [f"{lead} {len(checks)} checks. {verdict}"]
-    return write_page(folder, name, title, summary, lines, drawings, command, figure_format)
+    result = f"**Exceeded bounds: {'; '.join(names)}.**" if names else "**No bound is exceeded.**"
+    return f"{len(checks)} checks. {result}"
+
+
+def checks_section(checks: Iterable[Check]) -> list[str]:
+    """Section with a row for each check."""
+    return ["## Checks", "", *table(HEAD, [_check_row(check) for check in checks], NUMBERS), ""]
 
 
 def _check_row(check: Check) -> tuple[str, ...]:
-    passed = "yes" if check.ok else "**no**"
     figures = f"{check.states:,}", check.value_text(), check.bound_text()
-    return check.name, check.compares, *figures, passed, check.why
+    return check.name, check.compares, *figures, "yes" if check.ok else "**no**", check.why
 
 
 def contents(lines: Sequence[str]) -> list[str]:

@@ -151,6 +151,27 @@ def test_check_prints_a_table(capsys, coarse):
     assert "8 of 8 checks hold" in out
 
 
+def test_check_writes_a_page(capsys, coarse, tmp_path):
+    code, out, err = here(capsys, "check", "--poses", 2, "--seed", 5, "--out", tmp_path, "--json")
+    assert (code, err) == (0, "")
+    figures = json.loads(out)
+    names = {"magnetics_check.md", "magnetics_check.html", "magnetics_margins.svg"}
+    assert {path.name for path in tmp_path.iterdir()} == names
+    text = (tmp_path / "magnetics_check.md").read_text(encoding="utf-8")
+    assert "8 checks. **No bound is exceeded.**" in text.split("- [Checks]")[0]
+    for check in figures["checks"]:
+        assert f"| {check['name']} | {check['compares']} |" in text
+    for band in figures["by_tilt"]:
+        low, high = band["tilt_deg"]
+        assert f"| {low:.0f}° to {high:.0f}° | 1 | {100 * band['median_relative_error']:.3f} % |" in text
+    assert "Created by `spheretwin magnetics check --poses 2 --seed 5` with" in text
+    with_one_bound = [
+        check["name"] for check in figures["checks"] if check["bound"] and not check["at_least"]
+    ]
+    html = (tmp_path / "magnetics_check.html").read_text(encoding="utf-8")
+    assert all(f">{name}</text>" in html for name in with_one_bound)
+
+
 def test_check_finds_a_wrong_polarity(capsys, coarse, monkeypatch):
     right = direct_summation.fill_torque_matrix
 
@@ -176,15 +197,46 @@ def test_check_finds_a_wrong_curve_and_says_so(capsys, coarse, user_csv):
 # map
 
 
-def test_map_draws_and_tabulates(capsys, tmp_path):
-    code, out, err = here(capsys, "map", "--largest-tilt", 4, "--out", tmp_path / "figures")
+def test_map_prints_tables_and_writes_a_page(capsys, tmp_path, actuator):
+    folder = tmp_path / "page"
+    arguments = ["map", "--largest-tilt", 4, "--need", 0.5, "--out", folder, "--figure-format", "pdf"]
+    code, out, err = here(capsys, *arguments)
     assert (code, err) == (0, "")
     assert "weakest poses" in out
-    names = sorted(path.name for path in (tmp_path / "figures").iterdir())
-    assert names == ["capability_by_tilt.png", "capability_map.png"]
-    for name in names:
-        assert name in out.replace("\n", "")
-        assert (tmp_path / "figures" / name).read_bytes().startswith(b"\x89PNG")
+    figures = {f"capability_{name}.{kind}" for name in ("by_tilt", "map") for kind in ("svg", "pdf")}
+    pages = ["magnetics_map.md", "magnetics_map.html"]
+    assert {path.name for path in folder.iterdir()} == {*pages, *figures}
+    assert all(f"written  {folder / name}" in out for name in pages)
+    text = (folder / pages[0]).read_text(encoding="utf-8")
+    surveyed = torque_map.survey(actuator, largest_tilt_deg=4)
+    verdict = torque_map.judge(surveyed, 0.5)
+    worst = {
+        name: min(getattr(tilt, name) for tilt in verdict.by_tilt) for name in ("least_norm_Nm", "best_Nm")
+    }
+    summary = text.split("- [Checks]")[0]
+    assert "up to a tilt of 4°" in summary
+    assert f"least-norm currents give at least {worst['least_norm_Nm']:.3f} N·m in every direction" in summary
+    assert f"the best currents give at least {worst['best_Nm']:.3f} N·m" in summary
+    assert "2 checks. **No bound is exceeded.**" in summary
+    headings = [line for line in text.splitlines() if line.startswith("## ")]
+    assert [heading.split(" at ")[0] for heading in headings] == [
+        "## Checks", "## Torque in every direction", "## Weakest poses", "## Figures",
+    ]  # fmt: skip
+    first = verdict.by_tilt[0]
+    assert (
+        f"| 0° | {first.least_norm_Nm:.3f} | {first.least_norm_median_Nm:.3f} | {first.best_Nm:.3f} |" in text
+    )
+    assert "Created by `spheretwin magnetics map --largest-tilt 4 --need 0.5` with" in text
+    html = (folder / pages[1]).read_text(encoding="utf-8")
+    assert html.count("<svg") == 2
+    assert ">tilt of the shaft, degrees</text>" in html
+
+
+def test_page_of_a_map_names_a_need_that_is_not_met(capsys, tmp_path):
+    code, _, err = here(capsys, "map", "--largest-tilt", 0, "--need", 0.88, "--out", tmp_path)
+    assert code == 1
+    assert "broken: need" in one_line(err)
+    assert "**Exceeded bounds: need.**" in (tmp_path / "magnetics_map.md").read_text(encoding="utf-8")
 
 
 def test_map_gives_its_verdict_as_json(capsys, actuator):
@@ -192,11 +244,10 @@ def test_map_gives_its_verdict_as_json(capsys, actuator):
     assert (code, err) == (0, "")
     figures = json.loads(out)
     verdict = torque_map.judge(torque_map.survey(actuator, largest_tilt_deg=2))
-    assert list(figures) == [*verdict._fields, "figures"]
+    assert list(figures) == list(verdict._fields)
     assert figures["by_tilt"] == [row._asdict() for row in verdict.by_tilt]
     assert figures["weakest"] == [pose._asdict() for pose in verdict.weakest]
     assert figures["checks"] == [check.row() for check in verdict.checks]
-    assert figures["figures"] == []
 
 
 def test_map_fails_where_more_is_needed(capsys):

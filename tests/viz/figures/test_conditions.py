@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
-from spheretwin.viz.figures import conditions
+from spheretwin.viz.figures import conditions, style
 
 BANDWIDTHS = np.geomspace(20, 1000, 7)
 CURVES = {
@@ -29,7 +29,7 @@ def figure() -> Figure:
 def test_same_curves_give_the_same_bytes(tmp_path):
     paths = [tmp_path / "a.png", tmp_path / "b.png"]
     for path in paths:
-        conditions.save(drawn(), path)
+        style.save(drawn(), path)
     assert paths[0].read_bytes() == paths[1].read_bytes()
 
 

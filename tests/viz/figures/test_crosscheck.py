@@ -17,8 +17,14 @@ def labelled(axes):
 def test_margins_are_shares_of_their_bounds_in_rows_from_the_top():
     axes = crosscheck.margins({"one": 0.5, "two": 2.0, "three": 1e-3}, "title").axes[0]
     lines = labelled(axes)
-    assert (list(lines["within the bound"].get_xdata()), list(lines["within the bound"].get_ydata())) == ([0.5, 1e-3], [0, 2])
-    assert (list(lines["exceeds the bound"].get_xdata()), list(lines["exceeds the bound"].get_ydata())) == ([2.0], [1])
+    assert (list(lines["within the bound"].get_xdata()), list(lines["within the bound"].get_ydata())) == (
+        [0.5, 1e-3],
+        [0, 2],
+    )
+    assert (list(lines["exceeds the bound"].get_xdata()), list(lines["exceeds the bound"].get_ydata())) == (
+        [2.0],
+        [1],
+    )
     assert set(lines["bound"].get_xdata()) == {1.0}
     assert [text.get_text() for text in axes.get_yticklabels()] == ["one", "two", "three"]
     assert axes.get_ylim()[0] > axes.get_ylim()[1]

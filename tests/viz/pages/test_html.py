@@ -118,7 +118,9 @@ def test_text_of_a_paper_is_legible_and_within_the_figure(width_in):
     for panel in panels:
         panel.set_ylabel("largest error of the hinge, mrad", fontsize="small")
         panel.set_title("a panel", fontsize="x-small")
-    title = "A title of many words that is longer than the width of one column of a paper can hold in one line"
+    title = (
+        "A title of many words that is longer than the width of one column of a paper can hold in one line"
+    )
     figure.suptitle(title)
     figure.legend(loc="outside lower center", ncols=8)
     fit_width(figure, width_in)
