@@ -120,10 +120,7 @@ QUANTITIES = (
     ),
     _Quantity("bias C q̇ + G", "C q̇ + G; difference over |C||q̇| + |G|", BIAS_BOUND, _NO_RINGS),
     _Quantity(
-        "inverse dynamics",
-        "M q̈ + C q̇ + G; difference over |M||q̈| + |C||q̇| + |G|",
-        DYNAMICS_BOUND,
-        _RINGS,
+        "inverse dynamics", "M q̈ + C q̇ + G; difference over |M||q̈| + |C||q̇| + |G|", DYNAMICS_BOUND, _RINGS
     ),
     _Quantity(
         "forward dynamics",
@@ -243,11 +240,7 @@ def ask_pinocchio(mjcf: Path, case: Case, states: States) -> Answers:
 
 
 def _differences(
-    mjcf: Path,
-    actuator: Actuator,
-    case: Case,
-    states: States,
-    ask: Callable[[Path, Case, States], Answers],
+    mjcf: Path, actuator: Actuator, case: Case, states: States, ask: Callable[[Path, Case, States], Answers]
 ) -> dict[str, Array]:
     """Relative differences by quantity, one entry a state."""
     said = ask(mjcf, case, states)

@@ -13,12 +13,7 @@ from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 from spheretwin.viz.figures.maps import fit_scale
-from spheretwin.viz.figures.style import (
-    FAINT,
-    INK,
-    WIDTH_in,
-    faint_grid,
-)
+from spheretwin.viz.figures.style import FAINT, INK, WIDTH_in, faint_grid
 from spheretwin.viz.theme import law_colours
 
 Array = NDArray[np.float64]

@@ -11,13 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import NullFormatter
 from numpy.typing import NDArray
 
-from spheretwin.viz.figures.style import (
-    INK,
-    SERIES,
-    WIDTH_in,
-    faint_grid,
-    name_axes,
-)
+from spheretwin.viz.figures.style import INK, SERIES, WIDTH_in, faint_grid, name_axes
 
 Array = NDArray[np.float64]
 

@@ -16,14 +16,7 @@ from numpy.typing import NDArray
 
 from spheretwin.models.design.capability import Capability
 from spheretwin.models.design.workspace import Workspace
-from spheretwin.viz.figures.style import (
-    FAINT,
-    INK,
-    SERIES,
-    WIDTH_in,
-    faint_grid,
-    name_axes,
-)
+from spheretwin.viz.figures.style import FAINT, INK, SERIES, WIDTH_in, faint_grid, name_axes
 from spheretwin.viz.theme import law_colours
 
 Array = NDArray[np.float64]

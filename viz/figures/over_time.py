@@ -13,15 +13,7 @@ from matplotlib.ticker import NullFormatter
 from mpl_toolkits.mplot3d import Axes3D
 from numpy.typing import NDArray
 
-from spheretwin.viz.figures.style import (
-    INK,
-    LawStyle,
-    WIDTH_in,
-    faint_grid,
-    on_errors,
-    panel_column,
-    styles,
-)
+from spheretwin.viz.figures.style import INK, LawStyle, WIDTH_in, faint_grid, on_errors, panel_column, styles
 from spheretwin.viz.theme import law_colour
 
 Array = NDArray[np.float64]

@@ -3,7 +3,4 @@
 from spheretwin.study.engines import ray_cluster, threads
 from spheretwin.study.engines.engine import Engine
 
-ENGINES: dict[str, Engine] = {
-    "local": threads.ENGINE,
-    "ray": ray_cluster.ENGINE,
-}
+ENGINES: dict[str, Engine] = {"local": threads.ENGINE, "ray": ray_cluster.ENGINE}

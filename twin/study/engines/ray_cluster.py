@@ -95,10 +95,7 @@ class _Cluster:
         self._cores = self._most()
         context = ray.get_runtime_context()
         (ours,) = (node for node in ray.nodes() if node["NodeID"] == context.get_node_id())
-        self._lifelines = (
-            context.gcs_address,
-            f"{ours['NodeManagerAddress']}:{ours['NodeManagerPort']}",
-        )
+        self._lifelines = (context.gcs_address, f"{ours['NodeManagerAddress']}:{ours['NodeManagerPort']}")
 
     def results(self) -> Iterator[tuple[Row, Result | None]]:
         while True:

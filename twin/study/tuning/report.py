@@ -158,11 +158,7 @@ ALIGNED = [False, False, True, True, False, False]
 
 
 def write(
-    folder: Path,
-    study: Study,
-    result: TuningResult,
-    command: str,
-    figure_format: str = "svg",
+    folder: Path, study: Study, result: TuningResult, command: str, figure_format: str = "svg"
 ) -> list[Path]:
     """Write the page, its figures if matplotlib is installed, and the gains; return pages and gains.
 

@@ -190,11 +190,7 @@ WIDEST, NARROWEST = 0.2, 0.02
 
 
 def proposed(
-    gains: Sequence[Gain],
-    optimise: Optimise,
-    key: str,
-    number: int,
-    earlier: Sequence[FinishedTrial],
+    gains: Sequence[Gain], optimise: Optimise, key: str, number: int, earlier: Sequence[FinishedTrial]
 ) -> dict[str, float]:
     """Values of a trial by name.
 
