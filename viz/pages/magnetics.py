@@ -142,8 +142,8 @@ def write_map(
     InputError
         A file cannot be written there.
     """
-    least_norm_Nm = min(tilt.least_norm_Nm for tilt in verdict.by_tilt)
-    best_Nm = min(tilt.best_Nm for tilt in verdict.by_tilt)
+    least_norm_Nm = min(pose.least_norm_Nm for pose in verdict.weakest)
+    best_Nm = min(pose.best_Nm for pose in verdict.weakest)
     lead = (
         f"With at most {verdict.current_limit_A:g} A in each group, up to a tilt of"
         f" {verdict.largest_tilt_deg:g}°, least-norm currents give at least {least_norm_Nm:.3f} N·m in every"

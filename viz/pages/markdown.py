@@ -227,7 +227,7 @@ def verdict(checks: Sequence[Check]) -> str:
     """Sentence on the bounds that checks exceed."""
     names = broken(checks)
     result = f"**Exceeded bounds: {'; '.join(names)}.**" if names else "**No bound is exceeded.**"
-    return f"{len(checks)} checks. {result}"
+    return f"Number of checks: {len(checks)}. {result}"
 
 
 def checks_section(checks: Iterable[Check]) -> list[str]:

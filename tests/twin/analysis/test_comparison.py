@@ -17,6 +17,7 @@ from spheretwin.analysis.recorded_run import read
 from spheretwin.analysis.run_summary import amplitudes
 from spheretwin.models.base.errors import InputError
 from spheretwin.viz.quantities import compared_quantities
+from tests.browser import Browser, needs_a_browser
 from tests.twin.analysis.runs import written
 
 NAMES = ["whole", "error", "angle", "sliding", "effort", "more", "currents", "spectra", "events"]
@@ -266,3 +267,75 @@ def test_the_page_has_the_differences_of_the_scenarios_and_the_ranges_of_settled
 def test_titles_of_figures_name_the_common_conditions(files, drawn_into):
     svg = (drawn_into / "error.svg").read_text(encoding="utf-8")
     assert "Tracking error of each hinge: scenario hold, m 0, hardware ideal" in svg  # L differs
+
+
+FIRST_AXIS = "plots[0].layout.yaxis"
+DRAWN = """[...plots[0].querySelectorAll(".xy .js-line")].map((line) => line.getAttribute("d")).join("|")"""
+"""Outlines of the lines of the first panel, the error as one angle."""
+
+PANEL = """(() => {
+  const {x, y, width, height} = plots[0].querySelector(".xy .nsewdrag, .nsewdrag").getBoundingClientRect();
+  return [x, y, width, height];
+})()"""
+
+
+@pytest.fixture
+def opened(drawn_into):
+    with Browser() as browser:
+        page = browser.open((drawn_into / comparison.PAGE).as_uri())
+        page.wait_for("plots.every((plot) => plot.querySelector('.js-line'))")
+        yield page
+        assert page.errors == []
+
+
+@needs_a_browser
+def test_the_switch_draws_the_error_angle_on_a_logarithmic_axis_and_back(opened):
+    linear, (low, high) = opened.evaluate(DRAWN), opened.evaluate(f"{FIRST_AXIS}.range")
+    assert opened.evaluate("plots[0].layout.meta[0]") == "yaxis"  # the first panel
+    opened.click("#logarithmic")
+    opened.wait_for(f"{FIRST_AXIS}.type === 'log' && {FIRST_AXIS}.autorange !== true")
+    assert opened.evaluate("scale.getAttribute('aria-pressed')") == "true"
+    bottom, top = opened.evaluate(f"{FIRST_AXIS}.range")
+    # The axis ends at the largest error, and has at most four decades.
+    largest = opened.evaluate(
+        "Math.max(...plots[0]._fullData.filter((t) => t.yaxis === 'y').flatMap((t) => [...t.y]))"
+    )
+    assert bottom < np.log10(largest) < top < np.log10(largest) + 0.5
+    assert top - bottom <= 4
+    assert opened.evaluate(DRAWN) != linear
+    others = opened.evaluate("Object.keys(plots[0].layout).filter((key) => /^yaxis[0-9]/.test(key))")
+    assert all(opened.evaluate(f"plots[0].layout['{name}'].type") != "log" for name in others)
+    opened.click("#logarithmic")
+    opened.wait_for(f"{FIRST_AXIS}.type === 'linear' && {FIRST_AXIS}.autorange !== true")
+    assert opened.evaluate(f"{FIRST_AXIS}.range") == [low, high]
+    assert opened.evaluate(DRAWN) == linear
+
+
+@needs_a_browser
+def test_a_drag_zooms_into_the_time_and_a_double_click_resets_it(opened):
+    before, (first, last) = opened.evaluate(DRAWN), opened.evaluate("plots[0].layout.xaxis.range")
+    x, y, width, height = opened.evaluate(PANEL)
+    middle = y + height / 2
+    opened.drag((x + 0.25 * width, middle), (x + 0.5 * width, middle))
+    opened.wait_for(f"plots[0].layout.xaxis.range[0] > {first}")
+    zoomed = opened.evaluate("plots[0].layout.xaxis.range")
+    # Whole pixels of some hundred.
+    expected = [first + share * (last - first) for share in (0.25, 0.5)]
+    assert zoomed == pytest.approx(expected, abs=0.01 * (last - first))
+    assert opened.evaluate(DRAWN) != before
+    for count in (1, 2):
+        for kind in ("mousePressed", "mouseReleased"):
+            opened._mouse(kind, x + width / 2, middle, clickCount=count)
+    opened.wait_for(f"plots[0].layout.xaxis.range[1] === {last}")
+    assert opened.evaluate(DRAWN) == before
+
+
+@needs_a_browser
+def test_the_button_of_a_run_hides_its_lines_in_every_figure(opened):
+    count = "plots.map((plot) => plot.querySelectorAll('.js-line').length)"
+    both = opened.evaluate(count)
+    opened.click("[data-run='0']")
+    opened.wait_for("plots.every((plot) => plot.data.every((t) => t.meta !== '0' || t.visible === false))")
+    assert all(0 < one < every for one, every in zip(opened.evaluate(count), both, strict=True))
+    opened.click("[data-run='0']")
+    opened.wait_for(f"String({count}) === '{','.join(map(str, both))}'")

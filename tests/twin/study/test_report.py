@@ -1,13 +1,19 @@
 """What is said of a study as a whole: its summary, what the worst goes with, its figures and its page."""
 
+import re
+
 import numpy as np
 import pyarrow as pa
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from matplotlib.text import Text
 from scipy import stats
 
+from spheretwin.metrics import METRICS
 from spheretwin.models.base.errors import InputError
+from spheretwin.scenario.fields import every_field, quantity_text, unit_of
+from spheretwin.scenario.sections import Scenario
 from spheretwin.study import report
 from spheretwin.study.report import drawings
 from spheretwin.study.statistics import Rows, largest, ranked, read, strongest, summary
@@ -190,3 +196,88 @@ def test_failures_are_rows_that_a_watchdog_ended_or_in_which_user_code_raised():
     rows.statuses[2:4] = ["failsafe", "failed"]
     rows.complaints[[1, 4]] = ["end of the range", "the metric raised"]
     assert rows.failures.tolist() == [2, 3, 4]
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        ("max_abs_error_rad", "largest error, rad"),
+        ("current_variation_A_s", "current variation, A/s"),
+        ("copper_loss_J", "copper loss, J"),
+        ("saturated_fraction", "saturated fraction"),
+        ("drive.delay_s", "drive delay, s"),
+        ("plant.coulomb_Nm.1", "plant coulomb 1, N·m"),
+        ("controller.surface_slope", "controller surface slope"),
+        ("trajectory", "trajectory"),
+        ("duration", "duration, s"),
+        ("worst tail_rms_error_rad", "worst tail rms error, rad"),
+    ],
+)
+def test_quantities_are_words_with_their_unit(name, words):
+    assert quantity_text(name) == words
+
+
+def test_words_of_all_fields_and_metrics_are_different_and_end_in_their_units():
+    names = {name for name, _ in every_field(Scenario)} | set(METRICS)
+    words = {name: quantity_text(name) for name in names}
+    assert len(set(words.values())) == len(names)
+    assert not any("_" in text or "." in text for text in words.values())
+    assert all(text.endswith(f", {unit_of(name)}") for name, text in words.items() if unit_of(name))
+
+
+def texts(figure):
+    """All text of a figure."""
+    figure.draw_without_rendering()
+    return [text.get_text() for text in figure.findobj(Text)]
+
+
+FIELDS = {
+    "drive.delay_s": NUMBERS,
+    "plant.coulomb_Nm.0": NUMBERS[::-1],
+    "disturbance.load": NUMBERS**2,
+}
+
+
+@pytest.mark.parametrize("count", [1, 2, 3])
+def test_figures_and_summary_have_words_with_units_and_no_raw_keys(count, tmp_path):
+    axes = {name: FIELDS[name].round(1) for name in list(FIELDS)[:count]}
+    figures = {"max_abs_error_rad": 0.1 + NUMBERS, "current_variation_A_s": NUMBERS}
+    rows = made(24, figures, axes, ("pd", "afsm"))
+    raw = re.compile("|".join(map(re.escape, [*figures, *axes])))
+    drawn = list(drawings(rows))
+    for drawing in drawn:
+        assert not [text for text in [*texts(drawing.figure), drawing.caption] if raw.search(text)]
+    shown = {text for drawing in drawn for text in texts(drawing.figure)}
+    assert {"current variation, A/s", "largest error, rad", "drive delay, s"} <= shown
+    page = report.write(tmp_path, rows, summary(rows), (24, 24), "made")[0].read_text()
+    metrics, _, varied = page.partition("## Varied fields")
+    assert not raw.search(metrics)
+    assert "| largest error, rad | " in metrics
+    assert "| number of rows: completed | 12 | 12 |" in metrics
+    for name in axes:
+        assert re.search(rf"\| {re.escape(quantity_text(name))} \|.*\| `{re.escape(name)}` \|", varied)
+
+
+def test_axes_of_a_map_are_named_by_the_field_of_their_values():
+    first, second = np.repeat([1.0, 2.0], 6), np.tile([5.0, 6.0, 7.0], 4)
+    rows = made(
+        12, {"max_abs_error_rad": first + second}, {"drive.delay_s": first, "disturbance.load": second}
+    )
+    (axes, bar) = next(drawings(rows)).figure.axes
+    assert (axes.get_ylabel(), axes.get_xlabel()) == ("drive delay, s", "disturbance load")
+    assert [text.get_text() for text in axes.get_yticklabels()] == ["1", "2"]
+    assert [text.get_text() for text in axes.get_xticklabels()] == ["5", "6", "7"]
+    assert bar.get_ylabel() == "largest error, rad"
+
+
+def test_scatters_are_of_the_axis_that_their_label_names():
+    axes = {"drive.delay_s": NUMBERS, "plant.coulomb_Nm.0": 3 + NUMBERS**2, "disturbance.load": 7 - NUMBERS}
+    rows = made(24, {"max_abs_error_rad": 0.1 + NUMBERS}, axes)
+    figure = next(drawing.figure for drawing in drawings(rows) if drawing.file == "report_strongest.svg")
+    panels = {panel.get_xlabel(): panel for panel in figure.axes if panel.get_visible()}
+    assert set(panels) == set(map(quantity_text, axes))
+    for name, of_axis in axes.items():
+        dots = panels[quantity_text(name)].get_lines()[0]
+        np.testing.assert_array_equal(dots.get_xdata(), of_axis)
+        np.testing.assert_array_equal(dots.get_ydata(), 0.1 + NUMBERS)
+    assert figure.axes[0].get_ylabel() == "largest error, rad"
