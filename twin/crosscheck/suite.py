@@ -222,6 +222,6 @@ def write(folder: Path, evidence: Evidence, figure_format: str = "svg") -> list[
         "Comparison of the engine (MuJoCo) with the Lagrangian model, which is derived independently, and"
         f" with Pinocchio. {pieces.verdict(evidence.checks)}"
     ]
-    sections = [*pieces.checks_section(evidence.checks), "## Figures", "", *map(pieces.figure, drawings)]
+    sections = ["## Figures", "", *map(pieces.figure, drawings), *pieces.checks_section(evidence.checks)]
     command = "spheretwin crosscheck"
     return write_page(folder, NAME, "Cross-check", summary, sections, drawings, command, figure_format)

@@ -285,10 +285,14 @@ def findings(outcomes: Outcomes) -> list[Finding]:
 
 def _by_limit(hardware: Hardware, condition: Condition, outcomes: Outcomes) -> list[str]:
     """Statements on the order of the laws, each with the limits for which it is true."""
-    complete = [result for result in results(hardware, condition, outcomes) if not result.is_lost]
+    every = results(hardware, condition, outcomes)
+    complete = [result for result in every if not result.is_lost]
+    # A limit on the cases may leave out our own law, of which nothing is known then.
+    tuned = {gains.limit_A_s for gains in tuned_gains(hardware.study) if gains.law == OUR_LAW}
+    left_out = tuned - {result.limit_A_s for result in every if result.law == OUR_LAW}
     limits: dict[str, list[str]] = {}
     for limit in hardware.limits_A_s:
-        if ordered := within(complete, limit):
+        if limit not in left_out and (ordered := within(complete, limit)):
             limits.setdefault(_comparison(ordered), []).append(f"{limit:g}")
     return [f"within {_listed(texts)} A/s {statement}" for statement, texts in limits.items()]
 

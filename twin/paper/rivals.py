@@ -122,7 +122,7 @@ def _of_hardware(hardware: Hardware, outcomes: Outcomes) -> list[Section]:
     return [
         Section(
             title,
-            f"{method} {OBJECTIVES[hardware.name]}",
+            f"{method}\n\n{OBJECTIVES[hardware.name]}",
             rival_results.errors(hardware, outcomes),
             [lambda: figure(hardware, outcomes)],
         ),

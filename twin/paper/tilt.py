@@ -172,7 +172,7 @@ ONE_THING = (
     " reference: its rate jumps, and no law has a feed-forward of the acceleration. A better estimator or"
     " true rates do not reduce it."
 )
-CHANGE_HEAD = ("law", "single change", "paper's reached", "paper", "α measured", "α true")
+CHANGE_HEAD = ("law", "single change", "reaches the paper", "paper", "α measured", "α true")
 
 
 def change_section(outcomes: Outcomes) -> Section:

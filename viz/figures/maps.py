@@ -249,7 +249,7 @@ def capability_map(workspace: Workspace, on_grid: Capability, limit_A: float) ->
     on_grid : Capability
         Capability of its poses, in the grid's shape.
     limit_A : float, A
-        Current limit, for the titles.
+        Current limit, for the title.
     """
     figure = Figure(figsize=(1.25 * WIDTH_in, 1.2 * WIDTH_in), layout="constrained")
     least_norm, best, singular_value = (
@@ -259,16 +259,17 @@ def capability_map(workspace: Workspace, on_grid: Capability, limit_A: float) ->
     condition = _over_spin(workspace, on_grid.condition, np.max)
     torque = Normalize(np.nanmin(least_norm), np.nanmax(best))  # one scale: the two are to be compared
     maps = (
-        (f"least-norm torque at {limit_A:g} A, N·m", least_norm, torque, "viridis"),
-        (f"torque by the best currents at {limit_A:g} A, N·m", best, torque, "viridis"),
-        ("least singular value σ, N·m/A", singular_value, None, "viridis"),
+        ("least-norm torque, N·m", least_norm, torque, "viridis"),
+        ("torque by best currents, N·m", best, torque, "viridis"),
+        ("least singular value, N·m/A", singular_value, None, "viridis"),
         ("condition number", condition, None, "viridis_r"),
     )
     grid = figure.subplots(2, 2, subplot_kw={"projection": "polar"})
     for axes, (title, values, scale, colours) in zip(grid.flat, maps, strict=True):
         _polar(figure, axes, workspace, values, scale, title, colours)
     figure.suptitle(
-        "Worst direction and worst spin on the grid; radius: tilt of the shaft, angle: its azimuth"
+        f"Worst direction and worst spin at {limit_A:g} A; radius: tilt of the shaft in degrees, angle: its"
+        " azimuth"
     )
     return figure
 

@@ -103,7 +103,8 @@ def fit_width(figure: Figure, width_in: float) -> None:
         text.set_fontsize(max(PAPER_TEXT_pt, scale * text.get_fontsize()))
     titles = list(figure.texts)
     for axes in figure.axes:
-        axes.tick_params(labelsize=max(PAPER_TEXT_pt, 8.0 * scale))  # also of ticks that are added later
+        # Also of ticks that are added later.
+        axes.tick_params(which="both", labelsize=max(PAPER_TEXT_pt, 8.0 * scale))
         titles += [axes.title, axes.xaxis.label, axes.yaxis.label]
     for title in titles:
         title.set_wrap(True)

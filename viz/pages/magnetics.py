@@ -185,8 +185,8 @@ def _write(
     """Write the page of a part: warnings and exceeded bounds are in its summary."""
     warnings = [f"Warning: {warning}." for warning in verdict.warnings]
     summary = [" ".join([lead, markdown.verdict(verdict.checks), *warnings])]
-    lines = [*markdown.checks_section(verdict.checks), *sections]
-    lines += ["## Figures", "", *map(markdown.figure, drawings)]
+    lines = ["## Figures", "", *map(markdown.figure, drawings), *sections]
+    lines += markdown.checks_section(verdict.checks)
     return write_page(
         folder, f"magnetics_{part}", TITLES[part], summary, lines, drawings, command, figure_format
     )

@@ -158,7 +158,7 @@ def test_check_writes_a_page(capsys, coarse, tmp_path):
     names = {"magnetics_check.md", "magnetics_check.html", "magnetics_margins.svg"}
     assert {path.name for path in tmp_path.iterdir()} == names
     text = (tmp_path / "magnetics_check.md").read_text(encoding="utf-8")
-    assert "Number of checks: 8. **No bound is exceeded.**" in text.split("- [Checks]")[0]
+    assert "Number of checks: 8. **No bound is exceeded.**" in text.split("- [Figures]")[0]
     for check in figures["checks"]:
         assert f"| {check['name']} | {check['compares']} |" in text
     for band in figures["by_tilt"]:
@@ -213,14 +213,14 @@ def test_map_prints_tables_and_writes_a_page(capsys, tmp_path, actuator):
     worst = {
         name: min(getattr(pose, name) for pose in verdict.weakest) for name in ("least_norm_Nm", "best_Nm")
     }
-    summary = text.split("- [Checks]")[0]
+    summary = text.split("- [Figures]")[0]
     assert "up to a tilt of 4°" in summary
     assert f"least-norm currents give at least {worst['least_norm_Nm']:.3f} N·m in every direction" in summary
     assert f"the best currents give at least {worst['best_Nm']:.3f} N·m" in summary
     assert "Number of checks: 2. **No bound is exceeded.**" in summary
     headings = [line for line in text.splitlines() if line.startswith("## ")]
     assert [heading.split(" at ")[0] for heading in headings] == [
-        "## Checks", "## Torque in every direction", "## Weakest poses", "## Figures",
+        "## Figures", "## Torque in every direction", "## Weakest poses", "## Checks",
     ]  # fmt: skip
     first = verdict.by_tilt[0]
     assert (

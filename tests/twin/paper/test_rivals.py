@@ -137,7 +137,8 @@ def made_up(limit, by_law, condition=IDEAL.conditions[0]):
     return Outcomes(
         {
             rival_conditions.tuned_case(IDEAL, condition, tuned[law]).name: [
-                outcome(error, limit) for error in errors
+                outcome(error, limit, Status.DIVERGED if np.isnan(error) else Status.COMPLETED)
+                for error in errors
             ]
             for law, errors in by_law.items()
         }
@@ -164,7 +165,7 @@ def test_results_are_medians_and_no_numbers_if_a_run_was_lost():
             "tuned PID and ADRC have a smaller error than AFSM-ESO, which is level with LQI",
         ),
         (
-            {"adrc": (0.9e-3,)},
+            {"afsm_eso": (np.nan,), "adrc": (0.9e-3,)},
             "ADRC has the smallest error, and AFSM-ESO loses the rotor or exceeds the limit",
         ),
     ],
@@ -172,6 +173,10 @@ def test_results_are_medians_and_no_numbers_if_a_run_was_lost():
 def test_findings_say_where_rivals_are_level_or_better(errors, expected):
     (finding,) = rival_results.findings(made_up(30.0, errors))
     assert finding.text == f"{IDEAL.title}, {IDEAL.conditions[0].name}: within 30 A/s {expected}"
+
+
+def test_nothing_is_said_within_a_limit_of_which_our_own_law_did_not_run():
+    assert rival_results.findings(made_up(30.0, {"adrc": (0.9e-3,)})) == []
 
 
 def test_limits_with_the_same_order_are_one_statement():
