@@ -59,12 +59,7 @@ def chapter_of(result: PlanResult, rows: Sequence[Mapping[str, Any]]) -> Chapter
     )
 
 
-def write(
-    folder: Path,
-    chapters: Sequence[Chapter],
-    command: str,
-    figure_format: str = "svg",
-) -> list[Path]:
+def write(folder: Path, chapters: Sequence[Chapter], command: str, figure_format: str = "svg") -> list[Path]:
     """Write the page, its figures and its recordings; return both forms of the page and the recordings.
 
     Parameters
@@ -172,10 +167,7 @@ ERRORS: dict[str, Callable[[Outcome], Any]] = {
 }
 """Errors of each hinge; the JSON has their median, and lowest and highest, over the seeds."""
 
-EFFORT = {
-    "rms_torque_Nm": "rms_torque_range_Nm",
-    "current_variation_A_s": "current_variation_range_A_s",
-}
+EFFORT = {"rms_torque_Nm": "rms_torque_range_Nm", "current_variation_A_s": "current_variation_range_A_s"}
 """Metrics of the effort; the JSON has their median, and lowest and highest, over the seeds."""
 
 PLANT_LABELS = {"lagrangian": "the Lagrangian", "mujoco": "MuJoCo"}

@@ -112,10 +112,7 @@ def _medians(hardware: Hardware, runs: Sequence[Outcome]) -> tuple[float, float,
     return float(np.median(largest)), max(largest), float(variation), float(np.median(tail))
 
 
-ALLOCATION_LABELS = {
-    "least_norm": "full current, least norm",
-    "bounded": "full current, bounded allocation",
-}
+ALLOCATION_LABELS = {"least_norm": "full current, least norm", "bounded": "full current, bounded allocation"}
 
 
 def ranges(hardware: Hardware) -> ResultTable:
@@ -181,24 +178,14 @@ def robustness(hardware: Hardware, outcomes: Outcomes) -> list[ResultTable]:
 
 def complete_prototype(hardware: Hardware, outcomes: Outcomes) -> list[ResultTable]:
     """Median and worst error with every imperfection; no table for hardware without this condition."""
-    title = f"{hardware.title} with every imperfection: largest error in {_unit(hardware)}, variation in A/s"
-    return [
-        ResultTable(
-            title,
-            ("limit, A/s", "law", "median", "worst", "variation"),
-            [
-                (
-                    NONE if result.limit_A_s is None else f"{result.limit_A_s:g}",
-                    result.label,
-                    *_spread(result),
-                )
-                for result in sorted(every, key=_by_limit_and_error)
-            ],
-            2,
-        )
-        for condition in hardware.conditions
-        if condition.name == COMPLETE and (every := results(hardware, condition, outcomes))
+    complete = [condition for condition in hardware.conditions if condition.name == COMPLETE]
+    every = [result for condition in complete for result in results(hardware, condition, outcomes)]
+    rows: list[tuple[str, ...]] = [
+        (NONE if result.limit_A_s is None else f"{result.limit_A_s:g}", result.label, *_spread(result))
+        for result in sorted(every, key=_by_limit_and_error)
     ]
+    head = ("limit, A/s", "law", "median error, degrees", "worst error, degrees", "variation, A/s")
+    return [ResultTable(f"{hardware.title} with every imperfection", head, rows, 2)] if every else []
 
 
 def _spread(result: Result) -> tuple[str, str, str]:

@@ -139,8 +139,8 @@ EXPERIMENT = Experiment(
     name="rivals",
     title="Comparison of the laws, tuned by the same search",
     summary="A search with the same budget tuned every law for the sinusoid on ideal hardware and for the"
-    " tilt with the electronics of the prototype, within limits on the variation of the currents. The laws run with these gains"
-    " under other seeds and with a wrong nominal model.",
+    " tilt with the prototype's electronics, within limits on the variation of the currents. The laws run"
+    " with these gains under other seeds and with a wrong nominal model.",
     cases=cases,
     sections=_sections,
     reduce=start_error,
