@@ -159,7 +159,7 @@ def _sizes(outcomes: Outcomes) -> list[Finding]:
         texts.append(f"{law.label} {median:.2f}° (paper {law.paper})")
     if not texts:
         return []
-    why = "" if reproduced else "; what brings each law there alone is in its chapter"
+    why = "" if reproduced else "; its chapter lists the single changes with which a law reaches it"
     return [Finding(reproduced, f"largest measured error of α: {', '.join(texts)}{why}")]
 
 

@@ -274,7 +274,7 @@ DRAWN = """[...plots[0].querySelectorAll(".xy .js-line")].map((line) => line.get
 """Outlines of the lines of the first panel, the error as one angle."""
 
 PANEL = """(() => {
-  const {x, y, width, height} = plots[0].querySelector(".xy .nsewdrag, .nsewdrag").getBoundingClientRect();
+  const {x, y, width, height} = plots[0].querySelector(".nsewdrag[data-subplot='xy']").getBoundingClientRect();
   return [x, y, width, height];
 })()"""
 
@@ -316,6 +316,8 @@ def test_a_drag_zooms_into_the_time_and_a_double_click_resets_it(opened):
     before, (first, last) = opened.evaluate(DRAWN), opened.evaluate("plots[0].layout.xaxis.range")
     x, y, width, height = opened.evaluate(PANEL)
     middle = y + height / 2
+    # The panel is what a reader sees there: nothing covers it.
+    assert opened.evaluate(f"document.elementFromPoint({x + width / 2}, {middle}).matches('.nsewdrag')")
     opened.drag((x + 0.25 * width, middle), (x + 0.5 * width, middle))
     opened.wait_for(f"plots[0].layout.xaxis.range[0] > {first}")
     zoomed = opened.evaluate("plots[0].layout.xaxis.range")
