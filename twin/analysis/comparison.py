@@ -332,9 +332,10 @@ def _above(title: str, runs: Sequence[ComparedRun], most: int) -> str:
 
 
 def _below(runs: Sequence[Reviewed], drawn: Sequence[ComparedRun], figures: Sequence[dict[str, Any]]) -> str:
-    head = ["differences from run 1" if len(runs) > 1 else "", *(_plain(run.label) for run in drawn)]
+    head = ["angles in mrad (degrees)", *(_plain(run.label) for run in drawn)]
     rows = [[cell.replace("\n", "; ") for cell in row] for row in table_rows(figures, BAND_rad)]
-    lines = ["## Metrics", "", *markdown.table(head, rows, [False] + [True] * len(runs)), ""]
+    note = ["Differences are from run 1.", ""] if len(runs) > 1 else []
+    lines = ["## Metrics", "", *note, *markdown.table(head, rows, [False] + [True] * len(runs)), ""]
     if len(runs) > 1:
         lines += ["## Differences of the scenarios", "", *_difference_table(runs)]
     return "\n".join(lines)
