@@ -133,7 +133,8 @@ def _band(
     """
     running = ~np.any(np.isnan(values), axis=0)
     low, middle, high = np.quantile(values[:, running], [0, 0.5, 1], axis=0)
-    t_s, every = window_s * (np.flatnonzero(running) + 0.5), max(1, values.shape[1] // MARKS)
+    t_s: Array = window_s * (np.flatnonzero(running).astype(np.float64) + 0.5)
+    every = max(1, values.shape[1] // MARKS)
     panel.fill_between(t_s, low, high, color=style.colour, alpha=0.2, linewidth=0)
     panel.plot(t_s, middle, linewidth=1.3, marker=style.marker, markersize=4.5, label=label,
                markevery=(int(shift * every), every), **style.line())  # fmt: skip

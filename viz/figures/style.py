@@ -100,7 +100,7 @@ def fit_width(figure: Figure, width_in: float) -> None:
     scale = float(np.clip(width_in / former_in, PAPER_SCALE, 1.0))
     figure.set_size_inches(width_in, scale * height_in)
     for text in figure.findobj(Text):
-        text.set_fontsize(max(PAPER_TEXT_pt, scale * text.get_fontsize()))
+        text.set_fontsize(max(PAPER_TEXT_pt, scale * float(text.get_fontsize())))
     titles = list(figure.texts)
     for axes in figure.axes:
         # Also of ticks that are added later.
@@ -116,7 +116,7 @@ def _narrow(figure: Figure, legend: Legend) -> None:
     """Draw a legend below a figure with as many columns as its width has room for."""
     texts = legend.get_texts()
     handles = [handle for handle in legend.legend_handles if handle]
-    labels, size_pt = [text.get_text() for text in texts], texts[0].get_size()
+    labels, size_pt = [text.get_text() for text in texts], texts[0].get_fontsize()
     for columns in range(min(len(labels), 5), 0, -1):
         legend.remove()
         legend = figure.legend(handles, labels, loc="outside lower center", ncols=columns, frameon=False,

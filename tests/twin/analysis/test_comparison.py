@@ -274,7 +274,8 @@ DRAWN = """[...plots[0].querySelectorAll(".xy .js-line")].map((line) => line.get
 """Outlines of the lines of the first panel, the error as one angle."""
 
 PANEL = """(() => {
-  const {x, y, width, height} = plots[0].querySelector(".nsewdrag[data-subplot='xy']").getBoundingClientRect();
+  const panel = plots[0].querySelector(".nsewdrag[data-subplot='xy']");
+  const {x, y, width, height} = panel.getBoundingClientRect();
   return [x, y, width, height];
 })()"""
 
