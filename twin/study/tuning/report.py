@@ -188,7 +188,7 @@ def write(
         table = pieces.table(head, body, [False, *(True for _ in head[1:])]) if body else [NONE_COMPLETED]
         sections += [f"## {law}", "", counted(of_law), "", *table, ""]
     gains = json.dumps(best(result, optimise.objective), indent=1, ensure_ascii=False)
-    lead = [study.description]
+    lead = [study.description, "", f"{result.trials} of {result.of} trials are finished."]
     return [
         *write_page(folder, NAME, study.name, lead, sections, figures, command, figure_format),
         save_text(folder / GAINS, f"{gains}\n"),

@@ -10,6 +10,7 @@ import pytest
 from spheretwin import cli
 from spheretwin.cli import sweep
 from spheretwin.models.base.errors import InputError
+from spheretwin.study.optimise import Objective
 from spheretwin.study.tuning import report
 from tests.twin.study.tuning.cases import FIGURES
 
@@ -174,6 +175,30 @@ def test_the_page_has_every_law_its_front_and_its_figures(small, tmp_path, capsy
         figure = (tmp_path / "out" / file).read_text(encoding="utf-8")
         assert all(f">{law}, {label}</text>" in figure for law in laws)
     assert f"Created by `spheretwin sweep {small} --optimise` with python" in text
+    assert "16 of 16 trials are finished." in text.partition("- [Method]")[0]
+    # The words of a gain stand next to the fields that it sets; no other table has these.
+    assert "| controller stiffness | all | 30 | 3000 | `controller.stiffness` |" in text
+    assert "controller.stiffness" not in text.partition("## Figures")[2].partition("---\n")[0].replace(
+        "`", ""
+    )
+
+
+@pytest.mark.parametrize(
+    ("objective", "words"),
+    [
+        ({"metric": "max_abs_error_rad"}, "worst largest error, rad"),
+        ({"metric": "max_abs_error_rad", "of": ("alpha", "beta")}, "worst largest error, rad (alpha, beta)"),
+        ({"metric": "current_variation_A_s", "over": "median"}, "median current variation, A/s"),
+        ({"metric": "rms_torque_Nm", "over": "geometric_mean"}, "geometric mean rms torque, N·m"),
+        ({"metric": "slowness"}, "worst slowness"),
+    ],
+)
+def test_objectives_are_words_with_their_unit(objective, words):
+    made = Objective(**objective)
+    trial = {"trial": 1, "gains": {}, "fields": {"controller.damping": 1.0}, "ended": "completed"}
+    trial |= {"values": {made.called: 2.0}, "fresh": None, "fresh_reason": None}
+    head, _ = report.chosen({"start": None, "best": [trial]})
+    assert head == ["trial", "controller damping", words]
 
 
 def test_the_command_that_is_told_runs_the_gains(small, tmp_path, capsys):
