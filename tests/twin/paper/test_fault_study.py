@@ -35,7 +35,7 @@ from spheretwin.paper.runner import make_plan, run_plan, scenario_of, unexpected
 from spheretwin.session import Session
 from spheretwin.simulation import simulate
 
-# Nine open groups that leave a tenth of the torque needed, and a pair that is hard for who is not told.
+# Nine open groups that leave a tenth of the torque needed, and a pair that does not track if it is not reported.
 MANY, PAIR = (2, 3, 4, 9, 10, 11, 14, 15, 16), (0, 1)
 DROPOUT = next(each for each in failures() if (each.part, each.mode) == ("encoder.gamma", "dropout"))
 STUDY = [
@@ -236,7 +236,7 @@ def test_page_shows_every_figure_and_row(found):
     assert [row[:2] for row in groups.tables[0].rows] == [
         (str(number), way.name) for number in (1, 2, 9) for way in OF_GROUPS
     ]
-    assert "told, 4 of 4 runs track" in groups.text
+    assert "reported, 4 of 4 runs track" in groups.text
     assert {row[0] for row in reasons.tables[1].rows} == {" ".join(map(str, MANY))}
     (dropout,) = parts.tables[0].rows
     assert dropout[1].startswith("left_workspace: ")
