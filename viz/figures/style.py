@@ -108,7 +108,7 @@ def fit_width(figure: Figure, width_in: float) -> None:
         titles += [axes.title, axes.xaxis.label, axes.yaxis.label]
     for title in titles:
         title.set_wrap(True)
-    for legend in list(figure.legends):
+    for legend in [legend for legend in figure.legends if legend.get_texts()]:
         _narrow(figure, legend)
 
 
