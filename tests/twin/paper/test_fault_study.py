@@ -35,7 +35,7 @@ from spheretwin.paper.runner import make_plan, run_plan, scenario_of, unexpected
 from spheretwin.session import Session
 from spheretwin.simulation import simulate
 
-# Nine open groups that leave a tenth of the torque needed, and a pair that does not track if it is not reported.
+# Nine open groups that leave a tenth of the torque needed; a pair that does not track if it is not reported.
 MANY, PAIR = (2, 3, 4, 9, 10, 11, 14, 15, 16), (0, 1)
 DROPOUT = next(each for each in failures() if (each.part, each.mode) == ("encoder.gamma", "dropout"))
 STUDY = [
