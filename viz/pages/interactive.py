@@ -73,8 +73,9 @@ def page(
 def _switches(runs: Sequence[ComparedRun]) -> str:
     colours = run_colours([run.law for run in runs])
     return "".join(
-        f'<button type="button" data-run="{place}" aria-pressed="true" style="--run: {colour}">'
-        f"{escape(run.label)}</button>"
+        f'<button type="button" data-run="{place}" aria-pressed="true"><svg width="32" height="6">'
+        f'<line y1="3" x2="32" y2="3" stroke="{colour}" stroke-width="3"'
+        f' stroke-dasharray="{DASHES_px[place % len(DASHES_px)]}"/></svg>{escape(run.label)}</button>'
         for place, (run, colour) in enumerate(zip(runs, colours, strict=True))
     )
 
@@ -169,14 +170,18 @@ def over_time(
             for place in leading
             if quantity.desired
             for trace in _lines(
-                runs[place], place, quantity.desired(runs[place].rows), most, REFERENCE_COLOUR, 4.0
+                runs[place],
+                place,
+                quantity.desired(runs[place].rows),
+                most,
+                {"color": REFERENCE_COLOUR, "width": 4.0},
             )
         ]
         of_runs = [quantity.column(run.rows) for run in runs]
         lines = [
             trace
             for place, (run, colour, values) in enumerate(zip(runs, colours, of_runs, strict=True))
-            for trace in _lines(run, place, values, most, colour, 1.3)
+            for trace in _lines(run, place, values, most, _line(place, colour))
         ]
         for trace in reference_lines:
             trace.hoverinfo, trace.hovertemplate = "skip", None
@@ -217,7 +222,7 @@ def error_spectra(runs: Sequence[ComparedRun], spectra: Sequence[Sequence[Spectr
     for axis, name in enumerate(ANGLES):
         traces = []
         for place, (colour, of_run) in enumerate(zip(colours, spectra, strict=True)):
-            spectrum, look = of_run[axis], {"color": colour, "width": 1.3}
+            spectrum, look = of_run[axis], _line(place, colour)
             x, y = octave_maxima(spectrum.frequency_Hz, spectrum.amplitude_mrad, lines_per_octave)
             hover = "%{x:.4g} Hz: %{y:.3g} mrad<extra></extra>"
             traces.append(plotly.Scatter(x=_small(x), y=_small(y), mode="lines", line=look,
@@ -233,11 +238,21 @@ def error_spectra(runs: Sequence[ComparedRun], spectra: Sequence[Sequence[Spectr
     return stacked(panels, "frequency [Hz]", type="log")
 
 
+DASHES_px = ("", "7,3", "2,2", "7,2,2,2", "12,3", "12,2,2,2", "4,4", "2,5")
+"""Dash of each run, as an SVG writes it: colours alone are too alike for some readers."""
+
+
+def _line(place: int, colour: str) -> dict[str, Any]:
+    """Return the look of the lines of a run."""
+    dash = DASHES_px[place % len(DASHES_px)]
+    return {"color": colour, "width": 1.3, "dash": dash.replace(",", "px,") + "px" if dash else "solid"}
+
+
 def _lines(
-    run: ComparedRun, place: int, values: Array, most: int, colour: str, width: float
+    run: ComparedRun, place: int, values: Array, most: int, line: dict[str, Any]
 ) -> list[plotly.Scatter]:
     """Return every tick as one line, or the bounds of every few ticks as a band and their mean."""
-    t_s, line = run.table["t_s"], {"color": colour, "width": width}
+    t_s, colour = run.table["t_s"], line["color"]
     common = {"mode": "lines", "meta": f"{place}"}
     hover = "%{y:.4g}<extra></extra>"
     if len(values) <= most:
