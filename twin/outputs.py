@@ -138,7 +138,10 @@ class Outputs:
     def sinks(self) -> list[Sink]:
         """Sinks of the telemetry."""
         sinks: list[Sink] = [sink for sink in (self._file, self._recorder, self._live) if sink]
-        return [_FromTick(self._skipped, sink) for sink in sinks] if self._skipped else sinks
+        if not self._skipped:
+            return sinks
+        first_s = (self._first_tick - 0.5) * self._session.scenario.controller.period_s
+        return [_FromTick(self._skipped, first_s, sink) for sink in sinks]
 
     def facts(self) -> dict[str, str]:
         """Return the metadata of the telemetry at this time."""
@@ -174,10 +177,10 @@ class Outputs:
 
 
 class _FromTick:
-    """Passes the rows from a tick on to a sink."""
+    """Passes the rows from a tick on, and the notes from a time on, to a sink."""
 
-    def __init__(self, first_tick: int, sink: Sink) -> None:
-        self._remaining, self._sink = first_tick, sink
+    def __init__(self, skipped: int, first_s: float, sink: Sink) -> None:
+        self._remaining, self._first_s, self._sink = skipped, first_s, sink
 
     def write(self, rows: Table) -> None:
         skipped = min(self._remaining, len(rows))
@@ -186,7 +189,7 @@ class _FromTick:
             self._sink.write(rows.rows(skipped, len(rows)))
 
     def note(self, t_s: float, text: str) -> None:
-        if not self._remaining:
+        if t_s > self._first_s:  # a chunk may have faults on both sides of the first tick
             self._sink.note(t_s, text)
 
     def finish(self, status: Status) -> None:

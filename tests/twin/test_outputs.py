@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from spheretwin import scenario as scenarios
+from spheretwin import simulation as simulations
 from spheretwin.analysis.recorded_run import read
 from spheretwin.cli.common import interruptible
 from spheretwin.models.base.errors import InputError
@@ -15,6 +16,7 @@ from spheretwin.models.telemetry.table import read_parquet
 from spheretwin.outputs import Outputs
 from spheretwin.session import Session
 from spheretwin.simulation import follow
+from spheretwin.viz.recording import live
 
 
 @pytest.fixture
@@ -39,6 +41,23 @@ def test_telemetry_that_is_refused_leaves_no_recording(session, tmp_path):
     with pytest.raises(InputError, match="writable"):
         Outputs(session, tmp_path / "x.rrd", tmp_path / "missing" / "x.parquet", live=False)
     assert os.listdir(tmp_path) == []
+
+
+def test_a_live_view_has_the_tab_and_the_window_that_were_requested(session, monkeypatch):
+    requested = []
+
+    class View:
+        address = ""
+
+        def __init__(self, *_, **options):
+            requested.append(options)
+
+        def close(self):
+            pass
+
+    monkeypatch.setattr(live, "LiveView", View)
+    assert Outputs(session, None, None, live=True, view="control", live_window_s=3.0).close() == []
+    assert requested == [{"shown": "control", "window_s": 3.0}]
 
 
 def test_signals_that_the_parent_has_ignored_stay_ignored():
@@ -68,3 +87,19 @@ def test_files_that_begin_later_have_the_rows_and_the_log_from_then_on(tmp_path)
         np.testing.assert_allclose(table["t_s"], np.arange(20, 50) * 1e-3, rtol=1e-12)
     logged = [t_s for t_s, _, text in recording.log if "disturbance.load" in text]
     assert logged == [pytest.approx(0.04)]
+
+
+@pytest.mark.parametrize("chunk", [1, 7, 50])
+def test_the_log_of_files_that_begin_later_is_the_same_for_any_chunks(tmp_path, monkeypatch, chunk):
+    """Faults and events before, exactly at and after the first tick of the files."""
+    times_s = (0.005, 0.019, 0.02, 0.03)
+    faults = [{"target": f"coil.{i:02d}", "mode": "open", "start_s": t_s} for i, t_s in enumerate(times_s)]
+    events = [{"t_s": t_s, "set": "disturbance.load", "value": t_s} for t_s in times_s]
+    session = Session(scenarios.load("hold", {"duration": 0.05, "fault": faults, "event": events}))
+    monkeypatch.setattr(simulations, "CHUNK_STEPS", chunk * session.scenario.substeps)
+    files = Outputs(session, tmp_path / "x.rrd", None, live=False, first_tick=20)
+    follow(session, 50, files.sinks)
+    assert files.close() == []
+    log = read(tmp_path / "x.rrd").log
+    for part in ("coil", "disturbance.load"):
+        assert [t_s for t_s, _, text in log if part in text] == pytest.approx([0.02, 0.03], abs=1e-9)

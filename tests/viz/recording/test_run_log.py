@@ -2,10 +2,15 @@
 
 import numpy as np
 import pytest
+from hypothesis import example, given
+from hypothesis import strategies as st
 
 from spheretwin.models.telemetry.signals import Signal, width
 from spheretwin.models.telemetry.status import QUIET_S, Events, Level, Status
 from spheretwin.models.telemetry.table import Table
+
+TICKS = 200
+TICK_s = 0.01
 
 SIGNALS = (
     Signal("t_s", "s", 1, "time"),
@@ -46,3 +51,37 @@ def test_a_time_at_the_limit_is_one_event():
     assert [event[0] for event in found] == [pytest.approx(0.1), pytest.approx(0.3)]
     assert {event[1] for event in found} == {Level.WARN}
     assert "50 %" in found[0][2]
+
+
+def slow_messages(t_s, scale):
+    """A slow copy: a tick at a limit is a message unless the same limit acted shortly before it."""
+    return [
+        (t_s[tick], "rank lost" if scale[tick] == 0 else f"{100 * scale[tick]:.0f} %")
+        for tick in range(len(t_s))
+        if scale[tick] < 1
+        and not any(
+            (scale[before] == 0) == (scale[tick] == 0)
+            for before in np.flatnonzero((scale[:tick] < 1) & (t_s[tick] - t_s[:tick] <= QUIET_S))
+        )
+    ]
+
+
+# The last tick of a chunk and the first of the next one; a pause that is over just after an edge.
+@example([(99, 0.5), (100, 0.25)], {100})
+@example([(99, 0.5), (100, 0.0), (101, 0.5)], {100, 101})
+@example([(50, 0.5), (61, 0.5), (71, 0.5)], {51, 60, 61, 62})
+@given(
+    st.lists(st.tuples(st.integers(0, TICKS - 1), st.sampled_from([0.0, 0.25, 0.5])), max_size=12),
+    st.sets(st.integers(1, TICKS - 1)),
+)
+def test_limits_are_reported_once_for_any_chunks(limited, cuts):
+    t_s, scale = TICK_s * np.arange(TICKS), np.ones(TICKS)
+    for tick, value in limited:
+        scale[tick] = value
+    events, found = Events(), []
+    for first, last in zip([0, *sorted(cuts)], [*sorted(cuts), TICKS], strict=True):
+        found += events.of(rows(t_s[first:last], scale[first:last]))
+    expected = slow_messages(t_s, scale)
+    assert [t_s for t_s, _, _ in found] == [t_s for t_s, _ in expected]
+    assert all(text in found[i][2] for i, (_, text) in enumerate(expected))
+    assert events.end(Status.COMPLETED)[0] == t_s[-1]
