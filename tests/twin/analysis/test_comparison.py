@@ -5,6 +5,7 @@ import json
 import os
 import re
 import xml.etree.ElementTree as ElementTree
+from dataclasses import replace
 from html.parser import HTMLParser
 
 import numpy as np
@@ -16,7 +17,9 @@ from spheretwin.analysis.comparison import compared_runs
 from spheretwin.analysis.recorded_run import read
 from spheretwin.analysis.run_summary import amplitudes
 from spheretwin.models.base.errors import InputError
+from spheretwin.models.telemetry.status import Status
 from spheretwin.viz.quantities import compared_quantities
+from spheretwin.viz.theme import run_colours
 from tests.browser import Browser, needs_a_browser
 from tests.twin.analysis.runs import written
 
@@ -209,9 +212,17 @@ def test_a_folder_that_is_a_file_is_refused(files, capsys):
     assert "expected a writable folder" in capsys.readouterr().err
 
 
-def test_a_run_without_a_tick_is_not_drawn(files, tmp_path):
-    from dataclasses import replace
+@pytest.mark.parametrize(
+    ("status", "text"), [(None, "not closed"), (Status.LEFT_WORKSPACE, "left workspace")]
+)
+def test_the_end_of_a_run_that_is_not_complete_is_at_its_last_row(files, status, text):
+    run = read(files[0])
+    (drawn,) = compared_runs([replace(run, record=replace(run.record, status=status))])
+    assert (drawn.early_end.t_s, drawn.early_end.status) == (run.table["t_s"][-1], text)
+    assert compared_runs([run])[0].early_end is None
 
+
+def test_a_run_without_a_tick_is_not_drawn(files, tmp_path):
     run = read(files[0])
     with pytest.raises(InputError, match="at least one tick"):
         comparison.write_figures([replace(run, table=run.table.rows(0, 0))], [{}], tmp_path)
@@ -219,6 +230,11 @@ def test_a_run_without_a_tick_is_not_drawn(files, tmp_path):
 
 def test_the_page_shows_the_spectra_in_mrad(files, page):
     traces = figures_of(page)["spectra"]["data"]
+    colours = run_colours(["afsm", "afsm"])
+    assert colours[0] != colours[1]
+    for trace in traces:
+        look = trace["line"] if trace["mode"] == "lines" else trace["marker"]
+        assert look["color"] == colours[int(trace["meta"])]
     for place, path in enumerate(files):
         run = read(path)
         largest_mrad = [amplitudes(1e3 * error, run.period_s)[1].max() for error in run.table["error_rad"].T]

@@ -14,7 +14,7 @@ import pytest
 from spheretwin import cli
 from spheretwin import scenario as scenarios
 from spheretwin.analysis import recovery
-from spheretwin.analysis.recorded_run import export, read
+from spheretwin.analysis.recorded_run import export, open_run, read
 from spheretwin.analysis.run_summary import figures
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.telemetry.parquet import TelemetryFile
@@ -78,6 +78,10 @@ def test_a_run_without_its_law_file_is_reviewed(tmp_path):
     law.unlink()
     table.write_parquet(telemetry, {**metadata, "scenario": json.dumps(scenario)})
     assert figures(read(telemetry))["law"] == f"{law}:Mine"
+    opened = open_run(telemetry).scenario
+    assert opened.controller.law == f"{law}:Mine"
+    assert opened.description == scenario["description"] != ""
+    assert (opened.name, opened.duration) == ("hold", 0.05)
 
 
 @pytest.mark.parametrize("kind", [0, 1], ids=["telemetry", "recording"])

@@ -1,6 +1,8 @@
 """Files of a bench: recordings, replay, and saved scenarios."""
 
+import gc
 import shlex
+import weakref
 
 import numpy as np
 import pytest
@@ -8,6 +10,7 @@ import pytest
 from spheretwin import scenario as scenarios
 from spheretwin.analysis import recorded_run as reviewed
 from spheretwin.analysis import run_summary
+from spheretwin.bench.recording import RecordingThread
 from spheretwin.models.telemetry.parquet import TelemetryFile
 from spheretwin.scenario import reading
 from tests.twin.bench.cases import begun, done, kept_rows, said
@@ -40,6 +43,19 @@ def test_a_recording_and_a_telemetry_file_hold_the_same_rows_from_then_on(files)
     for signal in telemetry.table.signals:
         assert recording.table[signal.name].tobytes() == telemetry.table[signal.name].tobytes()
     assert any("trajectory set to" in text for _, _, text in recording.log)
+
+
+def test_a_closed_bench_has_completed_its_files_and_holds_none_of_them(tmp_path):
+    paths = tmp_path / "run.rrd", tmp_path / "run.parquet"
+    with begun() as made:
+        done(made, "record", recording=str(paths[0]), telemetry=str(paths[1]))
+        made.advance(50)
+        threads = [weakref.ref(each) for each in gc.get_objects() if isinstance(each, RecordingThread)]
+    assert made.state().completed_files == tuple(map(str, paths))
+    assert made.state().recording == ()
+    gc.collect()
+    assert threads
+    assert [thread() for thread in threads] == [None] * len(threads)
 
 
 def test_a_file_that_begins_during_a_run_can_be_reviewed(files):

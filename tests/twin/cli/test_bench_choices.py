@@ -6,7 +6,7 @@ import pytest
 
 from spheretwin import scenario as scenarios
 from spheretwin.bench import Bench
-from spheretwin.cli.bench import choices_of, read, settings_of, shape_settings
+from spheretwin.cli.bench import choices_of, read, settings_of, shape_settings, written
 from spheretwin.models.base.errors import InputError
 from spheretwin.scenario.fields import fields_of
 from spheretwin.scenario.reading import shipped
@@ -55,6 +55,10 @@ def test_the_gains_are_those_of_the_law_that_is_in_force():
     assert "controller.surface_slope" not in gains
     assert setting("controller.integral", scenario).text == "3 3 3"
     assert setting("controller.integral", scenario).default != "3 3 3"
+
+
+def test_a_name_of_any_alphabet_is_shown_as_it_is():
+    assert written(({"file": "Wärme.csv"},)) == '{"file": "Wärme.csv"}'
 
 
 def test_text_is_read_as_by_the_command_line():

@@ -60,6 +60,20 @@ def test_unit_and_distribution_of_a_field(capsys, name, unit, distribution):
     assert bool(row["distribution"]) == bool(distribution)
 
 
+def test_a_section_has_the_rows_of_each_of_its_fields(capsys):
+    assert cli.main(["explain", "sensors.adc", "--json"]) == cli.DONE
+    rows = json.loads(capsys.readouterr().out)["fields"]
+    for name, field in every_field(Scenario):
+        values = [(row["value"], row["origin"]) for row in rows if row["field"] == name]
+        if not name.startswith("sensors.adc."):
+            assert values == []
+            continue
+        assert (field.default, "default") in values
+        for hardware, defaults in HARDWARE.items():
+            if name in defaults:
+                assert (defaults[name], f"hardware {hardware}: {ORIGINS[hardware][name]}") in values
+
+
 def test_each_drawn_error_states_its_distribution():
     """Fields whose meaning speaks of the seed or of noise, but for those of the controller and of inputs."""
     for name, field in every_field(Scenario):

@@ -92,6 +92,14 @@ def few_samples(monkeypatch):
 
 
 @pytest.mark.usefixtures("few_samples")
+def test_a_warning_of_the_model_is_printed_with_the_verdict_on_a_curve(capsys, user_csv, changed_model):
+    model = changed_model(('autolimits="true"', 'autolimits="true" settotalmass="3"'))
+    code, out, err = here(capsys, "curve", "--csv", user_csv(), "--mjcf", model, "--json")
+    assert (code, json.loads(out)["rows"]) == (0, 61)
+    assert "settotalmass" in one_line(err)
+
+
+@pytest.mark.usefixtures("few_samples")
 def test_computed_curve_is_written_and_judged(capsys, tmp_path):
     out = tmp_path / "curve.csv"
     code, text, err = here(capsys, "curve", "--out", out)

@@ -39,6 +39,14 @@ def test_json_stands_alone_and_the_page_is_written(tmp_path):
     assert "`spheretwin reproduce figure11 --seeds 2 --limit 4`" in text
 
 
+def test_the_page_states_the_command_with_all_options(tmp_path, monkeypatch):
+    monkeypatch.setitem(reproduce.EXPERIMENTS, "short", experiment(IDEAL))
+    options = ["--seeds", "1", "--limit", "3", "--plant", "lagrangian"]
+    assert cli.main(["reproduce", "short", *options, "--out", str(tmp_path)]) == cli.DONE
+    text = (tmp_path / "reproduce.md").read_text(encoding="utf-8")
+    assert f"`{' '.join(['spheretwin', 'reproduce', 'short', *options])}`" in text
+
+
 def test_people_get_tables(capsys, monkeypatch):
     monkeypatch.setitem(reproduce.EXPERIMENTS, "short", experiment(IDEAL))
     assert cli.main(["reproduce", "short", "--seeds", "1", "--verbose"]) == cli.DONE

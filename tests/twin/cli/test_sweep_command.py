@@ -58,6 +58,19 @@ def test_damage_to_the_journal_is_told(source, tmp_path, capsys):
     assert "1 damaged lines of the journal were skipped, and their rows run again" in err
 
 
+def test_the_first_of_several_failed_rows_is_named(source, tmp_path, capsys):
+    (tmp_path / "mine.py").write_text(
+        "def fragile(run):\n    return 1 / (1 - min(run.scenario.disturbance.load, 1))\n"
+    )
+    path = Path(source)
+    path.write_text('metrics = ["mine.py:fragile"]\n' + path.read_text())
+    assert cli.main(["sweep", source, "--out", str(tmp_path / "out")]) == cli.FAILED
+    keys = [row.key for row in Grid(load_study(source))]
+    err = capsys.readouterr().err
+    assert [place for place, key in enumerate(keys) if key in err] == [1]
+    assert "2 of 3 rows failed" in err
+
+
 def test_without_matplotlib_there_is_a_table_and_a_word(source, tmp_path, capsys, monkeypatch):
     monkeypatch.setattr(report, "can_be_drawn", lambda: False)
     assert cli.main(["sweep", source, "--out", str(tmp_path / "out")]) == cli.DONE

@@ -149,8 +149,11 @@ def test_results_are_medians_and_no_numbers_if_a_run_was_lost():
     outcomes = made_up(30.0, {"pid": (2e-3, 4e-3, 9e-3), "adrc": (1e-3, 1e-3, 1e-3)})
     lost = next(name for name in outcomes if "adrc" in name)
     outcomes[lost][1] = outcome(1e-3, 30.0, Status.FAILSAFE)
+    complete = next(name for name in outcomes if "pid" in name)
+    outcomes[complete][2] = outcome(9e-3, 90.0)
     first, second = within(results(IDEAL, IDEAL.conditions[0], outcomes), 30.0)
     assert (first.law, first.largest_rad, first.tail_rad) == ("pid", 4e-3, 4e-4)
+    assert (first.worst_rad, first.variation_A_s) == (9e-3, 30.0)
     assert second.is_lost
 
 

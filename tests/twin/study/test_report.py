@@ -140,6 +140,19 @@ def test_where_hardly_a_row_was_completed_nothing_fails(tmp_path, lost):
     assert "| pd | left_workspace |" in (tmp_path / "report.md").read_text()
 
 
+@pytest.mark.parametrize(
+    ("of", "total", "missing", "beyond"), [(24, 24, [], []), (30, 30, ["6"], []), (24, 48, [], ["48"])]
+)
+def test_the_page_counts_rows_that_remain_and_rows_that_were_not_requested(
+    tmp_path, of, total, missing, beyond
+):
+    rows = made(24, {"max_abs_error_rad": NUMBERS}, {"a": NUMBERS})
+    markdown, _ = report.write(tmp_path, rows, summary(rows), (of, total), "made")
+    assert f"24 of {of} rows: 24 completed." in (text := markdown.read_text())
+    assert re.findall(r"(\d+) rows remain", text) == missing
+    assert re.findall(r"of the study's (\d+) rows", text) == beyond
+
+
 def test_the_page_tells_of_a_study(tmp_path):
     chosen = loads(axis=[*LOADS, values("plant.payload_kg", 0.0, -1.0)])
     told = found(chosen, tmp_path)

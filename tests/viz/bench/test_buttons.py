@@ -4,6 +4,8 @@ import msgspec
 import pytest
 
 from spheretwin.viz.bench.event_handlers import Note
+from spheretwin.viz.bench.protocols import FieldSetting
+from spheretwin.viz.bench.settings_tab import Form
 from tests.viz.bench.test_server import CAMERA, changed, handle_of, socket_to
 from tests.waiting import wait_for
 
@@ -55,6 +57,18 @@ def test_each_change_is_one_command(page, bench, change):
         visitor.send(msgspec.msgpack.encode(CAMERA))
         visitor.send(changed(handle_of(page, label), value=value))
         wait_for(lambda: bench.commands() == [expected])
+
+
+def test_a_form_begins_with_the_active_values(page):
+    settings = [
+        FieldSetting("plant.one_of_two", "Euler", "RK4", "a choice", ("RK4", "Euler")),
+        FieldSetting("plant.yes_or_no", "true", "false", "a flag"),
+        FieldSetting("plant.number", "0.25", "1", "a number"),
+    ]
+    Form(page._server.gui, page._handlers, "Apply").show(settings)
+    known = page._server.gui._gui_input_handle_from_uuid
+    values = [known[handle_of(page, label)].value for label in ("one_of_two", "yes_or_no", "number")]
+    assert values == ["Euler", True, "0.25"]
 
 
 def test_reset_of_gains_sets_those_that_differ(page, bench):
