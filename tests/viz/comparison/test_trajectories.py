@@ -31,6 +31,22 @@ def test_every_law_has_its_errors_and_its_tip_on_one_timeline(tmp_path, actuator
     assert [each.name for each in tmp_path.iterdir()] == ["side.rrd"]
 
 
+def test_the_layout_has_a_view_of_the_tips_the_error_of_each_hinge_and_the_torque(tmp_path, actuator):
+    path = write(tmp_path / "side.rrd", {"PD": flight("pd", 20)}, actuator, "one")
+    (store,) = RrdReader(path).blueprints()
+    views = {}
+    for chunk in RrdReader(path).stream(store=store):
+        batch = chunk.to_record_batch()
+        if "ViewBlueprint:space_origin" in batch.schema.names:
+            ((origin,),), ((name,),) = (
+                batch.column(f"ViewBlueprint:{each}").to_pylist() for each in ("space_origin", "display_name")
+            )
+            views[origin] = name
+    assert set(views) == {"/world", "/torque", *(f"/error/{angle}" for angle in "αβγ")}
+    assert all(f"{angle} [mrad]" in views[f"/error/{angle}"] for angle in "αβγ")
+    assert "[N·m]" in views["/torque"]
+
+
 def test_trajectories_have_errors_torques_tips_and_colours(tmp_path, actuator):
     runs = {"PD": flight("pd", 20), "tuned PID": flight("pid", 50)}
     path = write(tmp_path / "side.rrd", runs, actuator, "both")

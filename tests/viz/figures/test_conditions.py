@@ -77,6 +77,8 @@ def test_margins_are_errors_over_the_steps_with_the_bound_in_mrad():
     assert set(bound.get_ydata()) == {10.0}
     assert (left.get_xlabel(), right.get_xlabel()) == ("delay, ms", "gain")
     assert figure.get_supylabel() == "largest |error|, mrad"
+    four = conditions.margins([*panels, *panels], {"pd": "PD"}, 0.01, "largest |error|, mrad", "title")
+    assert [axes.get_visible() for axes in four.axes] == [True] * 4 + [False] * 2
     assert [text.get_text() for text in figure.legends[0].get_texts()] == ["PD", "does not hold"]
 
 

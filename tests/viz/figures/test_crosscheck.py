@@ -47,6 +47,26 @@ def test_spreads_have_quantiles_median_worst_and_bound():
     ]
 
 
+def test_spreads_stand_in_the_rows_of_their_quantities():
+    differences = {
+        source: {"M": factor * np.array([1e-9, 3e-9]), "tau": factor * np.array([1e-5, 2e-5])}
+        for source, factor in (("MuJoCo", 1.0), ("Pinocchio", 10.0))
+    }
+    axes = crosscheck.spreads(differences, {"M": 1e-7, "tau": 1e-3}, "title").axes[0]
+    labels = [text.get_text() for text in axes.get_yticklabels()]
+    assert labels == ["M", "tau"]
+    worst = [line for line in axes.get_lines() if line.get_marker() == "o"]
+    bounds = [line for line in axes.get_lines() if line.get_linestyle() == "--"]
+    for line, source in zip(worst, ("MuJoCo", "MuJoCo", "Pinocchio", "Pinocchio"), strict=True):
+        quantity = labels[round(line.get_ydata()[0])]
+        assert line.get_xdata()[0] == differences[source][quantity].max()
+        assert line.get_color() == style.SERIES[source == "Pinocchio"]
+    assert [(line.get_xdata()[0], round(np.mean(line.get_ydata()))) for line in bounds] == [
+        (1e-7, 0),
+        (1e-3, 1),
+    ]
+
+
 def test_motion_has_tilts_spin_and_differences():
     tilt, spin, apart = crosscheck.motion(T, THREE, -1e-9 * THREE, 1e-8, "title").axes
     for axes, axis, factor in ((tilt, 0, 1), (tilt, 1, 1), (spin, 2, 1), (apart, 0, 1e-9), (apart, 2, 1e-9)):

@@ -25,7 +25,7 @@ def courses(windows=WINDOWS):
 def lines():
     line = over_time.ErrorLine("as printed", SIZES, 0.5 * SIZES)
     groups = [
-        over_time.ErrorGroup("afsm", "AFSM", [line, line], 0.12),
+        over_time.ErrorGroup("afsm", "AFSM", [line, line._replace(label="as acceleration")], 0.12),
         over_time.ErrorGroup("pid", "PID", [line], None),
     ]
     return over_time.lines(groups, "largest |error|, degrees", "lines")
@@ -73,7 +73,11 @@ def test_lines_show_median_and_range():
         line for line in figure.axes[0].get_lines() if len(line.get_xdata()) == 2 and line.get_marker() != "o"
     ]
     assert list(ranges[0].get_xdata()) == [0.1, 0.3]
-    assert [label.get_text() for label in figure.axes[0].get_yticklabels()] == ["as printed"] * 2
+    assert [label.get_text() for label in figure.axes[0].get_yticklabels()] == [
+        "as printed",
+        "as acceleration",
+    ]
+    assert figure.axes[0].get_ylim() == (1.5, -0.5)  # the first at the top
 
 
 def test_heat_writes_what_is_a_number():

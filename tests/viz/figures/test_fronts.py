@@ -68,6 +68,26 @@ def test_axes_of_tunings_have_the_names_of_their_objectives():
     assert figure.axes[-1].get_xlabel() == "trial"
 
 
+@pytest.mark.parametrize(("largest", "top"), [(9.0, 9.0), (3000.0, 30.0)])
+def test_axes_of_a_front_reach_to_the_largest_value_or_thirty_times_the_least(largest, top):
+    values = np.array([[1.0, 2.0], [3.0, 6.0], [largest, 4.0]])
+    some = TRIALS._replace(numbers=np.arange(3.0), values=values, completed=np.ones(3, bool),
+                           best=np.array([True, False, False]), fresh=np.empty((0, 2)))  # fmt: skip
+    panel = fronts.front({"pid": some}, OBJECTIVES, "front").axes[0]
+    assert panel.get_xlim() == pytest.approx((1 / 1.15, 1.15 * top))
+    assert panel.get_ylim() == pytest.approx((2 / 1.15, 1.15 * 6))
+
+
+def test_fronts_of_conditions_show_errors_up_to_forty_times_the_least():
+    values = np.array([[1.0, 0.5], [2.0, 15.0], [3.0, 25.0]])
+    panel = fronts.FrontPanel("ideal", "error, mrad", {"pd": values}, {}, (0.25,))
+    axes = fronts.fronts([panel], {"pd": "PD"}, "variation, A/s").axes[0]
+    assert axes.get_ylim()[0] < 0.25
+    assert 15.0 < axes.get_ylim()[1] < 25.0
+    assert axes.get_xlim()[0] < 1.0
+    assert 2.0 < axes.get_xlim()[1] < 3.0
+
+
 def test_fronts_of_conditions_have_points_in_the_order_of_their_cost():
     values = np.array([[2.0, 1.0], [1.0, 3.0]])
     panel = fronts.FrontPanel("ideal", "error, mrad", {"pd": values}, {"best": ("pd", 1.0, 3.0)}, (0.5,))

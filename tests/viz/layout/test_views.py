@@ -9,6 +9,7 @@ from spheretwin.models.telemetry.signals import COMMON_NAMES, common_signals
 from spheretwin.provenance import facts_of
 from spheretwin.session import Session
 from spheretwin.simulation import follow
+from spheretwin.viz.layout import layout as blueprints
 from spheretwin.viz.layout.layout import VIEWS
 from spheretwin.viz.layout.view import (
     AFTER_THE_END,
@@ -207,6 +208,13 @@ def test_a_recording_that_takes_long_is_laid_out_before_its_end(tmp_path, monkey
     opening, _ = layouts(path)
     entities = {chunk.entity_path for chunk in RrdReader(path).stream()}
     assert all(exists(each, entities) for each in contents(opening))
+
+
+@pytest.mark.parametrize(("live", "played"), [(True, ("following", "off")), (False, ("playing", "all"))])
+def test_a_live_view_follows_the_run_and_a_recording_is_played_in_a_loop(live, played):
+    view = View(1.0, 8.0, 18, (), live=live)
+    for shown in (blueprints.layout(view), blueprints.opening_layout(view)):
+        assert (shown.time_panel.play_state, shown.time_panel.loop_mode) == played
 
 
 def test_time_axes_show_that_a_run_has_ended_early():

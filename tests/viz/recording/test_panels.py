@@ -339,5 +339,8 @@ def test_a_recording_that_was_not_closed_is_recovered_with_its_whole_picture(tab
     assert "largest" in figures
     marks = [entity for entity, name in values if entity.startswith("/marks/") and name == "Scalars:scalars"]
     assert len(marks) > 5
+    marked_s = np.concatenate([t_ns for each in marks for t_ns in times[each, "Scalars:scalars"]]) * 1e-9
+    assert marked_s.min() >= 0
+    assert 0.5 * last < marked_s.max() <= last + 1e-6
     ended = np.concatenate(times["/ended", "Scalars:scalars"])
     assert abs(ended[0] * 1e-9 - last) < 1e-6

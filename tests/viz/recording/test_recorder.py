@@ -106,6 +106,7 @@ def static_text(path, entity, component):
 def test_resolved_scenario_is_in_the_recording(run):
     path, *_ = run
     text = static_text(path, SCENARIO, "TextDocument:text")[0]
+    assert static_text(path, SCENARIO, "TextDocument:media_type") == ["text/markdown"]
     changed, _, sections = text.partition("## Chosen, or different from the defaults")[2].partition("## run")
     assert "| plant.modelling_error | 0.2 |" in changed
     assert "| controller.law | afsm |" in changed

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from spheretwin import scenario as scenarios
+from spheretwin.analysis.recorded_run import read
 from spheretwin.models import actuator as actuators
 from spheretwin.models.base.errors import InputError, SpheretwinError
 from spheretwin.models.telemetry.signals import common_signals, width
@@ -54,6 +55,16 @@ def test_a_folder_at_the_path_is_reported_with_the_place_of_the_recording(tmp_pa
     (kept,) = tmp_path.glob(".run.rrd.*.part")
     assert f"{raised.value}".endswith(f"; the recording is in {kept}")
     assert len(rows_of(kept, TELEMETRY, "values_0", "q_rad")[0]) == 100
+
+
+def test_a_partial_recording_has_every_row_that_was_written(tmp_path):
+    session, facts = hold_facts()
+    recorder = Recorder(session.actuator, session.signals, facts, path=tmp_path / "run.rrd")
+    recorder.write(session.advance(37))
+    part = recorder.partial()
+    (copy := tmp_path / "copy.rrd").write_bytes(part.path.read_bytes())
+    recorder.close()
+    np.testing.assert_allclose(read(copy).table["t_s"], 1e-3 * np.arange(37), rtol=1e-12)
 
 
 def test_closing_twice_is_closing_once(tmp_path):

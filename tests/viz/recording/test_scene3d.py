@@ -209,7 +209,7 @@ def test_a_run_that_is_complete_or_interrupted_has_no_mark(tmp_path, loaded):
     assert mark(path) == []
 
 
-@pytest.mark.parametrize("lost", [np.nan, 1e99, np.inf])
+@pytest.mark.parametrize("lost", [np.nan, 1e7, 1e99, np.inf])
 def test_a_run_that_diverged_is_marked_at_its_last_pose(tmp_path, actuator, lost):
     session = Session(scenarios.load("hold", {"plant.engine": "lagrangian"}))
     facts, path = facts_of(session.initial_scenario), tmp_path / "run.rrd"
