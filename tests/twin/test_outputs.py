@@ -60,6 +60,16 @@ def test_a_live_view_has_the_tab_and_the_window_that_were_requested(session, mon
     assert requested == [{"shown": "control", "window_s": 3.0}]
 
 
+def test_a_recording_has_the_rate_that_was_requested(session, tmp_path):
+    files = Outputs(session, tmp_path / "x.rrd", tmp_path / "x.parquet", record_rate_Hz=50.0)
+    follow(session, 50, files.sinks)
+    assert files.close() == []
+    recording = read(tmp_path / "x.rrd")
+    assert recording.rate_Hz == 50.0
+    assert len(recording.table) < 50
+    assert len(read_parquet(tmp_path / "x.parquet")[0]) == 50
+
+
 def test_signals_that_the_parent_has_ignored_stay_ignored():
     before = {number: signal.getsignal(number) for number in (signal.SIGHUP, signal.SIGTERM)}
     try:
@@ -74,6 +84,20 @@ def test_signals_that_the_parent_has_ignored_stay_ignored():
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)
+
+
+def test_the_descriptor_that_signals_wake_is_the_one_of_before():
+    reading, writing = os.pipe()
+    os.set_blocking(writing, False)
+    before = signal.set_wakeup_fd(writing)
+    try:
+        with interruptible():
+            pass
+        assert signal.set_wakeup_fd(before) == writing
+    finally:
+        signal.set_wakeup_fd(before)
+        os.close(reading)
+        os.close(writing)
 
 
 def test_files_that_begin_later_have_the_rows_and_the_log_from_then_on(tmp_path):

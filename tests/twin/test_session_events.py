@@ -111,6 +111,7 @@ def test_flags_write_the_same_list(planned):
     [
         ("--event.1.t-s 0.1", "expected a list index from 0 to 0, received event.1.t_s"),
         ("--event.0.t-s 0.1", "event.0.set: expected a value, received none"),
+        ("--event.0.t-s 1.001e9 --event.0.set seed --event.0.value 1", "event.0.t_s: expected a number less"),
         ("--event.0.t-s -1 --event.0.set seed --event.0.value 1", "event.0.t_s: expected a number greater"),
         ("--event.0.t-s 0 --event.0.set seed --event.0.value 1", "event.0.set: expected a field that may"),
         ("--event.0.t-s 0 --event.0.set controller.law --event.0.value pdd", "as event.0 sets it"),

@@ -6,6 +6,7 @@ import resource
 import signal
 import subprocess
 import sys
+import weakref
 from concurrent.futures import ThreadPoolExecutor
 
 import pyarrow as pa
@@ -143,6 +144,11 @@ def test_a_disk_that_fills_on_the_way_keeps_what_it_has_and_the_run_goes_on(sign
     more = table(300, signals)
     for first in range(0, len(more), 10):
         file.write(more.rows(first, first + 10))
+    late = table(10, signals)
+    values = weakref.ref(late.values)
+    file.write(late)
+    del late
+    assert values() is None  # however long the run goes on, its rows fill no memory
     monkeypatch.undo()
     with pytest.raises(SpheretwinError, match=r"No space left on device; 192 rows are kept in"):
         file.close({})

@@ -8,9 +8,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from spheretwin import cli
-from spheretwin.analysis import tolerances
+from spheretwin.analysis import review, tolerances
 from spheretwin.analysis.tolerances import Tolerance, Tolerances, beyond, compare, exceeded, share_used
 from spheretwin.models.base.errors import InputError
+from spheretwin.models.telemetry.table import read_parquet
 from tests.twin.analysis.runs import made_of, named, written
 
 T = np.arange(200) * 1e-3
@@ -43,6 +44,21 @@ def test_a_relative_tolerance_grows_with_the_reference():
     (place,) = first(WAVE, 1.02 * WAVE, relative=0.01)
     assert place.by == pytest.approx(0.01 * 3.0, rel=1e-12)  # β begins at 3, α at 0
     assert place.t_s == 0.0
+
+
+def test_a_review_compares_with_the_first_run(tmp_path):
+    first_run, _ = written(tmp_path, "first", **{"duration": 0.05, "disturbance.load": 1.0})
+    table, metadata = read_parquet(first_run)
+    table["q_ref_rad"][:] = 1.0
+    table.write_parquet(first_run, metadata)
+    table["q_ref_rad"][:] = 2.0
+    table.write_parquet(other := tmp_path / "other.parquet", metadata)
+    (path := tmp_path / "half.toml").write_text("[signals.q_ref_rad]\nrelative = 0.5\n")
+    reviewed = review.review(first_run, other, tolerance=str(path))
+    ((used,),), ((place,),) = reviewed.tolerances, reviewed.exceeded
+    # Twice the half of the first; of the other it would be all of it.
+    assert (used.share, used.excess) == pytest.approx((2.0, 0.5))
+    assert place.by == pytest.approx(0.5)
 
 
 @pytest.mark.parametrize("ticks", [-3, -1, 1, 3])

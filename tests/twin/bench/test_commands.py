@@ -217,6 +217,9 @@ def test_a_run_that_ends_leaves_a_bench_that_a_reset_brings_back():
         assert "end of its range" in state.reason
         for name in MODES:
             assert "expected reset, as the run has ended" in said(made, name, **MODES[name])
+        for name, ticks in (("start", {}), ("step", {"ticks": 1})):
+            assert "expected reset, as the run has ended" in said(made, name, **ticks)
+        assert not made.state().running
         done(made, "set", name="disturbance.load", value=0.0)
         assert made.state().pending == (("disturbance.load", "0.0"),)
         done(made, "reset")

@@ -133,6 +133,20 @@ def test_a_silent_client_does_not_become_the_operator(clock):
     assert (operators.operator, operators.watching, operators.asking) == (None, ("c",), ())
 
 
+@pytest.mark.parametrize(("gone_s", "silence_s"), [(1.0, 5.0), (5.0, 1.0)])
+def test_time_without_an_operator_and_silence_have_their_own_limits(clock, gone_s, silence_s):
+    left, silent = (Operators(gone_s, silence_s, clock) for _ in range(2))
+    for operators in (left, silent):
+        operators.register("a")
+    left.leave("a")
+    for now_s in (0.9, 1.1, 4.9, 5.1):
+        before_s, clock.now = clock.now, now_s
+        assert left.check_silence() == (before_s < gone_s < now_s)
+        assert silent.check_silence() == (
+            before_s < silence_s < now_s or before_s < silence_s + gone_s < now_s
+        )
+
+
 def test_a_silent_client_that_watches_changes_nothing_for_the_operator(clock):
     operators = Operators(clock=clock)
     for client in ("a", "b"):

@@ -3,7 +3,10 @@
 import contextlib
 import io
 import os
+import subprocess
+import sys
 from importlib.metadata import version
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -104,6 +107,16 @@ def test_bad_input_is_one_line_exit_2_and_no_file(tmp_path, monkeypatch, argumen
     for part in parts:
         assert part in line
     assert sorted(os.listdir(tmp_path)) == before
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs a device that is always full")
+def test_a_full_disk_behind_stdout_is_a_failure_and_no_bad_input():
+    with Path("/dev/full").open("w") as full:
+        command = [sys.executable, "-m", "spheretwin", "explain", "plant.step_s"]
+        done = subprocess.run(command, stdout=full, stderr=subprocess.PIPE, text=True, check=False)
+    assert done.returncode == cli.FAILED
+    (line,) = done.stderr.splitlines()
+    assert line.startswith("spheretwin: output: ")
 
 
 def test_the_verb_alone_lists_the_scenarios_a_line_each():

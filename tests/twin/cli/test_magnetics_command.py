@@ -100,6 +100,25 @@ def test_a_warning_of_the_model_is_printed_with_the_verdict_on_a_curve(capsys, u
 
 
 @pytest.mark.usefixtures("few_samples")
+def test_computed_curve_gives_its_figures_as_json(capsys, monkeypatch):
+    compute, results = curve_check.compute, []
+
+    def compute_and_keep(*arguments):
+        results.append(compute(*arguments))
+        return results[-1]
+
+    monkeypatch.setattr(curve_check, "compute", compute_and_keep)
+    _, out, _ = here(capsys, "curve", "--json")
+    figures, (computed,) = json.loads(out), results
+    assert figures["doubled_mesh_moves_peak"] == computed.doubled_mesh.peak
+    assert figures["doubled_mesh_moves_worst_sample"] == computed.doubled_mesh.worst
+    assert computed.doubled_mesh.peak != computed.doubled_mesh.worst
+    assert figures["lookup_error"] == computed.lookup_error
+    assert {name: figures[name] for name in computed.peak._fields} == computed.peak._asdict()
+    assert len(figures["checks"]) == len(computed.checks)
+
+
+@pytest.mark.usefixtures("few_samples")
 def test_computed_curve_is_written_and_judged(capsys, tmp_path):
     out = tmp_path / "curve.csv"
     code, text, err = here(capsys, "curve", "--out", out)

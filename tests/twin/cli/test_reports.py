@@ -76,6 +76,7 @@ def test_a_gate_states_shares_and_the_largest_excess(capsys, tmp_path):
     first = result["exceeded"][0]
     largest = next(signal for signal in signals if signal["signal"] == first["signal"])
     assert largest["excess"] >= first["by"]
+    assert f"{first['signal']} {first['axis']} leaves its tolerance first at {first['t_s']:.6g} s" in err
     assert (
         f"by {first['by']:.3g}; its largest excess is {largest['excess']:.3g} at {largest['t_s']:.6g} s"
         in err

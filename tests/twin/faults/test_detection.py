@@ -7,6 +7,7 @@ from spheretwin import scenario as scenarios
 from spheretwin.control.supervision.enabled_groups import DETECTED_OPEN, DETECTED_SHORTED, REPORTED
 from spheretwin.faults.fault_injector import FaultMessages
 from spheretwin.models.magnetics import torque_matrix
+from spheretwin.models.telemetry.signals import Signal, width
 from spheretwin.models.telemetry.table import Table
 from spheretwin.session import Session
 from spheretwin.simulation import simulate
@@ -161,6 +162,25 @@ def test_a_find_is_told_once_with_its_time():
         "coil.07 works again",
     ]
     assert [t_s for t_s, _ in told] == pytest.approx([0.5, 0.5 + 1e-3 * after_ms, 1.2], abs=1e-9)
+
+
+def test_messages_of_one_chunk_are_in_the_order_of_time():
+    """The detection comes between the start of its fault and that of another one, and a trip before it."""
+    signals = (
+        Signal("t_s", "s", 1, "time"),
+        Signal("fault", "1", 2, "faults", ("coil.00", "coil.01"), ("works", "open")),
+        Signal("group_out", "1", 2, "groups", ("group 0", "group 1"), ("in use", "reported", "found open")),
+        Signal("time_to_detection_s", "s", 2, "delay", ("group 0", "group 1")),
+        Signal("failsafe_reason", "1", 1, "reason", (), ("none", "other")),
+    )
+    table = Table(signals, np.zeros((60, width(signals))))
+    table["t_s"][:] = 1e-3 * np.arange(60)
+    table["fault"][10:, 0], table["fault"][50:, 1] = 1, 1
+    table["group_out"][30:, 0], table["time_to_detection_s"][30:, 0] = 2, 0.02
+    table["failsafe_reason"][20:] = 1
+    messages = FaultMessages().of(table)
+    assert [t_s for t_s, _ in messages] == pytest.approx([0.01, 0.02, 0.03, 0.05])
+    assert [text.split()[0] for _, text in messages] == ["coil.00", "watchdog:", "group", "coil.01"]
 
 
 def test_detect_of_a_fault_is_the_detector():

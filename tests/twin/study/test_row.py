@@ -13,6 +13,7 @@ from spheretwin.metrics import METRICS
 from spheretwin.models import actuator as actuators
 from spheretwin.models.telemetry.table import read_parquet
 from spheretwin.run import figures_of
+from spheretwin.scenario.hardware import HARDWARE
 from spheretwin.simulation import simulate
 from spheretwin.study.grid import Grid
 from spheretwin.study.row import Rows
@@ -72,6 +73,16 @@ def test_each_row_has_its_values_and_what_the_study_says_of_all():
         assert of_row.controller.law == row.law["law"]
         assert of_row.plant.engine == "lagrangian"
     assert scenarios(chosen)[1].controller.surface_slope == (60.0, 60.0, 60.0)
+
+
+def test_hardware_of_a_row_has_all_of_its_values():
+    chosen = study(values("hardware", *HARDWARE), fields={"duration": 0.03})
+    for row, of_row in zip(Grid(chosen), scenarios(chosen), strict=True):
+        name = row.values["hardware"]
+        whole = scenario.load("sinusoid", {"hardware": name, "duration": 0.03, "seed": row.seed})
+        for section in ("sensors", "drive", "nominal", "estimator", "watchdog"):
+            assert getattr(of_row, section) == getattr(whole, section), name
+        assert of_row.plant.model_copy(update={"engine": whole.plant.engine}) == whole.plant
 
 
 def test_an_entry_of_a_list_leaves_the_others():

@@ -1,5 +1,7 @@
 """Every button sends one command with the values of its fields; shared controls do not move by themselves."""
 
+from dataclasses import replace
+
 import msgspec
 import pytest
 
@@ -69,6 +71,22 @@ def test_a_form_begins_with_the_active_values(page):
     known = page._server.gui._gui_input_handle_from_uuid
     values = [known[handle_of(page, label)].value for label in ("one_of_two", "yes_or_no", "number")]
     assert values == ["Euler", True, "0.25"]
+
+
+def test_a_form_follows_the_active_values_and_keeps_a_change_in_progress(page):
+    settings = [
+        FieldSetting("plant.first_number", "1", "0", "a number"),
+        FieldSetting("plant.second_number", "2", "0", "a number"),
+    ]
+    form = Form(page._server.gui, page._handlers, "Apply")
+    form.show(settings)
+    known = page._server.gui._gui_input_handle_from_uuid
+    first, second = (known[handle_of(page, label)] for label in ("first_number", "second_number"))
+    first.value = "7"  # not applied yet
+    for text in ("20", "30"):
+        form.show([replace(setting, text=text) for setting in settings])
+        assert known[handle_of(page, "first_number")] is first
+        assert (first.value, second.value) == ("7", text)
 
 
 def test_reset_of_gains_sets_those_that_differ(page, bench):

@@ -7,7 +7,7 @@ from spheretwin.models.kinematics import rotation
 from spheretwin.viz import theme
 from spheretwin.viz.bench import scene as colours
 from spheretwin.viz.bench import server as front
-from spheretwin.viz.bench.actuator import actuator_solids, quaternions_along
+from spheretwin.viz.bench.actuator import CUT, actuator_solids, quaternions_along
 from spheretwin.viz.bench.scene import Scene
 from spheretwin.viz.scene import solids
 
@@ -77,6 +77,15 @@ def test_a_zone_lies_on_its_sphere_between_its_heights():
     assert np.linalg.norm(zone.vertices, axis=1) == pytest.approx(2.0, rel=SINGLE)
     assert zone.vertices[:, 2].min() == pytest.approx(-0.5, rel=SINGLE)
     assert zone.vertices[:, 2].max() == pytest.approx(1.0, rel=SINGLE)
+
+
+def test_the_rotor_is_a_ball_cut_flat_above_and_below(actuator):
+    """Its arms stand within the cut, one of them at its edge."""
+    vertices = actuator_solids(actuator).rotor.vertices
+    ball = actuator.magnet.front_m
+    assert np.linalg.norm(vertices, axis=1).max() <= ball * (1 + SINGLE)
+    assert vertices[:, 2].max() == pytest.approx(CUT * ball, rel=SINGLE)
+    assert vertices[:, 2].min() == pytest.approx(-CUT * ball, rel=SINGLE)
 
 
 @pytest.mark.parametrize("name", ["stator", "outer_ring", "inner_ring", "rotor", "shaft", "coil"])

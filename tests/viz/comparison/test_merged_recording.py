@@ -1,6 +1,7 @@
 """Runs merged into one recording: every number of each run, and a layout of existing entities only."""
 
 import os
+import re
 import shutil
 from dataclasses import replace
 
@@ -247,7 +248,11 @@ def test_the_text_names_runs_ends_and_the_differences_of_their_scenarios(merged,
     run, of_failed = failed
     ((text,),) = of_failed.static["/runs", "TextDocument:text"]
     end_s, _, reason = events(run)[-1]
-    assert f"**left workspace at {end_s:.3f} s**: {reason}" in text
+    complete, other = (line for line in text.splitlines() if line.startswith("- ") and ", " in line)
+    assert complete.startswith("- 1 slow")
+    assert complete.endswith(", completed")
+    assert other.startswith("- 2 failed")
+    assert other.endswith(f"**left workspace at {end_s:.3f} s**: {reason}")
 
 
 def test_the_end_of_a_failed_run_is_a_cross_at_its_last_value_in_every_plot(failed):
@@ -333,6 +338,22 @@ def test_every_plot_has_the_time_of_the_longest_run_and_its_range(merged):
         low, high = limits(merged, f"/run_{place}_{name}/compare/error_angle_deg")
         settled = merged.values(f"/run_{place}_{name}/compare/error_angle_deg")
         assert low <= settled[len(settled) // 2 :].min() <= settled[len(settled) // 2 :].max() <= high
+
+
+def test_titles_of_plots_with_values_outside_say_so(merged, failed):
+    for recording in (merged, failed[1]):
+        reader = RrdReader(recording.path)
+        cut = {
+            name.removesuffix(", cut").partition(" [")[0]
+            for chunk in reader.stream(store=reader.blueprints()[0])
+            if "ViewBlueprint:display_name" in (batch := chunk.to_record_batch()).schema.names
+            for cell in batch.column("ViewBlueprint:display_name").to_pylist()
+            for name in cell or []
+            if name.endswith(", cut")
+        }
+        ((text,),) = recording.static["/runs", "TextDocument:text"]
+        assert cut == set(re.findall(r"^- ([^,\n]*) \([^)\n]*\): run", text, re.MULTILINE))
+    assert "error of α" in cut
 
 
 def test_plots_have_titles_with_units_and_a_wide_line_under_the_reference(merged):

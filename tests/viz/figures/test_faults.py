@@ -105,3 +105,43 @@ def test_axes_of_points_squares_and_shares_have_their_labels():
         "open groups",
         "runs that track, %",
     )
+
+
+def test_points_have_the_colour_of_their_number_which_the_bar_names():
+    left, right, bar = clouds().axes
+    for axes, numbers in ((left, [9, 1]), (right, [9])):
+        (cloud,) = axes.collections
+        assert cloud.get_array().tolist() == numbers
+        colours = cloud.get_cmap()(cloud.norm(numbers))
+        np.testing.assert_allclose(cloud.to_rgba(cloud.get_array()), colours)
+    assert [text.get_text() for text in bar.get_yticklabels()] == ["1", "2", "9"]
+    shown = left.collections[0].norm
+    # A tick stands in the middle of the colour of its number.
+    for tick, number in zip(bar.get_yticks(), (1, 2, 9), strict=True):
+        assert shown(tick) == shown(number)
+    assert clouds().get_suptitle() == "clouds"
+
+
+def test_squares_have_ticks_at_every_third_group_and_a_bar_in_plain_numbers():
+    left, right, bar = faults.triangles(
+        {"told": np.ones((7, 7)), "not told": 10 * np.ones((7, 7))}, "group", "ratio", 2.0, "pairs"
+    ).axes
+    assert [list(axes.get_xticks()) for axes in (left, right)] == [[0, 3, 6]] * 2
+    assert list(left.get_yticks()) == [0, 3, 6]
+    assert [text.get_text() for text in bar.get_yticklabels()] == ["1", "1.5", "2", "3", "4", "6", "8", "10"]
+    assert [axes.get_title() for axes in (left, right)] == ["told", "not told"]
+    dark, light = (axes.collections[0].get_edgecolor() for axes in triangles().axes[:2])
+    assert len(dark) == len(light) == 2
+
+
+def test_lines_of_shares_and_of_what_remains_are_named_and_on_their_scales():
+    (axes,) = shares().axes
+    assert [text.get_text() for text in axes.get_legend().get_texts()] == ["told", "not told"]
+    assert [line.get_color() for line in axes.get_lines()] == list(style.SERIES[:2])
+    assert axes.get_ylim()[0] < 0 < 100 < axes.get_ylim()[1]
+    assert axes.get_title() == "shares"
+    (axes,) = faults.remaining({"open": [4e-3], "stuck": [0.1, np.inf]}, "s", "%", "latency").axes
+    assert (axes.get_xscale(), axes.get_yscale()) == ("log", "log")
+    assert [line.get_color() for line in axes.get_lines()] == list(style.SERIES[:2])
+    assert [text.get_text() for text in axes.get_legend().get_texts()] == ["open", "stuck"]
+    assert (axes.get_xlabel(), axes.get_ylabel(), axes.get_title()) == ("s", "%", "latency")

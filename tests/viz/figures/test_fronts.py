@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from spheretwin.viz.figures import fronts, style
+from spheretwin.viz.theme import law_colour
 
 TRIALS = fronts.Trials(
     law="pid",
@@ -66,6 +67,25 @@ def test_axes_of_tunings_have_the_names_of_their_objectives():
     figure = fronts.progress({"pid": TRIALS}, OBJECTIVES, "trials")
     assert [axes.get_ylabel() for axes in figure.axes] == list(OBJECTIVES)
     assert figure.axes[-1].get_xlabel() == "trial"
+
+
+def test_the_legend_of_fronts_has_each_law_with_its_marks():
+    values = np.array([[1.0, 3.0], [2.0, 1.0]])
+    panel = fronts.FrontPanel("ideal", "error, mrad", {"pd": values, "afsm": 2 * values}, {})
+    labels = {"pd": "PD", "afsm": "AFSM"}
+    figure = fronts.fronts([panel], labels, "variation, A/s")
+    (legend,) = figure.legends
+    for (law, label), text, handle in zip(
+        labels.items(), legend.get_texts(), legend.get_lines(), strict=True
+    ):
+        (drawn_line,) = (
+            line
+            for line in figure.axes[0].get_lines()
+            if np.array_equal(line.get_xydata(), panel.by_law[law])
+        )
+        assert text.get_text() == label
+        assert handle.get_color() == drawn_line.get_color() == law_colour(law)
+        assert handle.get_marker() == drawn_line.get_marker()
 
 
 @pytest.mark.parametrize(("largest", "top"), [(9.0, 9.0), (3000.0, 30.0)])

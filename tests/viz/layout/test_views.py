@@ -22,6 +22,7 @@ from spheretwin.viz.layout.view import (
 )
 from spheretwin.viz.recording import plots
 from spheretwin.viz.recording.recorder import Recorder
+from tests.viz.recording.panels import panels
 
 OPEN = {"target": "coil.00", "mode": "open", "start_s": 0.05, "detection": True}
 
@@ -150,6 +151,16 @@ def test_what_draws_a_signal_finds_its_values_and_its_looks(run):
         if each["selector"] not in there[entity, each["source_component"]]
     ]
     assert missing == []
+
+
+@pytest.mark.parametrize("name", ["afsm", "pid", "observer"])
+def test_every_signal_of_a_law_is_in_a_plot(name, tmp_path):
+    scenario, fields = RUNS[name]
+    path, _ = recorded(tmp_path / "run.rrd", scenario, {**fields, "duration": 0.02})
+    with Session(scenarios.load(scenario, fields)) as session:
+        own = {signal.name for signal in session.law.signals}
+    assert own
+    assert own <= {line.name for panel in panels(path) for line in panel.lines}
 
 
 def test_the_whole_layout_has_every_view_in_a_tab(run):

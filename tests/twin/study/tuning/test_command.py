@@ -105,6 +105,18 @@ def test_json_stands_alone_and_files_are_written(small, tmp_path, capsys):
     assert all(row[f"damping of {other[row['law']]}"] is None for row in table)
 
 
+def test_the_command_of_a_single_best_trial_is_printed(small, tmp_path, capsys):
+    path = tmp_path / "one.toml"
+    path.write_text(STUDY.replace('[[optimise.objective]]\nmetric = "slowness"\n', ""))
+    arguments = ["sweep", str(path), "--optimise", "--trials", "3", "--out", str(tmp_path / "out")]
+    assert cli.main(arguments) == cli.DONE
+    lines = capsys.readouterr().out.splitlines()
+    assert cli.main([*arguments, "--json"]) == cli.DONE
+    for of_law in json.loads(capsys.readouterr().out)["laws"].values():
+        (best,) = of_law["best"]
+        assert best["command"] in lines
+
+
 LIMITED = """
 name = "limited"
 scenario = "hold"

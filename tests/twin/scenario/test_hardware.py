@@ -1,0 +1,32 @@
+"""Hardware sets: the nominal model of the controller has the values of the set."""
+
+import pytest
+
+from spheretwin.scenario import load
+from spheretwin.scenario.hardware import HARDWARE
+from spheretwin.scenario.sections import Scenario
+
+NOMINAL = set(Scenario.model_fields["nominal"].annotation.model_fields)
+
+
+@pytest.mark.parametrize("name", [name for name, fields in HARDWARE.items() if fields])
+def test_what_the_controller_knows_of_plant_and_drive_is_in_the_set(name):
+    fields = HARDWARE[name]
+    shared = {
+        dotted: f"nominal.{dotted.partition('.')[2]}"
+        for dotted in fields
+        if dotted.startswith(("plant.", "drive.")) and dotted.partition(".")[2] in NOMINAL
+    }
+    assert len(shared) >= 5
+    for dotted, nominal in shared.items():
+        assert fields[nominal] == fields[dotted], dotted
+
+
+@pytest.mark.parametrize("name", HARDWARE)
+def test_a_scenario_has_every_value_of_its_set(name):
+    scenario = load("hold", {"hardware": name})
+    for dotted, value in HARDWARE[name].items():
+        inside = scenario
+        for part in dotted.split("."):
+            inside = getattr(inside, part)
+        assert inside == value, dotted
