@@ -95,7 +95,7 @@ def test_every_run_ends_with_a_status_and_numbers(found):
 
 def test_the_error_without_a_failure_is_the_median_of_its_seeds():
     runs = [outcome(ratio) for ratio in (1.0, 2.0, 9.0)]
-    text = fault_sections.parts_section(Outcomes({HEALTHY_PROTOTYPE.name: runs})).text
+    text = fault_sections.parts_section(Outcomes({HEALTHY_ELECTRONICS.name: runs})).text
     assert f"{np.degrees(0.02):.2f}°" in text
     assert f"{np.degrees(0.09):.2f}°" not in text
 
