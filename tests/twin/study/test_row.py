@@ -100,6 +100,11 @@ def test_faults_are_an_axis(tmp_path):
     assert len({tuple(row["rms_error_rad"]) for row in rows}) == 3
 
 
+def test_a_column_of_numbers_is_empty_where_the_value_is_none(tmp_path):
+    rows = found(study(values("plant.gravity_m_s2", None, 1.62)), tmp_path)
+    assert [row["plant.gravity_m_s2"] for row in rows] == [None, 1.62]
+
+
 def test_none_is_a_value(tmp_path):
     rows = found(study(values("nominal.inertia_kg_m2", None, [3e-4, 3e-4, 3e-4])), tmp_path)
     assert [row["nominal.inertia_kg_m2"] for row in rows] == [None, "[0.0003, 0.0003, 0.0003]"]

@@ -2,7 +2,7 @@
 
 import sys
 
-from spheretwin.study.engines import ray_cluster, ray_internals
+from spheretwin.study.engines import ray_cluster, ray_internals, ray_worker
 
 
 def test_a_silenced_driver_prints_no_message_of_a_node(monkeypatch, capsys):
@@ -16,3 +16,10 @@ def test_a_silenced_driver_prints_no_message_of_a_node(monkeypatch, capsys):
     ray_internals.silence(ray)
     worker.print_worker_logs(message, sys.stdout)
     assert capsys.readouterr().out == ""
+
+
+def test_what_one_node_lacks_is_a_difference():
+    version = {"a package": "1"}
+    assert ray_worker._differ("a package", version, {})
+    assert ray_worker._differ("a package", {}, version)
+    assert not ray_worker._differ("a package", version, dict(version))
