@@ -181,7 +181,6 @@ class MeanLoad(Metric):
 from typing import NamedTuple
 
 from spheretwin.models.base.checks import Check
-from spheretwin.crosscheck.part import Part
 
 
 class Units(NamedTuple):
@@ -191,12 +190,9 @@ class Units(NamedTuple):
 def examine(subject):
     value = float(abs(subject.actuator.inertia).max())
     return Units([Check("inertia is small", "largest inertia, kg·m²", 1, value, 1.0, "it fits a hand")])
-
-
-PART = Part("units", examine)
 """,
         "twin/crosscheck/suite.py",
-        ("    trajectories.CLOSED_LOOP,\n", "    trajectories.CLOSED_LOOP,\n    units.PART,\n"),
+        ("\n)\n\n\nclass Evidence", '\n    Part("units", units.examine),\n)\n\n\nclass Evidence'),
         "from spheretwin.crosscheck import units\n",
     ),
     "figure": Addition(

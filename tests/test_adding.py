@@ -85,7 +85,7 @@ from spheretwin import cli
 from spheretwin import scenario as scenarios
 from spheretwin.scenario import reading as flags
 from spheretwin.crosscheck import suite
-from spheretwin.crosscheck.part import Evidence, Subject
+from spheretwin.crosscheck.suite import Evidence, Subject
 from spheretwin.models import actuator as actuators
 from spheretwin.viz.recording.recorder import Recorder
 from spheretwin.provenance import facts_of

@@ -8,7 +8,7 @@ import time
 from spheretwin.cli.common import print_json, report_broken, warn_about_model
 from spheretwin.cli.options import Parser, whole
 from spheretwin.crosscheck import suite
-from spheretwin.crosscheck.part import STATES
+from spheretwin.crosscheck.suite import STATES
 from spheretwin.models import actuator as actuators
 from spheretwin.models.telemetry.run_record import versions
 from spheretwin.viz.pages.markdown import prepare

@@ -20,7 +20,6 @@ from scipy.integrate import solve_ivp
 from spheretwin import assembly
 from spheretwin import scenario as scenarios
 from spheretwin.active_config import initial_config
-from spheretwin.crosscheck.part import Part
 from spheretwin.crosscheck.trajectories import ENGINES, Convergence, convergence, order_check
 from spheretwin.linear import Magnetics, hinge_matrix
 from spheretwin.models.actuator import Actuator
@@ -252,6 +251,3 @@ def _order(name: str, compares: str, measured: Convergence) -> Check:
         " the next power of the step adds at these steps"
     )
     return order_check(name, measured, ORDER, why, f"{compares}; ", "")
-
-
-PART = Part("coil-driven motion", lambda on: compare(on.mjcf, on.actuator))

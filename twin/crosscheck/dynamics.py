@@ -18,7 +18,6 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from spheretwin.crosscheck.part import Part
 from spheretwin.models.actuator import Actuator
 from spheretwin.models.base.checks import Check
 from spheretwin.models.base.errors import InputError, without_breaks
@@ -362,6 +361,3 @@ def _times(matrices: Array, vectors: Array) -> Array:
 def _norm(values: Array) -> Array:
     """Euclidean norm of every vector, Frobenius norm of every matrix."""
     return np.sqrt(np.sum(values**2, axis=tuple(range(1, values.ndim))))
-
-
-PART = Part("dynamics", lambda on: compare(on.mjcf, on.actuator, on.states))

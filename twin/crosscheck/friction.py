@@ -33,7 +33,6 @@ from spheretwin.crosscheck.hinge import (
     run,
     slope_Nm_s,
 )
-from spheretwin.crosscheck.part import Part
 from spheretwin.models.actuator import Actuator
 from spheretwin.models.base.checks import Check
 from spheretwin.scenario.hardware import PROTOTYPE_BEARINGS
@@ -280,6 +279,3 @@ def _share(check: Check) -> float:
     value, bound = float(check.value or 0), float(check.bound or 0)
     share = max(value / bound, check.at_least / value if check.at_least is not None else 0.0)
     return share if isfinite(value) and isfinite(share) else float("inf")
-
-
-PART = Part("friction", lambda on: compare(on.mjcf, on.actuator))

@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from spheretwin.crosscheck.dynamics import random_states
-from spheretwin.crosscheck.part import Part
 from spheretwin.models.actuator import Actuator
 from spheretwin.models.base.checks import Check
 from spheretwin.models.kinematics import rotation, rotor_rate_jacobian
@@ -108,9 +107,6 @@ def _coupling(J: float, q: Array, qdot: Array, qddot: Array) -> Check:
         bound=BOUND,
         why=_WHY_EXACT,
     )
-
-
-IDENTITIES = Part("identities", lambda on: check_identities(on.actuator, on.states))
 
 
 DURATION_s = 60.0
@@ -278,6 +274,3 @@ def _drift_check(quantity: str, spin: str, drift: Drift) -> Check:
         why=_WHY[quantity],
         unit="rad" if quantity == "attitude" else "1",
     )
-
-
-FREE_ROTOR = Part("torque-free rotor", lambda on: check_free_rotor(on.mjcf, on.actuator))

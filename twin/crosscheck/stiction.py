@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
 from spheretwin.crosscheck.coil_driven import drive_plant
-from spheretwin.crosscheck.part import Part
 from spheretwin.crosscheck.trajectories import ENGINES
 from spheretwin.models.actuator import Actuator
 from spheretwin.models.base.checks import Check
@@ -173,6 +172,3 @@ def _motion(name: str, difference: Array, bound: float) -> Check:
         unit="rad/s",
         detail={"largest difference of an angle, rad": float(difference[:, :3].max())},
     )
-
-
-PART = Part("static friction", lambda subject: compare(subject.mjcf, subject.actuator))

@@ -2,30 +2,77 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
+from typing import NamedTuple, Protocol, TypeVar
 
 from spheretwin.crosscheck import coil_driven, dynamics, friction, identities, stiction, trajectories
 from spheretwin.crosscheck.friction import HingeFriction, VISCOUS_Nm_s
 from spheretwin.crosscheck.hinge import PUSH, Bearing, START_rad_s
-from spheretwin.crosscheck.part import STATES, Evidence, Finding, Subject
 from spheretwin.models import actuator as actuators
-from spheretwin.models.base.checks import bound_shares
+from spheretwin.models.actuator import Actuator
+from spheretwin.models.base.checks import Check, bound_shares
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.mjcf import beyond_a_free_rotor, read
 from spheretwin.viz.pages import markdown as pieces
 from spheretwin.viz.pages.markdown import Drawing, write_page
 
+F = TypeVar("F", bound="Finding")
+
+STATES = 10_000
+"""Default number of random states at which the dynamics are compared."""
+
+
+class Subject(NamedTuple):
+    """Subject of the checks."""
+
+    mjcf: Path
+    actuator: Actuator
+    states: int
+    """Random states at which formulas are compared."""
+
+
+class Finding(Protocol):
+    """Result of a part: its checks, and the data of its figures."""
+
+    @property
+    def checks(self) -> list[Check]:
+        """Rows of the part."""
+        ...
+
+
+class Part(NamedTuple):
+    """One row of the suite."""
+
+    name: str
+    examine: Callable[[Subject], Finding]
+
+
 PARTS = (
-    dynamics.PART,
-    identities.IDENTITIES,
-    trajectories.TRAJECTORIES,
-    identities.FREE_ROTOR,
-    friction.PART,
-    stiction.PART,
-    coil_driven.PART,
-    trajectories.CLOSED_LOOP,
+    Part("dynamics", lambda on: dynamics.compare(on.mjcf, on.actuator, on.states)),
+    Part("identities", lambda on: identities.check_identities(on.actuator, on.states)),
+    Part("trajectories", lambda on: trajectories.compare_trajectories(on.mjcf, on.actuator)),
+    Part("torque-free rotor", lambda on: identities.check_free_rotor(on.mjcf, on.actuator)),
+    Part("friction", lambda on: friction.compare(on.mjcf, on.actuator)),
+    Part("static friction", lambda on: stiction.compare(on.mjcf, on.actuator)),
+    Part("coil-driven motion", lambda on: coil_driven.compare(on.mjcf, on.actuator)),
+    Part("closed loop", lambda on: trajectories.compare_closed_loop(on.mjcf)),
 )
+
+
+class Evidence(NamedTuple):
+    """Findings of every part by its name."""
+
+    findings: Mapping[str, Finding]
+
+    @property
+    def checks(self) -> list[Check]:
+        """Every check, in the order of the parts."""
+        return [check for finding in self.findings.values() for check in finding.checks]
+
+    def of(self, kind: type[F]) -> F:
+        """Findings of a kind."""
+        return next(finding for finding in self.findings.values() if isinstance(finding, kind))
 
 
 def run(

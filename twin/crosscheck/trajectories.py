@@ -19,7 +19,6 @@ from scipy.integrate import solve_ivp
 
 from spheretwin import scenario as scenarios
 from spheretwin.crosscheck.dynamics import MASS
-from spheretwin.crosscheck.part import Part
 from spheretwin.models.actuator import Actuator
 from spheretwin.models.base.checks import Check
 from spheretwin.models.base.errors import EngineError
@@ -209,9 +208,6 @@ def _order(name: str, measured: Convergence, order: int) -> Check:
     return order_check(name, measured, order, why, "", ", against DOP853")
 
 
-TRAJECTORIES = Part("trajectories", lambda on: compare_trajectories(on.mjcf, on.actuator))
-
-
 SCENARIO = "nutation"
 
 # At the scenario's load of 2, PD lags so far behind that the currents saturate and the rotor leaves the
@@ -329,6 +325,3 @@ def _figures(pair: Pair) -> dict[str, float]:
         "rms error, relative": float(np.max(np.abs(rms[0] / rms[1] - 1))),
         "largest error, relative": float(np.max(np.abs(largest[0] / largest[1] - 1))),
     }
-
-
-CLOSED_LOOP = Part("closed loop", lambda on: compare_closed_loop(on.mjcf))
