@@ -31,6 +31,14 @@ class By(Enum):
     """Any client that names itself: the command is about the client and is executed at once."""
 
 
+def arguments(**fields: Any) -> type[BaseModel]:
+    """Return the arguments of a command: each is a type and its default, or ``...`` if it is required."""
+    return create_model("Arguments", __config__=_CONFIG, **fields)
+
+
+_NONE = arguments()
+
+
 class Command(NamedTuple):
     """Definition of a command."""
 
@@ -38,35 +46,19 @@ class Command(NamedTuple):
     action: Callable[..., None]
     """Takes the bench state, the result of `prepare`, and the arguments by name; for a client's command, the
     operators and the client."""
-    arguments: type[BaseModel]
-    replace_equal: tuple[str, ...] | None
+    replace_equal: tuple[str, ...] | None = None
     """Arguments that must be equal for a new command to replace a waiting one; None if none is replaced."""
-    by: By
-    prepare: Callable[..., Callable[[], Any] | None] | None
+    by: By = By.OPERATOR
+    prepare: Callable[..., Callable[[], Any] | None] | None = None
     """Takes the bench state and the arguments by name; returns work to do outside the loop before, if any."""
-    urgent: bool
+    urgent: bool = False
     """True if it is executed before all others."""
-    cancelled_by_stop: bool
+    cancelled_by_stop: bool = False
     """True if an urgent command that was given later cancels it."""
+    arguments: type[BaseModel] = _NONE
 
 
-def command(
-    name: str,
-    action: Callable[..., None],
-    /,
-    replace_equal: tuple[str, ...] | None = None,
-    by: By = By.OPERATOR,
-    prepare: Callable[..., Callable[[], Any] | None] | None = None,
-    urgent: bool = False,
-    cancelled_by_stop: bool = False,
-    arguments: Mapping[str, Any] | None = None,
-) -> Command:
-    """Define a command; each argument is a type and its default, or ``...`` if it is required."""
-    model = create_model("Arguments", __config__=_CONFIG, **(arguments or {}))
-    return Command(name, action, model, replace_equal, by, prepare, urgent, cancelled_by_stop)
-
-
-def check_arguments(command: Command, arguments: Mapping[str, Any]) -> dict[str, Any]:
+def check_arguments(command: Command, given: Mapping[str, Any]) -> dict[str, Any]:
     """Return the checked arguments of a command.
 
     Raises
@@ -75,11 +67,11 @@ def check_arguments(command: Command, arguments: Mapping[str, Any]) -> dict[str,
         An argument is missing, unknown, of the wrong type or out of range.
     """
     name, kind = command.name, command.arguments
-    if unknown := [field for field in arguments if field not in kind.model_fields]:
+    if unknown := [field for field in given if field not in kind.model_fields]:
         known = ", ".join(kind.model_fields) or "no arguments"
         raise InputError(f"bench: {name}: expected {known}, received {unknown[0]}")
     try:
-        values = kind.model_validate_json(json.dumps(arguments, default=as_plain))
+        values = kind.model_validate_json(json.dumps(given, default=as_plain))
     except ValidationError as error:
         raise InputError(f"bench: {name}: {explain(error, kind)}") from None
     except (TypeError, ValueError, RecursionError) as error:

@@ -11,7 +11,7 @@ from pydantic import Field, JsonValue
 
 from spheretwin import scenario as scenarios
 from spheretwin.bench.bench_state import BenchState, Player
-from spheretwin.bench.command_queue import By, Command, Place, Text, command
+from spheretwin.bench.command_queue import By, Command, Place, Text, arguments
 from spheretwin.bench.driver import Driver, compiled_session, with_field
 from spheretwin.bench.modes import Limits
 from spheretwin.bench.operators import Operators
@@ -170,91 +170,91 @@ def _trial(bench_state: BenchState, name: str, value: Any) -> Callable[[], None]
 COMMANDS: dict[str, Command] = {
     definition.name: definition
     for definition in (
-        command("start", _start, replace_equal=(), cancelled_by_stop=True),
-        command("pause", lambda bench_state, _: bench_state.pause(), replace_equal=()),
-        command("step", _step, cancelled_by_stop=True, arguments={"ticks": (Ticks, 1)}),
-        command("speed", _speed, replace_equal=(), arguments={"factor": (Speed, ...)}),
-        command("stop", _stop, by=By.ANYONE, urgent=True),
-        command("reset", _restart, replace_equal=(), prepare=_present_scenario, cancelled_by_stop=True),
-        command(
+        Command("start", _start, replace_equal=(), cancelled_by_stop=True),
+        Command("pause", lambda bench_state, _: bench_state.pause(), replace_equal=()),
+        Command("step", _step, cancelled_by_stop=True, arguments=arguments(ticks=(Ticks, 1))),
+        Command("speed", _speed, replace_equal=(), arguments=arguments(factor=(Speed, ...))),
+        Command("stop", _stop, by=By.ANYONE, urgent=True),
+        Command("reset", _restart, replace_equal=(), prepare=_present_scenario, cancelled_by_stop=True),
+        Command(
             "load",
             _restart,
             prepare=_load_scenario,
             cancelled_by_stop=True,
-            arguments={"source": (Text, ...), "overrides": (dict[str, JsonValue], {})},
+            arguments=arguments(source=(Text, ...), overrides=(dict[str, JsonValue], {})),
         ),
-        command(
+        Command(
             "snapshot",
             lambda bench_state, _, name: bench_state.driver.snapshot(name),
-            arguments={"name": (Text, "last")},
+            arguments=arguments(name=(Text, "last")),
         ),
-        command("restore", _restore, arguments={"name": (Text, "last")}),
-        command("off", _mode(Driver.off), replace_equal=()),
-        command("hold", _mode(Driver.hold), replace_equal=()),
-        command("point", _mode(Driver.point), replace_equal=(), arguments={"pose_rad": (Triple, ...)}),
-        command(
+        Command("restore", _restore, arguments=arguments(name=(Text, "last"))),
+        Command("off", _mode(Driver.off), replace_equal=()),
+        Command("hold", _mode(Driver.hold), replace_equal=()),
+        Command("point", _mode(Driver.point), replace_equal=(), arguments=arguments(pose_rad=(Triple, ...))),
+        Command(
             "trajectory",
             _mode(Driver.trajectory),
             replace_equal=(),
-            arguments={"fields": (dict[str, JsonValue] | None, None)},
+            arguments=arguments(fields=(dict[str, JsonValue] | None, None)),
         ),
-        command("jog", _mode(Driver.jog), replace_equal=(), arguments={"rates_rad_s": (Triple, ...)}),
-        command(
+        Command("jog", _mode(Driver.jog), replace_equal=(), arguments=arguments(rates_rad_s=(Triple, ...))),
+        Command(
             "manual",
             _mode(Driver.manual),
             replace_equal=(),
-            arguments={
-                "currents_A": (tuple[Current, ...] | None, None),
-                "group": (Place | None, None),
-                "current_A": (Current, 1.0),
-            },
+            arguments=arguments(
+                currents_A=(tuple[Current, ...] | None, None),
+                group=(Place | None, None),
+                current_A=(Current, 1.0),
+            ),
         ),
-        command(
+        Command(
             "replay",
             _replay,
             prepare=lambda bench_state, file: partial(Player, Path(file)),
-            arguments={"file": (Text, ...)},
+            arguments=arguments(file=(Text, ...)),
         ),
-        command(
+        Command(
             "limits",
             _limits,
             replace_equal=(),
-            arguments={
-                "rate_rad_s": (PositiveLimit | None, None),
-                "acceleration_rad_s2": (PositiveLimit | None, None),
-            },
+            arguments=arguments(
+                rate_rad_s=(PositiveLimit | None, None),
+                acceleration_rad_s2=(PositiveLimit | None, None),
+            ),
         ),
-        command(
+        Command(
             "set",
             lambda bench_state, _, name, value: bench_state.driver.set(name, value),
             replace_equal=("name",),
             prepare=_trial,
-            arguments={"name": (Text, ...), "value": (JsonValue, ...)},
+            arguments=arguments(name=(Text, ...), value=(JsonValue, ...)),
         ),
-        command(
+        Command(
             "add_fault",
             lambda bench_state, _, fault: bench_state.driver.set(FAULT, fault),
             prepare=lambda bench_state, fault: _trial(bench_state, FAULT, fault),
-            arguments={"fault": (dict[str, JsonValue], ...)},
+            arguments=arguments(fault=(dict[str, JsonValue], ...)),
         ),
-        command(
+        Command(
             "clear_faults",
             lambda bench_state, _, place: bench_state.driver.clear_faults(place),
-            arguments={"place": (Place | None, None)},
+            arguments=arguments(place=(Place | None, None)),
         ),
-        command(
+        Command(
             "record",
             _record,
             prepare=_open_files,
-            arguments={"recording": (Text | None, None), "telemetry": (Text | None, None)},
+            arguments=arguments(recording=(Text | None, None), telemetry=(Text | None, None)),
         ),
-        command("keep", _keep, replace_equal=()),
-        command("save", _save, prepare=_write_scenario, arguments={"file": (Text, ...)}),
-        command("hello", Operators.register, by=By.CLIENT),
-        command("beat", Operators.register, by=By.CLIENT),
-        command("ask", Operators.ask, by=By.CLIENT),
-        command("leave", Operators.leave, by=By.CLIENT),
-        command("grant", Operators.grant, by=By.CLIENT, arguments={"to": (Text, ...)}),
+        Command("keep", _keep, replace_equal=()),
+        Command("save", _save, prepare=_write_scenario, arguments=arguments(file=(Text, ...))),
+        Command("hello", Operators.register, by=By.CLIENT),
+        Command("beat", Operators.register, by=By.CLIENT),
+        Command("ask", Operators.ask, by=By.CLIENT),
+        Command("leave", Operators.leave, by=By.CLIENT),
+        Command("grant", Operators.grant, by=By.CLIENT, arguments=arguments(to=(Text, ...))),
     )
 }
 """All commands by name; `Bench` describes each."""

@@ -9,6 +9,7 @@ import numpy as np
 
 from spheretwin.bench.bench_state import BenchState
 from spheretwin.faults.fault import Fault
+from spheretwin.models.telemetry.signals import common_signals, width
 from spheretwin.models.telemetry.table import Table, rank_lost, saturated
 from spheretwin.session import Session
 
@@ -171,30 +172,16 @@ def _of_row(row: Table, limit_A: float) -> dict[str, Any]:
     }
 
 
-def _at_start(session: Session) -> dict[str, Any]:
-    reference = session.scenario.trajectory.sample(np.array([session.t_s]))[0]
-    error = session.q_rad - reference[0]
-    groups = (0.0,) * len(session.actuator.groups)
-    none = (0.0, 0.0, 0.0)
-    return {
-        "t_s": session.t_s,
-        "q_rad": tuple(session.q_rad.tolist()),
-        "qdot_rad_s": tuple(session.qdot_rad_s.tolist()),
-        "q_ref_rad": tuple(reference[0].tolist()),
-        "qdot_ref_rad_s": tuple(reference[1].tolist()),
-        "error_rad": tuple(error.tolist()),
-        "error_mrad": float(1e3 * np.linalg.norm(error)),
-        "error_deg": float(np.degrees(np.linalg.norm(error))),
-        "torque_command_Nm": none,
-        "torque_Nm": none,
-        "disturbance_Nm": none,
-        "current_command_A": groups,
-        "current_A": groups,
-        "temperature_C": None,
-        "torque_margin": 1.0,
-        "saturated": False,
-        "rank_lost": False,
-    }
+def _start_row(session: Session) -> Table:
+    """Return the row before the first tick: no torque, no current."""
+    signals = common_signals(len(session.actuator.groups))
+    row = Table(signals, np.zeros((1, width(signals))))
+    q_ref_rad, qdot_ref_rad_s, _ = session.scenario.trajectory.sample(np.array([session.t_s]))[0]
+    row["t_s"][:], row["allocation_scale"][:] = session.t_s, 1.0
+    row["q_rad"][:], row["qdot_rad_s"][:] = session.q_rad, session.qdot_rad_s
+    row["q_ref_rad"][:], row["qdot_ref_rad_s"][:] = q_ref_rad, qdot_ref_rad_s
+    row["error_rad"][:] = session.q_rad - q_ref_rad
+    return row
 
 
 def bench_status(bench_state: BenchState) -> BenchStatus:
@@ -243,7 +230,7 @@ def _shown(bench_state: BenchState) -> dict[str, Any]:
         row, tick, period_s = driver.row, driver.session.tick, bench_state.period_s
         limit_A = driver.session.scenario.nominal.current_limit_A
     place = {"tick": tick, "period_s": period_s, "current_limit_A": limit_A}
-    return place | (_at_start(driver.session) if row is None else _of_row(row, limit_A))
+    return place | _of_row(_start_row(driver.session) if row is None else row, limit_A)
 
 
 def _names(bench_state: BenchState) -> dict[str, Any]:
