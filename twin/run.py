@@ -18,6 +18,7 @@ from spheretwin.faults.fault_injector import FaultMessages
 from spheretwin.metrics import CHECKS, METRICS, PlannedRun
 from spheretwin.models.actuator import Actuator
 from spheretwin.models.base.errors import InputError, LawError, exception_text, shown
+from spheretwin.models.base.user_code import load_function
 from spheretwin.models.telemetry.run_record import RunRecord, versions
 from spheretwin.models.telemetry.signals import ANGLES
 from spheretwin.models.telemetry.status import Status
@@ -332,6 +333,41 @@ def check_names(own: Mapping[str, UserMetric]) -> None:
         if name in METRICS or name in OTHER_KEYS:
             taken = ", ".join([*METRICS, *OTHER_KEYS])
             raise InputError(f"metric: expected another name than {taken}, received {name}")
+
+
+def load_metrics(references: Sequence[str]) -> dict[str, UserMetric]:
+    """Return user functions by the names of their figures.
+
+    Parameters
+    ----------
+    references : sequence of str
+        Each ``path/to/file.py:name``; the name is also the name of the figure.
+
+    Raises
+    ------
+    InputError
+        A function cannot be loaded, or has the name of another figure.
+    """
+    own: dict[str, UserMetric] = {}
+    for reference in references:
+        name = reference.rpartition(":")[2]
+        if name in own:
+            raise InputError(f"metric: expected a different name for each function, received {name} twice")
+        own[name] = load_function(reference, f"metric {name}")
+    check_names(own)
+    return own
+
+
+def own_values(own: Mapping[str, UserMetric], run: Run) -> tuple[dict[str, Any], list[str]]:
+    """Return the values of user functions, and a line for each that failed; the others are not lost."""
+    values: dict[str, Any] = dict.fromkeys(own)
+    faults: list[str] = []
+    for name, metric in own.items():
+        try:
+            values[name] = own_value(name, metric, run)
+        except InputError as error:
+            faults.append(str(error))
+    return values, faults
 
 
 def own_value(name: str, metric: UserMetric, run: Run) -> Any:

@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import json
-import tomllib
 from collections.abc import Iterator
 from importlib import resources
-from pathlib import Path
 from typing import Annotated, Any, NamedTuple
 
 import numpy as np
@@ -14,9 +12,10 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from spheretwin.analysis.recorded_run import Reviewed
-from spheretwin.models.base.errors import InputError, did_you_mean, shown, without_breaks
+from spheretwin.models.base.errors import InputError, did_you_mean
 from spheretwin.models.telemetry.signals import Signal
 from spheretwin.scenario.fields import explain
+from spheretwin.scenario.reading import read_toml, toml_names
 from spheretwin.viz.terminal.reviews import SignalTolerance
 
 FOLDER = resources.files("spheretwin.analysis") / "shipped"
@@ -51,7 +50,7 @@ class Tolerances(BaseModel):
 
 def shipped() -> list[str]:
     """Return the names of the tolerances of the package."""
-    return sorted(path.name.removesuffix(".toml") for path in FOLDER.iterdir() if path.name.endswith(".toml"))
+    return toml_names(FOLDER)
 
 
 def load(source: str) -> Tolerances:
@@ -62,18 +61,7 @@ def load(source: str) -> Tolerances:
     InputError
         It cannot be read, or a field is unknown, of the wrong type or out of range.
     """
-    if not (source in shipped() or source.endswith(".toml")):
-        raise InputError(
-            f"tolerance: expected {', '.join(shipped())} or a .toml file,"
-            f" received {shown(source)}{did_you_mean(source, shipped())}"
-        )
-    path = FOLDER / f"{source}.toml" if source in shipped() else Path(source)
-    try:
-        fields = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError, RecursionError) as error:
-        raise InputError(
-            f"tolerance {source}: expected a readable TOML file, {without_breaks(error)}"
-        ) from None
+    fields, _ = read_toml("tolerance", source, FOLDER)
     try:
         return Tolerances.model_validate_json(json.dumps(fields, default=str))
     except ValidationError as error:

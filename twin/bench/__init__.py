@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic.fields import FieldInfo
 
 from spheretwin.bench.bench_state import BenchState
 from spheretwin.bench.command_queue import By, Command, Ticket, check_arguments, settled_ticket
@@ -16,7 +17,7 @@ from spheretwin.bench.operators import Operators
 from spheretwin.bench.status import BenchStatus, bench_status
 from spheretwin.models.actuator import Actuator
 from spheretwin.models.base.errors import InputError, SpheretwinError
-from spheretwin.scenario.fields import fields_of
+from spheretwin.scenario.reading import described_fields
 from spheretwin.scenario.sections import Scenario
 from spheretwin.scenario.writing import as_command, as_toml
 
@@ -138,14 +139,14 @@ class Bench:
         """Return the present settings as a command line."""
         return as_command(self._bench_state.driver.settings)
 
-    def fields(self) -> list[tuple[str, Any, str]]:
-        """Return every field of the active scenario: dotted name, value, meaning.
+    def fields(self) -> list[tuple[str, Any, FieldInfo]]:
+        """Return every field of the active scenario: dotted name, value, description.
 
         The trajectory is the one that is set, whatever the mode.
         """
         driver = self._bench_state.driver
         active = driver.session.scenario.model_copy(update={"trajectory": driver.settings.trajectory})
-        return [(name, value, field.description or "") for name, value, field in fields_of(active)]
+        return described_fields(active)
 
     def advance(self, ticks: int) -> int:
         """Execute the waiting commands, then run control ticks, at once; return how many were run.

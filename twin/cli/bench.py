@@ -10,7 +10,6 @@ import sys
 import warnings
 import webbrowser
 from collections.abc import Iterator, Mapping
-from functools import cache
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, Literal, get_args, get_origin
@@ -32,7 +31,7 @@ from spheretwin.faults.targets import TARGETS
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.base.mujoco_library import timers_stopped
 from spheretwin.scenario import reading
-from spheretwin.scenario.fields import every_field, kind_of
+from spheretwin.scenario.fields import families, without_indices
 from spheretwin.scenario.reading import shipped
 from spheretwin.scenario.sections import Scenario
 from spheretwin.trajectories import SHAPES
@@ -60,10 +59,9 @@ def choices_of(bench: Bench) -> Choices:
     )
 
 
-def settings_of(fields: list[tuple[str, Any, str]]) -> list[FieldSetting]:
+def settings_of(fields: list[tuple[str, Any, FieldInfo]]) -> list[FieldSetting]:
     """Return the fields of a run with their valid values."""
-    values = {name: value for name, value, _ in fields}
-    return [_setting(name, value, meaning, values) for name, value, meaning in fields]
+    return [_setting(*field) for field in fields]
 
 
 def shape_settings(name: str, bench: Bench) -> list[FieldSetting]:
@@ -81,8 +79,8 @@ def shape_settings(name: str, bench: Bench) -> list[FieldSetting]:
         FieldSetting(
             field,
             written(known.get(field, _default(info))),
-            written(_default(info)),
-            _meaning(info.description or "", info),
+            _default_text(info),
+            _meaning(info),
             _literals(info.annotation),
         )
         for field, info in kind.model_fields.items()
@@ -137,46 +135,9 @@ def _gathered(fields: Mapping[str, Any]) -> dict[str, Any]:
     return gathered
 
 
-def _setting(name: str, value: Any, meaning: str, values: Mapping[str, Any]) -> FieldSetting:
-    info = _field_of(name, values)
-    default = written(_default(info)) if info else None
-    choices = _families().get(_anywhere(name)) or (_literals(info.annotation) if info else ())
-    return FieldSetting(name, written(value), default, _meaning(meaning, info), choices)
-
-
-@cache
-def _families() -> dict[str, tuple[str, ...]]:
-    return {
-        f"{name}.{kind.discriminator}": tuple(kind.members)
-        for name, field in every_field(Scenario)
-        if (kind := kind_of(field)) and kind.discriminator
-    }
-
-
-def _anywhere(name: str) -> str:
-    return ".".join("#" if part.isdigit() else part for part in name.split("."))
-
-
-def _field_of(name: str, values: Mapping[str, Any]) -> FieldInfo | None:
-    """Return the description of a field for the selected members; None for a field of a user section."""
-    members: list[type[BaseModel]] = [Scenario]
-    *inside, last = name.split(".")
-    prefix, kind = "", None
-    for part in inside:
-        prefix += f"{part}."
-        if not part.isdigit():
-            field = next(
-                (member.model_fields[part] for member in members if part in member.model_fields), None
-            )
-            kind = kind_of(field) if field else None
-        if kind is None:
-            return None
-        tag = kind.discriminator
-        which = values.get(f"{prefix}{tag}", "") if tag else ""
-        if tag and which and which not in kind.members:
-            return None
-        members = kind.chosen({tag: which} if tag else {})
-    return next((member.model_fields[last] for member in members if last in member.model_fields), None)
+def _setting(name: str, value: Any, field: FieldInfo) -> FieldSetting:
+    choices = families(Scenario).get(without_indices(name)) or _literals(field.annotation)
+    return FieldSetting(name, written(value), _default_text(field), _meaning(field), choices)
 
 
 def _default(field: FieldInfo) -> Any:
@@ -184,9 +145,12 @@ def _default(field: FieldInfo) -> Any:
     return None if default is PydanticUndefined or isinstance(default, BaseModel) else default
 
 
-def _meaning(meaning: str, field: FieldInfo | None) -> str:
-    bounds = list(dict.fromkeys(_bounds(field))) if field else []
-    return ", ".join([meaning, *bounds])
+def _default_text(field: FieldInfo) -> str | None:
+    return None if field.is_required() else written(_default(field))
+
+
+def _meaning(field: FieldInfo) -> str:
+    return ", ".join([field.description or "", *dict.fromkeys(_bounds(field))])
 
 
 def _bounds(field: FieldInfo) -> Iterator[str]:

@@ -12,7 +12,7 @@ from spheretwin.cli.common import print_json
 from spheretwin.cli.options import Parser
 from spheretwin.models.base.errors import InputError, did_you_mean, shown
 from spheretwin.scenario import reading
-from spheretwin.scenario.fields import every_field, fields_of, unit_of
+from spheretwin.scenario.fields import every_field, unit_of
 from spheretwin.scenario.hardware import HARDWARE, ORIGINS
 from spheretwin.scenario.sections import Scenario
 from spheretwin.viz.terminal.texts import print_facts
@@ -88,9 +88,7 @@ def _of_hardware(name: str) -> Iterator[FieldFacts]:
 def _of_scenario(source: str, everything: bool) -> Iterator[FieldFacts]:
     scenario = initial_config(scenarios.load(source), None, None).scenario
     given, stated = set(_flat(reading.read(source))), ORIGINS[scenario.hardware]
-    described = dict(every_field(Scenario))  # a resolved section repeats no description
-    for dotted, value, resolved in fields_of(scenario):
-        field = resolved if resolved.description else described.get(dotted, resolved)
+    for dotted, value, field in reading.described_fields(scenario):
         if dotted in given:
             origin = f"scenario {scenario.name}"
         elif dotted in stated:

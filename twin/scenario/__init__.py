@@ -9,8 +9,7 @@ from spheretwin.control.laws import LAWS
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.base.user_code import is_reference
 from spheretwin.scenario.changes import check_events, fields_with
-from spheretwin.scenario.hardware import hardware_defaults
-from spheretwin.scenario.reading import override, resolve_paths, validated
+from spheretwin.scenario.reading import fill_hardware, resolve_paths, validated
 from spheretwin.scenario.sections import Scenario
 from spheretwin.trajectories import SHAPES
 
@@ -33,9 +32,7 @@ def load(source: str, overrides: Mapping[str, Any] | None = None) -> Scenario:
         The scenario does not exist, or a field is unknown, of the wrong type or out of range.
     """
     fields = fields_with(source, overrides or {})
-    hardware = fields.get("hardware")
-    for dotted, value in hardware_defaults(fields, hardware if isinstance(hardware, str) else None).items():
-        override(fields, dotted, value)
+    fill_hardware(fields)
     try:
         resolved = resolve_paths("", fields)
     except RecursionError:

@@ -14,7 +14,7 @@ from pydantic_core import to_jsonable_python
 from spheretwin.control.laws import LAWS
 from spheretwin.models.base.errors import InputError, shown
 from spheretwin.models.telemetry.run_record import Change
-from spheretwin.scenario.fields import Kind, every_field, kind_of, section_kind
+from spheretwin.scenario.fields import Kind, families, kind_of, section_kind
 from spheretwin.scenario.reading import is_dotted, override, read, resolve_paths, shipped, validated
 from spheretwin.scenario.sections import Scenario, UserController, kind_of_scenario, scenario_with
 from spheretwin.trajectories.rounding import Triple
@@ -53,11 +53,7 @@ class StateChange(BaseModel):
     current_A: tuple[float, ...] | None = None
 
 
-TAGS = frozenset(
-    kind.discriminator
-    for _, field in every_field(Scenario)
-    if (kind := kind_of(field)) and kind.discriminator
-)
+TAGS = frozenset(name.rpartition(".")[2] for name in families(Scenario))
 """Names of the fields that select a member of a family, such as ``shape`` and ``law``."""
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
-from functools import cache
+from functools import cache, lru_cache
 from types import NoneType, UnionType
 from typing import Annotated, Any, NamedTuple, Union, get_args, get_origin
 
@@ -86,6 +86,21 @@ def every_field(section: type[BaseModel], prefix: str = "") -> Iterator[tuple[st
             below = f"{prefix}{name}.{INDEX}." if kind.is_list else f"{prefix}{name}."
             for member in kind.members.values():
                 yield from every_field(member, below)
+
+
+@lru_cache(maxsize=32)
+def families(section: type[BaseModel]) -> dict[str, tuple[str, ...]]:
+    """Return the names of the members of every family by the dotted name of the field that selects one."""
+    return {
+        f"{name}.{kind.discriminator}": tuple(kind.members)
+        for name, field in every_field(section)
+        if (kind := kind_of(field)) and kind.discriminator
+    }
+
+
+def without_indices(dotted: str) -> str:
+    """Return the name of a field with every list index replaced by `INDEX`."""
+    return re.sub(r"\.\d+(?=\.|$)", f".{INDEX}", dotted)
 
 
 def place_of(scenario: type[BaseModel], path: tuple[str | int, ...]) -> FieldLocation:

@@ -154,13 +154,13 @@ ORIGINS: dict[str, dict[str, str]] = {
 """Origin of each value of each hardware set."""
 
 
-def hardware_defaults(fields: dict[str, Any], name: Any) -> dict[str, Any]:
-    """Return the fields of a hardware set that given fields by section do not contain."""
-    nominal = fields.get(NOMINAL)
+def hardware_defaults(fields: dict[str, Any]) -> dict[str, Any]:
+    """Return the fields of the named hardware set that given fields by section do not contain."""
+    name, nominal = fields.get("hardware"), fields.get(NOMINAL)
     equals_truth = isinstance(nominal, dict) and nominal.get("equals_truth") is True
     return {
         dotted: value
-        for dotted, value in hardware_fields(name, equals_truth).items()
+        for dotted, value in hardware_fields(name if isinstance(name, str) else "", equals_truth).items()
         if not _is_given(fields, dotted)
     }
 

@@ -6,19 +6,29 @@ import copy
 import json
 import math
 import os
-import re
 import tomllib
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from importlib import resources
+from importlib.resources.abc import Traversable
 from pathlib import Path
 from typing import Any, get_args
 
 import numpy as np
 from pydantic import BaseModel, ValidationError
+from pydantic.fields import FieldInfo
 
 from spheretwin.models.base.errors import InputError, did_you_mean, is_plain, shown, without_breaks
 from spheretwin.models.base.user_code import file_of, is_reference
-from spheretwin.scenario.fields import INDEX, every_field, explain, fields_of, files_in, kind_of, section_kind
+from spheretwin.scenario.fields import (
+    every_field,
+    explain,
+    families,
+    fields_of,
+    files_in,
+    section_kind,
+    without_indices,
+)
+from spheretwin.scenario.hardware import hardware_defaults
 from spheretwin.scenario.sections import Scenario, scenario_with
 
 FOLDER = resources.files("spheretwin") / "scenario" / "shipped"
@@ -26,7 +36,12 @@ FOLDER = resources.files("spheretwin") / "scenario" / "shipped"
 
 def shipped() -> list[str]:
     """Return the names of the scenarios of the package."""
-    return sorted(path.name.removesuffix(".toml") for path in FOLDER.iterdir() if path.name.endswith(".toml"))
+    return toml_names(FOLDER)
+
+
+def toml_names(folder: Traversable) -> list[str]:
+    """Return the names of the TOML files in a folder of the package."""
+    return sorted(path.name.removesuffix(".toml") for path in folder.iterdir() if path.name.endswith(".toml"))
 
 
 def read(source: str) -> dict[str, Any]:
@@ -37,26 +52,46 @@ def read(source: str) -> dict[str, Any]:
     InputError
         The scenario does not exist, or its file cannot be read.
     """
-    path = _from_home(source)
-    if source in shipped():
-        text = (FOLDER / f"{source}.toml").read_text(encoding="utf-8")
+    fields, folder = read_toml("scenario", source, FOLDER)
+    return resolve_paths(folder, fields)
+
+
+def read_toml(what: str, source: str, shipped_folder: Traversable) -> tuple[dict[str, Any], str]:
+    """Return the contents of a TOML file, and the folder that it is in; none for a shipped one.
+
+    Parameters
+    ----------
+    what : str
+        Kind of the file, for messages.
+    source : str
+        A shipped name, or the path of a file; ``~`` is the user's home.
+    shipped_folder : Traversable
+        Folder of the package with the shipped files.
+
+    Raises
+    ------
+    InputError
+        The file does not exist, or cannot be read.
+    """
+    path, names = _from_home(source), toml_names(shipped_folder)
+    if source in names:
+        text = (shipped_folder / f"{source}.toml").read_text(encoding="utf-8")
     elif source.endswith(".toml"):
         try:
             text = Path(path).read_text(encoding="utf-8-sig")  # some editors write a byte-order mark
         except (OSError, ValueError) as error:  # ValueError: not UTF-8, or a null character in the path
             raise InputError(
-                f"scenario {source}: expected a readable TOML file, {without_breaks(error)}"
+                f"{what} {source}: expected a readable TOML file, {without_breaks(error)}"
             ) from None
     else:
         raise InputError(
-            f"scenario: expected {', '.join(shipped())} or a .toml file,"
-            f" received {shown(source)}{did_you_mean(source, shipped())}"
+            f"{what}: expected {', '.join(names)} or a .toml file,"
+            f" received {shown(source)}{did_you_mean(source, names)}"
         )
     try:
-        fields = tomllib.loads(text)
+        return tomllib.loads(text), os.path.dirname(path)
     except (ValueError, RecursionError) as error:
-        raise InputError(f"scenario {source}: expected valid TOML, {without_breaks(error)}") from None
-    return resolve_paths(os.path.dirname(path), fields)
+        raise InputError(f"{what} {source}: expected valid TOML, {without_breaks(error)}") from None
 
 
 def is_dotted(name: object) -> bool:
@@ -83,6 +118,12 @@ def override(fields: dict[str, Any], dotted: str, value: Any) -> None:
         inside[place : place + 1] = [value]
     else:
         inside[name] = value
+
+
+def fill_hardware(fields: dict[str, Any]) -> None:
+    """Fill in the values of the named hardware set for fields that are not set."""
+    for dotted, value in hardware_defaults(fields).items():
+        override(fields, dotted, value)
 
 
 def _enter(inside: Any, part: str, empty: Any, dotted: str) -> Any:
@@ -285,31 +326,36 @@ def overrides(tokens: Sequence[str]) -> dict[str, Any]:
         if not values:
             raise InputError(f"command line: expected a value after --{flag}, received none")
         name = flag.replace("-", "_")
-        read = [text if _without_indices(name) in texts else _value(text) for text in values]
+        read = [text if without_indices(name) in texts else _value(text) for text in values]
         values_by_name[name] = read[0] if len(read) == 1 else read
     return values_by_name
 
 
 def field_descriptions(scenario: Scenario) -> list[tuple[str, str, str]]:
     """Return flag, present value and meaning of every field of a scenario."""
-    families = {
-        f"{name}.{kind.discriminator}": f": {', '.join(kind.members)}"
-        for name, field in every_field(type(scenario))
-        if (kind := kind_of(field)) and kind.discriminator
-    }
+    members = {name: f": {', '.join(of_family)}" for name, of_family in families(type(scenario)).items()}
     return [
         (
             "--" + dotted.replace("_", "-"),
             value_text(value),
-            (field.description or "") + families.get(_without_indices(dotted), ""),
+            (field.description or "") + members.get(without_indices(dotted), ""),
         )
         for dotted, value, field in fields_of(scenario)
     ]
 
 
-def _without_indices(dotted: str) -> str:
-    """Return the name of a field with every list index replaced by `INDEX`."""
-    return re.sub(r"\.\d+(?=\.|$)", f".{INDEX}", dotted)
+def described_fields(scenario: Scenario) -> list[tuple[str, Any, FieldInfo]]:
+    """Return dotted name, value and description of every field of a resolved scenario.
+
+    A resolved section repeats no description: it is that of the scenario.
+    """
+    return [
+        (dotted, value, field if field.description else _DESCRIBED.get(dotted, field))
+        for dotted, value, field in fields_of(scenario)
+    ]
+
+
+_DESCRIBED = dict(every_field(Scenario))
 
 
 def value_text(value: Any) -> str:

@@ -11,8 +11,7 @@ from typing import Any
 from pydantic import BaseModel
 
 from spheretwin.scenario.changes import fields_with
-from spheretwin.scenario.hardware import hardware_defaults
-from spheretwin.scenario.reading import override, read, shipped, validated
+from spheretwin.scenario.reading import fill_hardware, override, read, shipped, validated
 from spheretwin.scenario.sections import Scenario, UserController, UserPath
 
 # A shipped scenario with few fields: other scenarios are written as differences from it.
@@ -117,8 +116,7 @@ def _defaults(chosen: Mapping[str, Any]) -> dict[str, Any]:
 def _completed(fields: dict[str, Any]) -> dict[str, Any]:
     """Return all fields: the given ones and the defaults of the others."""
     fields = copy.deepcopy(fields)
-    for dotted, value in hardware_defaults(fields, fields.get("hardware")).items():
-        override(fields, dotted, value)
+    fill_hardware(fields)
     return validated(fields, "to be written").model_dump(mode="json")
 
 

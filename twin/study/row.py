@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import copy
 import json
-import re
 import shlex
 from collections.abc import Mapping
 from pathlib import Path
@@ -19,16 +18,15 @@ from spheretwin.models.base.errors import (
     exception_text,
     shown,
 )
-from spheretwin.models.base.user_code import is_reference, load_function
+from spheretwin.models.base.user_code import is_reference
 from spheretwin.models.telemetry.parquet import TelemetryFile
 from spheretwin.models.telemetry.table import TelemetryBuffer
 from spheretwin.provenance import record_of
-from spheretwin.run import Figures, Run, UserMetric, check_names, own_value
+from spheretwin.run import Figures, Run, load_metrics, own_values
 from spheretwin.scenario import reading
 from spheretwin.scenario.changes import check_events, fields_with, is_tag
-from spheretwin.scenario.fields import INDEX, every_field, new_name
+from spheretwin.scenario.fields import INDEX, every_field, new_name, without_indices
 from spheretwin.scenario.files import Files, files_of, named_files
-from spheretwin.scenario.hardware import hardware_defaults
 from spheretwin.scenario.sections import Scenario, scenario_with
 from spheretwin.session import Session
 from spheretwin.simulation import Sink, follow
@@ -83,7 +81,7 @@ class Rows:
         self._check_axes()
         self.metrics = tuple(METRICS) if not study.metrics else tuple(chosen)
         self._references = [study.path(name) for name in study.metrics if is_reference(name)]
-        self._own = _own_metrics(self._references)
+        self._own = load_metrics(self._references)
         self.chooses_plant = study.fast and not self._names_engine()
 
     @property
@@ -212,7 +210,8 @@ class Rows:
         complaints: list[str] = []
         if buffer:
             run = Run(session.initial_scenario, status, buffer.table, session.loop_s, session.actuator)
-            figures |= {name: _own_value(name, metric, run, complaints) for name, metric in self._own.items()}
+            own, complaints = own_values(self._own, run)
+            figures |= own
         reason = session.reason.text if session.reason else None
         return Result(str(status), reason, "; ".join(complaints) or None, figures)
 
@@ -228,11 +227,7 @@ class Rows:
 
     def _whole(self, fields: dict[str, Any]) -> dict[str, Any]:
         """Fields with the defaults of their hardware, and with resolved paths."""
-        hardware = fields.get("hardware")
-        for dotted, value in hardware_defaults(
-            fields, hardware if isinstance(hardware, str) else None
-        ).items():
-            reading.override(fields, dotted, value)
+        reading.fill_hardware(fields)
         return reading.resolve_paths("", fields) if self._names_files else fields
 
     def _check_axes(self) -> None:
@@ -242,7 +237,7 @@ class Rows:
             name = self._resolve({"controller.law": law["law"]})["controller.law"]
             known |= dict(every_field(scenario_with(name)))
         for axis in self.study.axis:
-            name = re.sub(r"\.\d+(?=\.|$)", f".{INDEX}", axis.field)
+            name = without_indices(axis.field)
             if name.removesuffix(f".{INDEX}") not in known:
                 raise InputError(
                     f"study {self.study.name}: expected an axis over a field of a scenario,"
@@ -296,21 +291,6 @@ def _value_at(whole: Mapping[str, Any], dotted: str, value: Any) -> Any:
     for part in dotted.split("."):
         inside = inside.get(part) if isinstance(inside, Mapping) else None
     return inside if isinstance(inside, list) else value
-
-
-def _own_metrics(references: list[str]) -> dict[str, UserMetric]:
-    own = {name.rpartition(":")[2]: load_function(name, "metric") for name in references}
-    check_names(own)
-    return own
-
-
-def _own_value(name: str, metric: UserMetric, run: Run, complaints: list[str]) -> Any:
-    """Value of a user metric; None after an exception, so that the other figures of the row are not lost."""
-    try:
-        return own_value(name, metric, run)
-    except InputError as error:
-        complaints.append(str(error))
-        return None
 
 
 def command_words(scenario: str, fields: Mapping[str, Any]) -> list[str]:

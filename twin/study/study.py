@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import os
-import tomllib
 from collections import Counter
 from collections.abc import Iterable, Mapping
 from contextlib import suppress
@@ -26,9 +25,10 @@ from pydantic import (
 from spheretwin.metrics import METRICS
 from spheretwin.models import mjcf
 from spheretwin.models.actuator import MJCF_PATH
-from spheretwin.models.base.errors import InputError, did_you_mean, is_plain, shown, without_breaks
+from spheretwin.models.base.errors import InputError, did_you_mean, is_plain, shown
 from spheretwin.models.base.user_code import is_reference
 from spheretwin.scenario.fields import explain
+from spheretwin.scenario.reading import read_toml, toml_names
 from spheretwin.study.axes import MOST_VALUES, AnyAxis, Axis
 from spheretwin.study.optimise import Optimise
 
@@ -180,7 +180,7 @@ def _alike(value: Any) -> Any:
 
 def shipped() -> list[str]:
     """Names of the studies that come with the package."""
-    return sorted(path.name.removesuffix(".toml") for path in FOLDER.iterdir() if path.name.endswith(".toml"))
+    return toml_names(FOLDER)
 
 
 def load(source: str) -> Study:
@@ -191,26 +191,7 @@ def load(source: str) -> Study:
     InputError
         No such study, or a field that is unknown, of the wrong type or out of range.
     """
-    folder = ""
-    if source in shipped():
-        text = (FOLDER / f"{source}.toml").read_text(encoding="utf-8")
-    elif source.endswith(".toml"):
-        try:
-            path = Path(source).expanduser()
-            text, folder = path.read_text(encoding="utf-8-sig"), os.path.dirname(path)
-        except (OSError, ValueError, RuntimeError) as error:
-            raise InputError(
-                f"study {source}: expected a readable TOML file, {without_breaks(error)}"
-            ) from None
-    else:
-        raise InputError(
-            f"study: expected {', '.join(shipped())} or a .toml file,"
-            f" received {shown(source)}{did_you_mean(source, shipped())}"
-        )
-    try:
-        fields = tomllib.loads(text)
-    except (ValueError, RecursionError) as error:
-        raise InputError(f"study {source}: expected valid TOML, {without_breaks(error)}") from None
+    fields, folder = read_toml("study", source, FOLDER)
     if isinstance(given := fields.get("folder", ""), str):  # anything else is refused below
         fields["folder"] = os.path.join(folder, given)
     return made(fields, source)

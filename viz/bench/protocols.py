@@ -51,7 +51,7 @@ class FieldSetting:
     text: str
     """Its value."""
     default: str | None
-    """None if it is not known, as of a user's law."""
+    """None if it has none."""
     meaning: str
     choices: tuple[str, ...] = ()
     """Valid values, if they are a list."""

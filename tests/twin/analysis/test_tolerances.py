@@ -134,7 +134,7 @@ def test_signals_without_a_reference_are_refused_by_name():
         ("[signals.q_rad]\nabsolute = inf", "finite"),
         ("[signals.q_rad]\nrelativ = 1.0", "did you mean relative"),
         ("signals = 1", "signals"),
-        ("no toml", "readable TOML"),
+        ("no toml", "valid TOML"),
     ],
 )
 def test_bad_tolerances_are_refused_by_name(tmp_path, text, complaint):

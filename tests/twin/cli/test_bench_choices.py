@@ -8,25 +8,20 @@ from spheretwin import scenario as scenarios
 from spheretwin.bench import Bench
 from spheretwin.cli.bench import choices_of, read, settings_of, shape_settings, written
 from spheretwin.models.base.errors import InputError
-from spheretwin.scenario.fields import fields_of
-from spheretwin.scenario.reading import shipped
+from spheretwin.scenario.reading import described_fields, shipped
 from spheretwin.trajectories import SHAPES
 
 
-def fields(scenario):
-    return [(name, value, field.description or "") for name, value, field in fields_of(scenario)]
-
-
 def setting(name, scenario):
-    return next(each for each in settings_of(fields(scenario)) if each.name == name)
+    return next(each for each in settings_of(described_fields(scenario)) if each.name == name)
 
 
 @pytest.mark.parametrize("name", shipped())
 @pytest.mark.parametrize("hardware", ["ideal", "electronics"])
 def test_what_is_shown_of_a_field_is_read_as_what_it_is(name, hardware):
     scenario = scenarios.load(name, {"hardware": hardware})
-    known = {dotted: value for dotted, value, _ in fields(scenario)}
-    for each in settings_of(fields(scenario)):
+    known = {dotted: value for dotted, value, _ in described_fields(scenario)}
+    for each in settings_of(described_fields(scenario)):
         if each.name in ("name", "description"):  # words, which no form has
             continue
         value = json.loads(json.dumps(known[each.name]))
@@ -51,7 +46,9 @@ def test_bounds_are_told_beside_the_meaning():
 
 def test_the_gains_are_those_of_the_law_that_is_in_force():
     scenario = scenarios.load("hold", {"controller.law": "pid", "controller.integral": 3.0})
-    gains = {each.name for each in settings_of(fields(scenario)) if each.name.startswith("controller.")}
+    gains = {
+        each.name for each in settings_of(described_fields(scenario)) if each.name.startswith("controller.")
+    }
     assert "controller.surface_slope" not in gains
     assert setting("controller.integral", scenario).text == "3 3 3"
     assert setting("controller.integral", scenario).default != "3 3 3"
@@ -112,15 +109,15 @@ def test_a_shape_with_a_list_of_tables_is_offered_as_it_is():
         ]
 
 
-def test_a_law_of_a_persons_own_is_offered_as_it_is_and_nothing_is_made_up(tmp_path):
-    """A gain of the same name as a shipped law's has neither its bounds nor its default."""
+def test_a_law_of_a_persons_own_is_offered_with_its_own_bounds_and_defaults(tmp_path):
+    """A gain of the same name as a shipped law's has its own meaning, bounds and default."""
     (tmp_path / "mine.py").write_text(OWN)
     law = f"{tmp_path / 'mine.py'}:Mine"
     with Bench(scenarios.load("hold", {"plant.engine": "lagrangian", "controller.law": law})) as bench:
         found = {each.name: each for each in settings_of(bench.fields())}
     assert found["controller.law"].text == law
-    assert (found["controller.stiffness"].text, found["controller.stiffness"].default) == ("3 3 3", None)
-    assert found["controller.stiffness"].meaning == "my own"
+    assert (found["controller.stiffness"].text, found["controller.stiffness"].default) == ("3 3 3", "3 3 3")
+    assert found["controller.stiffness"].meaning == "my own, > 0, ≤ 1e+09"
 
 
 OWN = """
