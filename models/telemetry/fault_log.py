@@ -49,7 +49,7 @@ class FaultLog:
         self._active: dict[int, FaultRecord] = {}
         self._changes = ColumnChanges()
 
-    def add(self, rows: Table) -> None:
+    def write(self, rows: Table) -> None:
         """Add the rows of one chunk."""
         signals = {signal.name: signal for signal in rows.signals}
         if not len(rows) or FAULT not in signals:
@@ -68,6 +68,12 @@ class FaultLog:
                 is_reported = state == REPORTED or delay_s < 0
                 found = f"detected after {1e3 * delay_s:.3g} ms"
                 started[-1].detection = "reported to the controller" if is_reported else found
+
+    def note(self, t_s: float, text: str) -> None:
+        """Ignore a message: the rows contain every fault."""
+
+    def finish(self, status: str) -> None:
+        """Ignore the end of the run."""
 
 
 def _group_of(part: str) -> int | None:

@@ -6,7 +6,7 @@ import argparse
 import contextlib
 import sys
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -20,15 +20,14 @@ from spheretwin.loop import is_user_law
 from spheretwin.metrics import BAND_rad, PlannedRun
 from spheretwin.models.base.errors import InputError, LawError, SpheretwinError
 from spheretwin.models.base.mujoco_library import timers_stopped
-from spheretwin.models.base.user_code import load_function
 from spheretwin.models.telemetry.checksums import NO_CHECKSUMS, has_checksums
 from spheretwin.models.telemetry.fault_log import FaultLog
 from spheretwin.models.telemetry.signals import ANGLES
 from spheretwin.models.telemetry.status import Status
-from spheretwin.models.telemetry.table import Table, TelemetryBuffer
+from spheretwin.models.telemetry.table import TelemetryBuffer
 from spheretwin.outputs import Outputs
 from spheretwin.replay import RunPlan
-from spheretwin.run import Figures, Run, UserMetric, check_names, own_value, summary
+from spheretwin.run import Figures, Run, UserMetric, load_metrics, own_values, summary
 from spheretwin.scenario import reading
 from spheretwin.scenario.reading import shipped
 from spheretwin.session import Session
@@ -36,90 +35,6 @@ from spheretwin.simulation import Sink, follow
 from spheretwin.viz.layout.view import LIVE_WINDOW_S, OVERVIEW, VIEW_NAMES
 from spheretwin.viz.terminal import runs
 from spheretwin.viz.terminal.progress import Progress
-
-
-class UserMetrics:
-    """User metrics: stores the telemetry of a run and calls the functions at its end.
-
-    Parameters
-    ----------
-    specs : sequence of str
-        Each ``path/to/file.py:name``; the name is also the name of the figure.
-
-    Attributes
-    ----------
-    faults : list of str
-        Reasons for missing figures, one line each.
-
-    Raises
-    ------
-    InputError
-        A function cannot be loaded, or has the name of another figure.
-    """
-
-    def __init__(self, specs: Sequence[str]) -> None:
-        self._functions: dict[str, UserMetric] = {}
-        self._telemetry: TelemetryBuffer | None = None
-        self.faults: list[str] = []
-        for spec in specs:
-            name = spec.rpartition(":")[2]
-            if name in self._functions:
-                raise InputError(
-                    f"metric: expected a different name for each function, received {name} twice"
-                )
-            self._functions[name] = load_function(spec, f"metric {name}")
-        check_names(self._functions)
-
-    def sinks(self, session: Session, ticks: int) -> list[TelemetryBuffer]:
-        """Return the sinks of a run of a number of ticks; none without a function.
-
-        Raises
-        ------
-        InputError
-            The telemetry does not fit in memory.
-        """
-        self._telemetry = TelemetryBuffer(session.signals, ticks) if self._functions else None
-        return [self._telemetry] if self._telemetry else []
-
-    def values(self, session: Session, status: Status) -> dict[str, Any]:
-        """Return the figures by name; None if a function failed, so that the other figures are not lost."""
-        if self._telemetry is None:
-            return {}
-        run = Run(session.initial_scenario, status, self._telemetry.table, session.loop_s, session.actuator)
-        return {name: self._value(name, metric, run) for name, metric in self._functions.items()}
-
-    def _value(self, name: str, metric: UserMetric, run: Run) -> Any:
-        try:
-            with contextlib.redirect_stdout(sys.stderr):  # stdout is only for the figures
-                return own_value(name, metric, run)
-        except InputError as error:
-            self.faults.append(f"{error}")
-            return None
-
-
-class Faults:
-    """Sink that collects the faults of a run for its report."""
-
-    def __init__(self) -> None:
-        self._log = FaultLog()
-
-    def write(self, rows: Table) -> None:
-        """Add the rows of one chunk."""
-        self._log.add(rows)
-
-    def note(self, t_s: float, text: str) -> None:
-        """Ignore a message: the rows contain every fault."""
-
-    def finish(self, status: Status) -> None:
-        """Ignore the end of the run."""
-
-    def lines(self, session: Session) -> list[str]:
-        """Return a line for each fault: start and detection, or that the run ended before its start."""
-        late = [fault for fault in session.initial_scenario.fault if fault.start_s >= session.t_s]
-        return [fault.text() for fault in self._log.faults] + [
-            f"{fault.target} {fault.mode} from {fault.start_s:.3f} s: not started, the run ended before"
-            for fault in late
-        ]
 
 
 def declare(parser: Parser) -> None:
@@ -173,14 +88,15 @@ def run(options: argparse.Namespace) -> bool:
         raise InputError(
             f"command line: expected --view with --record or --live, received {options.view} alone"
         )
-    own = UserMetrics(options.metric)
+    own = load_metrics(options.metric)
     outputs.check([path for path in (options.record, options.telemetry) if path])
     outputs.check_rate(options.record_rate, options.record, plan.scenario.controller.period_s)
     with interruptible() as stop_requested, Session(plan.scenario) as session:
         figures = Figures(PlannedRun(session.initial_scenario, session.actuator, plan.ticks))
         progress = Progress(plan.scenario.name, plan.ticks)
-        faults = Faults()
-        sinks: list[Sink] = [progress, figures, faults, *own.sinks(session, plan.ticks)]
+        faults = FaultLog()
+        telemetry = TelemetryBuffer(session.signals, plan.ticks) if own else None
+        sinks: list[Sink] = [progress, figures, faults, *([telemetry] if telemetry else [])]
         files = Outputs(
             session,
             options.record,
@@ -201,8 +117,8 @@ def run(options: argparse.Namespace) -> bool:
                     live=options.live,
                     stop_requested=stop_requested,
                 )
-            values = own.values(session, status)
-            warnings = [*session.warnings(), *figures.warnings(), *own.faults]
+            values, own_faults = _own_values(own, session, status, telemetry)
+            warnings = [*session.warnings(), *figures.warnings(), *own_faults]
             run_summary = summary(session, status, {**figures.values(), **values}, warnings)
             if options.json:
                 print_json(run_summary)
@@ -217,7 +133,27 @@ def run(options: argparse.Namespace) -> bool:
         finally:
             file_errors = files.close()
             _report_files(files, file_errors, options.json)
-    return status == Status.COMPLETED and not file_errors and not own.faults
+    return status == Status.COMPLETED and not file_errors and not own_faults
+
+
+def _fault_lines(session: Session, log: FaultLog) -> list[str]:
+    """Return a line for each fault: start and detection, or that the run ended before its start."""
+    late = [fault for fault in session.initial_scenario.fault if fault.start_s >= session.t_s]
+    return [fault.text() for fault in log.faults] + [
+        f"{fault.target} {fault.mode} from {fault.start_s:.3f} s: not started, the run ended before"
+        for fault in late
+    ]
+
+
+def _own_values(
+    own: Mapping[str, UserMetric], session: Session, status: Status, telemetry: TelemetryBuffer | None
+) -> tuple[dict[str, Any], list[str]]:
+    """Return the values of user functions, and a line for each that failed."""
+    if telemetry is None:
+        return {}, []
+    run = Run(session.initial_scenario, status, telemetry.table, session.loop_s, session.actuator)
+    with contextlib.redirect_stdout(sys.stderr):  # stdout is only for the figures
+        return own_values(own, run)
 
 
 def _is_bare(options: argparse.Namespace, rest: Sequence[str]) -> bool:
@@ -250,7 +186,7 @@ def _print_results(
     status: Status,
     run_summary: dict[str, Any],
     own: Sequence[str],
-    faults: Faults,
+    faults: FaultLog,
 ) -> None:
     """Print the results of the run as tables and lines."""
     runs.print_run(
@@ -259,7 +195,7 @@ def _print_results(
         run_summary,
         own,
         band_rad=BAND_rad,
-        faults=faults.lines(session),
+        faults=_fault_lines(session, faults),
         why=_reason(session, status),
     )
 

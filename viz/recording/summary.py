@@ -66,7 +66,7 @@ class Summary:
             reasons = rows[FAILSAFE_REASON].ravel()
             if reasons[-1]:
                 self._failsafe = signals[FAILSAFE_REASON].states[int(reasons[-1])]
-        self._faults.add(rows)
+        self._faults.write(rows)
 
     def running(self) -> str:
         """Return the text of a run in progress."""

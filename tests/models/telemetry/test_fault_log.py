@@ -32,7 +32,7 @@ def rows():
 def test_each_fault_has_start_end_and_detection(chunk):
     log, table = FaultLog(), rows()
     for first in range(0, 100, chunk):
-        log.add(table.rows(first, min(first + chunk, 100)))
+        log.write(table.rows(first, min(first + chunk, 100)))
     assert [fault.text() for fault in log.faults] == [
         "coil.00 open from 0.01 s to 0.02 s, not detected",
         "coil.01 open from 0.03 s, reported to the controller",
@@ -43,5 +43,5 @@ def test_each_fault_has_start_end_and_detection(chunk):
 
 def test_rows_without_faults_have_none():
     log = FaultLog()
-    log.add(Table(SIGNALS[:1], np.zeros((5, 1))))
+    log.write(Table(SIGNALS[:1], np.zeros((5, 1))))
     assert log.faults == []

@@ -5,8 +5,7 @@ import json
 import pytest
 
 from spheretwin import cli
-from spheretwin.cli.simulate import UserMetrics
-from spheretwin.models.base.errors import InputError
+from spheretwin.cli import simulate
 from spheretwin.models.telemetry.table import read_parquet
 
 FUNCTIONS = """
@@ -168,11 +167,9 @@ def test_what_is_no_metric_is_bad_input_before_the_run(file, specs, told, capsys
     assert not (file.parent / "run.parquet").exists()
 
 
-def test_nothing_is_kept_where_nothing_asks_for_it(file):
-    from spheretwin import scenario as scenarios
-    from spheretwin.session import Session
-
-    session = Session(scenarios.load("hold", {"duration": 0.05}))
-    assert UserMetrics([]).sinks(session, 50) == []
-    with pytest.raises(InputError, match="fit in memory"):
-        UserMetrics([f"{file}:largest"]).sinks(session, 10**15)
+def test_telemetry_is_kept_for_own_metrics_alone(file, monkeypatch, capsys):
+    """Rows of a run of ages do not fit in memory; without a function no memory is taken for rows."""
+    assert cli.main(["simulate", "hold", "--duration", "1e9", "--metric", f"{file}:largest"]) == 2
+    assert "fit in memory" in capsys.readouterr().err
+    monkeypatch.setattr(simulate, "TelemetryBuffer", None)
+    assert cli.main(["simulate", *HOLD]) == 0
