@@ -9,12 +9,12 @@ from numpy.typing import NDArray
 
 from spheretwin.models.actuator import Actuator
 from spheretwin.viz.scene.solids import (
-    Solid,
+    Surface,
     bar,
     cylinder,
-    merged_solid,
+    merged_surface,
     reversed_,
-    revolved_solid,
+    revolved_surface,
     tube,
     zone,
 )
@@ -46,23 +46,23 @@ POLE_PROUD_M = 1e-4
 class ActuatorSolids:
     """Solids in the frames that carry them."""
 
-    stator: Solid
-    outer_ring: Solid
-    inner_ring: Solid
-    rotor: Solid
-    shaft: Solid
-    pole: Solid
+    stator: Surface
+    outer_ring: Surface
+    inner_ring: Surface
+    rotor: Surface
+    shaft: Surface
+    pole: Surface
     """One pole, its z along its axis, the middle of its front at the ball's radius."""
-    coil: Solid
+    coil: Surface
     """One coil, its z along its axis, its centre at the origin."""
 
     def triangles(self, actuator: Actuator) -> int:
         """Return the number of triangles that a browser draws, copies counted."""
         once = (self.stator, self.outer_ring, self.inner_ring, self.rotor, self.shaft)
-        copies = len(actuator.pole_axes) * len(self.pole.faces) + len(actuator.coil_axes) * len(
-            self.coil.faces
+        copies = len(actuator.pole_axes) * len(self.pole.triangles) + len(actuator.coil_axes) * len(
+            self.coil.triangles
         )
-        return sum(len(solid.faces) for solid in once) + copies
+        return sum(len(solid.triangles) for solid in once) + copies
 
 
 def actuator_solids(actuator: Actuator) -> ActuatorSolids:
@@ -88,34 +88,32 @@ def quaternions_along(axes: NDArray[np.float64]) -> NDArray[np.float64]:
     return quaternions / np.linalg.norm(quaternions, axis=1, keepdims=True)
 
 
-def _ball(radius: float) -> Solid:
+def _ball(radius: float) -> Surface:
     """Shell, cut flat above and below, and the arms that join it to the shaft."""
     cut, inside = CUT * radius, (1 - WALL) * radius
     rim, rim_inside = np.sqrt(radius**2 - cut**2), np.sqrt(inside**2 - cut**2)
     outer = zone(radius, -cut, cut, BALL_STEPS, RING_SECTIONS)
     inner = reversed_(zone(inside, -cut, cut, BALL_STEPS // 2, RING_SECTIONS))
-    above = revolved_solid([(rim, cut), (rim_inside, cut)], RING_SECTIONS)
-    below = revolved_solid([(rim_inside, -cut), (rim, -cut)], RING_SECTIONS)
+    above = revolved_surface([(rim, cut), (rim_inside, cut)], RING_SECTIONS)
+    below = revolved_surface([(rim_inside, -cut), (rim, -cut)], RING_SECTIONS)
     width = ARM * radius
     arms = [bar(lengths) for lengths in ((2 * rim_inside, width, width), (width, 2 * rim_inside, width))]
-    lifted = [
-        Solid(arm.vertices + np.array([0, 0, cut - width], dtype=np.float32), arm.faces) for arm in arms
-    ]
-    return merged_solid([outer, inner, above, below, *lifted])
+    lifted = [arm.placed(np.eye(3), np.array([0.0, 0.0, cut - width])) for arm in arms]
+    return merged_surface([outer, inner, above, below, *lifted])
 
 
-def _pole(actuator: Actuator) -> Solid:
+def _pole(actuator: Actuator) -> Surface:
     magnet = actuator.magnet
     rho = np.linspace(magnet.radius_m, 0.0, 4 if magnet.front_radius_m else 2)
     front = [(float(r), magnet.front_m + POLE_PROUD_M - magnet.sagitta_at_m(float(r))) for r in rho]
-    return revolved_solid([(magnet.radius_m, magnet.back_m), *front], POLE_SECTIONS)
+    return revolved_surface([(magnet.radius_m, magnet.back_m), *front], POLE_SECTIONS)
 
 
-def _ring(ball: float, inner: float, outer: float, half: float) -> Solid:
+def _ring(ball: float, inner: float, outer: float, half: float) -> Surface:
     return tube(inner * ball, outer * ball, -half * ball, half * ball, RING_SECTIONS)
 
 
-def _stator(actuator: Actuator) -> Solid:
+def _stator(actuator: Actuator) -> Surface:
     """Return a hoop behind the coils of each latitude, a base, legs, and the neck that carries the joint."""
     ball, coil = actuator.magnet.front_m, actuator.coil
     behind, width = coil.distance_m + coil.length_m / 2, HOOP * actuator.magnet.front_m
@@ -132,5 +130,5 @@ def _stator(actuator: Actuator) -> Solid:
     angles = 2 * np.pi * (np.arange(LEGS) + 0.5) / LEGS
     reach = max(radii) + width / 2
     places = np.stack([reach * np.cos(angles), reach * np.sin(angles), np.zeros(LEGS)], axis=1)
-    legs = [Solid(leg.vertices + place.astype(np.float32), leg.faces) for place in places]
-    return merged_solid([*hoops, base, neck, *legs])
+    legs = [leg.placed(np.eye(3), place) for place in places]
+    return merged_surface([*hoops, base, neck, *legs])

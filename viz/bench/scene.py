@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 from spheretwin.models.actuator import Actuator
 from spheretwin.viz import theme
 from spheretwin.viz.bench.actuator import actuator_solids, quaternions_along
-from spheretwin.viz.scene.solids import Solid
+from spheretwin.viz.scene.solids import Surface
 
 LIGHT = 1.6
 """Light of a surface that appears in its own colour, relative to the light that makes white appear white."""
@@ -109,8 +109,8 @@ class Scene:
         _mesh(api, f"{rotor}/shaft", parts.shaft, STEEL, wxyz=shaft)
         api.add_batched_meshes_simple(
             f"{rotor}/poles",
-            parts.pole.vertices,
-            parts.pole.faces,
+            parts.pole.positions,
+            parts.pole.triangles,
             batched_wxyzs=quaternions_along(actuator.pole_axes),
             batched_positions=np.zeros((len(actuator.pole_axes), 3)),
             batched_colors=instance_colours(np.where(actuator.pole_polarity[:, None] > 0, NORTH, SOUTH)),
@@ -120,8 +120,8 @@ class Scene:
         )
         self.coils = api.add_batched_meshes_simple(
             "/coils",
-            parts.coil.vertices,
-            parts.coil.faces,
+            parts.coil.positions,
+            parts.coil.triangles,
             batched_wxyzs=quaternions_along(actuator.coil_axes),
             batched_positions=actuator.coil.distance_m * actuator.coil_axes,
             batched_colors=self._coil_colours(np.zeros(len(actuator.groups)), 1.0),
@@ -249,15 +249,15 @@ _LAMPS = (("key", 0.75, (0.6, -0.8, 1.0)), ("fill", 0.3, (-1.0, 0.3, 0.4)))
 def _mesh(
     api: viser.SceneApi,
     name: str,
-    solid: Solid,
+    surface: Surface,
     colour: theme.Colour,
     wxyz: NDArray[np.float64] | tuple[float, float, float, float] = (1.0, 0.0, 0.0, 0.0),
     opacity: float | None = None,
 ) -> None:
     api.add_mesh_simple(
         name,
-        solid.vertices,
-        solid.faces,
+        surface.positions,
+        surface.triangles,
         color=mesh_colour(colour),
         wxyz=wxyz,
         opacity=opacity,

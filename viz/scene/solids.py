@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from math import pi
 
 import numpy as np
 from numpy.typing import NDArray
@@ -75,85 +73,44 @@ def _circle(point: Array, angle: Array) -> NDArray[np.float32]:
     return np.stack(around, axis=1).astype(np.float32)
 
 
-@dataclass(frozen=True)
-class Solid:
-    """A mesh whose vertices are shared only where its surface is smooth."""
-
-    vertices: NDArray[np.float32]  # (n, 3) m
-    faces: NDArray[np.uint32]  # (m, 3)
-
-
-def revolved_solid(outline: Sequence[tuple[float, float]], sections: int) -> Solid:
-    """Surface of revolution about z.
-
-    Parameters
-    ----------
-    outline : sequence of (float, float), m
-        Points (distance from z, height), upward on the outside.
-    sections : int
-        Around z.
-    """
-    angles = np.linspace(0.0, 2 * pi, sections + 1)
-    circle = np.stack([np.cos(angles), np.sin(angles)], axis=1)
-    return merged_solid([_strip(circle, *ends) for ends in pairwise(outline)])
-
-
-def tube(inner: float, outer: float, low: float, high: float, sections: int) -> Solid:
+def tube(inner: float, outer: float, low: float, high: float, sections: int) -> Surface:
     """Hollow cylinder about z between two heights."""
-    return revolved_solid([(inner, low), (outer, low), (outer, high), (inner, high), (inner, low)], sections)
-
-
-def cylinder(radius: float, low: float, high: float, sections: int) -> Solid:
-    """Cylinder about z between two heights."""
-    return revolved_solid([(0.0, low), (radius, low), (radius, high), (0.0, high)], sections)
-
-
-def zone(radius: float, low: float, high: float, steps: int, sections: int) -> Solid:
-    """Part of a sphere between two heights, smooth in both directions."""
-    latitudes = np.linspace(np.arcsin(low / radius), np.arcsin(high / radius), steps + 1)
-    angles = np.linspace(0.0, 2 * pi, sections + 1)
-    latitude, angle = np.meshgrid(latitudes, angles, indexing="ij")
-    across = radius * np.cos(latitude)
-    points = np.stack([across * np.cos(angle), across * np.sin(angle), radius * np.sin(latitude)], axis=-1)
-    return Solid(points.reshape(-1, 3).astype(np.float32), _grid(steps + 1, sections + 1))
-
-
-def merged_solid(solids: Sequence[Solid]) -> Solid:
-    """Merge several solids."""
-    first = np.cumsum([0, *(len(solid.vertices) for solid in solids[:-1])]).astype(np.uint32)
-    return Solid(
-        np.concatenate([solid.vertices for solid in solids]),
-        np.concatenate([solid.faces + start for solid, start in zip(solids, first, strict=True)]),
+    return revolved_surface(
+        [(inner, low), (outer, low), (outer, high), (inner, high), (inner, low)], sections
     )
 
 
-def reversed_(solid: Solid) -> Solid:
-    """Return the solid with its surface turned inside out."""
-    return Solid(solid.vertices, solid.faces[:, ::-1].copy())
+def cylinder(radius: float, low: float, high: float, sections: int) -> Surface:
+    """Cylinder about z between two heights."""
+    return revolved_surface([(0.0, low), (radius, low), (radius, high), (0.0, high)], sections)
 
 
-def bar(lengths: tuple[float, float, float]) -> Solid:
+def zone(radius: float, low: float, high: float, steps: int, sections: int) -> Surface:
+    """Part of a sphere between two heights, smooth in both directions."""
+    latitudes = np.linspace(np.arcsin(low / radius), np.arcsin(high / radius), steps + 1)
+    angles = np.linspace(0.0, 2 * np.pi, sections + 1)
+    latitude, angle = (grid.ravel() for grid in np.meshgrid(latitudes, angles, indexing="ij"))
+    across = np.cos(latitude)
+    normals = np.stack([across * np.cos(angle), across * np.sin(angle), np.sin(latitude)], axis=1)
+    corner = np.arange(len(normals)).reshape(steps + 1, sections + 1)
+    a, b, c, d = (
+        part.ravel() for part in (corner[:-1, :-1], corner[:-1, 1:], corner[1:, 1:], corner[1:, :-1])
+    )
+    triangles = np.concatenate([np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)])
+    return Surface((radius * normals).astype(np.float32), normals.astype(np.float32), triangles)
+
+
+def bar(lengths: tuple[float, float, float]) -> Surface:
     """Box about the origin."""
-    square = np.array([[-1, -1, 1], [1, -1, 1], [1, 1, 1], [-1, 1, 1]])
-    two = np.array([[0, 1, 2], [0, 2, 3]])
-    # Each pair of sides is the first with its axes in cyclic order; the far side is its image from behind.
-    near = [np.roll(square, shift, axis=1) * np.array(lengths) / 2 for shift in range(3)]
-    sides = [Solid(corners.astype(np.float32), two.astype(np.uint32)) for corners in near]
-    far = [Solid(-side.vertices, side.faces[:, ::-1].copy()) for side in sides]
-    return merged_solid([*sides, *far])
+    square = np.array([[-1, -1, 1], [1, -1, 1], [1, 1, 1], [-1, 1, 1]], dtype=np.float32)
+    top = Surface(square, np.tile(np.float32([0, 0, 1]), (4, 1)), np.array([[0, 1, 2], [0, 2, 3]]))
+    # Each pair of sides is the first with its axes in cyclic order; the far side is its mirror image.
+    near = [top.placed(np.roll(np.eye(3), shift, axis=0), np.zeros(3)) for shift in range(3)]
+    far = [Surface(-side.positions, -side.normals, side.triangles[:, ::-1]) for side in near]
+    box = merged_surface([*near, *far])
+    return Surface(box.positions * np.float32(np.array(lengths) / 2), box.normals, box.triangles)
 
 
-def _strip(circle: NDArray[np.float64], start: tuple[float, float], end: tuple[float, float]) -> Solid:
-    """Return the surface that one segment of an outline sweeps, with its own vertices."""
-    rings = [
-        np.column_stack([radius * circle, np.full(len(circle), height)]) for radius, height in (start, end)
-    ]
-    return Solid(np.concatenate(rings).astype(np.float32), _grid(2, len(circle)))
-
-
-def _grid(rows: int, columns: int) -> NDArray[np.uint32]:
-    """Two triangles for each cell of a grid of vertices, rows upward and columns counter-clockwise."""
-    corner = np.arange(rows * columns).reshape(rows, columns)
-    a, b = corner[:-1, :-1].ravel(), corner[:-1, 1:].ravel()
-    c, d = corner[1:, 1:].ravel(), corner[1:, :-1].ravel()
-    return np.concatenate([np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)]).astype(np.uint32)
+def reversed_(surface: Surface) -> Surface:
+    """Return the surface turned inside out."""
+    return Surface(surface.positions, -surface.normals, surface.triangles[:, ::-1])

@@ -20,14 +20,14 @@ MOST_TRIANGLES = 10_000
 
 def volume(solid):
     """Enclosed volume, by the divergence theorem; positive where the faces look outward."""
-    a, b, c = np.moveaxis(solid.vertices[solid.faces].astype(float), 1, 0)
+    a, b, c = np.moveaxis(solid.positions[solid.triangles].astype(float), 1, 0)
     return float(np.einsum("ij,ij->", a, np.cross(b, c))) / 6
 
 
 def is_closed(solid):
     """Whether each edge, by the places of its ends, is walked once in each direction."""
-    _, place = np.unique(np.round(solid.vertices, 7), axis=0, return_inverse=True)
-    corners = place.reshape(-1)[solid.faces]
+    _, place = np.unique(np.round(solid.positions, 7), axis=0, return_inverse=True)
+    corners = place.reshape(-1)[solid.triangles]
     edges = np.concatenate([corners[:, [0, 1]], corners[:, [1, 2]], corners[:, [2, 0]]])
     edges = edges[edges[:, 0] != edges[:, 1]]  # at the axis
     found = {}
@@ -74,9 +74,9 @@ def test_solids_have_the_volume_of_their_prisms():
 
 def test_a_zone_lies_on_its_sphere_between_its_heights():
     zone = solids.zone(2.0, -0.5, 1.0, 6, 12)
-    assert np.linalg.norm(zone.vertices, axis=1) == pytest.approx(2.0, rel=SINGLE)
-    assert zone.vertices[:, 2].min() == pytest.approx(-0.5, rel=SINGLE)
-    assert zone.vertices[:, 2].max() == pytest.approx(1.0, rel=SINGLE)
+    assert np.linalg.norm(zone.positions, axis=1) == pytest.approx(2.0, rel=SINGLE)
+    assert zone.positions[:, 2].min() == pytest.approx(-0.5, rel=SINGLE)
+    assert zone.positions[:, 2].max() == pytest.approx(1.0, rel=SINGLE)
 
 
 def test_the_rotor_is_a_ball_cut_flat_above_and_below(actuator):
@@ -97,17 +97,17 @@ def test_every_part_is_closed_and_looks_outward(actuator, name):
 
 def test_coils_and_poles_have_the_actuators_own_size(actuator):
     parts, coil, magnet = actuator_solids(actuator), actuator.coil, actuator.magnet
-    across = np.linalg.norm(parts.coil.vertices[:, :2], axis=1)
+    across = np.linalg.norm(parts.coil.positions[:, :2], axis=1)
     assert (across.min(), across.max()) == pytest.approx(
         (coil.inner_radius_m, coil.outer_radius_m), rel=SINGLE
     )
-    assert np.ptp(parts.coil.vertices[:, 2]) == pytest.approx(coil.length_m, rel=SINGLE)
+    assert np.ptp(parts.coil.positions[:, 2]) == pytest.approx(coil.length_m, rel=SINGLE)
     # A tenth of a millimetre proud, so as not to flicker.
-    assert parts.pole.vertices[:, 2].max() == pytest.approx(magnet.front_m + 1e-4, rel=SINGLE)
-    assert np.linalg.norm(parts.pole.vertices[:, :2], axis=1).max() == pytest.approx(
+    assert parts.pole.positions[:, 2].max() == pytest.approx(magnet.front_m + 1e-4, rel=SINGLE)
+    assert np.linalg.norm(parts.pole.positions[:, :2], axis=1).max() == pytest.approx(
         magnet.radius_m, rel=SINGLE
     )
-    assert parts.shaft.vertices[:, 2].max() == pytest.approx(actuator.shaft_tip_m[2], rel=SINGLE)
+    assert parts.shaft.positions[:, 2].max() == pytest.approx(actuator.shaft_tip_m[2], rel=SINGLE)
 
 
 def test_all_of_it_is_few_triangles(actuator):
