@@ -24,7 +24,7 @@ from spheretwin import scenario as scenarios
 from spheretwin.bench import Bench
 from spheretwin.bench.modes import Limits
 from spheretwin.bench.operators import GONE_s, Operators
-from spheretwin.cli.common import interruptible
+from spheretwin.cli.common import interruptible, print_message
 from spheretwin.cli.options import Parser, number, whole
 from spheretwin.control.laws import LAWS
 from spheretwin.faults.targets import TARGETS
@@ -255,5 +255,5 @@ def _report(bench: Bench) -> bool:
     state = bench.state()
     runs.print_written([Path(file) for file in state.completed_files])
     if state.recording:
-        print(f"spheretwin: not completed: {', '.join(state.recording)}", file=sys.stderr)
+        print_message(f"not completed: {', '.join(state.recording)}")
     return not state.recording

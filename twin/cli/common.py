@@ -25,10 +25,15 @@ def print_json(figures: Mapping[str, Any]) -> None:
     print(json.dumps(_plain(figures), allow_nan=False), flush=True)
 
 
+def print_message(line: str) -> None:
+    """Print a line on stderr: stdout is for the results."""
+    print(f"spheretwin: {line}", file=sys.stderr, flush=True)
+
+
 def warn(lines: Iterable[str]) -> None:
     """Print warnings on stderr, one line each."""
     for line in lines:
-        print(f"spheretwin: warning: {line}", file=sys.stderr)
+        print_message(f"warning: {line}")
 
 
 def warn_about_model(path: Path) -> None:
@@ -40,7 +45,7 @@ def report_broken(source: str, checks: Iterable[Check]) -> bool:
     """Print the names of broken checks on stderr; return True if every check is within its bound."""
     names = broken(checks)
     if names:
-        print(f"spheretwin: {source}: broken: {'; '.join(names)}", file=sys.stderr)
+        print_message(f"{source}: broken: {'; '.join(names)}")
     return not names
 
 

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import argparse
-import sys
 import time
 from collections.abc import Sequence
 
-from spheretwin.cli.common import print_json
+from spheretwin.cli.common import print_json, print_message
 from spheretwin.cli.options import Parser, whole
 from spheretwin.models.base.errors import InputError, did_you_mean, shown
 from spheretwin.models.base.mujoco_library import timers_stopped
@@ -90,7 +89,7 @@ def run(options: argparse.Namespace) -> bool:
         for case in unexpected_ends(result.plan, result.outcomes)
     ]
     if bad:
-        print(f"spheretwin: reproduce: ended early: {'; '.join(bad)}", file=sys.stderr)
+        print_message(f"reproduce: ended early: {'; '.join(bad)}")
     return not bad
 
 

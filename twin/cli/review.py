@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import sys
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -11,7 +10,7 @@ from spheretwin.analysis import comparison, recorded_run, tolerances
 from spheretwin.analysis.recorded_run import Reviewed
 from spheretwin.analysis.review import Review, review
 from spheretwin.analysis.tolerances import Exceeded
-from spheretwin.cli.common import print_json, warn
+from spheretwin.cli.common import print_json, print_message, warn
 from spheretwin.cli.options import Parser
 from spheretwin.metrics import BAND_rad
 from spheretwin.models.base.errors import InputError
@@ -83,7 +82,7 @@ def run(options: argparse.Namespace) -> bool:
     warn(_thinned(run) for run in runs if run.rate_Hz)
     for places, signals in zip(over, reviewed.tolerances, strict=True):
         if places:
-            print(f"spheretwin: review: {_first(places, signals)}", file=sys.stderr)
+            print_message(f"review: {_first(places, signals)}")
     return not any(over)
 
 

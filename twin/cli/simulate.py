@@ -14,7 +14,7 @@ import numpy as np
 
 from spheretwin import outputs, replay
 from spheretwin import scenario as scenarios
-from spheretwin.cli.common import interruptible, print_json, warn
+from spheretwin.cli.common import interruptible, print_json, print_message, warn
 from spheretwin.cli.options import Parser, number
 from spheretwin.loop import is_user_law
 from spheretwin.metrics import BAND_rad, PlannedRun
@@ -125,7 +125,7 @@ def run(options: argparse.Namespace) -> bool:
             else:
                 _print_results(session, plan, status, run_summary, tuple(values), faults)
             if status != Status.COMPLETED:
-                print(f"spheretwin: {_ending(session, plan, status)}", file=sys.stderr, flush=True)
+                print_message(_ending(session, plan, status))
             if options.live and sys.stderr.isatty():
                 print("the run has ended; Ctrl-C closes the viewer", file=sys.stderr, flush=True)
                 while not stop_requested():
@@ -209,7 +209,7 @@ def _report_files(files: Outputs, errors: Sequence[SpheretwinError], as_json: bo
     if not as_json:
         runs.print_files(files.record, files.telemetry)
     for error in errors:
-        print(f"spheretwin: {error}", file=sys.stderr, flush=True)
+        print_message(str(error))
 
 
 @contextlib.contextmanager

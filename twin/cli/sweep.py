@@ -12,7 +12,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
-from spheretwin.cli.common import interruptible, print_json
+from spheretwin.cli.common import interruptible, print_json, print_message
 from spheretwin.cli.options import Parser, whole
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.base.mujoco_library import timers_stopped
@@ -123,26 +123,22 @@ def run(options: argparse.Namespace) -> bool:
         print(f"table  {outcome.table}")
         runs.print_written(written)
     if outcome.torn:
-        print("spheretwin: sweep: the journal ended in a torn line, which was dropped", file=sys.stderr)
+        print_message("sweep: the journal ended in a torn line, which was dropped")
     if outcome.damaged:
-        print(
-            f"spheretwin: sweep: {outcome.damaged} damaged lines of the journal were skipped,"
-            " and their rows run again",
-            file=sys.stderr,
+        print_message(
+            f"sweep: {outcome.damaged} damaged lines of the journal were skipped, and their rows run again"
         )
     if outcome.rows < outcome.of:
-        print(
-            f"spheretwin: sweep: interrupted after {outcome.rows} of {outcome.of} rows;"
-            " the same command continues from there",
-            file=sys.stderr,
+        print_message(
+            f"sweep: interrupted after {outcome.rows} of {outcome.of} rows;"
+            " the same command continues from there"
         )
     failures = rows.failures
     if len(failures):
         first = failures[0]
-        print(
-            f"spheretwin: sweep: {len(failures)} of {outcome.rows} rows failed, the first with key"
-            f" {rows.keys[first]}: {rows.statuses[first]}, {rows.complaints[first]}",
-            file=sys.stderr,
+        print_message(
+            f"sweep: {len(failures)} of {outcome.rows} rows failed, the first with key"
+            f" {rows.keys[first]}: {rows.statuses[first]}, {rows.complaints[first]}"
         )
     return outcome.rows >= outcome.of and not len(failures)
 
@@ -171,7 +167,7 @@ def _optimised(study: Study, options: argparse.Namespace) -> bool:
     command = f"spheretwin sweep {shlex.quote(options.study)} --optimise{trials}"
     written = tuning_page.write(folder, study, outcome, command, options.figure_format)
     if find_spec("matplotlib") is None:
-        print("spheretwin: sweep: no figures without the extra `spheretwin[plots]`", file=sys.stderr)
+        print_message("sweep: no figures without the extra `spheretwin[plots]`")
     printed = tuning_page.summary(outcome, objectives)
     if options.json:
         print_json({**printed, "versions": versions()})
@@ -180,10 +176,9 @@ def _optimised(study: Study, options: argparse.Namespace) -> bool:
         print(f"table  {outcome.table}")
         runs.print_written(written)
     if outcome.trials < outcome.of:
-        print(
-            f"spheretwin: sweep: interrupted after {outcome.trials} of {outcome.of} trials;"
-            " the same command continues from there",
-            file=sys.stderr,
+        print_message(
+            f"sweep: interrupted after {outcome.trials} of {outcome.of} trials;"
+            " the same command continues from there"
         )
     return outcome.trials >= outcome.of
 
@@ -218,7 +213,7 @@ def _report(
         of = outcome.of, outcome.study_rows
         folder, source, kind = outcome.table.parent, options.study, options.figure_format
         return report.write(folder, rows, printed, of, source, kind)
-    print("spheretwin: sweep: no report was written: it needs the extra `spheretwin[plots]`", file=sys.stderr)
+    print_message("sweep: no report was written: it needs the extra `spheretwin[plots]`")
     return []
 
 
