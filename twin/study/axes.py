@@ -35,11 +35,6 @@ class Axis(BaseModel):
         None, description="axes of the same name go together, value by value; all others are crossed"
     )
 
-    @property
-    def is_drawn(self) -> bool:
-        """Whether its values are random."""
-        return False
-
 
 class ListedAxis(Axis):
     """Axis with listed values."""
@@ -51,11 +46,6 @@ class ListedAxis(Axis):
 
 class DrawnAxis(Axis):
     """Axis with random values."""
-
-    @property
-    def is_drawn(self) -> bool:
-        """It is."""
-        return True
 
     @abstractmethod
     def quantile(self, uniform: NDArray[np.float64]) -> NDArray[np.float64]:

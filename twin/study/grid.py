@@ -12,7 +12,7 @@ import json
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import chain
 from math import isfinite
-from typing import Any, NamedTuple, cast
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,7 +21,7 @@ from spheretwin.models.base.errors import InputError, shown
 from spheretwin.scenario import reading
 from spheretwin.scenario.changes import check_events
 from spheretwin.scenario.sections import Scenario
-from spheretwin.study.axes import DrawnAxis, ListedAxis
+from spheretwin.study.axes import ListedAxis
 from spheretwin.study.study import Study, repeated
 
 KEY_LENGTH = 16
@@ -158,7 +158,7 @@ def _check_values(study: Study, group: Mapping[str, list[Any]]) -> None:
 
 def _points(study: Study) -> NDArray[np.float64]:
     """Values of the random axes, (samples, axes); one empty point without such axes."""
-    axes = cast(tuple[DrawnAxis, ...], study.drawn_axes)
+    axes = study.drawn_axes
     if not axes:
         return np.empty((1, 0))
     uniform = _uniform(study, len(axes), study.samples or 1)

@@ -29,7 +29,7 @@ from spheretwin.models.base.errors import InputError, did_you_mean, is_plain, sh
 from spheretwin.models.base.user_code import is_reference
 from spheretwin.scenario.fields import explain
 from spheretwin.scenario.reading import read_toml, toml_names
-from spheretwin.study.axes import MOST_VALUES, AnyAxis, Axis
+from spheretwin.study.axes import MOST_VALUES, AnyAxis, DrawnAxis
 from spheretwin.study.optimise import Optimise
 
 FOLDER = resources.files("spheretwin.study") / "shipped"
@@ -105,7 +105,7 @@ class Study(BaseModel):
 
     @model_validator(mode="after")
     def _fits(self) -> Study:
-        random = [axis.field for axis in self.axis if axis.is_drawn]
+        random = [axis.field for axis in self.drawn_axes]
         if random and self.samples is None:
             raise ValueError(f"expected samples, as {', '.join(random)} is drawn, received none")
         if self.samples is not None and not random:
@@ -123,7 +123,7 @@ class Study(BaseModel):
         if twice := repeated(self.law):
             raise ValueError(f"expected each [[law]] once, received {shown(twice[0])} twice")
         zips = [axis.zip for axis in self.axis if axis.zip is not None]
-        if zipped := [axis.field for axis in self.axis if axis.is_drawn and axis.zip is not None]:
+        if zipped := [axis.field for axis in self.drawn_axes if axis.zip is not None]:
             raise ValueError(
                 f"expected no zip of what is drawn, which goes together as it is, received {zipped[0]}"
             )
@@ -152,9 +152,9 @@ class Study(BaseModel):
         return self.path(self.scenario) if self.scenario.endswith(".toml") else self.scenario
 
     @property
-    def drawn_axes(self) -> tuple[Axis, ...]:
+    def drawn_axes(self) -> tuple[DrawnAxis, ...]:
         """Axes with random values."""
-        return tuple(axis for axis in self.axis if axis.is_drawn)
+        return tuple(axis for axis in self.axis if isinstance(axis, DrawnAxis))
 
 
 def repeated(values: Iterable[Any]) -> list[Any]:

@@ -23,7 +23,7 @@ from collections.abc import Generator, Iterator
 from typing import Any
 
 from spheretwin.models.base.errors import InputError, SpheretwinError, shown, without_breaks
-from spheretwin.study.engines import ray_internals, ray_worker, threads
+from spheretwin.study.engines import ray_worker, threads
 from spheretwin.study.engines.engine import Batches, Engine, Order
 from spheretwin.study.grid import Row
 from spheretwin.study.row import Result
@@ -198,7 +198,7 @@ def _connected(ray: Any, order: Order) -> Iterator[None]:
     """Connect to the cluster at the address, or to one on this machine that ends with the sweep."""
     quiet = {"log_to_driver": False, "configure_logging": False}
     logging.getLogger("ray").setLevel(logging.CRITICAL)
-    ray_internals.silence(ray)
+    _silence(ray)
     if order.address is not None:
         _check_reachable(order.address)
     before = signal.getsignal(signal.SIGTERM)
@@ -225,6 +225,16 @@ def _connected(ray: Any, order: Order) -> Iterator[None]:
         yield
     finally:
         ray.shutdown()
+
+
+def _silence(ray: Any) -> None:
+    """Keep the messages of lost nodes off stdout, which contains the result of a sweep alone.
+
+    ``log_to_driver=False`` silences the workers. Another thread of the driver prints the messages of a node
+    that is lost, and Ray has no public switch for it. If Ray drops the internal one, a sweep still runs, but
+    these messages appear between its results.
+    """
+    ray._private.worker._worker_logs_enabled = False
 
 
 def _where(address: str | None) -> str:

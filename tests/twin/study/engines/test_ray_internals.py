@@ -2,7 +2,7 @@
 
 import sys
 
-from spheretwin.study.engines import ray_cluster, ray_internals, ray_worker
+from spheretwin.study.engines import ray_cluster, ray_worker
 
 
 def test_a_silenced_driver_prints_no_message_of_a_node(monkeypatch, capsys):
@@ -13,7 +13,7 @@ def test_a_silenced_driver_prints_no_message_of_a_node(monkeypatch, capsys):
     message = {"pid": "raylet", "ip": "10.0.0.1", "lines": ["a node is lost"]}
     worker.print_worker_logs(message, sys.stdout)
     assert "a node is lost" in capsys.readouterr().out
-    ray_internals.silence(ray)
+    ray_cluster._silence(ray)
     worker.print_worker_logs(message, sys.stdout)
     assert capsys.readouterr().out == ""
 
