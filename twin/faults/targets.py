@@ -46,7 +46,7 @@ ADC = Target(
 )
 
 
-def _open_amplifier(effects: Effects, fault: ActiveFault) -> None:
+def _open_circuit(effects: Effects, fault: ActiveFault) -> None:
     effects.drive.coil.contact[fault.place] = OPEN
 
 
@@ -55,16 +55,12 @@ AMPLIFIER_SIGNAL = FaultSignal(lambda effects: effects.drive.stage("amplifier").
 AMPLIFIER = Target(
     "amplifier",
     {
-        "open": Mode(_open_amplifier),
+        "open": Mode(_open_circuit),
         **signal_modes(AMPLIFIER_SIGNAL),
         **silent_modes(AMPLIFIER_SIGNAL),
     },
     each_group=True,
 )
-
-
-def _open_coil(effects: Effects, fault: ActiveFault) -> None:
-    effects.drive.coil.contact[fault.place] = OPEN
 
 
 def _short_coil(effects: Effects, fault: ActiveFault) -> None:
@@ -82,13 +78,13 @@ def _fewer_turns(effects: Effects, fault: ActiveFault) -> None:
 COIL = Target(
     "coil",
     {
-        "open": Mode(_open_coil),
+        "open": Mode(_open_circuit),
         "short": Mode(_short_coil),
         "gain": Mode(
             _fewer_turns,
             Value("factor on torque and back-EMF per ampere: share of the turns that are left", 0.0, 1.0),
         ),
-        "intermittent": Mode(_open_coil, INTERVAL, intermittent=True),
+        "intermittent": Mode(_open_circuit, INTERVAL, intermittent=True),
     },
     each_group=True,
 )
