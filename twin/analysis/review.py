@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -14,6 +14,7 @@ from spheretwin.analysis.run_summary import figures
 from spheretwin.analysis.tolerances import Exceeded, compare, exceeded
 from spheretwin.models.base.errors import InputError, shortened
 from spheretwin.scenario.fields import SHIPPED
+from spheretwin.scenario.writing import flat
 from spheretwin.viz.terminal.reviews import NominalError, SignalTolerance
 
 LONGEST_VALUE = 60
@@ -174,12 +175,12 @@ def scenario_differences(scenarios: Sequence[Mapping[str, Any]]) -> list[tuple[s
 
     Fields that follow from another one are omitted: those of a law, a trajectory or a hardware that differs.
     """
-    flat = [dict(_fields(scenario)) for scenario in scenarios]
-    all_names = list(dict.fromkeys([*FIRST_FIELDS, *(name for fields in flat for name in fields)]))
-    different = [name for name in all_names if len({fields.get(name, "none") for fields in flat}) > 1]
+    flattened = [_texts(scenario) for scenario in scenarios]
+    all_names = list(dict.fromkeys([*FIRST_FIELDS, *(name for fields in flattened for name in fields)]))
+    different = [name for name in all_names if len({fields.get(name, "none") for fields in flattened}) > 1]
     implied = tuple(part for name, parts in IMPLIED_FIELDS.items() if name in different for part in parts)
     return [
-        (FIRST_FIELDS.get(name, name), [fields.get(name, "none") for fields in flat])
+        (FIRST_FIELDS.get(name, name), [fields.get(name, "none") for fields in flattened])
         for name in different
         if name in FIRST_FIELDS or not name.startswith(implied)
     ]
@@ -187,14 +188,14 @@ def scenario_differences(scenarios: Sequence[Mapping[str, Any]]) -> list[tuple[s
 
 def common_conditions(scenarios: Sequence[Mapping[str, Any]]) -> str:
     """Return scenario, load, modelling error and hardware as text, as far as all scenarios agree."""
-    flat = [dict(_fields(scenario)) for scenario in scenarios]
+    flattened = [_texts(scenario) for scenario in scenarios]
     names = {
         "name": "scenario",
         "disturbance.load": "L",
         "plant.modelling_error": "m",
         "hardware": "hardware",
     }
-    values = {name: {fields.get(name) for fields in flat} for name in names}
+    values = {name: {fields.get(name) for fields in flattened} for name in names}
     return ", ".join(
         f"{names[name]} {shortened(str(*of_runs), LONGEST_LABEL)}"
         for name, of_runs in values.items()
@@ -202,13 +203,9 @@ def common_conditions(scenarios: Sequence[Mapping[str, Any]]) -> str:
     )
 
 
-def _fields(value: Mapping[str, Any], before: str = "") -> Iterator[tuple[str, str]]:
-    """Dotted names and values, each as a text."""
-    for name, inside in value.items():
-        if isinstance(inside, Mapping):
-            yield from _fields(inside, f"{before}{name}.")
-        else:
-            yield before + name, _text(inside)
+def _texts(scenario: Mapping[str, Any]) -> dict[str, str]:
+    """Return the text of every field by dotted name."""
+    return {name: _text(value) for name, value in flat(scenario).items()}
 
 
 def _text(value: Any) -> str:

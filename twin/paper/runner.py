@@ -29,10 +29,10 @@ from spheretwin.provenance import digest
 from spheretwin.run import Run, figures_of
 from spheretwin.scenario.reading import named_files
 from spheretwin.scenario.sections import Scenario
+from spheretwin.scenario.writing import command_words
 from spheretwin.simulation import simulate
 from spheretwin.study.agreement import Ending, compare
 from spheretwin.study.engines.threads import run_each
-from spheretwin.study.row import command_words
 from spheretwin.study.study import FULL, fast_engine
 
 Array = NDArray[np.float64]

@@ -44,14 +44,19 @@ def as_command(scenario: Scenario) -> str:
     name = scenario.name if scenario.name in shipped() else PLAIN
     if read(name)["trajectory"]["shape"] != chosen["trajectory.shape"]:
         name = PLAIN
-    base = _flat(_completed(read(name)))
+    base = flat(_completed(read(name)))
     flags = {dotted: value for dotted, value in chosen.items() if base.get(dotted) != value}
-    defaults = _flat(_completed(fields_with(name, flags)))
+    defaults = flat(_completed(fields_with(name, flags)))
     flags |= {
-        dotted: value for dotted, value in _flat(fields).items() if defaults.get(dotted, defaults) != value
+        dotted: value for dotted, value in flat(fields).items() if defaults.get(dotted, defaults) != value
     }
-    tokens = [token for dotted, value in flags.items() for token in _flag(dotted, value)]
-    return shlex.join(["spheretwin", "simulate", name, *tokens])
+    return shlex.join(command_words(name, flags))
+
+
+def command_words(scenario: str, fields: Mapping[str, Any]) -> list[str]:
+    """Return the words of the command line that runs a scenario with some fields."""
+    tokens = [token for dotted, value in fields.items() for token in _flag(dotted, value)]
+    return ["spheretwin", "simulate", scenario, *tokens]
 
 
 def changed_fields(scenario: Scenario) -> dict[str, Any]:
@@ -64,7 +69,7 @@ def changed_fields(scenario: Scenario) -> dict[str, Any]:
     chosen = _chosen(scenario, fields)
     defaults = _defaults(_without_objects(scenario, chosen))
     changed = {
-        dotted: value for dotted, value in _flat(fields).items() if defaults.get(dotted) not in (None, value)
+        dotted: value for dotted, value in flat(fields).items() if defaults.get(dotted) not in (None, value)
     }
     return {dotted: value for dotted, value in {**chosen, **changed}.items() if dotted not in _HEADINGS}
 
@@ -101,7 +106,7 @@ def _differences(fields: Mapping[str, Any], chosen: Mapping[str, Any]) -> dict[s
     """Return the fields by dotted name that differ from those of a scenario with only the chosen fields."""
     defaults = _defaults(chosen)
     return {
-        dotted: value for dotted, value in _flat(fields).items() if defaults.get(dotted, defaults) != value
+        dotted: value for dotted, value in flat(fields).items() if defaults.get(dotted, defaults) != value
     }
 
 
@@ -110,7 +115,7 @@ def _defaults(chosen: Mapping[str, Any]) -> dict[str, Any]:
     base: dict[str, Any] = {}
     for dotted, value in chosen.items():
         override(base, dotted, value)
-    return _flat(_completed(base))
+    return flat(_completed(base))
 
 
 def _completed(fields: dict[str, Any]) -> dict[str, Any]:
@@ -120,17 +125,17 @@ def _completed(fields: dict[str, Any]) -> dict[str, Any]:
     return validated(fields, "to be written").model_dump(mode="json")
 
 
-def _flat(fields: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
+def flat(fields: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
     """Return the values by dotted name; a list is one value."""
     values: dict[str, Any] = {}
     for name, value in fields.items():
-        values |= _flat(value, f"{prefix}{name}.") if isinstance(value, dict) else {prefix + name: value}
+        values |= flat(value, f"{prefix}{name}.") if isinstance(value, Mapping) else {prefix + name: value}
     return values
 
 
 def _flag(dotted: str, value: Any) -> list[str]:
-    is_list = isinstance(value, list) and len(value) > 1 and not _has_tables(value)
-    entries = value if is_list and not any(isinstance(entry, list) for entry in value) else [value]
+    is_list = isinstance(value, list | tuple) and len(value) > 1 and not _has_tables(value)
+    entries = value if is_list and not any(isinstance(entry, list | tuple) for entry in value) else [value]
     tokens = [entry if isinstance(entry, str) else json.dumps(entry, ensure_ascii=False) for entry in entries]
     return ["--" + dotted.replace("_", "-"), *tokens]
 

@@ -28,9 +28,10 @@ from spheretwin.scenario.changes import check_events, fields_with, is_tag
 from spheretwin.scenario.fields import INDEX, every_field, new_name, without_indices
 from spheretwin.scenario.files import Files, files_of, named_files
 from spheretwin.scenario.sections import Scenario, scenario_with
+from spheretwin.scenario.writing import command_words
 from spheretwin.session import Session
 from spheretwin.simulation import Sink, follow
-from spheretwin.study.axes import Axis
+from spheretwin.study.axes import Axis, DrawnAxis
 from spheretwin.study.grid import Row, Template, are_numbers, template_of
 from spheretwin.study.study import Study, fast_engine
 
@@ -276,7 +277,9 @@ def _period(fields: Mapping[str, Any]) -> dict[str, Any]:
 
 def _is_of_numbers(axis: Axis) -> bool:
     """True if no value of an axis can name a file."""
-    return axis.is_drawn or all(isinstance(value, int | float) for value in getattr(axis, "values", ()))
+    return isinstance(axis, DrawnAxis) or all(
+        isinstance(value, int | float) for value in getattr(axis, "values", ())
+    )
 
 
 def _list_of(dotted: str) -> str:
@@ -291,18 +294,3 @@ def _value_at(whole: Mapping[str, Any], dotted: str, value: Any) -> Any:
     for part in dotted.split("."):
         inside = inside.get(part) if isinstance(inside, Mapping) else None
     return inside if isinstance(inside, list) else value
-
-
-def command_words(scenario: str, fields: Mapping[str, Any]) -> list[str]:
-    """Words of the command line that runs a scenario with some fields."""
-    words = ["spheretwin", "simulate", scenario]
-    for dotted, value in fields.items():
-        words += [f"--{dotted.replace('_', '-')}", *_texts(value)]
-    return words
-
-
-def _texts(value: Any) -> list[str]:
-    is_list = isinstance(value, list | tuple) and len(value) > 0
-    if is_list and not any(isinstance(entry, list | dict) for entry in value):
-        return [json.dumps(entry) for entry in value]
-    return [value if isinstance(value, str) else json.dumps(value)]
