@@ -9,7 +9,7 @@ import numpy as np
 import rerun as rr
 from numpy.typing import NDArray
 
-from spheretwin.models.telemetry.signals import ANGLES
+from spheretwin.models.telemetry.signals import ANGLES, Signal
 from spheretwin.models.telemetry.status import Status
 from spheretwin.models.telemetry.table import Table
 from spheretwin.viz import theme
@@ -17,7 +17,6 @@ from spheretwin.viz.decimation import CompletedBins, FirstRows, TimeBins
 from spheretwin.viz.layout.extents import ColumnSelector, ExtentTracker, plotted_signals
 from spheretwin.viz.layout.layout import layout, marked_lines, opening_layout
 from spheretwin.viz.layout.styles import (
-    LineStyle,
     as_struct,
     mark_style,
     quantity_style,
@@ -84,24 +83,52 @@ OPENED_AFTER_s = 2.0
 _AS_PLANNED = (Status.COMPLETED, Status.RUNNING)
 
 
+class PlottedColumns:
+    """Columns that the plots of a run show: derived quantities, then signals.
+
+    Parameters
+    ----------
+    signals : tuple of Signal
+        Signals of the run.
+
+    Attributes
+    ----------
+    quantities : list of Quantity
+        Derived quantities.
+    signals : dict
+        Plotted signals, with the entries of each.
+    styles : dict
+        Style of the lines of each column.
+    sizes : dict
+        Entries of each column.
+    places : dict
+        Entries of each column among those of all.
+    """
+
+    def __init__(self, signals: tuple[Signal, ...]) -> None:
+        self.quantities = quantities_of({signal.name for signal in signals})
+        self.signals = plotted_signals(signals)
+        self.styles = {quantity.name: quantity_style(quantity) for quantity in self.quantities}
+        self.styles |= {
+            signal.name: signal_style(signal) for signal in signals if signal.name in self.signals
+        }
+        self.sizes = {**{quantity.name: quantity.size for quantity in self.quantities}, **self.signals}
+        ends = np.cumsum(list(self.sizes.values())).tolist()
+        self.places = {
+            name: slice(end - self.sizes[name], end) for name, end in zip(self.sizes, ends, strict=True)
+        }
+
+
 class PlotData(RecordingPart):
     """Derived quantities of every row, or envelopes of all plotted lines; markers, ranges and titles."""
 
     def __init__(self, subject: RecordingSubject) -> None:
         super().__init__(subject)
-        self._quantities = quantities_of({signal.name for signal in subject.signals})
-        signals = plotted_signals(subject.signals)
-        self._column_selector = ColumnSelector(signals)
-        sizes = {**{quantity.name: quantity.size for quantity in self._quantities}, **signals}
-        self._styles = {quantity.name: quantity_style(quantity) for quantity in self._quantities}
-        self._styles |= {
-            signal.name: signal_style(signal) for signal in subject.signals if signal.name in signals
-        }
-        ends = np.cumsum(list(sizes.values())).tolist()
-        self._places = {name: slice(end - sizes[name], end) for name, end in zip(sizes, ends, strict=True)}
-        self._extent_tracker = ExtentTracker(sizes)
+        self._columns = PlottedColumns(subject.signals)
+        self._column_selector = ColumnSelector(self._columns.signals)
+        self._extent_tracker = ExtentTracker(self._columns.sizes)
         self._bins = TimeBins(ENVELOPE_RATE_Hz, immediate=subject.live)
-        self._marks = Marks(subject.view, self._styles, self._places)
+        self._marks = Marks(subject.view, self._columns)
         self._summary = Summary(subject.facts)
         self._before: Table | None = None
         self._begun_s: float | None = None  # clock at the first rows: all is compiled then
@@ -111,11 +138,11 @@ class PlotData(RecordingPart):
         """Log the styles of lines and markers and, in a live view, the facts of the run."""
         self._marks.begin(recording)
         if self.subject.view.decimated:
-            envelopes = {name: style.of_envelope() for name, style in self._styles.items()}
+            envelopes = {name: style.of_envelope() for name, style in self._columns.styles.items()}
             _log_styles(recording, ENVELOPE, envelopes)
         else:
-            names = [quantity.name for quantity in self._quantities]
-            _log_styles(recording, DERIVED, {name: self._styles[name].lines() for name in names})
+            names = [quantity.name for quantity in self._columns.quantities]
+            _log_styles(recording, DERIVED, {name: self._columns.styles[name].lines() for name in names})
         if self.subject.live:
             log_summary(recording, self._summary.running())
 
@@ -127,7 +154,7 @@ class PlotData(RecordingPart):
             rows, self._before or rows.rows(0, 1), self.subject.actuator, facts.current_limit_A
         )
         with np.errstate(all="ignore"):  # of a run that diverged, the last rows may hold no numbers
-            values = {quantity.name: quantity.values(given) for quantity in self._quantities}
+            values = {quantity.name: quantity.values(given) for quantity in self._columns.quantities}
         self._before = Table(rows.signals, rows.values[-1:].copy())
         self._summary.add(rows, values[ERROR_ANGLE.name][:, 0])
         if not self.subject.view.decimated:
@@ -170,7 +197,7 @@ class PlotData(RecordingPart):
         blocks = binned.low, binned.mean, binned.high
         values = {
             name: np.concatenate([block[:, place] for block in blocks], axis=1)
-            for name, place in self._places.items()
+            for name, place in self._columns.places.items()
         }
         _send(recording, ENVELOPE, binned.t_s, values)
 
@@ -182,14 +209,12 @@ class Marks:
     ----------
     view : View
         Properties of the run.
-    styles : mapping of str to LineStyle
-        Styles of the lines by the name of the signal or quantity.
-    places : mapping of str to slice
-        Columns of the lines, by the same names.
+    columns : PlottedColumns
+        Columns of the lines, with their styles.
     """
 
-    def __init__(self, view: View, styles: Mapping[str, LineStyle], places: Mapping[str, slice]) -> None:
-        self._lines, self._styles, self._places = marked_lines(view), styles, places
+    def __init__(self, view: View, columns: PlottedColumns) -> None:
+        self._lines, self._styles, self._places = marked_lines(view), columns.styles, columns.places
         self._rate_Hz = 3 * MARKS_OF_A_LINE / view.shown_s
         self._firsts = FirstRows(self._rate_Hz)
         self._live = view.live

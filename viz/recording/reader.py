@@ -25,14 +25,13 @@ from spheretwin.models.telemetry.signals import COMMON_NAMES, Signal
 from spheretwin.models.telemetry.status import Event, Level
 from spheretwin.models.telemetry.table import Table
 from spheretwin.viz.decimation import TimeBins
-from spheretwin.viz.layout.extents import ExtentTracker, plotted_signals
+from spheretwin.viz.layout.extents import ExtentTracker
 from spheretwin.viz.layout.layout import layout
-from spheretwin.viz.layout.styles import quantity_style, signal_style
 from spheretwin.viz.layout.view import DERIVED, ENVELOPE, TIMELINE, VALUES, View, application, component
-from spheretwin.viz.quantities import angle_between, quantities_of
+from spheretwin.viz.quantities import angle_between
 from spheretwin.viz.recording.contents import Contents
 from spheretwin.viz.recording.part import total
-from spheretwin.viz.recording.plots import ENVELOPE_RATE_Hz, Marks, log_end, log_summary
+from spheretwin.viz.recording.plots import ENVELOPE_RATE_Hz, Marks, PlottedColumns, log_end, log_summary
 from spheretwin.viz.recording.signals import RATE
 from spheretwin.viz.recording.summary import Summary
 from spheretwin.viz.rerun_internals import check_readable, whole_messages
@@ -194,14 +193,9 @@ class RecoveredPlots:
         signals_at_start : tuple of Signal
             Signals of its first rows: a change of law brings others, which no plot shows.
         """
-        names = {signal.name for signal in signals_at_start}
-        quantities, signals = quantities_of(names), plotted_signals(signals_at_start)
-        styles = {quantity.name: quantity_style(quantity) for quantity in quantities}
-        styles |= {signal.name: signal_style(signal) for signal in signals_at_start if signal.name in signals}
-        sizes = {**{quantity.name: quantity.size for quantity in quantities}, **signals}
-        ends = np.cumsum(list(sizes.values())).tolist()
-        places = {name: slice(end - sizes[name], end) for name, end in zip(sizes, ends, strict=True)}
-        tracker, marks = ExtentTracker(sizes), Marks(view, styles, places)
+        columns = PlottedColumns(signals_at_start)
+        sizes = columns.sizes
+        tracker, marks = ExtentTracker(sizes), Marks(view, columns)
         if self._t_ns:
             if view.decimated:
                 t_s = np.concatenate(self._t_ns).astype(np.float64) * 1e-9
@@ -210,12 +204,12 @@ class RecoveredPlots:
                 tracker.add(t_s, low, high)
                 marks.add(recording, t_s, mean)
             else:
-                t_s, columns = self._rows(sizes, table)
+                t_s, rows = self._rows(sizes, table)
                 bins = TimeBins(ENVELOPE_RATE_Hz)
-                for binned in (bins.add(t_s, columns), bins.flush()):
+                for binned in (bins.add(t_s, rows), bins.flush()):
                     if binned:
                         tracker.add(binned.t_s, binned.low, binned.high)
-                marks.add(recording, t_s, columns)
+                marks.add(recording, t_s, rows)
             marks.send(recording)
         error_deg = np.degrees(angle_between(table["q_rad"], table["q_ref_rad"]))
         summary = Summary(_run_facts(facts))

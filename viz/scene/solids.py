@@ -103,7 +103,9 @@ def zone(radius: float, low: float, high: float, steps: int, sections: int) -> S
 def bar(lengths: tuple[float, float, float]) -> Surface:
     """Box about the origin."""
     square = np.array([[-1, -1, 1], [1, -1, 1], [1, 1, 1], [-1, 1, 1]], dtype=np.float32)
-    top = Surface(square, np.tile(np.float32([0, 0, 1]), (4, 1)), np.array([[0, 1, 2], [0, 2, 3]]))
+    top = Surface(
+        square, np.tile(np.array([0, 0, 1], dtype=np.float32), (4, 1)), np.array([[0, 1, 2], [0, 2, 3]])
+    )
     # Each pair of sides is the first with its axes in cyclic order; the far side is its mirror image.
     near = [top.placed(np.roll(np.eye(3), shift, axis=0), np.zeros(3)) for shift in range(3)]
     far = [Surface(-side.positions, -side.normals, side.triangles[:, ::-1]) for side in near]
