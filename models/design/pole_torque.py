@@ -68,19 +68,9 @@ class MeshConvergence(NamedTuple):
     """Largest change of the samples computed again."""
 
 
-def sample_angles(step_deg: float = STEP_DEG) -> Array:
-    """Return the angles of the samples: equal steps from 0 to pi.
-
-    Parameters
-    ----------
-    step_deg : float, degrees
-        Desired step; the number of steps is rounded.
-
-    Returns
-    -------
-    (n,) array, rad
-    """
-    return np.radians(np.linspace(0.0, 180.0, round(180.0 / step_deg) + 1))
+def sample_angles() -> Array:
+    """Return the angles of the samples, rad: equal steps from 0 to pi."""
+    return np.radians(np.linspace(0.0, 180.0, round(180.0 / STEP_DEG) + 1))
 
 
 def compute_curve(

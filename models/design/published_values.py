@@ -14,7 +14,7 @@ cuboid magnet, with a stated error of 1 %.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from dataclasses import replace
 from math import hypot, log2, pi
 from typing import NamedTuple
@@ -77,15 +77,13 @@ DIPOLE_ORDER = 2.0
 DIPOLE_ORDER_TOLERANCE = 0.05
 
 
-def checks(actuator: Actuator, track: Callable[[range], Iterable[int]] = iter) -> list[Check]:
+def checks(actuator: Actuator) -> list[Check]:
     """Return the comparisons with published numbers, and those with limits of the actuator's own parts.
 
     Parameters
     ----------
     actuator : Actuator
         Its magnet and its coil are scaled down for the dipole limit.
-    track : callable
-        Iterates over the numbers of the comparisons, and may show progress.
 
     Raises
     ------
@@ -93,10 +91,10 @@ def checks(actuator: Actuator, track: Callable[[range], Iterable[int]] = iter) -
         magpylib is not installed.
     """
     tasks: tuple[Callable[[Actuator], list[Check]], ...] = (_robertson, _loop, _axis, _dipole)
-    return [check for number in track(range(len(tasks))) for check in tasks[number](actuator)]
+    return [check for task in tasks for check in task(actuator)]
 
 
-def axial_force_N(magnet: Magnet, coil: CoilGeometry, rule: Rule = FORCE_RULE) -> float:
+def axial_force_N(magnet: Magnet, coil: CoilGeometry) -> float:
     """Return the axial force of a magnet on a coaxial coil with one ampere, by the Lorentz force, N.
 
     Parameters
@@ -105,11 +103,9 @@ def axial_force_N(magnet: Magnet, coil: CoilGeometry, rule: Rule = FORCE_RULE) -
         Its distance is that of its middle from the origin.
     coil : CoilGeometry
         On the same axis.
-    rule : Rule
-        Points in the winding.
     """
-    position, element = direct_summation.conductors(coil, rule)
-    field = direct_summation.pole_magnet(magnet, np.array([0.0, 0.0, 1.0]), 1.0, rule.stacked)
+    position, element = direct_summation.conductors(coil, FORCE_RULE)
+    field = direct_summation.pole_magnet(magnet, np.array([0.0, 0.0, 1.0]), 1.0, FORCE_RULE.stacked)
     return float(np.sum(direct_summation.lorentz_force(field, position, element), axis=0)[2])
 
 

@@ -161,12 +161,9 @@ def _texts(metadata: Mapping[bytes, bytes] | None) -> dict[str, str]:
 def _signal(field: pa.Field) -> Signal:
     described = _texts(field.metadata)
     size = getattr(field.type, "list_size", 1)
-    labels, states = (tuple(filter(None, text.split(","))) for text in _named(described))
+    texts = described["labels"], described.get("states", "")
+    labels, states = (tuple(filter(None, text.split(","))) for text in texts)
     return Signal(field.name, described["unit"], size, described["meaning"], labels, states)
-
-
-def _named(described: Mapping[str, str]) -> tuple[str, str]:
-    return described["labels"], described.get("states", "")
 
 
 def _flat(column: pa.ChunkedArray, size: int) -> NDArray[np.float64]:
