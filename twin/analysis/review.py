@@ -13,8 +13,7 @@ from spheretwin.analysis.recorded_run import Reviewed, of_the_actuator, read
 from spheretwin.analysis.run_summary import figures
 from spheretwin.analysis.tolerances import Exceeded, compare, exceeded
 from spheretwin.models.base.errors import InputError, shortened
-from spheretwin.scenario.fields import SHIPPED
-from spheretwin.scenario.writing import flat
+from spheretwin.scenario.fields import SHIPPED, flat
 from spheretwin.viz.terminal.reviews import NominalError, SignalTolerance
 
 LONGEST_VALUE = 60

@@ -11,6 +11,7 @@ from spheretwin.models.base.errors import InputError, exception_text
 from spheretwin.models.telemetry.table import Table
 from spheretwin.provenance import record_of
 from spheretwin.scenario.changes import FAULT, is_fixed, with_change
+from spheretwin.scenario.fields import flat
 from spheretwin.scenario.hardware import hardware_fields
 from spheretwin.scenario.reading import override, validated
 from spheretwin.scenario.sections import Scenario
@@ -44,20 +45,14 @@ def with_field(settings: Scenario, name: str, value: Any) -> Scenario:
 def _with_hardware(settings: Scenario, hardware: str) -> Scenario:
     fields = settings.model_dump(mode="json")
     fields["hardware"] = hardware
-    untouched = Scenario(trajectory=settings.trajectory).model_dump(mode="json")
+    untouched = flat(Scenario(trajectory=settings.trajectory).model_dump(mode="json"))
     knows_truth = settings.nominal.equals_truth
-    plain = {dotted: _value(untouched, dotted) for dotted in hardware_fields(settings.hardware, knows_truth)}
+    plain = {dotted: untouched[dotted] for dotted in hardware_fields(settings.hardware, knows_truth)}
     for dotted, value in (plain | hardware_fields(hardware, knows_truth)).items():
         if dotted == "estimator.kind":  # another member of a family has other fields
             fields["estimator"] = {}
         override(fields, dotted, value)
     return validated(fields, settings.name)
-
-
-def _value(fields: Any, dotted: str) -> Any:
-    for part in dotted.split("."):
-        fields = fields[part]
-    return fields
 
 
 CURRENTS = "manual.currents_A"

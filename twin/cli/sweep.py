@@ -7,7 +7,7 @@ import contextlib
 import math
 import shlex
 import sys
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
@@ -95,12 +95,7 @@ def run(options: argparse.Namespace) -> bool:
         if options.out or options.threads or options.limit:
             raise InputError("command line: expected --row without --out, --threads or --limit")
         return _one(study, options.row, options.json)
-    with (
-        interruptible(GO_ON) as stop_requested,
-        counted(study.name) as done,
-        timers_stopped(),
-        contextlib.redirect_stdout(sys.stderr),  # the output of user code is not part of the figures
-    ):
+    with _tracked(study.name, "rows") as tracking:
         outcome = run_study(
             study,
             options.out,
@@ -108,8 +103,7 @@ def run(options: argparse.Namespace) -> bool:
             address=options.address,
             threads=options.threads,
             limit=options.limit,
-            done=done,
-            stop_requested=stop_requested,
+            **tracking,
         )
     rows = statistics.read(outcome.table)
     printed = statistics.summary(rows)
@@ -128,11 +122,7 @@ def run(options: argparse.Namespace) -> bool:
         print_message(
             f"sweep: {outcome.damaged} damaged lines of the journal were skipped, and their rows run again"
         )
-    if outcome.rows < outcome.of:
-        print_message(
-            f"sweep: interrupted after {outcome.rows} of {outcome.of} rows;"
-            " the same command continues from there"
-        )
+    is_complete = _is_complete(outcome.rows, outcome.of, "rows")
     failures = rows.failures
     if len(failures):
         first = failures[0]
@@ -140,7 +130,28 @@ def run(options: argparse.Namespace) -> bool:
             f"sweep: {len(failures)} of {outcome.rows} rows failed, the first with key"
             f" {rows.keys[first]}: {rows.statuses[first]}, {rows.complaints[first]}"
         )
-    return outcome.rows >= outcome.of and not len(failures)
+    return is_complete and not len(failures)
+
+
+@contextlib.contextmanager
+def _tracked(name: str, what: str) -> Iterator[dict[str, Callable[..., Any]]]:
+    """Show progress until the end or an interruption; yield what reports both to a study."""
+    with (
+        interruptible(GO_ON) as stop_requested,
+        counted(name, what) as done,
+        timers_stopped(),
+        contextlib.redirect_stdout(sys.stderr),  # the output of user code is not part of the figures
+    ):
+        yield {"done": done, "stop_requested": stop_requested}
+
+
+def _is_complete(done: int, of: int, what: str) -> bool:
+    """Return True if all were finished; otherwise print how to continue."""
+    if done < of:
+        print_message(
+            f"sweep: interrupted after {done} of {of} {what}; the same command continues from there"
+        )
+    return done >= of
 
 
 def _optimised(study: Study, options: argparse.Namespace) -> bool:
@@ -149,19 +160,13 @@ def _optimised(study: Study, options: argparse.Namespace) -> bool:
         raise InputError("command line: expected --optimise without --row and --limit")
     objectives = section_of(study).objective
     folder = options.out or Path(f"{study.name}_study")
-    with (
-        interruptible(GO_ON) as stop_requested,
-        counted(study.name, "trials") as done,
-        timers_stopped(),
-        contextlib.redirect_stdout(sys.stderr),  # the output of user code is not part of the figures
-    ):
+    with _tracked(study.name, "trials") as tracking:
         outcome = tune(
             study,
             folder,
             trials=options.trials,
             threads=options.threads,
-            done=done,
-            stop_requested=stop_requested,
+            **tracking,
         )
     trials = f" --trials {options.trials}" if options.trials else ""
     command = f"spheretwin sweep {shlex.quote(options.study)} --optimise{trials}"
@@ -175,12 +180,7 @@ def _optimised(study: Study, options: argparse.Namespace) -> bool:
         _print_laws(study.name, printed["laws"])
         print(f"table  {outcome.table}")
         runs.print_written(written)
-    if outcome.trials < outcome.of:
-        print_message(
-            f"sweep: interrupted after {outcome.trials} of {outcome.of} trials;"
-            " the same command continues from there"
-        )
-    return outcome.trials >= outcome.of
+    return _is_complete(outcome.trials, outcome.of, "trials")
 
 
 def _print_laws(name: str, laws: Mapping[str, Any]) -> None:
@@ -238,10 +238,7 @@ def _one(study: Study, key: str, as_json: bool) -> bool:
         print_json(printed)
     else:
         command = printed.pop("command")
-        runs.print_rows(f"row {row.number} of {study.name}", ("", "value"), _pairs(printed), 2)
+        pairs = [(name, str(value)) for name, value in printed.items()]
+        runs.print_rows(f"row {row.number} of {study.name}", ("", "value"), pairs, 2)
         print(f"command  {command}")
     return result.status == Status.COMPLETED and result.error is None
-
-
-def _pairs(printed: dict[str, Any]) -> list[tuple[str, ...]]:
-    return [(name, str(value)) for name, value in printed.items()]

@@ -98,6 +98,14 @@ def families(section: type[BaseModel]) -> dict[str, tuple[str, ...]]:
     }
 
 
+def flat(fields: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
+    """Return the values by dotted name; a list is one value."""
+    values: dict[str, Any] = {}
+    for name, value in fields.items():
+        values |= flat(value, f"{prefix}{name}.") if isinstance(value, Mapping) else {prefix + name: value}
+    return values
+
+
 def without_indices(dotted: str) -> str:
     """Return the name of a field with every list index replaced by `INDEX`."""
     return re.sub(r"\.\d+(?=\.|$)", f".{INDEX}", dotted)

@@ -11,6 +11,7 @@ from typing import Any
 from pydantic import BaseModel
 
 from spheretwin.scenario.changes import fields_with
+from spheretwin.scenario.fields import flat
 from spheretwin.scenario.reading import fill_hardware, override, read, shipped, validated
 from spheretwin.scenario.sections import Scenario, UserController, UserPath
 
@@ -123,14 +124,6 @@ def _completed(fields: dict[str, Any]) -> dict[str, Any]:
     fields = copy.deepcopy(fields)
     fill_hardware(fields)
     return validated(fields, "to be written").model_dump(mode="json")
-
-
-def flat(fields: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
-    """Return the values by dotted name; a list is one value."""
-    values: dict[str, Any] = {}
-    for name, value in fields.items():
-        values |= flat(value, f"{prefix}{name}.") if isinstance(value, Mapping) else {prefix + name: value}
-    return values
 
 
 def _flag(dotted: str, value: Any) -> list[str]:

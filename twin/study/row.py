@@ -25,7 +25,7 @@ from spheretwin.provenance import record_of
 from spheretwin.run import Figures, Run, load_metrics, own_values
 from spheretwin.scenario import reading
 from spheretwin.scenario.changes import check_events, fields_with, is_tag
-from spheretwin.scenario.fields import INDEX, every_field, new_name, without_indices
+from spheretwin.scenario.fields import INDEX, every_field, flat, new_name, without_indices
 from spheretwin.scenario.files import Files, files_of, named_files
 from spheretwin.scenario.sections import Scenario, scenario_with
 from spheretwin.scenario.writing import command_words
@@ -77,7 +77,7 @@ class Rows:
         self._names_files = True
         self.base = self._validated(copy.deepcopy(self._fields))
         self._names_files = bool(study.law) or not all(map(_is_of_numbers, study.axis))
-        self._defaults = self.base.model_dump(mode="json")
+        self._defaults = flat(self.base.model_dump(mode="json"))
         chosen = [name for name in study.metrics if name in METRICS]
         self._check_axes()
         self.metrics = tuple(METRICS) if not study.metrics else tuple(chosen)
@@ -144,15 +144,14 @@ class Rows:
         try:
             scenario = self.scenario(row)
         except InputError:
-            whole: dict[str, Any] = {}
+            values: dict[str, Any] = {}
         else:
-            whole = scenario.model_dump(mode="json")
+            values = flat(scenario.model_dump(mode="json"))
             if self.chooses_plant:
                 named[ENGINE] = scenario.plant.engine
-        named = {
-            _list_of(dotted): _value_at(whole, _list_of(dotted), value) for dotted, value in named.items()
-        }
-        words = command_words(self.study.source, named)
+        lists = {dotted: value for dotted, value in values.items() if isinstance(value, list)}
+        complete = {(name := _list_of(dotted)): lists.get(name, value) for dotted, value in named.items()}
+        words = command_words(self.study.source, complete)
         for reference in self._references:
             words += ["--metric", reference]
         return shlex.join(words)
@@ -247,18 +246,10 @@ class Rows:
 
     def _fill_list(self, fields: dict[str, Any], dotted: str) -> None:
         """Fill a list with its defaults if the name is of an entry and the scenario leaves the list open."""
-        above, _, last = dotted.rpartition(".")
-        if not last.isdecimal():
-            return
-        default: Any = self._defaults
-        inside: Any = fields
-        for part in above.split("."):
-            if not isinstance(default, dict) or part not in default:
-                return
-            default = default[part]
-            inside = inside.get(part) if isinstance(inside, dict) else None
-        if isinstance(default, list) and not isinstance(inside, list):
-            reading.override(fields, above, list(default))
+        name = _list_of(dotted)
+        default = self._defaults.get(name)
+        if name != dotted and isinstance(default, list) and not isinstance(flat(fields).get(name), list):
+            reading.override(fields, name, list(default))
 
     def _fast_engine(self, fields: Mapping[str, Any]) -> str:
         plant = fields.get("plant")
@@ -286,11 +277,3 @@ def _list_of(dotted: str) -> str:
     """Name of the list if a name is of an entry: a command line sets complete lists."""
     above, _, last = dotted.rpartition(".")
     return above if last.isdecimal() else dotted
-
-
-def _value_at(whole: Mapping[str, Any], dotted: str, value: Any) -> Any:
-    """Value of a field of a complete scenario if it is a list; else the given value."""
-    inside: Any = whole
-    for part in dotted.split("."):
-        inside = inside.get(part) if isinstance(inside, Mapping) else None
-    return inside if isinstance(inside, list) else value
