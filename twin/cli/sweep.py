@@ -8,7 +8,6 @@ import math
 import shlex
 import sys
 from collections.abc import Callable, Iterator, Mapping
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -171,7 +170,7 @@ def _optimised(study: Study, options: argparse.Namespace) -> bool:
     trials = f" --trials {options.trials}" if options.trials else ""
     command = f"spheretwin sweep {shlex.quote(options.study)} --optimise{trials}"
     written = tuning_page.write(folder, study, outcome, command, options.figure_format)
-    if find_spec("matplotlib") is None:
+    if not report.can_be_drawn():
         print_message("sweep: no figures without the extra `spheretwin[plots]`")
     printed = tuning_page.summary(outcome, objectives)
     if options.json:

@@ -15,17 +15,15 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.integrate import solve_ivp
 
 from spheretwin import assembly
 from spheretwin import scenario as scenarios
 from spheretwin.active_config import initial_config
-from spheretwin.crosscheck.trajectories import ENGINES, Convergence, convergence, order_check
+from spheretwin.crosscheck.trajectories import ENGINES, Convergence, convergence, order_check, solve
 from spheretwin.linear import Magnetics, hinge_matrix
 from spheretwin.models.actuator import Actuator
 from spheretwin.models.base.checks import Check
 from spheretwin.models.base.compiled import compiled
-from spheretwin.models.base.errors import EngineError
 from spheretwin.models.lagrangian import acceleration
 from spheretwin.plant.plant_tick import GOING, PlantOutput, plant_tick
 from spheretwin.shared_buffers import shared_buffers
@@ -133,11 +131,8 @@ def integrate(actuator: Actuator) -> Array:
 
     start = np.concatenate([START_rad, START_rad_s])
     # The torque curve is a spline: its third derivative jumps, which no method of order eight likes better.
-    solved = solve_ivp(
-        flow, (0, DURATION_s), start, method="DOP853", t_eval=_samples_s(), rtol=1e-9, atol=1e-11
-    )
-    if not solved.success:
-        raise EngineError(f"coil-driven reference: expected DOP853 to converge, {solved.message}")
+    tolerances = {"rtol": 1e-9, "atol": 1e-11}
+    solved = solve("coil-driven reference", flow, (0, DURATION_s), start, t_eval=_samples_s(), **tolerances)
     states: Array = solved.y.T
     return states
 

@@ -12,13 +12,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.integrate import solve_ivp
 
 from spheretwin.crosscheck.coil_driven import drive_plant
-from spheretwin.crosscheck.trajectories import ENGINES
+from spheretwin.crosscheck.trajectories import ENGINES, solve
 from spheretwin.models.actuator import Actuator
 from spheretwin.models.base.checks import Check
-from spheretwin.models.base.errors import EngineError
 from spheretwin.models.lagrangian import acceleration
 from spheretwin.plant.bristle_friction import LAST, SLIP_SHARES, StictionSection
 
@@ -100,9 +98,8 @@ class Reference:
         states: list[Array] = []
         state, now, break_aways = np.concatenate([start_rad, np.zeros(3)]), 0.0, 0
         while len(states) < len(t_s):
-            solved = solve_ivp(self._flow, (now, t_s[-1]), state, "DOP853", events=events, **TIGHT)
-            if not solved.success:
-                raise EngineError(f"static friction reference: expected DOP853 to converge, {solved.message}")
+            span = now, t_s[-1]
+            solved = solve("static friction reference", self._flow, span, state, events=events, **TIGHT)
             now, state = float(solved.t[-1]), solved.y[:, -1]
             states += [solved.sol(t) for t in t_s[len(states) :] if t <= now]
             if solved.status == 1:

@@ -111,6 +111,20 @@ def nutation_pieces(inertia: Array) -> Pieces:
     return Pieces(nutation.sample(np.zeros(1))[0, :2].ravel(), np.array(torque))
 
 
+def solve(what: str, *problem: Any, **options: Any) -> Any:
+    """Return the solution of a problem of `solve_ivp` by DOP853.
+
+    Raises
+    ------
+    EngineError
+        It did not converge.
+    """
+    solution = solve_ivp(*problem, "DOP853", **options)
+    if not solution.success:
+        raise EngineError(f"{what}: expected DOP853 to converge, {solution.message}")
+    return solution
+
+
 def integrate(pieces: Pieces, inertia: Array) -> Array:
     """States at the ends of the pieces by DOP853, of order eight, on the Lagrangian.
 
@@ -128,11 +142,8 @@ def integrate(pieces: Pieces, inertia: Array) -> Array:
 
     states = [pieces.start]
     for torque in pieces.torque:
-        solved = solve_ivp(
-            flow, (0, HOLD_s), states[-1], method="DOP853", rtol=1e-13, atol=1e-14, args=(torque,)
-        )
-        if not solved.success:
-            raise EngineError(f"reference trajectory: expected DOP853 to converge, {solved.message}")
+        start, tight = states[-1], {"rtol": 1e-13, "atol": 1e-14}
+        solved = solve("reference trajectory", flow, (0, HOLD_s), start, args=(torque,), **tight)
         states.append(solved.y[:, -1])
     return np.array(states)
 

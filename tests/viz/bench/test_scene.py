@@ -81,7 +81,7 @@ def test_a_zone_lies_on_its_sphere_between_its_heights():
 
 def test_the_rotor_is_a_ball_cut_flat_above_and_below(actuator):
     """Its arms stand within the cut, one of them at its edge."""
-    vertices = actuator_solids(actuator).rotor.vertices
+    vertices = actuator_solids(actuator).rotor.positions
     ball = actuator.magnet.front_m
     assert np.linalg.norm(vertices, axis=1).max() <= ball * (1 + SINGLE)
     assert vertices[:, 2].max() == pytest.approx(CUT * ball, rel=SINGLE)

@@ -109,13 +109,17 @@ def _prepared(job: Job) -> tuple[Grid, Rows]:
     if apart := [
         _difference_text(name, ours, theirs)
         for name in sorted({*ours, *theirs})
-        if ours.get(name) != theirs.get(name)
+        if _differ(name, ours, theirs)
     ]:
         raise SpheretwinError(
             f"study {study.name}: expected node {platform.node()} to have the driver's sources, files and"
             f" versions, received other {', '.join(apart)}; none of its rows was taken"
         )
     return Grid(study), rows
+
+
+def _differ(name: str, ours: dict[str, str], theirs: dict[str, str]) -> bool:
+    return ours.get(name) != theirs.get(name)
 
 
 def _difference_text(name: str, ours: dict[str, str], theirs: dict[str, str]) -> str:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -13,6 +12,7 @@ import numpy as np
 
 from spheretwin.scenario.fields import quantity_text
 from spheretwin.study.optimise import ON, SWITCH, Gain, Objective, Optimise, best_within
+from spheretwin.study.report import can_be_drawn
 from spheretwin.study.study import Study
 from spheretwin.study.tuning.gains import section_of
 from spheretwin.study.tuning.trials import Ended
@@ -179,8 +179,7 @@ def write(
         A file cannot be written there.
     """
     optimise = section_of(study)
-    can_draw = find_spec("matplotlib") is not None
-    figures = drawings(study.name, result, optimise.objective) if can_draw else []
+    figures = drawings(study.name, result, optimise.objective) if can_be_drawn() else []
     sections = ["## Method", "", *_what(study), ""]
     sections += ["## Figures", "", *map(pieces.figure, figures)] if figures else []
     for law, of_law in summary(result, optimise.objective)["laws"].items():

@@ -79,7 +79,9 @@ def run_trial(
         if stop_requested():
             return None
         result = rows.run(with_fields(row, fields))
-        numbers = [optimise.of_row(objective, figure_of(result, objective)) for objective in objectives]
+        numbers = [
+            optimise.of_row(objective, result.figures.get(objective.metric)) for objective in objectives
+        ]
         if reason := _reason_of_loss(row, result, objectives, numbers):
             return Tried(Ended.LOST, reason, values_of(objectives, by_row, len(conditions)), by_row)
         by_row.append([number for number in numbers if number is not None])
@@ -92,11 +94,6 @@ def run_trial(
 def with_fields(row: Row, fields: Mapping[str, float]) -> Row:
     """A row with the fields that gains set."""
     return row._replace(values={**row.values, **fields})
-
-
-def figure_of(result: Result, objective: Objective) -> object:
-    """Figure of a run that an objective is of."""
-    return result.figures.get(objective.metric)
 
 
 def _reason_of_loss(
