@@ -110,7 +110,7 @@ class Bench:
             return self._processor.submit(command, values)
         except InputError as error:
             self._bench_state.refused = f"{error}"
-            return Ticket(str(error))
+            return settled_ticket(str(error))
 
     def state(self) -> BenchStatus:
         """Return the latest status; does not wait for the loop."""

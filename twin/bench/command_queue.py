@@ -96,12 +96,10 @@ class Ticket:
         Clock when it was created and when it was settled (`time.monotonic`).
     """
 
-    def __init__(self, refused: str | None = None) -> None:
+    def __init__(self) -> None:
         self.refused: str | None = None
         self.created_s = self.settled_s = time.monotonic()
         self._done = threading.Event()
-        if refused is not None:
-            self.settle(refused)
 
     @property
     def done(self) -> bool:
@@ -119,10 +117,10 @@ class Ticket:
         self._done.set()
 
 
-def settled_ticket() -> Ticket:
-    """Return the ticket of a command that was executed at once."""
+def settled_ticket(refused: str | None = None) -> Ticket:
+    """Return the ticket of a command that was executed or refused at once."""
     ticket = Ticket()
-    ticket.settle()
+    ticket.settle(refused)
     return ticket
 
 
