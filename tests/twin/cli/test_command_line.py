@@ -65,7 +65,7 @@ def test_version_is_printed():
         (["simulate", "hold", "--telemetry", "."], ["file name", "folder"]),
         (["simulate", "hold", "--plant.mjcf", "broken.xml"], ["broken.xml", "MJCF"]),
         (["simulate", "hold", "--plant.mjcf", "empty.xml"], ["three degrees of freedom", "0"]),
-        (["simulate", "hold", "--plant.initial-rad", "0", "1.6", "0"], ["first pose", "1.6"]),
+        (["simulate", "hold", "--plant.initial-rad", "0", "1.6", "0"], ["expected a pose with", "1.6"]),
         (["simulate", "hold", "--plant.step-s", "1e-12"], ["step_s", "1e-12"]),
         (["simulate", "hold", "--trajectory.angle-rad", "1e200", "0", "0"], ["angle_rad", "1e+200"]),
         (["simulate", "hold", "--record", "same", "--telemetry", "./same"], ["separate path", "twice"]),
