@@ -174,3 +174,12 @@ def test_currents_differ_from_zero_and_by_their_sign_for_every_reader_and_are_vi
     assert min(difference(negative, zero), difference(positive, zero)) >= 30
     for colour in (negative, zero, positive):
         assert min(contrast(colour, ground) for ground in GROUNDS.values()) >= 3
+
+
+@pytest.mark.parametrize("count", [17, 40])
+def test_colours_of_many_runs_have_one_luminance(count):
+    """The luminance with which a colour has a contrast of 4:1 both to black and to white is 0.2."""
+    colours = theme.run_colours(["afsm"] * count)
+    luminance = [np.dot((0.2126, 0.7152, 0.0722), linear(rgb(colour))) for colour in colours]
+    # Steps of lightness are 0.003, whose luminance is at most 0.005 here, and colours have eight bits.
+    assert luminance == pytest.approx([0.2] * count, abs=0.008)

@@ -148,3 +148,12 @@ def test_a_file_that_was_there_stays_until_the_new_one_is_whole(tmp_path):
     assert path.read_text() == "what was there before"
     file.close({})
     assert len(read_parquet(path)[0]) == 200
+
+
+def test_only_a_file_that_is_not_closed_can_be_recovered(tmp_path):
+    """Parts of an open file are named with their rows; a closed file has none."""
+    file = streamed(path := tmp_path / "run.parquet", table(2 * PART_ROWS), PART_ROWS)
+    (part,) = parts_beside(path)
+    assert file.partial() == (part.parent, path, 2 * PART_ROWS)
+    file.close({})
+    assert file.partial() is None

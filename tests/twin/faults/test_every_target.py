@@ -126,3 +126,11 @@ def test_without_a_supply_it_is_refused_where_it_needs_one(name):
             planned(fault(name, mode), **given)
     else:
         planned(fault(name, mode), **given)
+
+
+@EACH
+def test_only_faults_of_sensors_change_what_the_controller_measures(name):
+    """The flag decides whether the controller receives the true angles."""
+    assert planned(fault(name, next(iter(TARGETS[name].modes)))).fault[0].kind.measured == (
+        name in ("pot", "encoder", "adc")
+    )

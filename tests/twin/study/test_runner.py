@@ -9,8 +9,10 @@ from spheretwin.models.base.errors import InputError, SpheretwinError
 from spheretwin.study import agreement
 from spheretwin.study import table as tables
 from spheretwin.study.engines.threads import AHEAD
+from spheretwin.study.grid import Grid
+from spheretwin.study.row import Rows
 from spheretwin.study.runner import run
-from tests.twin.study.cases import found, loads, rows_of, study, table, values
+from tests.twin.study.cases import SHORT, found, loads, rows_of, study, table, values
 
 
 @pytest.fixture(scope="module")
@@ -183,3 +185,13 @@ def test_a_failure_of_the_table_hides_no_other(tmp_path, monkeypatch):
     monkeypatch.setattr(agreement, "check", differs)
     with pytest.raises(SpheretwinError, match="plants"):
         found(study(), tmp_path / "b")
+
+
+@pytest.mark.parametrize("field", [{"plant.engine": "lagrangian"}, {"plant.integrator": "Euler"}], ids=str)
+def test_a_row_with_one_possible_plant_is_not_compared(field, monkeypatch):
+    """The plant is named, or MuJoCo alone has the integrator."""
+    rows = Rows(chosen := study(fields={**SHORT, **field}))
+    row = Grid(chosen)[0]
+    monkeypatch.setattr(agreement, "_rms", lambda *_: pytest.fail("a row was run for a comparison"))
+    assert rows.chooses_plant != (rows.scenario(row).plant.engine == "lagrangian")
+    agreement.check(rows, row)

@@ -7,7 +7,7 @@ from spheretwin.models.kinematics import rotation
 from spheretwin.viz import theme
 from spheretwin.viz.bench import scene as colours
 from spheretwin.viz.bench import server as front
-from spheretwin.viz.bench.actuator import CUT, actuator_solids, quaternions_along
+from spheretwin.viz.bench.actuator import CUT, RING_SECTIONS, actuator_solids, quaternions_along
 from spheretwin.viz.bench.scene import Scene
 from spheretwin.viz.scene import solids
 
@@ -175,3 +175,14 @@ def test_both_coils_of_a_group_have_its_colour(scene, actuator):
     assert [scene.group_of(coil) for coil in actuator.groups[5].tolist()] == [5, 5]
     assert scene.group_of(None) is None
     assert scene.group_of(99) is None
+
+
+def test_the_stator_has_a_hoop_behind_the_coils_of_each_latitude(actuator):
+    """Within the heights of its coils, the outermost vertices of a hoop are a full ring."""
+    vertices, coil = actuator_solids(actuator).stator.vertices, actuator.coil
+    behind = coil.distance_m + coil.length_m / 2
+    for height in behind * np.unique(actuator.coil_axes[:, 2].round(6)):
+        at = vertices[np.abs(vertices[:, 2] - height) < 0.05 * actuator.magnet.front_m]
+        radius = np.hypot(at[:, 0], at[:, 1])
+        angles = np.arctan2(at[:, 1], at[:, 0])[radius < 1.001 * np.sqrt(behind**2 - height**2)]
+        assert len(np.unique(angles.round(3))) >= RING_SECTIONS

@@ -257,7 +257,19 @@ def test_only_messages_of_a_page_pass():
     value = {"type": "GuiUpdateMessage", "uuid": "a", "updates": {"value": True}}
     assert is_page_message(msgspec.msgpack.encode(value))
     assert is_page_message(msgspec.msgpack.encode(CAMERA))
+    click = {
+        "type": "SceneNodeClickMessage",
+        "name": "/coils",
+        "instance_index": 3,
+        "ray_origin": [0.0, 0.0, 0.0],
+        "ray_direction": [0.0, 0.0, 1.0],
+        "screen_pos": [0.5, 0.5],
+        "modifier": None,
+    }
+    assert is_page_message(msgspec.msgpack.encode(click))
     for other in (
+        {**click, "screen_pos": [0.5, 0.5, 0.5]},
+        {**click, "ray_origin": [0.0, 0.0]},
         {**value, "updates": {"removed": True}},
         {**value, "updates": {"value": True, "removed": True}},
         {**value, "updates": {"value": np.nan}},
