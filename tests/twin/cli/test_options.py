@@ -1,0 +1,181 @@
+"""Options of every verb: their defaults, their types, and the ends of their ranges."""
+
+from importlib import import_module
+from pathlib import Path
+
+import pytest
+
+from spheretwin import cli
+from spheretwin.models.actuator import MJCF_PATH, TORQUE_CURVE_PATH
+
+PART = {"curve": "run_curve", "check": "run_check", "map": "run_map"}
+
+
+@pytest.fixture
+def received(monkeypatch):
+    """Return the options that a verb receives in place of its run."""
+
+    def parse(*arguments):
+        verb = arguments[0]
+        run = PART[arguments[1]] if verb == "magnetics" else "run"
+        calls = []
+        monkeypatch.setattr(import_module(f"spheretwin.cli.{verb}"), run, lambda given: not calls.append(given))
+        assert cli.main(list(arguments)) == cli.DONE
+        (options,) = calls
+        return vars(options)
+
+    return parse
+
+
+PAGE = {"out": None, "figure_format": "svg", "json": False}
+MAGNETICS = {"mjcf": MJCF_PATH, "json": False, "verbose": False, "out": None}
+
+DEFAULTS = {
+    "simulate hold": {
+        "scenario": "hold", "record": None, "record_rate": None, "telemetry": None, "live": False,
+        "live_window": 10.0, "view": None, "replay": None, "metric": [], "json": False, "fields": [],
+    },
+    "bench": {
+        "scenario": "hold", "port": 8080, "no_browser": False, "hold_after": 2.0, "record": None, "fields": [],
+    },
+    "crosscheck": {**PAGE, "states": 10_000, "mjcf": MJCF_PATH, "verbose": False},
+    "reproduce figure6": {
+        **PAGE, "names": ["figure6"], "verbose": False, "seeds": 20, "limit": None, "plant": None,
+    },
+    "sweep paper": {
+        **PAGE, "study": "paper", "threads": None, "engine": "local", "address": None, "limit": None,
+        "row": None, "optimise": False, "trials": None,
+    },
+    "review a": {
+        "runs": [Path("a")], "tolerance": None, "export": None, "merge": None, "figures": None,
+        "figure_format": "svg", "json": False,
+    },
+    "recover a --out b": {"file": Path("a"), "out": Path("b")},
+    "explain x y": {"subject": ["x", "y"], "all": False, "json": False},
+    "magnetics curve": {**MAGNETICS, "csv": None},
+    "magnetics check": {**MAGNETICS, "csv": TORQUE_CURVE_PATH, "poses": 15, "seed": 0, "figure_format": "svg"},
+    "magnetics map": {
+        **MAGNETICS, "csv": TORQUE_CURVE_PATH, "need": None, "largest_tilt": 57.0, "figure_format": "svg",
+    },
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("command", DEFAULTS)
+def test_options_have_their_defaults(received, command):
+    options = received(*command.split())
+    own = {name: value for name, value in options.items() if name in DEFAULTS[command]}
+    assert own == DEFAULTS[command]
+    assert set(options) - set(own) <= {"run", "parser", "has_fields", "help", "fields"}
+    assert options["has_fields"] == (command.split()[0] in ("simulate", "bench"))
+
+
+@pytest.mark.parametrize(
+    ("command", "flag", "name"),
+    [
+        ("simulate hold", "--record", "record"),
+        ("simulate hold", "--telemetry", "telemetry"),
+        ("simulate", "--replay", "replay"),
+        ("bench", "--record", "record"),
+        ("crosscheck", "--out", "out"),
+        ("crosscheck", "--mjcf", "mjcf"),
+        ("reproduce figure6", "--out", "out"),
+        ("sweep paper", "--out", "out"),
+        ("review a", "--export", "export"),
+        ("review a", "--merge", "merge"),
+        ("review a", "--figures", "figures"),
+        ("magnetics curve", "--out", "out"),
+        ("magnetics curve", "--csv", "csv"),
+        ("magnetics check", "--csv", "csv"),
+        ("magnetics map", "--out", "out"),
+    ],
+)
+def test_files_and_folders_are_paths(received, command, flag, name):
+    assert received(*command.split(), flag, "a/b")[name] == Path("a/b")
+
+
+@pytest.mark.parametrize(
+    ("command", "flags"),
+    [
+        ("simulate hold", "--live --json"),
+        ("bench", "--no-browser"),
+        ("crosscheck", "--json --verbose"),
+        ("reproduce all", "--json --verbose"),
+        ("sweep paper", "--optimise --json"),
+        ("review a", "--json"),
+        ("explain x", "--all --json"),
+        ("magnetics map", "--json --verbose"),
+    ],
+)
+def test_switches_are_on_where_they_are_given(received, command, flags):
+    options = received(*command.split(), *flags.split())
+    assert all(options[flag.strip("-").replace("-", "_")] is True for flag in flags.split())
+
+
+@pytest.mark.parametrize(
+    ("command", "flag", "valid", "invalid"),
+    [
+        ("simulate hold", "--record-rate", ["1e-9", "1000.5"], ["0", "-1", "inf", "nan", "x"]),
+        ("simulate hold", "--live-window", ["0.001", "3600"], ["0", "-1", "inf"]),
+        ("simulate hold", "--view", ["overview", "control"], ["Overview", "all"]),
+        ("bench", "--port", ["0", "65535"], ["65536", "-1", "8e3"]),
+        ("bench", "--hold-after", ["0", "2.5"], ["-0.1", "inf"]),
+        ("crosscheck", "--states", ["1", "1000000"], ["0", "1000001"]),
+        ("crosscheck", "--figure-format", ["pdf", "png", "pdf-one-column", "pdf-two-columns"], ["PDF", "jpg"]),
+        ("reproduce all", "--seeds", ["1", "1000"], ["0", "1001", "²"]),
+        ("reproduce all", "--limit", ["1", "1000"], ["0", "1001"]),
+        ("sweep paper", "--threads", ["1", "1024"], ["0", "1025"]),
+        ("sweep paper", "--limit", ["1", "1000000000000"], ["0", "1000000000001"]),
+        ("sweep paper", "--trials", ["1", "1000000000000"], ["0", "1.5"]),
+        ("sweep paper", "--engine", ["local", "ray"], ["threads"]),
+        ("magnetics check", "--poses", ["1", "10000"], ["0", "10001"]),
+        ("magnetics check", "--seed", ["0", "1000000000000000000"], ["-1", "1000000000000000001"]),
+        ("magnetics map", "--need", ["1e-6", "2"], ["0", "-1"]),
+        ("magnetics map", "--largest-tilt", ["0", "85"], ["-0.1", "85.1", "nan"]),
+    ],
+)
+def test_a_value_is_taken_up_to_the_ends_of_its_range(received, capsys, command, flag, valid, invalid):
+    for text in valid:
+        value = received(*command.split(), flag, text)[flag[2:].replace("-", "_")]
+        assert value == (text if isinstance(value, str) else type(value)(text))
+    for text in invalid:
+        assert cli.main([*command.split(), f"{flag}={text}"]) == cli.BAD_INPUT
+        assert text in capsys.readouterr().err
+
+
+def test_own_metrics_can_be_repeated(received):
+    assert received("simulate", "hold", "--metric", "a:b", "--metric", "c:d")["metric"] == ["a:b", "c:d"]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["simulate", "hold", "--view", "control"], "expected --view with --record or --live, received control"),
+        (["simulate", "hold", "--replay", "a.parquet"], "expected --replay without scenario and fields, received hold"),
+        (["simulate", "--replay", "a.parquet", "--seed=2"], "fields, received --seed=2"),
+        (["simulate", "--live"], "expected a scenario"),
+        (["simulate", "--record", "a.rrd"], "expected a scenario"),
+        (["simulate", "--telemetry", "a.parquet"], "expected a scenario"),
+        (["simulate", "--metric", "a.py:b"], "expected a scenario"),
+        (["simulate", "--seed=2"], "expected a scenario"),
+        (["magnetics", "curve", "--csv", "a.csv", "--out", "b.csv"], "expected --out or --csv, received both"),
+        (["review", "a", "--tolerance", "gate"], "expected two runs or more for --tolerance, received one"),
+        (["review", "a", "--merge", "b.rrd"], "expected two runs or more for --merge, received one"),
+        (["review", "a", "b", "c", "--export", "d.csv"], "expected one run for --export, received 3"),
+        (["review", "a", "--export", "d.txt"], "d.txt"),
+        (["sweep", "paper", "--trials", "3"], "expected --trials with --optimise, received it alone"),
+        (["sweep", "paper", "--optimise", "--row", "1"], "expected --optimise without --row and --limit"),
+        (["sweep", "paper", "--optimise", "--limit", "1"], "expected --optimise without --row and --limit"),
+        (["sweep", "paper", "--row", "1", "--out", "a"], "expected --row without --out, --threads or --limit"),
+        (["sweep", "paper", "--row", "1", "--threads", "2"], "expected --row without --out"),
+        (["recover", "a.rrd"], "--out"),
+        (["explain"], "SUBJECT"),
+        (["explain", "hardware", "ideal", "x"], "received 'hardware ideal x'"),
+    ],
+)  # fmt: skip
+def test_options_that_do_not_combine_are_refused(capsys, tmp_path, monkeypatch, arguments, message):
+    monkeypatch.chdir(tmp_path)
+    assert cli.main(arguments) == cli.BAD_INPUT
+    out, err = capsys.readouterr()
+    assert (out, err.count("\n")) == ("", 1)
+    assert message in err
+    assert list(tmp_path.iterdir()) == []
