@@ -1,15 +1,20 @@
 """The verb `bench`: where it is served, what it refuses, and how it ends."""
 
 import os
+import re
 import signal
 import socket
 import subprocess
 import sys
 import urllib.request
+from types import SimpleNamespace
 
 import pytest
 
 from spheretwin import cli
+from spheretwin.bench.operators import Operators
+from spheretwin.cli import bench
+from spheretwin.viz.bench.page import Page
 from tests.waiting import PATIENCE_S
 
 COMMAND = (sys.executable, "-m", "spheretwin", "bench", "hold", "--plant.engine", "lagrangian")
@@ -73,3 +78,29 @@ def test_without_viser_it_says_what_brings_it(monkeypatch, capsys):
     monkeypatch.setattr("spheretwin.cli.bench.find_spec", lambda name: None)
     assert cli.main(["bench", "hold", "--no-browser"]) == 2
     assert "spheretwin[bench]" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("flags", [[], ["--no-browser", "--hold-after", "7"]], ids=["browser", "none"])
+def test_a_browser_is_opened_at_the_printed_address_unless_it_is_not_to(capsys, monkeypatch, flags):
+    opened, silences = [], []
+
+    def operators(*silence_s):
+        silences.append(silence_s)
+        return Operators(*silence_s)
+
+    monkeypatch.setattr(bench, "Operators", operators)
+    monkeypatch.setattr(Page, "show", lambda page, ended: None)
+    monkeypatch.setattr(bench.webbrowser, "open", opened.append)
+    assert cli.main(["bench", *COMMAND[4:], "--port", "0", *flags]) == cli.DONE
+    out, err = capsys.readouterr()
+    address = re.fullmatch(r"bench: (http://127\.0\.0\.1:\d+) \(Ctrl-C ends it\)\n", out)[1]
+    assert opened == ([] if flags else [address])
+    assert silences == [(7.0 if flags else 2.0, 10.0)]
+    assert err == "bench: preparing hold\n"
+
+
+@pytest.mark.parametrize(("recording", "line"), [((), ""), (("c", "d"), "spheretwin: not completed: c, d\n")])
+def test_recordings_that_are_not_complete_fail_the_bench(capsys, recording, line):
+    state = SimpleNamespace(completed_files=("a", "b"), recording=recording)
+    assert bench._report(SimpleNamespace(state=lambda: state)) == (not recording)
+    assert capsys.readouterr() == ("written  a\nwritten  b\n", line)

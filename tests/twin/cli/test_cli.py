@@ -230,6 +230,7 @@ def test_reader_that_leaves_is_no_error():
     with process:
         process.stdout.close()
         assert process.stderr.read() == ""
+    assert process.returncode == 1
 
 
 def test_console_script_is_this_command():

@@ -25,7 +25,9 @@ GOOD, BAD = Check("first", "a", 1, 1.0, 2.0, "reason"), Check("second", "b", 1, 
 
 
 def test_figures_have_json_types(capsys):
-    common.print_json({"peak": Peak(1.5, (2.0, float("inf"))), "rows": [GOOD, {"a": float("nan")}], "text": "é"})
+    common.print_json(
+        {"peak": Peak(1.5, (2.0, float("inf"))), "rows": [GOOD, {"a": float("nan")}], "text": "é"}
+    )
     out, err = capsys.readouterr()
     assert err == ""
     assert json.loads(out) == {

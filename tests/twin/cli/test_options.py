@@ -19,7 +19,9 @@ def received(monkeypatch):
         verb = arguments[0]
         run = PART[arguments[1]] if verb == "magnetics" else "run"
         calls = []
-        monkeypatch.setattr(import_module(f"spheretwin.cli.{verb}"), run, lambda given: not calls.append(given))
+        monkeypatch.setattr(
+            import_module(f"spheretwin.cli.{verb}"), run, lambda given: not calls.append(given)
+        )
         assert cli.main(list(arguments)) == cli.DONE
         (options,) = calls
         return vars(options)
@@ -36,7 +38,8 @@ DEFAULTS = {
         "live_window": 10.0, "view": None, "replay": None, "metric": [], "json": False, "fields": [],
     },
     "bench": {
-        "scenario": "hold", "port": 8080, "no_browser": False, "hold_after": 2.0, "record": None, "fields": [],
+        "scenario": "hold", "port": 8080, "no_browser": False, "hold_after": 2.0, "record": None,
+        "fields": [],
     },
     "crosscheck": {**PAGE, "states": 10_000, "mjcf": MJCF_PATH, "verbose": False},
     "reproduce figure6": {
@@ -53,7 +56,9 @@ DEFAULTS = {
     "recover a --out b": {"file": Path("a"), "out": Path("b")},
     "explain x y": {"subject": ["x", "y"], "all": False, "json": False},
     "magnetics curve": {**MAGNETICS, "csv": None},
-    "magnetics check": {**MAGNETICS, "csv": TORQUE_CURVE_PATH, "poses": 15, "seed": 0, "figure_format": "svg"},
+    "magnetics check": {
+        **MAGNETICS, "csv": TORQUE_CURVE_PATH, "poses": 15, "seed": 0, "figure_format": "svg",
+    },
     "magnetics map": {
         **MAGNETICS, "csv": TORQUE_CURVE_PATH, "need": None, "largest_tilt": 57.0, "figure_format": "svg",
     },
@@ -120,7 +125,12 @@ def test_switches_are_on_where_they_are_given(received, command, flags):
         ("bench", "--port", ["0", "65535"], ["65536", "-1", "8e3"]),
         ("bench", "--hold-after", ["0", "2.5"], ["-0.1", "inf"]),
         ("crosscheck", "--states", ["1", "1000000"], ["0", "1000001"]),
-        ("crosscheck", "--figure-format", ["pdf", "png", "pdf-one-column", "pdf-two-columns"], ["PDF", "jpg"]),
+        (
+            "crosscheck",
+            "--figure-format",
+            ["pdf", "png", "pdf-one-column", "pdf-two-columns"],
+            ["PDF", "jpg"],
+        ),
         ("reproduce all", "--seeds", ["1", "1000"], ["0", "1001", "²"]),
         ("reproduce all", "--limit", ["1", "1000"], ["0", "1001"]),
         ("sweep paper", "--threads", ["1", "1024"], ["0", "1025"]),
@@ -149,15 +159,24 @@ def test_own_metrics_can_be_repeated(received):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["simulate", "hold", "--view", "control"], "expected --view with --record or --live, received control"),
-        (["simulate", "hold", "--replay", "a.parquet"], "expected --replay without scenario and fields, received hold"),
+        (
+            ["simulate", "hold", "--view", "control"],
+            "expected --view with --record or --live, received control",
+        ),
+        (
+            ["simulate", "hold", "--replay", "a.parquet"],
+            "expected --replay without scenario and fields, received hold",
+        ),
         (["simulate", "--replay", "a.parquet", "--seed=2"], "fields, received --seed=2"),
         (["simulate", "--live"], "expected a scenario"),
         (["simulate", "--record", "a.rrd"], "expected a scenario"),
         (["simulate", "--telemetry", "a.parquet"], "expected a scenario"),
         (["simulate", "--metric", "a.py:b"], "expected a scenario"),
         (["simulate", "--seed=2"], "expected a scenario"),
-        (["magnetics", "curve", "--csv", "a.csv", "--out", "b.csv"], "expected --out or --csv, received both"),
+        (
+            ["magnetics", "curve", "--csv", "a.csv", "--out", "b.csv"],
+            "expected --out or --csv, received both",
+        ),
         (["review", "a", "--tolerance", "gate"], "expected two runs or more for --tolerance, received one"),
         (["review", "a", "--merge", "b.rrd"], "expected two runs or more for --merge, received one"),
         (["review", "a", "b", "c", "--export", "d.csv"], "expected one run for --export, received 3"),
@@ -165,7 +184,10 @@ def test_own_metrics_can_be_repeated(received):
         (["sweep", "paper", "--trials", "3"], "expected --trials with --optimise, received it alone"),
         (["sweep", "paper", "--optimise", "--row", "1"], "expected --optimise without --row and --limit"),
         (["sweep", "paper", "--optimise", "--limit", "1"], "expected --optimise without --row and --limit"),
-        (["sweep", "paper", "--row", "1", "--out", "a"], "expected --row without --out, --threads or --limit"),
+        (
+            ["sweep", "paper", "--row", "1", "--out", "a"],
+            "expected --row without --out, --threads or --limit",
+        ),
         (["sweep", "paper", "--row", "1", "--threads", "2"], "expected --row without --out"),
         (["recover", "a.rrd"], "--out"),
         (["explain"], "SUBJECT"),

@@ -1,14 +1,20 @@
 """Reports of `simulate` and `review`: faults, hardware, use of tolerances, time of compilation."""
 
 import json
+import re
+from pathlib import Path
 
 import pytest
 
 from spheretwin import cli
 from spheretwin import scenario as scenarios
+from spheretwin.analysis.tolerances import Exceeded
+from spheretwin.cli import review, simulate
+from spheretwin.models.base.errors import InputError, SpheretwinError
 from spheretwin.runtime import Runtime
 from spheretwin.scenario.reading import shipped
 from spheretwin.session import Session
+from spheretwin.viz.terminal.reviews import SignalTolerance
 
 PLANT = ["--plant.engine", "lagrangian"]
 
@@ -101,3 +107,97 @@ def test_the_time_of_a_run_does_not_contain_that_of_its_compilation(monkeypatch)
         session.advance(3)
     (compiled,) = entries
     assert not hasattr(compiled, "overloads")  # a dispatcher would compile at its first call
+
+
+@pytest.mark.parametrize(
+    ("options", "expected"),
+    [
+        ("", (None, None, False, "overview", None, 0, 10.0)),
+        (
+            "--record a.rrd --telemetry b.parquet --record-rate 50 --view control",
+            (Path("a.rrd"), Path("b.parquet"), False, "control", 50.0, 0, 10.0),
+        ),
+        ("--live --live-window 3 --view control", (None, None, True, "control", None, 0, 3.0)),
+    ],
+    ids=["none", "files", "live"],
+)
+def test_the_outputs_of_a_run_are_those_of_its_options(capsys, tmp_path, monkeypatch, options, expected):
+    def refuse(session, *settings):
+        assert settings == expected
+        raise InputError("outputs: expected others")
+
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(simulate, "Outputs", refuse)
+    _, err = printed(capsys, "simulate", "hold", *PLANT, *options.split(), code=cli.BAD_INPUT)
+    assert err == "spheretwin: outputs: expected others\n"
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_file_that_cannot_be_completed_fails_the_run_and_keeps_its_figures(capsys, monkeypatch):
+    monkeypatch.setattr(simulate.Outputs, "close", lambda files: [SpheretwinError("a.rrd: the disk is full")])
+    out, err = printed(capsys, "simulate", "hold", *PLANT, "--duration", 0.01, code=cli.FAILED)
+    assert out.startswith("hold under afsm, ideal hardware: completed")
+    assert err == "spheretwin: a.rrd: the disk is full\n"
+
+
+def test_the_end_of_a_failed_run_has_time_reason_and_pose(capsys):
+    """The line is that of the figures; the same run with and without JSON."""
+    stuck = fault(0, "encoder.gamma", "dropout", 0.01)
+    flags = [*PLANT, "--hardware", "electronics", "--duration", 0.5, "--watchdog.on", "true", *stuck]
+    out, err = printed(capsys, "simulate", "nutation", *flags, "--json", code=cli.FAILED)
+    run = json.loads(out)
+    assert run["status"] == "failsafe"
+    assert 0.01 < run["simulated_s"] < 0.5
+    pose = r"\(α -?\d+\.\d°, β -?\d+\.\d°, γ -?\d+\.\d°\)"
+    line = (
+        f"spheretwin: the run ended at {run['simulated_s']:.3f} s of 0.5 s: failsafe, no fresh measurement "
+    )
+    assert re.fullmatch(re.escape(line) + pose, err.removesuffix("\n"))
+    out, again = printed(capsys, "simulate", "nutation", *flags, code=cli.FAILED)
+    assert again == err
+    assert f"failsafe at {run['simulated_s']:.3f} s of 0.5 s, no fresh measurement" in " ".join(out.split())
+
+
+def test_output_of_a_law_is_not_among_the_json(capsys, tmp_path):
+    (tmp_path / "law.py").write_text(
+        "def loud(t, reference, measurement, parameters, state, torque):\n"
+        "    print('here')\n    torque[:] = 0\n"
+    )
+    flags = [*PLANT, "--controller.law", f"{tmp_path / 'law.py'}:loud", "--duration", 0.001]
+    out, err = printed(capsys, "simulate", "hold", *flags, "--json")
+    assert json.loads(out)["status"] == "completed"
+    assert "here" in err
+    out, err = printed(capsys, "simulate", "hold", *flags)
+    assert "here" in out
+    assert err == ""
+
+
+def test_a_run_without_a_tick_has_no_time_and_no_pose(capsys, tmp_path):
+    (tmp_path / "law.py").write_text(
+        "def broken(t, reference, measurement, parameters, state, torque):\n    torque[:] = float('nan')\n"
+    )
+    flags = [*PLANT, "--controller.law", f"{tmp_path / 'law.py'}:broken", "--duration", 0.01]
+    _, err = printed(capsys, "simulate", "hold", *flags, code=cli.FAILED)
+    assert err == "spheretwin: the run ended before its first tick was complete: diverged\n"
+
+
+@pytest.mark.parametrize(
+    ("count", "more"), [(1, ""), (2, "; 1 more signal later"), (3, "; 2 more signals later")]
+)
+def test_the_first_violation_is_stated_with_the_largest_excess_of_its_signal(count, more):
+    places = [
+        Exceeded("b.parquet", name, axis, 0.5, 0.125)
+        for name, axis in (("q_rad", "β"), ("t_s", ""), ("error_rad", "γ"))
+    ]
+    signals = [
+        SignalTolerance("error_rad", 4.0, "γ", 0.75, 0.25),
+        SignalTolerance("q_rad", 2.0, "α", 0.625, 0.375),
+        SignalTolerance("t_s", 2.0, "", 0.875, 0.4375),
+    ]
+    assert review._first(places[:count], signals) == (
+        "b.parquet: q_rad β leaves its tolerance first at 0.5 s, by 0.125;"
+        f" its largest excess is 0.375 at 0.625 s{more}"
+    )
+    assert review._first(places[1:2], signals).startswith(
+        "b.parquet: t_s leaves its tolerance first at 0.5 s"
+    )

@@ -1,14 +1,17 @@
 """``spheretwin sweep``: its two streams, its exit codes, its folder."""
 
 import json
+import shlex
 from pathlib import Path
 
 import pytest
 
 from spheretwin import cli
+from spheretwin.cli import sweep
 from spheretwin.models.base.errors import SpheretwinError
 from spheretwin.study import agreement, report
 from spheretwin.study.grid import Grid
+from spheretwin.study.runner import run as run_study
 from spheretwin.study.study import load as load_study
 
 
@@ -122,3 +125,89 @@ def test_the_exit_code_of_one_row_is_that_of_its_run(source, tmp_path, capsys, l
     key = Grid(load_study(source))[1].key
     assert cli.main(["sweep", source, "--row", key, "--json"]) == code
     assert json.loads(capsys.readouterr().out)["status"] == status
+
+
+@pytest.mark.parametrize(
+    ("rows", "of", "startup_s", "code"),
+    [(3, 3, 1.26, cli.DONE), (2, 3, None, cli.FAILED), (4, 3, 0.0, cli.DONE)],
+)
+def test_a_study_that_is_not_complete_exits_1(
+    source, tmp_path, capsys, monkeypatch, rows, of, startup_s, code
+):
+    def run(*arguments, **options):
+        result = run_study(*arguments, **options)
+        return result._replace(rows=rows, of=of, wall_s=12.34, startup_s=startup_s)
+
+    monkeypatch.setattr(sweep, "run_study", run)
+    monkeypatch.setattr(report, "can_be_drawn", lambda: True)
+    monkeypatch.setattr(report, "write", lambda *_: [tmp_path / "a", tmp_path / "b"])
+    assert cli.main(["sweep", source, "--out", str(tmp_path / "out")]) == code
+    out, err = capsys.readouterr()
+    lines = out.splitlines()
+    took = [] if startup_s is None else [f"took   12.3 s, {startup_s:.1f} s of it to start"]
+    table = f"table  {tmp_path / 'out' / 'table.parquet'}"
+    assert lines[0].startswith(f"short: {rows} of {of} rows")
+    assert lines[-3 - len(took) :] == [
+        *took,
+        table,
+        f"written  {tmp_path / 'a'}",
+        f"written  {tmp_path / 'b'}",
+    ]
+    left = (
+        f"spheretwin: sweep: interrupted after {rows} of {of} rows; the same command continues from there\n"
+    )
+    assert err == (left if code else "")
+
+
+def test_a_study_is_run_with_its_options(source, tmp_path, capsys, monkeypatch):
+    def refuse(study, folder, **options):
+        del options["done"], options["stop_requested"]
+        received.append((study.name, folder, options))
+        raise SpheretwinError("no more")
+
+    received = []
+    monkeypatch.setattr(sweep, "run_study", refuse)
+    plain = {"engine": "local", "address": None, "threads": None, "limit": None}
+    chosen = {"engine": "ray", "address": "auto", "threads": 3, "limit": 2}
+    flags = [text for name, value in chosen.items() for text in (f"--{name}", str(value))]
+    assert cli.main(["sweep", source]) == cli.FAILED
+    assert cli.main(["sweep", source, "--out", str(tmp_path / "out"), *flags]) == cli.FAILED
+    assert received == [("short", None, plain), ("short", tmp_path / "out", chosen)]
+
+
+def test_one_row_is_printed_with_its_values_its_figures_and_its_command(source, capsys, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "200")
+    row = Grid(load_study(source))[2]
+    assert cli.main(["sweep", source, "--row", row.key, "--json"]) == cli.DONE
+    told = json.loads(capsys.readouterr().out)
+    assert (told["row"], told["key"], told["seed"]) == (2, row.key, row.seed)
+    assert (told["values"], told["law"], told["reason"], told["error"]) == (
+        {"disturbance.load": 2.0}, None, None, None,
+    )  # fmt: skip
+    assert cli.main([*shlex.split(told["command"])[1:], "--json"]) == cli.DONE
+    assert json.loads(capsys.readouterr().out)["rms_error_rad"] == told["rms_error_rad"]
+    assert cli.main(["sweep", source, "--row", row.key]) == cli.DONE
+    out, err = capsys.readouterr()
+    title, *lines, command = out.splitlines()
+    assert (title.strip(), command, err) == ("row 2 of short", f"command  {told['command']}", "")
+    cells = [[cell.strip() for cell in line.split("|")[1:-1]] for line in lines if line.startswith("| ")]
+    assert cells == [["", "value"], *([name, str(told[name])] for name in told if name != "command")]
+
+
+@pytest.mark.parametrize(
+    ("trials", "shown"), [(1, [0]), (15, range(15)), (16, range(0, 16, 2)), (40, range(0, 40, 3))]
+)
+def test_a_long_front_is_printed_at_even_places(capsys, monkeypatch, trials, shown):
+    front = [{"trial": place, "command": f"command {place}"} for place in range(trials)]
+    printed = []
+    monkeypatch.setattr(
+        sweep.tuning_page, "chosen", lambda of_law: ([], [trial["trial"] for trial in of_law["best"]])
+    )
+    monkeypatch.setattr(sweep.tuning_page, "counted", lambda of_law: f"{len(of_law['best'])} counted")
+    monkeypatch.setattr(sweep.runs, "print_rows", lambda *table: printed.append(table))
+    sweep._print_laws("short", {"pd": {"best": front}})
+    lines = capsys.readouterr().out.splitlines()
+    assert printed == [("short, pd", [], list(shown), 1)]
+    some = [f"{len(shown)} of the {trials} trials of the front"] if len(shown) < trials else []
+    command = ["command 0"] if trials == 1 else []
+    assert lines == [f"{trials} counted", *some, *command]
