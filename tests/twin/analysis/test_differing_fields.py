@@ -61,3 +61,23 @@ def test_common_conditions_are_those_of_every_scenario():
     other = but(disturbance={"load": 2.0}, hardware="electronics")
     assert common_conditions([SCENARIO, other]) == "scenario tilt, m 0.2"
     assert common_conditions([{"name": "a"}, {"name": "b"}]) == ""
+
+
+def test_fields_implied_by_name_and_modelling_error_are_not_listed():
+    own = {"description": "a", "duration": 1.0, "trajectory": {"shape": "hold"}}
+    other = {"description": "b", "duration": 2.0, "trajectory": {"shape": "sine"}}
+    assert scenario_differences([{"name": "x", **own}, {"name": "y", **other}]) == [("scenario", ["x", "y"])]
+    assert scenario_differences([{"name": "x", **own}, {"name": "x", **other}]) == [
+        ("description", ["a", "b"]),
+        ("duration", ["1", "2"]),
+        ("trajectory.shape", ["hold", "sine"]),
+    ]
+    plants = [{"plant": {"modelling_error": m, "modelling_torque_Nm": m}} for m in (0.0, 0.2)]
+    assert scenario_differences(plants) == [("m", ["0", "0.2"])]
+
+
+def test_values_have_all_digits_and_words_as_they_are():
+    values = [0.100000001, 1e-7, 3.0, True, None, "pd", [], [1, 2]]
+    texts = ["0.100000001", "1e-07", "3", "true", "null", "pd", "none", "[1, 2]"]
+    pairs = [scenario_differences([{"x": value}, {"x": "other"}]) for value in values]
+    assert pairs == [[("x", [text, "other"])] for text in texts]

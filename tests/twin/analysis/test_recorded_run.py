@@ -15,7 +15,7 @@ from spheretwin import cli
 from spheretwin import scenario as scenarios
 from spheretwin.analysis import recovery
 from spheretwin.analysis.recorded_run import export, open_run, read
-from spheretwin.analysis.run_summary import figures
+from spheretwin.analysis.run_summary import figures, peaks
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.telemetry.parquet import TelemetryFile
 from spheretwin.models.telemetry.table import read_parquet
@@ -64,6 +64,15 @@ def test_a_review_reports_the_figures_of_the_run(files):
     assert {name: told[name] for name in expected} == expected
     assert (told["scenario"], told["law"], told["status"]) == ("hold", "afsm", "completed")
     assert told["energy_J"] == told["copper_loss_J"] + told["mechanical_work_J"]
+    facts = {
+        "path": str(files[0]), "modelling_error": 0.0, "load": 1.0, "hardware": "ideal", "seed": 0,
+        "reason": None, "whole": True, "rows": 2200, "record_rate_Hz": None, "planned_s": 2.2,
+    }  # fmt: skip
+    assert {name: told[name] for name in facts} == facts
+    assert told["simulated_s"] == pytest.approx(2.2, rel=1e-12)  # a sum of periods
+    for column, of_axis in zip(run.telemetry["error_rad"].T, told["error_peaks"].values(), strict=True):
+        assert [tuple(peak.values()) for peak in of_axis] == [*map(tuple, peaks(column, 1e-3))]
+    assert list(told["error_peaks"]) == ["α", "β", "γ"]
 
 
 def test_a_run_without_its_law_file_is_reviewed(tmp_path):

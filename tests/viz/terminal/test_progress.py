@@ -6,7 +6,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from spheretwin.viz.terminal.progress import Progress, parts, runs, tracked
+from spheretwin.viz.terminal import progress
+from spheretwin.viz.terminal.progress import Progress, counted, parts, runs, tracked
 
 ESCAPES = re.compile(r"\x1b\[[0-9;?]*[a-zA-Z]")
 LOOK = r"{} +[━╸╺]+ +100% {}0:00:00"
@@ -37,11 +38,11 @@ class Chunk(SimpleNamespace):
 
 
 def follow_a_run():
-    with Progress("hold", 100) as progress:
-        progress.write(Chunk(t_s=np.array([])))
-        progress.write(Chunk(t_s=np.arange(100) / 50))
-        progress.note(1.0, "saturation begins")
-        progress.finish("completed")
+    with Progress("hold", 100) as bar:
+        bar.write(Chunk(t_s=np.array([])))
+        bar.write(Chunk(t_s=np.arange(100) / 50))
+        bar.note(1.0, "saturation begins")
+        bar.finish("completed")
 
 
 @pytest.mark.parametrize("follow", [follow_steps, follow_parts, follow_runs, follow_a_run])
@@ -94,3 +95,23 @@ def test_progress_shows_simulated_time_and_status(capsys):
     assert re.search(
         LOOK.format("hold: completed", "1.98 s simulated "), ESCAPES.sub("", capsys.readouterr().err)
     )
+
+
+@pytest.mark.usefixtures("watched")
+def test_rows_are_counted_with_their_rate_and_earlier_ones_are_no_start(capsys):
+    with counted("short", "trials") as done:
+        done(2, 4)
+        getting_ready = ESCAPES.sub("", capsys.readouterr().err)
+        done(3, 4)
+        done(4, 4)
+    lines = ESCAPES.sub("", capsys.readouterr().err)
+    assert "short: getting ready" in getting_ready
+    assert re.search(LOOK.format("short", r"\S* *\S* *"), re.split(r"[\r\n]+", lines.rstrip())[-1])
+
+
+@pytest.mark.parametrize(
+    ("speed", "text"),
+    [(None, ""), (0.123, "0.12 rows/s"), (9.96, "10 rows/s"), (10.0, "10 rows/s"), (1234.5, "1234 rows/s")],
+)
+def test_a_rate_has_two_digits_or_is_whole(speed, text):
+    assert progress._Rate("rows").render(SimpleNamespace(speed=speed)).plain == text

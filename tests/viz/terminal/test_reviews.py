@@ -3,7 +3,13 @@
 import pytest
 
 from spheretwin.viz.terminal import reviews
-from spheretwin.viz.terminal.reviews import NominalError, SignalTolerance, differences, print_comparison
+from spheretwin.viz.terminal.reviews import (
+    NominalError,
+    SignalTolerance,
+    differences,
+    print_comparison,
+    print_run_report,
+)
 
 AXES = {
     "max_abs_error_rad": [0.03, 0.02, 0.01],
@@ -119,3 +125,59 @@ def test_tolerances_state_the_share_that_is_used_and_the_largest_excess(capsys):
         ["error_rad", "0 %", "–", "–"],
         ["torque_Nm", "exceeded", "1 s", "inf"],
     ]
+
+
+PEAK = {"frequency_Hz": 12.5, "amplitude_rad": 0.001}
+REPORT = {
+    **RUN,
+    "status": "failsafe",
+    "reason": "no fresh measurement",
+    "error_peaks": {"α": [PEAK, {**PEAK, "frequency_Hz": 30.0}], "β": [PEAK], "γ": []},
+    "events": [],
+}
+
+
+def test_the_report_of_one_run_has_every_figure_once(capsys, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "200")
+    print_run_report(REPORT, [NominalError("nominal.x", "1", "2")], 0.01)
+    out = capsys.readouterr().out
+    assert out.splitlines()[0].rstrip() == "hold under pd: failsafe at 1.000 s"
+    peak, none = "Hz: 1.00 (0.0573°)", "–"
+    assert [row for row in table_rows(out) if not set("".join(row)) <= set("-:")] == [
+        ["tracking error, mrad (degrees)", "α", "β", "γ"],
+        ["largest", "30.0 (1.72°)", "20.0 (1.15°)", "10.0 (0.573°)"],
+        ["rms", *["10.0 (0.573°)"] * 3],
+        ["rms, second half", *["10.0 (0.573°)"] * 3],
+        ["overshoot", none, none, none],
+        ["settled to ±10 mrad after", "0.300 s", none, "0 s"],
+        ["strongest oscillation", f"12.5 {peak}", f"12.5 {peak}", none],
+        ["second oscillation", f"30.0 {peak}", none, none],
+        ["field", "run", "controller", "truth"],
+        ["nominal.x", "a.parquet", "1", "2"],
+    ]
+    for line in (
+        "largest current 2.00 A",
+        "share of ticks at the limit 0.960 %",
+        "rms torque 0.100 N·m",
+        "variation of the commands 3.00 A/s",
+        "copper loss 4.00 J",
+        "work on the rotor 0.00100 J",
+        "energy 4.00 J",
+        "modelling_error 0.2, load 1.0, hardware ideal, seed 0, no fresh measurement",
+    ):
+        assert line in out.splitlines()
+    print_run_report({**REPORT, "status": None, "reason": None}, [], 0.01)
+    out = capsys.readouterr().out
+    assert out.splitlines()[0].rstrip() == "hold under pd: not closed at 1.000 s"
+    assert "hardware ideal, seed 0" in out.splitlines()[-1]
+    assert out.splitlines()[-1].endswith("seed 0")
+
+
+@pytest.mark.parametrize("more", [-1, 0, 1, 7])
+def test_the_first_events_are_printed_and_the_others_counted(capsys, more):
+    events = [{"t_s": 0.5 * place, "text": f"event {place}"} for place in range(reviews.MOST_EVENTS + more)]
+    print_run_report({**REPORT, "events": events}, [], 0.01)
+    lines = capsys.readouterr().out.splitlines()
+    printed = [line.split(maxsplit=2) for line in lines if " s  event " in line]
+    assert printed == [[f"{event['t_s']:.3f}", "s", event["text"]] for event in events[: reviews.MOST_EVENTS]]
+    assert (f"and {more} more events; --json has them all" in lines) == (more > 0)
