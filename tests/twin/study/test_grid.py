@@ -1,13 +1,15 @@
 """Rows by number: crossed, zipped, drawn; keys that are a row's own, seeds that follow from them."""
 
+import hashlib
 import itertools
+import json
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from spheretwin.models.base.errors import InputError
-from spheretwin.study.grid import Grid, _mixed
+from spheretwin.study.grid import Grid, _mixed, are_numbers
 from tests.twin.study.cases import loads, study, values
 
 
@@ -111,3 +113,35 @@ def test_rows_that_are_the_same_or_without_end_are_refused(axes, told):
 def test_values_of_a_zip_may_repeat_where_their_rows_do_not():
     axes = [values("disturbance.load", 1.0, 1.0, zip="a"), values("plant.modelling_error", 0.1, 0.2, zip="a")]
     assert len({row.key for row in Grid(study(*axes))}) == 2
+
+
+def test_a_key_is_that_of_values_law_and_repeat_and_not_of_their_order():
+    """Rows of a journal are found by it: it is the digest of the content, whatever the order of the axes."""
+    axes = [values("disturbance.load", 0.5, 2.0), values("plant.payload_kg", 0.1)]
+    rows, swapped = ([*Grid(study(*listed, seeds=2))] for listed in (axes, axes[::-1]))
+    assert {row.key for row in rows} == {row.key for row in swapped}
+    content = json.dumps([{"disturbance.load": 2.0, "plant.payload_kg": 0.1}, None, 1])
+    assert rows[3].key == hashlib.sha256(content.encode()).hexdigest()[:16]
+    assert rows[3].seed == int(hashlib.sha256(f"0 {rows[3].key}".encode()).hexdigest()[:16], 16) // 2**11
+
+
+def test_a_law_has_no_row_twice_and_rows_at_even_places():
+    grid = Grid(study(values("disturbance.load", *map(float, range(9)))))
+    assert [row.number for row in grid.of_law(0, 5)] == [0, 2, 4, 6, 8]
+    assert [row.number for row in grid.of_law(0, 20)] == list(range(9))
+
+
+def test_rows_are_numbered_from_zero_and_no_others_exist():
+    grid = Grid(study(values("disturbance.load", 0.0, 1.0)))
+    assert [row.number for row in grid] == [0, 1]
+    for number in (-1, 2):
+        with pytest.raises(IndexError):
+            grid[number]
+    assert grid.values("disturbance.load") == [0.0, 1.0]
+    assert grid.values("seed") is None
+
+
+def test_numbers_alone_have_a_gap_in_a_template():
+    assert are_numbers([1, 2.5])
+    assert not are_numbers([1.0, True])
+    assert not are_numbers(["1"])
