@@ -179,7 +179,7 @@ def test_both_coils_of_a_group_have_its_colour(scene, actuator):
 
 def test_the_stator_has_a_hoop_behind_the_coils_of_each_latitude(actuator):
     """Within the heights of its coils, the outermost vertices of a hoop are a full ring."""
-    vertices, coil = actuator_solids(actuator).stator.vertices, actuator.coil
+    vertices, coil = actuator_solids(actuator).stator.positions, actuator.coil
     behind = coil.distance_m + coil.length_m / 2
     for height in behind * np.unique(actuator.coil_axes[:, 2].round(6)):
         at = vertices[np.abs(vertices[:, 2] - height) < 0.05 * actuator.magnet.front_m]

@@ -115,3 +115,58 @@ def test_rows_are_counted_with_their_rate_and_earlier_ones_are_no_start(capsys):
 )
 def test_a_rate_has_two_digits_or_is_whole(speed, text):
     assert progress._Rate("rows").render(SimpleNamespace(speed=speed)).plain == text
+
+
+class Bars:
+    """Bars that keep the state of their one task."""
+
+    def __init__(self, *more, transient=False):
+        self.state = {}
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        pass
+
+    def start(self):
+        pass
+
+    stop = start
+
+    def add_task(self, description, **fields):
+        self.state = {"description": description, **fields}
+
+    def update(self, task, **fields):
+        advance = fields.pop("advance", 0)
+        self.state |= {
+            **fields,
+            "completed": fields.get("completed", self.state.get("completed", 0) + advance),
+        }
+
+
+@pytest.fixture
+def bars(monkeypatch):
+    bars = Bars()
+    monkeypatch.setattr(progress, "_bars", lambda *more, transient=False: bars)
+    return bars
+
+
+def test_rows_of_earlier_runs_are_counted_but_are_no_start(bars):
+    with counted("short") as done:
+        assert bars.state == {"description": "short: getting ready", "total": None}
+        for finished, name in ((2, "short: getting ready"), (3, "short"), (4, "short")):
+            done(finished, 4)
+            assert bars.state == {"description": name, "total": 4, "completed": finished}
+
+
+def test_a_run_is_named_alone_once_it_has_begun(bars):
+    with Progress("hold", 100) as bar:
+        bar.write(Chunk(t_s=np.array([])))
+        assert bars.state == {
+            "description": "hold: getting ready", "total": 100, "simulated_s": 0.0,
+        }  # fmt: skip
+        bar.write(Chunk(t_s=np.arange(20) / 50))
+        assert bars.state == {"description": "hold", "total": 100, "simulated_s": 0.38, "completed": 20}
+        bar.finish("interrupted")
+        assert (bars.state["description"], bars.state["completed"]) == ("hold: interrupted", 20)

@@ -50,3 +50,12 @@ def test_verdicts_share_the_lines_of_one_screen(capsys, monkeypatch, count, spac
     first = lines[1 : 1 + space]
     assert first[:2] == ["  - not reproduced: bad.", "  - reproduced: good."][: len(first)]
     assert [line.endswith(" …") for line in first] == [False] * (space - 1) + [True] * (space > 0)
+
+
+@pytest.mark.parametrize("more", [-1, 0, 1])
+def test_results_that_fit_have_no_mark_of_omission(capsys, monkeypatch, more):
+    monkeypatch.setenv("COLUMNS", "80")
+    print_verdicts([Verdict("figure6", "Title", [(True, f"{place}") for place in range(34 + more)])])
+    lines = capsys.readouterr().out.splitlines()[1:-1]
+    assert len(lines) == min(34, 34 + more)
+    assert lines[-1].endswith(" …") == (more > 0)
