@@ -56,7 +56,8 @@ class Sources(HTMLParser):
 
     def handle_starttag(self, tag, attributes):
         named = dict(attributes)
-        self.inside = tag if tag in ("script", "style", "button") else None
+        if tag not in ("svg", "line"):  # within a button
+            self.inside = tag if tag in ("script", "style", "button") else None
         self.asked += [
             named[each] for each in ("src", "href", "data", "action", "poster", "srcset") if each in named
         ]
@@ -66,7 +67,8 @@ class Sources(HTMLParser):
             self.buttons.append("")
 
     def handle_endtag(self, tag):
-        self.inside = None
+        if tag == self.inside:
+            self.inside = None
 
     def handle_data(self, data):
         if self.inside == "script":

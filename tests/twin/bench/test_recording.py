@@ -50,7 +50,8 @@ def test_a_closed_bench_has_completed_its_files_and_holds_none_of_them(tmp_path)
     with begun() as made:
         done(made, "record", recording=str(paths[0]), telemetry=str(paths[1]))
         made.advance(50)
-        threads = [weakref.ref(each) for each in gc.get_objects() if isinstance(each, RecordingThread)]
+        # By type: `isinstance` would look into a weak proxy of another test, whose object may be gone.
+        threads = [weakref.ref(each) for each in gc.get_objects() if type(each) is RecordingThread]
     assert made.state().completed_files == tuple(map(str, paths))
     assert made.state().recording == ()
     gc.collect()

@@ -102,7 +102,9 @@ def test_a_bench_is_driven_from_a_browser(tmp_path):
 
         tab.key(" ")
         until(bench, lambda state: state.stopped)
-        says(tab, "OFF", "STOPPED")
+        says(tab, "STOPPED")
+        # Without currents the rotor falls, and may leave the workspace before a busy page has drawn it.
+        tab.wait_for(f"/OFF|FAULT/.test({STATUS}.innerText)")
         until(bench, lambda state: not np.any(state.current_command_A))
         tab.click("text=keep")
         tab.click("text=Stop and complete the files")

@@ -151,6 +151,8 @@ def test_every_kind_of_error_of_the_sections_has_words():
                 Scenario.model_validate_json(json.dumps(fields))
             except explaining.ValidationError as error:
                 kinds |= {each["type"] for each in error.errors()}
+            except InputError:  # a file that does not exist has words of its own
+                continue
     own = {"value_error", "extra_forbidden", "union_tag_not_found", "union_tag_invalid", "json_invalid"}
     assert kinds - own <= set(explaining.EXPECTED)
     assert len(kinds) > 10

@@ -10,6 +10,7 @@ import pytest
 from spheretwin import cli
 from spheretwin.cli import sweep
 from spheretwin.models.base.errors import InputError
+from spheretwin.study import report as study_report
 from spheretwin.study.optimise import Objective
 from spheretwin.study.tuning import report
 from tests.twin.study.tuning.cases import FIGURES
@@ -236,8 +237,7 @@ def test_people_get_the_start_the_front_and_where_all_is(small, tmp_path, capsys
 
 
 def test_without_matplotlib_there_are_trials_and_a_word(small, tmp_path, capsys, monkeypatch):
-    for module in (sweep, report):
-        monkeypatch.setattr(module, "find_spec", lambda name: None)
+    monkeypatch.setattr(study_report, "find_spec", lambda name: None)
     assert cli.main(["sweep", small, "--optimise", "--json", "--out", str(tmp_path / "out")]) == cli.DONE
     out, err = capsys.readouterr()
     assert json.loads(out)["trials"] == 16
