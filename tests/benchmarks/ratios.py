@@ -148,8 +148,8 @@ def torque_matrix_seconds() -> float:
 
 
 def plant_step_seconds() -> float:
-    """Time of one public step of the plant with friction, called from compiled code, s."""
-    parameters, calls = plant.parameters("nutation", {"hardware": "electronics"}), 100_000
+    """Time of one public step of rotor and field, called from compiled code, s."""
+    parameters, calls = plant.parameters("nutation"), 100_000
     state = plant.State(np.zeros(3), np.array([0.0, 0.0, 5.0]))
     _coast(1, state, np.zeros(18), np.zeros(3), parameters)
     return seconds_of(lambda: _coast(calls, state, np.zeros(18), np.zeros(3), parameters)) / calls
