@@ -101,7 +101,7 @@ def step(state: State, currents: Array, disturbance: Array, parameters: Paramete
         Of new arrays. The ends of the workspace are not checked.
     """
     groups = parameters.torque_gain.shape[0]
-    # Three allocations: with one for each vector the step takes half as long again.
+    # Few allocations: with one for each vector the step takes half as long again.
     G, vectors = np.empty((3, groups)), np.empty((10, max(3, groups)))
     scratch = np.empty((5, parameters.magnetics.line_weights.shape[0] * groups))
     q, qdot = state.q_rad.copy(), state.qdot_rad_s.copy()
