@@ -168,14 +168,19 @@ def _compensators_of(scenario: ResolvedScenario, magnetics: TorqueModel) -> Comp
     )
 
 
+def true_magnetics(section: ResolvedPlant, seed: int, actuator: Actuator) -> TorqueModel:
+    """Return the magnetics of the true plant, with the scatter of its poles and coils."""
+    scatter = scatter_of(section, seed, actuator)
+    return scattered_model(actuator, scatter) if scatter else torque_model(actuator)
+
+
 def plant_of(scenario: ResolvedScenario, files: Files, rotor: Any, buffers: SharedBuffers) -> Plant:
     """Return the plant of a resolved scenario with a started rotor and zero currents."""
     section, actuator, groups = scenario.plant, files.actuator, len(files.actuator.groups)
     chain, inertia = _rotor_settings(scenario, files).joint_chain(), _inertia(section, actuator)
     joint = chain if chain and not chain.has_ideal_hinges else None
     middle_q, middle_qdot = np.empty((2, 3))
-    scatter = scatter_of(section, scenario.seed, actuator)
-    magnetics = scattered_model(actuator, scatter) if scatter else torque_model(actuator)
+    magnetics = true_magnetics(section, scenario.seed, actuator)
     drive, group_gain = drive_of(scenario, actuator, buffers), np.array(section.group_gain)
     heat = _heat(scenario, drive)
     return Plant(

@@ -11,12 +11,9 @@ from spheretwin import assembly
 from spheretwin import scenario as scenarios
 from spheretwin.active_config import initial_config
 from spheretwin.models.base.errors import InputError
-from spheretwin.models.magnetics import torque_model
-from spheretwin.models.scatter import scattered_model
 from spheretwin.plant.cable import constant_torque_Nm
 from spheretwin.plant.lagrangian_rotor import LagrangianRotor
 from spheretwin.plant.magnet_heat import remanence
-from spheretwin.plant.part_scatter import scatter_of
 from spheretwin.plant.plant_step import Parameters
 from spheretwin.scenario.files import Files
 from spheretwin.scenario.sections import ResolvedScenario, Scenario
@@ -65,10 +62,10 @@ def parameters_of(scenario: ResolvedScenario, files: Files) -> Parameters:
     InputError
         The model has physics that the equations of motion do not have.
     """
-    section, actuator, cable = scenario.plant, files.actuator, scenario.plant.cable
+    section, cable = scenario.plant, scenario.plant.cable
     engine = section.model_copy(update={"engine": "lagrangian", "integrator": "RK4"})
     rotor = cast("LagrangianRotor", assembly.rotor_of(scenario.model_copy(update={"plant": engine}), files))
-    scatter, spring = scatter_of(section, scenario.seed, actuator), np.array(cable.stiffness_Nm_rad)
+    spring = np.array(cable.stiffness_Nm_rad)
     cable_Nm = constant_torque_Nm(cable, scenario.seed) + spring * cable.neutral_rad
     return Parameters(
         inertia_kg_m2=rotor.inertia,
@@ -80,5 +77,5 @@ def parameters_of(scenario: ResolvedScenario, files: Files) -> Parameters:
         constant_torque_Nm=np.array(section.modelling_torque_Nm) - cable_Nm,
         spring_Nm_rad=spring,
         torque_gain=remanence(section.thermal, scenario.drive.ambient_degC) * np.array(section.group_gain),
-        magnetics=scattered_model(actuator, scatter) if scatter else torque_model(actuator),
+        magnetics=assembly.true_magnetics(section, scenario.seed, files.actuator),
     )
