@@ -1,0 +1,118 @@
+"""Approved content: the text of a case, the file that holds the approved one, and what varies by machine."""
+
+import atexit
+import contextlib
+import functools
+import io
+import os
+import re
+import shutil
+import tempfile
+from collections.abc import Callable, Iterator
+from importlib import import_module
+from pathlib import Path
+
+from spheretwin import cli
+from tests.content.compare import difference
+
+FOLDER = Path(__file__).parent
+EXPECTED = FOLDER / "expected"
+
+Cases = dict[str, Callable[[], str]]
+
+PACKAGES = (
+    "spheretwin|mujoco|numba|llvmlite|numpy|rerun|rerun-sdk|scipy|pyarrow|pydantic|matplotlib|pinocchio|magpylib"
+    "|optuna"
+)
+
+VOLATILE = (
+    (r"python \d+\.\d+\.\d+\S*", "python VERSION"),
+    (rf"(\b(?:{PACKAGES})[ =]+v?)\d+\.\d[\w.+-]*", r"\1VERSION"),
+    (r"\d{4}-\d\d-\d\d[T ]\d\d:\d\d(:\d\d(\.\d+)?)?( ?UTC|Z|\+00:00)?", "TIME"),
+    (r"\b[0-9a-f]{40,64}\b", "DIGEST"),
+    (r"\b[0-9a-f]{8}-[0-9a-f]{4}-[0-9a-f]{4}-[0-9a-f]{4}-[0-9a-f]{12}\b", "UUID"),
+)
+"""Texts that vary by machine, version or time, and their placeholders. A case adds its own by `replaced`."""
+
+
+def stable(text: str) -> str:
+    """Return a text with placeholders for what varies; trailing spaces are omitted."""
+    for folder in sorted({str(scratch()), str(scratch().resolve())}, key=len, reverse=True):
+        text = text.replace(folder, "FOLDER")
+    text = text.replace(str(FOLDER.parents[1]), "SOURCES")
+    for pattern, placeholder in VOLATILE:
+        text = re.sub(pattern, placeholder, text)
+    return "".join(f"{line.rstrip()}\n" for line in text.splitlines())
+
+
+@functools.cache
+def _scratch() -> Path:
+    folder = Path(tempfile.mkdtemp(prefix="content"))
+    atexit.register(shutil.rmtree, folder, ignore_errors=True)
+    return folder
+
+
+def scratch(name: str = "") -> Path:
+    """Return a folder of this process, or a new folder in it; it is removed at the exit."""
+    folder = _scratch() / name
+    folder.mkdir(exist_ok=True)
+    return folder
+
+
+def expected_path(name: str) -> Path:
+    """Return the file with the approved text of a case."""
+    return EXPECTED / f"{name}.txt"
+
+
+def check(name: str, cases: Cases) -> None:
+    """Compare the text of a case with the approved one."""
+    found = difference(expected_path(name).read_text(encoding="utf-8"), stable(cases[name]()))
+    assert not found, (
+        f"{name}: the content changed. If it is right: python -m tests.content.approve {name}\n{found}"
+    )
+
+
+def all_cases() -> dict[str, Cases]:
+    """Return the cases of each test file of this folder."""
+    return {
+        path.stem: import_module(f"tests.content.{path.stem}").CASES
+        for path in sorted(FOLDER.glob("test_*.py"))
+        if "CASES" in path.read_text(encoding="utf-8")
+    }
+
+
+@contextlib.contextmanager
+def _columns(count: int) -> Iterator[None]:
+    before = os.environ.get("COLUMNS")
+    os.environ["COLUMNS"] = str(count)
+    try:
+        yield
+    finally:
+        os.environ.pop("COLUMNS")
+        if before is not None:
+            os.environ["COLUMNS"] = before
+
+
+def printed(call: Callable[[], object], columns: int = 80) -> str:
+    """Return what a call prints on stdout at a width of the terminal."""
+    with _columns(columns), contextlib.redirect_stdout(io.StringIO()) as out:
+        call()
+    return out.getvalue()
+
+
+def command(*arguments: object, columns: int = 80) -> str:
+    """Return the command line of a call, its exit code, and what it prints on both streams."""
+    given = [str(argument) for argument in arguments]
+    with (
+        _columns(columns),
+        contextlib.redirect_stdout(io.StringIO()) as out,
+        contextlib.redirect_stderr(io.StringIO()) as err,
+    ):
+        try:
+            code = cli.main(given)
+        except SystemExit as end:  # of argparse: help, version
+            code = end.code
+    streams = [
+        f"{name}:\n{text.getvalue()}" for name, text in (("stdout", out), ("stderr", err)) if text.getvalue()
+    ]
+    return "\n".join([f"$ spheretwin {' '.join(given)}", f"exit code {code}", *streams])
