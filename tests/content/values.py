@@ -83,29 +83,35 @@ def words(texts: list) -> str:
 
 
 def tree(value: object, indent: int = 0) -> list[str]:
-    """Return the lines of nested keys and values, as JSON holds them."""
+    """Return the lines of nested keys and values, as JSON holds them; what has no inner level is a line."""
     space = "  " * indent
+    if _is_line(value):
+        return [f"{space}{_leaf(value)}"]
+    lines = []
+    for key, inside in value.items() if isinstance(value, dict) else enumerate(value):
+        if _is_line(inside):
+            lines.append(f"{space}{key}: {_leaf(inside)}")
+        else:
+            lines += [f"{space}{key}:", *tree(inside, indent + 1)]
+    return lines
+
+
+def _is_line(value: object) -> bool:
+    """True for a leaf, a list of leaves, and keys with leaves or short lists."""
     if isinstance(value, dict):
-        lines = []
-        for key, inside in value.items():
-            if isinstance(inside, dict) or (isinstance(inside, list | tuple) and not _is_flat(inside)):
-                lines += [f"{space}{key}:", *tree(inside, indent + 1)]
-            else:
-                lines.append(f"{space}{key}: {_leaf(inside)}")
-        return lines
-    if isinstance(value, list | tuple) and not _is_flat(value):
-        lines = []
-        for place, inside in enumerate(value):
-            lines += [f"{space}- {place}", *tree(inside, indent + 1)]
-        return lines
-    return [f"{space}{_leaf(value)}"]
+        return bool(value) and all(_is_flat(inside) for inside in value.values())
+    return _is_flat(value)
 
 
-def _is_flat(values: object) -> bool:
-    return not any(isinstance(value, dict | list | tuple) for value in values)
+def _is_flat(value: object) -> bool:
+    return not isinstance(value, dict) and not (
+        isinstance(value, list | tuple) and any(isinstance(inside, dict | list | tuple) for inside in value)
+    )
 
 
 def _leaf(value: object) -> str:
+    if isinstance(value, dict):
+        return ", ".join(f"{key} {_leaf(inside)}" for key, inside in value.items())
     if isinstance(value, list | tuple):
         if len(value) > 3 * FEW and all(isinstance(each, int | float) for each in value):
             return array(value)
