@@ -59,8 +59,8 @@ def _axes(axes: Axes) -> list[str]:
     hidden = "" if axes.get_visible() and axes.axison else " hidden"
     titles = [axes.get_title(loc) for loc in ("left", "center", "right")]
     spines = [name for name, spine in axes.spines.items() if spine.get_visible()]
-    out = [f"axes {axes.name}{hidden}{where}", f"  title {titles!r} {_look(axes.title)}"]
-    out.append(f"  aspect {axes.get_aspect()} spines {' '.join(spines)} face {_colour(axes.get_facecolor())}")
+    frame = f"aspect {axes.get_aspect()} spines {' '.join(spines)} face {_colour(axes.get_facecolor())}"
+    out = [f"axes {axes.name}{hidden}{where} title {titles!r} {_look(axes.title)} {frame}"]
     for name, axis in axes._axis_map.items():
         out += _axis(name, axis, getattr(axes, f"get_{name}lim")())
     shared = [name for name in "xy" if len(getattr(axes, f"get_shared_{name}_axes")().get_siblings(axes)) > 1]
@@ -91,16 +91,12 @@ def _axis(name: str, axis: Axis, limits) -> list[str]:
     on = axis.get_tick_params()
     drawn = [side for side in ("labelleft", "labelbottom", "labelright", "labeltop") if on.get(side)]
     grid = " grid" if on.get("gridOn") else ""
-    out = [
-        f"  {name}: label {axis.get_label_text()!r} scale {axis.get_scale()} limits {array(limits)}",
-        f"    ticks {array(np.array(ticks))} {words(shown)} minor {minor}{grid} {' '.join(drawn)}",
-    ]
     rotation = {label.get_rotation() for label in axis.get_majorticklabels()}
-    if rotation - {0.0}:
-        out.append(f"    rotation {sorted(rotation)}")
-    if minor_labels:
-        out.append(f"    minor labels {words(minor_labels)}")
-    return out
+    turned = f" rotation {sorted(rotation)}" if rotation - {0.0} else ""
+    small = f" minor labels {words(minor_labels)}" if minor_labels else ""
+    head = f"  {name}: label {axis.get_label_text()!r} scale {axis.get_scale()} limits {array(limits)}"
+    ticks_text = f"ticks {array(np.array(ticks))} {words(shown)} minor {minor}{small}{grid}{turned}"
+    return [f"{head} {ticks_text} {' '.join(drawn)}"]
 
 
 def _artist(artist) -> list[str]:
