@@ -17,13 +17,16 @@ Columns = dict[str, dict[str, list]]
 """Rows by entity and component: times in ns (None if static), row ids, values as Arrow."""
 
 
-def recording_text(path: Path, layouts: bool = True) -> str:
-    """Return all that a recording holds; identities and checksums are omitted."""
+def recording_text(path: Path, scenario: bool = False) -> str:
+    """Return all that a recording holds, the scenario on request; identities and checksums are omitted."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", rr.error_utils.RerunWarning)  # a live stream has no footer
         reader = RrdReader(path)
     out = []
     for entity, components in sorted(_columns(reader.stream()).items()):
+        if entity.endswith("/scenario") and not scenario:
+            out.append(f"{entity} {' '.join(sorted(components))}")
+            continue
         out.append(entity)
         times = ""
         for component, rows in sorted(components.items()):
@@ -36,11 +39,10 @@ def recording_text(path: Path, layouts: bool = True) -> str:
                 elif at and separator:
                     times = mine
                 out.append(f"  {line}")
-    if layouts:
-        # The order of the layouts in a file has no meaning.
-        found = ["\n".join(_layout(reader.stream(store=store))) for store in reader.blueprints()]
-        for place, text in enumerate(sorted(found)):
-            out += [f"layout {place}", text]
+    # The order of the layouts in a file has no meaning.
+    found = ["\n".join(_layout(reader.stream(store=store))) for store in reader.blueprints()]
+    for place, text in enumerate(sorted(found)):
+        out += [f"layout {place}", text]
     return "\n".join(out)
 
 
@@ -89,8 +91,11 @@ def _values(column: pa.Array) -> Iterator[str]:
         column = column.flatten()
     if pa.types.is_struct(column.type):
         for field in column.type:
-            for line in _values(column.field(field.name)):
-                yield f"{field.name} {line}"
+            lines = list(_values(column.field(field.name)))
+            if all(len(line) < 200 for line in lines) and len(lines) <= 4:
+                yield f"{field.name} {', '.join(lines)}"
+            else:
+                yield from (f"{field.name} {line}" for line in lines)
         return
     inner = column.type
     while pa.types.is_nested(inner) and not (pa.types.is_struct(inner) or pa.types.is_union(inner)):

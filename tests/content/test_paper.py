@@ -15,7 +15,7 @@ from tests.content.pages import folder_text
 from tests.content.runs import made_run
 from tests.content.values import tree
 
-MOST_ROWS = 6
+MOST_ROWS = 3
 """Rows of the JSON in the text; all of them have the same keys."""
 
 SEEDS = {"figure8": 2, "figure11": 2}

@@ -22,7 +22,7 @@ from tests.content.runs import FAULTS, PERIOD_s, recording, rows_of, session_of,
 
 def every_row() -> str:
     session = session_of(duration=0.7, **{"disturbance.load": 2.0})
-    return recording_text(recording(_file("every_row"), session, 500, Status.LEFT_WORKSPACE))
+    return recording_text(recording(_file("every_row"), session, 500, Status.LEFT_WORKSPACE), scenario=True)
 
 
 def decimated_electronics() -> str:

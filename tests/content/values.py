@@ -116,4 +116,4 @@ def _leaf(value: object) -> str:
         if len(value) > 3 * FEW and all(isinstance(each, int | float) for each in value):
             return array(value)
         return f"[{', '.join(map(_leaf, value))}]"
-    return repr(value) if isinstance(value, str) else number(value)
+    return repr(str(value)) if isinstance(value, str) else number(value)
