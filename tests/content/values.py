@@ -7,6 +7,9 @@ import numpy as np
 FEW = 6
 """Largest number of values that are written one by one."""
 
+KEYS = 8
+"""Keys in a line."""
+
 
 def number(value: object) -> str:
     """Return a number with nine digits; only whole types are without a point."""
@@ -83,17 +86,26 @@ def words(texts: list) -> str:
 
 
 def tree(value: object, indent: int = 0) -> list[str]:
-    """Return the lines of nested keys and values, as JSON holds them; what has no inner level is a line."""
+    """Return the lines of nested keys and values, as JSON holds them; leaves of one level share lines."""
     space = "  " * indent
     if _is_line(value):
-        return [f"{space}{_leaf(value)}"]
+        return [f"{space}{line}" for line in _leaf_lines(value)]
     lines = []
     for key, inside in value.items() if isinstance(value, dict) else enumerate(value):
-        if _is_line(inside):
-            lines.append(f"{space}{key}: {_leaf(inside)}")
+        leaves = _leaf_lines(inside) if _is_line(inside) else []
+        if len(leaves) == 1:
+            lines.append(f"{space}{key}: {leaves[0]}")
         else:
             lines += [f"{space}{key}:", *tree(inside, indent + 1)]
     return lines
+
+
+def _leaf_lines(value: object) -> list[str]:
+    """Lines of leaves, with a fixed number of keys each: no line break depends on a value."""
+    if not isinstance(value, dict):
+        return [_leaf(value)]
+    texts = [f"{key} {_leaf(inside)}" for key, inside in value.items()]
+    return [", ".join(texts[first : first + KEYS]) for first in range(0, len(texts), KEYS)]
 
 
 def _is_line(value: object) -> bool:
@@ -110,8 +122,6 @@ def _is_flat(value: object) -> bool:
 
 
 def _leaf(value: object) -> str:
-    if isinstance(value, dict):
-        return ", ".join(f"{key} {_leaf(inside)}" for key, inside in value.items())
     if isinstance(value, list | tuple):
         if len(value) > 3 * FEW and all(isinstance(each, int | float) for each in value):
             return array(value)
