@@ -1,0 +1,205 @@
+"""Content of the bench: its status after each command, its journal, settings and history, and its clients."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from spheretwin import scenario as scenarios
+from spheretwin.bench.commands import COMMANDS
+from spheretwin.bench.modes import (
+    Limits,
+    approach_fields,
+    current_motion,
+    hold_shape,
+    jog_shape,
+    point_shape,
+)
+from spheretwin.cli.bench import choices_of, settings_of, shape_settings
+from spheretwin.models.telemetry.table import read_parquet
+from spheretwin.session import Session
+from spheretwin.trajectories import SHAPES
+from tests.content.content import check, scratch
+from tests.content.values import array, tree
+from tests.twin.bench.cases import QUIET, bench
+
+VARIABLE = {"missed", "missed_share", "realtime_factor"}
+"""Entries of a status that depend on the clock."""
+
+
+def plain(value):
+    """Return a value as nested keys and values."""
+    if dataclasses.is_dataclass(value) and not isinstance(value, type):
+        return {field.name: plain(getattr(value, field.name)) for field in dataclasses.fields(value)}
+    if hasattr(value, "_asdict"):
+        return {name: plain(inside) for name, inside in value._asdict().items()}
+    if isinstance(value, dict):
+        return {str(name): plain(inside) for name, inside in value.items()}
+    if isinstance(value, np.ndarray):
+        return array(value)
+    if isinstance(value, list | tuple):
+        return [plain(inside) for inside in value]
+    return value if isinstance(value, str | int | float | bool | None) else repr(value)
+
+
+def differences(before, after, prefix=""):
+    """Return the entries of nested values that changed, by dotted name."""
+    changed = {}
+    for name, value in after.items():
+        if isinstance(value, dict) and isinstance(before.get(name), dict):
+            changed |= differences(before[name], value, f"{prefix}{name}.")
+        elif before.get(name) != value:
+            changed[f"{prefix}{name}"] = value
+    return changed
+
+
+COIL = {"target": "coil.07", "mode": "open"}
+
+SCRIPT = [
+    ("start", {}, 20),
+    ("set", {"name": "disturbance.load", "value": 0.5}, 10),
+    ("hold", {}, 30),
+    ("snapshot", {"name": "s"}, 1),
+    ("point", {"pose_rad": [0.1, -0.05, 0.2]}, 150),
+    ("jog", {"rates_rad_s": [0.05, -0.1, 0.3]}, 60),
+    ("add_fault", {"fault": COIL}, 20),
+    ("add_fault", {"fault": {**COIL, "target": "coil.02"}}, 5),
+    ("clear_faults", {"place": 0}, 5),
+    ("clear_faults", {"place": 7}, 0),
+    ("manual", {"group": 4, "current_A": 0.3}, 10),
+    ("manual", {"currents_A": [0.01] * 18}, 10),
+    ("manual", {"group": 99}, 0),
+    ("trajectory", {"fields": {"shape": "sinusoid", "frequency_Hz": 1.0}}, 80),
+    ("set", {"name": "trajectory.frequency_Hz", "value": 0.8}, 40),
+    ("set", {"name": "controller.law", "value": "pid"}, 20),
+    ("set", {"name": "plant.step_s", "value": 0.00025}, 5),
+    ("limits", {"rate_rad_s": 0.4}, 5),
+    ("limits", {}, 0),
+    ("limits", {"rate_rad_s": -1.0}, 0),
+    ("restore", {"name": "x"}, 0),
+    ("restore", {"name": "s"}, 20),
+    ("speed", {"factor": 2.0}, 5),
+    ("set", {"name": "seed", "value": 5}, 5),
+    ("set", {"name": "hardware", "value": "electronics"}, 0),
+    ("pause", {}, 10),
+    ("step", {"ticks": 7}, 10),
+    ("reset", {}, 5),
+    ("start", {}, 30),
+    ("off", {}, 10),
+    ("stop", {}, 10),
+    ("hold", {}, 5),
+    ("restore", {"name": "s"}, 0),
+    ("reset", {}, 0),
+    ("load", {"source": "tilt", "overrides": QUIET}, 0),
+    ("start", {}, 25),
+    ("set", {"name": "manual.currents_A", "value": None}, 0),
+    ("trajectory", {"fields": {"shape": "hold", "approach": {"x": 1}}}, 0),
+    ("grant", {"to": "nobody"}, 0),
+    ("keep", {}, 0),
+    ("record", {"telemetry": "FOLDER/r.parquet"}, 15),
+    ("keep", {}, 5),
+    ("save", {"file": "FOLDER/saved.toml"}, 0),
+    ("replay", {"file": "FOLDER/r.parquet"}, 5),
+    ("hold", {}, 5),
+    ("set", {"name": "disturbance.load", "value": 1000.0}, 1500),
+    ("hold", {}, 3),
+    ("snapshot", {"name": "t"}, 0),
+    ("reset", {}, 0),
+]
+
+
+def a_script_of_commands():
+    """Status after each of some commands: what changed since the one before."""
+    folder, lines = scratch("bench"), []
+    with bench() as made:
+        before = {}
+        for name, arguments, ticks in SCRIPT:
+            given = {
+                key: value.replace("FOLDER", str(folder)) if isinstance(value, str) else value
+                for key, value in arguments.items()
+            }
+            ticket = made.command(name, **given)
+            ran = made.advance(ticks)
+            if name == "keep":
+                made._bench_state.recording.join()
+                made.advance(0)
+            after = plain(made.state())
+            lines.append(f"## {name} {arguments}: {ran} ticks, refused: {ticket.refused}")
+            lines += tree(
+                {key: value for key, value in differences(before, after).items() if key not in VARIABLE}
+            )
+            before = after
+        lines += ["## history", *tree(plain(made.history())), "## bounds", *tree(plain(made.bounds()))]
+        lines += [made.scenario_toml(), made.command_line()]
+    table, metadata = read_parquet(folder / "r.parquet")
+    lines += [f"{signal.name}: {array(table[signal.name])}" for signal in table.signals]
+    lines += [(folder / "saved.toml").read_text(encoding="utf-8"), f"journal {metadata.get('journal')}"]
+    return "\n".join(lines)
+
+
+def shapes_of_modes():
+    """Shapes and approaches that modes make of a motion."""
+    content = {}
+    with Session(scenarios.load("sinusoid", QUIET)) as session:
+        session.advance(137)
+        motion, limits, reach = current_motion(session), Limits(), session.actuator.hinge_range_rad
+        shapes = {
+            "hold": hold_shape(motion, limits, reach),
+            "point": point_shape((0.1, -0.2, 3.0), reach),
+            "point far": point_shape((1.2, -1.3, -9.0), reach),
+            "jog": jog_shape(motion, (0.1, -0.2, 0.3), limits, reach),
+            "jog far": jog_shape(motion, (9.0, -0.2, 50.0), limits, reach),
+            "sinusoid": SHAPES["sinusoid"](),
+            "nutation": SHAPES["nutation"](),
+        }
+        content["motion"] = plain(motion)
+        for slow in (Limits(), Limits(rate_rad_s=0.2), Limits(acceleration_rad_s2=1.0)):
+            for name, shape in shapes.items():
+                approach = approach_fields(shape, motion, 1.5, 0.25, slow, reach)
+                content[f"{slow}, {name}"] = {
+                    "shape": plain(shape.model_dump(mode="json")),
+                    "approach": plain(approach),
+                }
+    return "\n".join(tree(content))
+
+
+def arguments_of_commands():
+    return "\n".join(
+        f"{name}: by {command.by}, {command.arguments.model_json_schema().get('properties')}"
+        for name, command in COMMANDS.items()
+    )
+
+
+def row(setting):
+    """Return the entries of a setting as a line."""
+    return " | ".join(
+        map(str, dataclasses.astuple(setting) if dataclasses.is_dataclass(setting) else setting)
+    )
+
+
+def choices():
+    """What the page of a bench offers."""
+    with bench(controller__law="pid") as made:
+        offered = choices_of(made)
+        content = {
+            "targets": {name: list(modes) for name, modes in offered.targets.items()},
+            **{name: list(getattr(offered, name)) for name in ("scenarios", "shapes", "laws")},
+            "limits": plain(offered.limits),
+            "settings": list(map(row, offered.settings())),
+            "fields": list(map(row, settings_of(made.fields()[:3]))),
+            "shape": {name: list(map(row, shape_settings(name, made))) for name in (*SHAPES, "x")},
+        }
+    return "\n".join(tree(content))
+
+
+CASES = {
+    "bench_script": a_script_of_commands,
+    "bench_shapes": shapes_of_modes,
+    "bench_arguments": arguments_of_commands,
+    "bench_choices": choices,
+}
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_the_content_is_the_approved_one(name):
+    check(name, CASES)

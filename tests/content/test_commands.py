@@ -1,0 +1,279 @@
+"""Content of what the verbs print: help, tables, JSON, pages, and messages about what is refused."""
+
+import functools
+import json
+import os
+import re
+
+import pytest
+
+from spheretwin import cli
+from tests.content.content import check, command, scratch
+from tests.content.values import tree
+
+TIMES = re.compile(
+    r'(?<="wall_s": )[^,}]+|(?<="startup_s": )[^,}]+|(?<="realtime_factor": )[^,}]+|(?<= simulated in ).*'
+    r"|(?<= object at )0x[0-9a-f]+"
+)
+VERSIONS = re.compile(r'(?<="versions": )\{[^}]*\}')
+
+
+def stated(*arguments):
+    """What a call prints, without the times that it took; JSON as lines."""
+    text = command(*arguments)
+    text = VERSIONS.sub('"VERSIONS"', TIMES.sub("0", text))
+    head, marker, rest = text.partition("stdout:\n{")
+    if not marker:
+        return text
+    line, _, more = rest.partition("\n")
+    return "\n".join([head, *tree(json.loads("{" + line)), more])
+
+
+def several(calls):
+    return "\n\n".join(stated(*call.split()) if isinstance(call, str) else stated(*call) for call in calls)
+
+
+HELP = [
+    "--help",
+    *(f"{verb} --help" for verb in cli.VERBS),
+    "magnetics curve --help",
+    "magnetics check --help",
+    "magnetics map --help",
+    "simulate tilt --help run",
+    "simulate hold --help controller.governor",
+    "bench --help watchdog",
+    "simulate hold --help fault",
+    "simulate --help trajectory --controller.law pid",
+    "simulate hold --help controler",
+]
+
+EXPLAIN = [
+    "explain hardware prototype --json",
+    "explain hardware electronics",
+    "explain hardware x",
+    "explain scenario nutation",
+    "explain scenario tilt --all --json",
+    "explain plant.coulomb_Nm",
+    "explain drive --json",
+    "explain plant.coulomb",
+    "explain hardware ideal x",
+    "explain trajectory",
+    "explain scenario x",
+]
+
+REFUSED = [
+    "",
+    "fly",
+    "simulte",
+    "simulate",
+    "simulate x",
+    "simulate hold x",
+    "simulate hold --duration",
+    "simulate hold --duration 1 --duration 2",
+    "simulate hold --record a.rrd --record b.rrd",
+    "simulate hold --record=",
+    "simulate hold --recrod a.rrd",
+    "simulate hold --metric x",
+    "simulate hold --metric nothing.py:f",
+    "simulate hold --replay a.parquet",
+    "simulate --replay nothing.parquet",
+    "simulate --replay a.rrd",
+    "simulate --seed=2",
+    "simulate hold --view control",
+    "simulate hold --json --json",
+    "simulate hold --record nowhere/a.rrd",
+    "simulate hold --telemetry nowhere/a.parquet",
+    "simulate hold --plant.mjcf nothing.xml",
+    "simulate hold --plant.torque_curve nothing.csv",
+    "bench hold x",
+    "bench nowhere",
+    "bench --port 70000",
+    "bench --hold-after -1",
+    "crosscheck x",
+    "crosscheck --states 0",
+    "crosscheck --mjcf nothing.xml",
+    "crosscheck --out a --figure-format gif",
+    "reproduce",
+    "reproduce figure99",
+    "reproduce figure6 --seeds 0",
+    "reproduce figure6 figure6 --limit 0",
+    "reproduce all --plant x",
+    "sweep",
+    "sweep x",
+    "sweep paper --limit 0",
+    "sweep paper --row x",
+    "sweep paper --row 0123456789abcdef",
+    "sweep paper --optimise",
+    "sweep paper --trials 3",
+    "sweep paper --row 1 --out a",
+    "sweep paper --optimise --row 1",
+    "sweep paper --engine x",
+    "sweep paper --address x",
+    "sweep nothing.toml",
+    "sweep rivals_ideal --optimise --limit 3",
+    "review",
+    "review nothing.parquet",
+    "review a --tolerance gate",
+    "review a b --tolerance gat",
+    "review a --merge b.rrd",
+    "review a b --merge c.txt",
+    "review a b --export c.csv",
+    "review a --export d.txt",
+    "review a.txt",
+    "recover",
+    "recover a.rrd",
+    "recover a.rrd --out b.parquet",
+    "recover nothing.parquet --out b.parquet",
+    "recover a --out b",
+    "magnetics",
+    "magnetics x",
+    "magnetics check --poses 0",
+    "magnetics curve --csv a.csv --out b.csv",
+    "magnetics curve --csv nothing.csv",
+    "magnetics map --need 0",
+    "magnetics map --largest-tilt 86",
+    "magnetics check --mjcf nothing.xml",
+    "explain",
+    "explain x",
+    "--x",
+    "explain x --y",
+]
+
+
+def refusals():
+    """Messages and exit codes of calls that are refused, in an empty folder."""
+    here, folder = os.getcwd(), scratch("empty")
+    os.chdir(folder)
+    try:
+        text = several([*REFUSED, ["explain", "a\x1b[2J"], ["simulate", "hold", "--name", "a\nb"]])
+    finally:
+        os.chdir(here)
+    return "\n".join([text, f"files: {sorted(path.name for path in folder.iterdir())}"])
+
+
+FAULTS = '[{"target": "coil.07", "mode": "open", "start_s": 0.02, "detection": true}]'
+
+
+@functools.cache
+def recorded():
+    """Folder with three short runs, one of which ended early, and a user metric."""
+    folder = scratch("commands")
+    (folder / "own.py").write_text(
+        "def highest(run):\n    return run.telemetry['error_rad'].max(axis=0)\n"
+        "def broken(run):\n    return 1 / 0\ndef strange(run):\n    return object()\n"
+    )
+    calls = {
+        "a": "nutation --duration 0.06 --plant.engine lagrangian",
+        "b": "nutation --duration 0.06 --plant.engine lagrangian --controller.law pd --seed 4"
+        " --event.0.t_s 0.03 --event.0.set disturbance.load --event.0.value 1.5",
+        "c": "sinusoid --duration 2 --plant.engine lagrangian --controller.law pd --disturbance.load 900",
+    }
+    for name, call in calls.items():
+        command("simulate", *call.split(), "--telemetry", folder / f"{name}.parquet")
+    return folder
+
+
+def runs():
+    """Tables and JSON of runs, of a complete one, one with faults, and one that leaves the workspace."""
+    folder = recorded()
+    lagrangian, own = "--plant.engine lagrangian", f"--metric {folder}/own.py:"
+    return several(
+        [
+            f"simulate nutation --duration 0.05 --json {lagrangian}",
+            f"simulate nutation --duration 0.05 {lagrangian}",
+            [
+                "simulate",
+                "nutation",
+                "--duration",
+                "0.05",
+                "--plant.engine",
+                "lagrangian",
+                "--fault",
+                FAULTS,
+                "--json",
+            ],
+            f"simulate sinusoid --controller.law pd --disturbance.load 900 --json {lagrangian}",
+            f"simulate sinusoid --controller.law pd --disturbance.load 900 {lagrangian}",
+            f"simulate hold --duration 0.02 --json {lagrangian} {own}highest {own}broken",
+            f"simulate hold --duration 0.02 {lagrangian} {own}strange {own}highest",
+            f"simulate hold --duration 0.02 --json {lagrangian} {own}highest {own}highest",
+            f"simulate --replay {folder}/b.parquet --json",
+            f"simulate --replay {folder}/c.parquet",
+            f"simulate --replay {folder}/b.parquet --seed 3",
+        ]
+    )
+
+
+def reviews():
+    folder = recorded()
+    a, b, c = (f"{folder}/{name}.parquet" for name in "abc")
+    (folder / "narrow.toml").write_text(
+        "[signals.q_rad]\nabsolute = 1e-9\n[signals.current_A]\nabsolute = 0.5\ntime_s = 0.002\n"
+    )
+    text = several(
+        [
+            f"review {a}",
+            f"review {a} --json",
+            f"review {a} {b}",
+            f"review {a} {b} {c} --json",
+            f"review {a} {b} --tolerance {folder}/narrow.toml",
+            f"review {a} {b} --tolerance {folder}/narrow.toml --json",
+            f"review {a} {a} --tolerance {folder}/narrow.toml",
+            f"review {c}",
+            f"review {a} --export {folder}/a.csv",
+            f"review {a} {b} --figures {folder}/figures",
+            f"review {a} {b} --merge {folder}/{{}}.rrd".format("merged"),
+            f"recover {a} --out {folder}/again.parquet",
+        ]
+    )
+    (folder / "merged.rrd").unlink()
+    page = re.sub(
+        r"(?s)<(script|style)\b.*?</\1>", "", (folder / "figures" / "review.html").read_text(encoding="utf-8")
+    )
+    words = re.sub(r"\s*\n\s*", "\n", re.sub(r"<[^>]+>", "\n", re.sub(r"(?s)<svg.*?</svg>", "", page)))
+    csv = (folder / "a.csv").read_text().splitlines()
+    return "\n".join([text, *csv[:3], *csv[-2:], f"{len(csv)} lines", words])
+
+
+def sweeps():
+    folder = recorded()
+    (folder / "mine.toml").write_text(
+        'name = "mine"\nscenario = "hold"\n[fields]\nduration = 0.01\n"plant.engine" = "lagrangian"\n'
+        '[[axis]]\nfield = "disturbance.load"\nkind = "values"\nvalues = [0.0, 1.0, 2000.0]\n'
+        '[[law]]\nlaw = "pd"\n[[law]]\nlaw = "pid"\n'
+    )
+    study = f"{folder}/mine.toml"
+    return several(
+        [
+            f"sweep {study} --limit 2 --threads 1 --out {folder}/sweep --json",
+            f"sweep {study} --threads 1 --out {folder}/sweep --json",
+            f"sweep {study} --threads 1 --out {folder}/sweep",
+            f"sweep {study} --row {{}}".format("0" * 16),
+        ]
+    )
+
+
+def magnetics():
+    folder = recorded()
+    return several(
+        [
+            "magnetics map --json --largest-tilt 10",
+            f"magnetics map --largest-tilt 10 --need 0.1 --verbose --out {folder}/map",
+        ]
+    ) + "\n".join(path.read_text(encoding="utf-8") for path in sorted(folder.glob("map/*.md")))
+
+
+CASES = {
+    "command_help": lambda: several(HELP),
+    "command_explain": lambda: several(EXPLAIN),
+    "command_refusals": refusals,
+    "command_runs": runs,
+    "command_reviews": reviews,
+    "command_sweeps": sweeps,
+    "command_magnetics": magnetics,
+}
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_the_content_is_the_approved_one(name):
+    check(name, CASES)
