@@ -257,7 +257,6 @@ def magnetics():
     folder = recorded()
     return several(
         [
-            "magnetics map --json --largest-tilt 10",
             f"magnetics map --largest-tilt 10 --need 0.1 --verbose --out {folder}/map",
         ]
     ) + "\n".join(path.read_text(encoding="utf-8") for path in sorted(folder.glob("map/*.md")))

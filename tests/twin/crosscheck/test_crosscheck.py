@@ -4,6 +4,7 @@ import dataclasses
 import json
 import subprocess
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -75,6 +76,28 @@ def test_every_row_says_what_it_compares_and_why(told):
         assert row["states"] > 0
         assert np.isfinite(row["value"])
         assert row["value"] <= row["bound"]  # no row without a bound: it could not fail
+
+
+ROWS = json.loads(Path(__file__).with_name("rows.json").read_text(encoding="utf-8"))
+
+
+@pytest.mark.parametrize("name", ROWS)
+def test_every_row_has_its_bounds_and_what_is_no_rounding_its_value(told, name):
+    """`rows.json` has what was measured: errors of methods, times, angles; 'rounding' is below 1e-8."""
+    rows = {row["name"]: row for row in json.loads(told[0].stdout)["checks"]}
+    row, expected = rows[name], ROWS[name]
+    assert list(rows) == list(ROWS)
+    assert (row["states"], row["unit"]) == (expected["states"], expected["unit"])
+    assert row["bound"] == pytest.approx(expected["bound"], rel=1e-6)
+    assert row["at_least"] == (expected["at_least"] and pytest.approx(expected["at_least"], rel=1e-6))
+    assert row["detail"].keys() == expected["detail"].keys()
+    for received, number in [(row["value"], expected["value"])] + [
+        (row["detail"][entry], expected["detail"][entry]) for entry in expected["detail"]
+    ]:
+        if number == "rounding":
+            assert abs(received) < 1e-8
+        else:  # the reference solutions are exact to some 1e-12 of an angle
+            assert received == pytest.approx(number, rel=1e-3 if abs(number) < 1e-7 else 2e-5)
 
 
 def test_random_states_are_counted_over_all_plants(told):
