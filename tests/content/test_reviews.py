@@ -1,0 +1,228 @@
+"""Approved content of reviews, recoveries and exports of constructed runs, of short runs and of tables."""
+
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from spheretwin import scenario as scenarios
+from spheretwin.models.telemetry.fault_log import FaultLog
+from spheretwin.models.telemetry.status import Status
+from spheretwin.models.telemetry.table import read_parquet
+from spheretwin.provenance import facts_of
+from spheretwin.viz.recording.recorder import Recorder
+from spheretwin.viz.terminal import runs, tables, texts
+from spheretwin.viz.terminal.texts import Verdict
+from tests.content.content import Cases, check, command, printed, scratch
+from tests.content.pages import folder_text
+from tests.content.recordings import recording_text
+from tests.content.runs import FAULTS, made_run
+from tests.content.values import array, tree
+from tests.viz.terminal.test_runs import SUMMARY
+
+
+@cache
+def run_files() -> dict[str, Path]:
+    """Telemetry and recordings of constructed runs: other law, load, rate and hardware."""
+    changes = {
+        "first": {},
+        "other": {"controller.law": "pd", "disturbance.load": 1.5},
+        "slow": {"controller.period_s": 2e-3, "seed": 7},
+        "electronics": {
+            "hardware": "electronics",
+            "fault": FAULTS,
+            "watchdog.on": True,
+            "controller.law": "afsm_eso",
+        },
+    }
+    files = {}
+    for name, fields in changes.items():
+        scenario = scenarios.load("tilt", {"plant.engine": "lagrangian", "duration": 0.4, **fields})
+        run = made_run(scenario, f"run {name}")
+        for suffix in ("parquet", "rrd"):
+            files[f"{name}.{suffix}"] = run.save(scratch("files") / f"{name}.{suffix}")
+    return files
+
+
+def review_of(*names: str, options: tuple = ()) -> str:
+    files = run_files()
+    return command("review", *(files[name] for name in names), *options)
+
+
+def reviews() -> str:
+    calls = [
+        (("first.parquet",), ()),
+        (("electronics.rrd",), ()),
+        (("first.parquet", "other.parquet", "slow.rrd", "electronics.parquet"), ()),
+        (("first.parquet", "other.parquet"), ("--tolerance", "gate")),
+        (("first.parquet", "first.rrd"), ("--tolerance", "gate")),
+        (("first.parquet",), ("--merge", "x.rrd")),
+    ]
+    return "\n".join(review_of(*names, options=options) for names, options in calls)
+
+
+def review_json() -> str:
+    import json
+
+    out = []
+    for names, options in (
+        (("electronics.parquet",), ()),
+        (("first.parquet", "other.parquet"), ("--tolerance", "gate")),
+    ):
+        text = review_of(*names, options=(*options, "--json"))
+        found = json.loads(text.partition("stdout:\n")[2].partition("\n")[0])
+        out += [text.partition("stdout:")[0], *tree(found)]
+    return "\n".join(out)
+
+
+def review_page() -> str:
+    """Figures and page of a comparison; the plots of the page with their data."""
+    folder = scratch("review_page")
+    return folder_text(
+        lambda into: review_of("first.parquet", "other.parquet", "slow.parquet", options=("--figures", into)),
+        folder,
+        html=True,
+    )
+
+
+def review_merge() -> str:
+    path = scratch("merge") / "all.rrd"
+    path.unlink(missing_ok=True)
+    text = review_of("first.parquet", "other.parquet", options=("--merge", path))
+    found = recording_text(path).splitlines()
+    return "\n".join([text, *(line for line in found if not line.startswith("    "))])
+
+
+def exported() -> str:
+    """Tables of a run in other formats, its text, and its HTML."""
+    table, metadata = read_parquet(run_files()["electronics.parquet"])
+    csv = scratch("export") / "run.csv"
+    text = review_of("electronics.parquet", options=("--export", csv))
+    lines = csv.read_text().splitlines()
+    scenario = scenarios.load("hold", {"plant.engine": "lagrangian", "duration": 0.2})
+    run = made_run(scenario, "exported")
+    frame = run.to_pandas()
+    columns = [
+        f"{signal.name} [{signal.unit}] {signal.size} {array(table[signal.name])}" for signal in table.signals
+    ]
+    return "\n".join(
+        [
+            text, lines[0], lines[1][:200], f"{len(lines)} lines", *columns, *sorted(metadata),
+            repr(run), run._repr_html_().partition("<img")[0],
+            *(f"{name} {array(frame[name].to_numpy())}" for name in frame.columns),
+        ]
+    )  # fmt: skip
+
+
+def recoveries() -> str:
+    """Recovery of a partial recording and of a complete file."""
+    scenario = scenarios.load("hold", {"plant.engine": "lagrangian", "duration": 2.0})
+    run = made_run(scenario, "cut", most_ticks=2000)
+    cut = scratch("recover") / "cut.rrd"
+    recorder = Recorder(run.actuator, run.telemetry.signals, facts_of(run.scenario), path=cut)
+    recorder.write(run.telemetry)
+    cut.with_name("partial.rrd").write_bytes(recorder.partial().path.read_bytes())
+    recorder.close()
+    out = scratch("recover") / "whole.parquet"
+    calls = [
+        command("recover", cut.with_name("partial.rrd"), "--out", cut.with_name("again.rrd")),
+        command("review", cut.with_name("again.rrd")),
+        command("recover", run_files()["first.parquet"], "--out", out),
+        command("recover", scratch("recover") / "nowhere.rrd", "--out", out),
+    ]
+    return "\n".join(calls)
+
+
+def simulations() -> str:
+    """Short real runs: files, JSON, a failed run, a failsafe, faults and a manual mode."""
+    short = ("--plant.engine", "lagrangian", "--duration", "0.2")
+    faults = [
+        text
+        for place, fault in enumerate(FAULTS)
+        for name, value in fault.items()
+        for text in (f"--fault.{place}.{name.replace('_', '-')}", str(value).lower())
+    ]
+    folder = scratch("simulate")
+    calls = [
+        ("nutation", *short),
+        ("tilt", *short, "--hardware", "electronics", *faults),
+        ("sinusoid", *short, "--telemetry", folder / "a.parquet", "--record", folder / "a.rrd",
+         "--record-rate", "50"),
+        ("sinusoid", "--plant.engine", "lagrangian", "--controller.law", "pd", "--disturbance.load", "90"),
+        ("hold", *short, "--hardware", "electronics", "--watchdog.on", "true",
+         "--fault.0.target", "encoder.gamma", "--fault.0.mode", "dropout", "--fault.0.start-s", "0.01"),
+    ]  # fmt: skip
+    return "\n".join(command("simulate", *call) for call in calls)
+
+
+def terminal() -> str:
+    """Tables and texts of the terminal that no verb prints from constructed runs, also in colour."""
+    figures = {"law_metric": 3, **SUMMARY}
+    figures |= {
+        "warnings": ["a [warning]"],
+        "notes": ["a note"],
+        "realtime_factor": 12.3456,
+        "overshoot_rad": None,
+    }
+
+    def all_tables() -> None:
+        for status, why in (
+            (Status.COMPLETED, None),
+            (Status.FAILSAFE, "a coil is too hot"),
+            (Status.INTERRUPTED, None),
+        ):
+            summary = {**figures, "status": str(status)}
+            runs.print_run("pd", 10.0, summary, band_rad=0.01, why=why, faults=["coil.07 open", "supply off"])
+        runs.print_scenarios({"hold": "a [short] one", "nutation": "a longer one"})
+        runs.print_files(Path("a b.rrd"), Path("c.parquet"))
+        runs.print_written([Path("x.svg"), Path("[y].svg")])
+        wide = [f"heading {place}" for place in range(14)]
+        body = [[f"label {row}", *(f"{row * 10.5 + column:.2f}" for column in range(13))] for row in range(3)]
+        runs.print_rows("a wide table", wide, body, 1)
+        runs.print_rows("two words", ["a", "b", "c"], [["x", "some [text]", "1.5"], ["y", "z", "-2"]], 2)
+        long = "a long text of many words that has no room in a cell of three lines of a narrow terminal " * 4
+        runs.print_rows("a list", ["a", "b", "c"], [["x", long, "1"], ["y", "z", "2"]], 1)
+        print(
+            [
+                tables.three_digits(value)
+                for value in (0.0, 1e-4, -2e-4, 0.0123456, 1.005, 99.95, 123456.0, np.inf)
+            ]
+        )
+        print([tables.percent(share) for share in (0.0, 1e-6, 0.1234, 1.0)], runs.angle(0.0301))
+        results = [(None, "more " * 40), (True, "this " * 30), (False, "that")]
+        verdicts = [Verdict(f"figure{number}", "A title", results[: number + 1]) for number in range(4)]
+        texts.print_verdicts(verdicts)
+        texts.print_fields(
+            "fields", [texts.FieldText("--a", "1", "meaning " * 12), texts.FieldText("--b.c", "x" * 40, "m")]
+        )
+        texts.print_facts("facts", [("a", "1", "m", "normal", "a sheet", "why"), ("b", "", "", "", "", "")])
+        texts.print_sections(["run", "controller", "plant"])
+
+    return "\n".join([printed(all_tables), printed(all_tables, columns=50)])
+
+
+def fault_texts() -> str:
+    """Texts of faults of a constructed run."""
+    table, _ = read_parquet(run_files()["electronics.parquet"])
+    log = FaultLog()
+    log.write(table)
+    return "\n".join(f"{fault.text()} | {fault!r}" for fault in log.faults)
+
+
+CASES: Cases = {
+    "review_terminal": reviews,
+    "review_json": review_json,
+    "review_page": review_page,
+    "review_merge": review_merge,
+    "review_recover": recoveries,
+    "review_exported": exported,
+    "review_faults": fault_texts,
+    "review_simulate": simulations,
+    "terminal_tables": terminal,
+}
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_content(name):
+    check(name, CASES)
