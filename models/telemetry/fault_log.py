@@ -61,8 +61,10 @@ class FaultLog:
             if mode:
                 self._active[part] = FaultRecord(labels[part], modes[mode], t_s)
                 self.faults.append(self._active[part])
-        for tick, _, group, state in self._changes.of(rows, GROUP_OUT):
-            started = [fault for fault in self.faults if _group_of(fault.part) == group]
+        for tick, t_s, group, state in self._changes.of(rows, GROUP_OUT):
+            started = [
+                fault for fault in self.faults if _group_of(fault.part) == group and fault.start_s <= t_s
+            ]
             if state and started:
                 delay_s = rows[TIME_TO_DETECTION][tick, group]
                 is_reported = state == REPORTED or delay_s < 0
