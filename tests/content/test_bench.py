@@ -133,6 +133,7 @@ def statuses() -> str:
         ((1.0, -2.0, 0.0, 8.0), 8.0, None),
         ((0.5, -0.25), 0.0, (20.0, 31.25)),
         ((0.0, 0.0), 0.0, None),
+        ((12.0, -9.0, 4.0), 8.0, None),
     ):
         out.append(html_text(currents_html(currents, limit_A, temperature)))
     return "\n".join(out)

@@ -12,6 +12,7 @@ from spheretwin.models.telemetry.status import Status
 from spheretwin.models.telemetry.table import read_parquet
 from spheretwin.provenance import facts_of
 from spheretwin.viz.recording.recorder import Recorder
+from spheretwin.viz.terminal import reviews as reviews_printed
 from spheretwin.viz.terminal import runs, tables, texts
 from spheretwin.viz.terminal.texts import Verdict
 from tests.content.content import Cases, check, command, printed, scratch
@@ -19,6 +20,7 @@ from tests.content.pages import folder_text
 from tests.content.recordings import recording_text
 from tests.content.runs import FAULTS, made_run
 from tests.content.values import array, tree
+from tests.viz.terminal.test_reviews import RUN
 from tests.viz.terminal.test_runs import SUMMARY
 
 
@@ -202,6 +204,24 @@ def terminal() -> str:
     return "\n".join([printed(all_tables), printed(all_tables, columns=50)])
 
 
+def many_events() -> str:
+    """Report of a run with more events than are printed, and of one without numbers."""
+    events = [{"t_s": 0.125 * place, "level": "WARN", "text": f"event [{place}]"} for place in range(15)]
+    peak = {"frequency_Hz": 5.0, "amplitude_rad": 1e-3}
+    peaks = {"α": [peak, {**peak, "frequency_Hz": 0.5}], "β": [], "γ": [{**peak, "amplitude_rad": 2e-3}]}
+    some = {**RUN, "events": events, "error_peaks": peaks, "reason": "a reason", "rms_torque_Nm": None}
+    few = {
+        **RUN,
+        "events": events[:12],
+        "error_peaks": {"α": [], "β": [], "γ": []},
+        "overshoot_rad": [0.1, None, 1e-9],
+    }
+    errors = [reviews_printed.NominalError("nominal.x", "1", "2")]
+    return "\n".join(
+        printed(lambda run=run: reviews_printed.print_run_report(run, errors, 0.01)) for run in (some, few)
+    )
+
+
 def fault_texts() -> str:
     """Texts of faults of a constructed run."""
     table, _ = read_parquet(run_files()["electronics.parquet"])
@@ -220,6 +240,7 @@ CASES: Cases = {
     "review_faults": fault_texts,
     "review_simulate": simulations,
     "terminal_tables": terminal,
+    "terminal_many_events": many_events,
 }
 
 

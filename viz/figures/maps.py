@@ -74,7 +74,8 @@ def heat(
 def _write_cells(axes: Axes, panel: HeatPanel, scale: SymLogNorm) -> None:
     for (row, column), value in np.ndenumerate(panel.values):
         if np.isfinite(value):
-            away = abs(float(scale(np.clip(panel.changes[row, column], -FAR, FAR))) - 0.5)
+            change = panel.changes[row, column]
+            away = abs(float(scale(np.clip(change, -FAR, FAR))) - 0.5) if np.isfinite(change) else 0.0
             axes.text(column, row, _text(value), ha="center", va="center", fontsize="small",
                       color="white" if away > DARK else "black")  # fmt: skip
 
