@@ -15,7 +15,10 @@ from spheretwin.bench.modes import (
     jog_shape,
     point_shape,
 )
+from spheretwin.bench.operators import Operators
+from spheretwin.bench.pace import Pace
 from spheretwin.cli.bench import choices_of, settings_of, shape_settings
+from spheretwin.models.base.errors import InputError
 from spheretwin.models.telemetry.table import read_parquet
 from spheretwin.session import Session
 from spheretwin.trajectories import SHAPES
@@ -137,6 +140,134 @@ def a_script_of_commands():
     return "\n".join(lines)
 
 
+class Clock:
+    """Clock of a test."""
+
+    now = 0.0
+
+    def __call__(self):
+        return self.now
+
+
+def a_script_of_operators():
+    """Operator, watching and asking clients after each of their commands, and what is refused."""
+    clock = Clock()
+    operators, lines = Operators(2.0, 10.0, clock), []
+    steps = [
+        (0, "register", "a"),
+        (1, "register", "b"),
+        (1, "ask", "b"),
+        (1, "ask", "c"),
+        (1, "ask", "b"),
+        (2, "check", "b"),
+        (2, "check", None),
+        (2, "grant", "b", "c"),
+        (2, "grant", "a", "x"),
+        (3, "grant", "a", "c"),
+        (3, "check", "a"),
+        (4, "leave", "c"),
+        (4, "leave", "b"),
+        (
+            5,
+            "check_silence",
+        ),
+        (
+            6,
+            "check_silence",
+        ),
+        (
+            6.5,
+            "check_silence",
+        ),
+        (
+            7,
+            "check_silence",
+        ),
+        (7, "ask", "d"),
+        (8, "register", "a"),
+        (
+            16.9,
+            "check_silence",
+        ),
+        (
+            17.5,
+            "check_silence",
+        ),
+        (18, "register", "a"),
+        (
+            18.5,
+            "check_silence",
+        ),
+        (19, "ask", "a"),
+        (
+            30,
+            "check_silence",
+        ),
+        (
+            31,
+            "check_silence",
+        ),
+        (32, "register", "e"),
+        (33, "ask", "f"),
+        (
+            42.5,
+            "check_silence",
+        ),
+    ]
+    steps += [(50, "register", f"client {place}") for place in range(70)]
+    for now, name, *arguments in steps:
+        clock.now = now
+        try:
+            result = getattr(operators, name)(*arguments)
+        except InputError as error:
+            result = error
+        lines.append(
+            f"{now} {name} {arguments}: {result} | {operators.operator}, watching {operators.watching[:4]},"
+            f" asking {operators.asking}"
+        )
+    return "\n".join(lines)
+
+
+def a_script_of_the_pace():
+    """Ticks, waits and counts of chunks that are fast, slow and late, at several speeds."""
+    clock = Clock()
+    pace, lines, t_s = Pace(clock), [], 0.0
+    for speed, took_s in [
+        *[(1.0, 0.001)] * 8,
+        *[(1.0, 0.015)] * 3,
+        *[(2.0, 0.006)] * 4,
+        *[(1.0, 0.3)] * 2,
+        *[(0.1, 0.001)] * 3,
+        *[(1e6, 0.002)] * 4,
+        *[(1e6, 0.012)] * 2,
+        *[(1.0, 0.004)] * 4,
+        *[(1.0, 0.01)] * 2,
+        (20.0, 0.0041),
+        (20.0, 0.0039),
+    ]:
+        pace.speed = speed
+        ticks, wait_s = pace.ticks(1e-3), pace.wait_s()
+        clock.now += wait_s + took_s
+        t_s += 1e-3 * ticks
+        pace.record_chunk(ticks, 1e-3, t_s, took_s)
+        lines.append(
+            f"{speed:g} {took_s:g}: {ticks} ticks, wait {wait_s:.9g} s, factor {pace.realtime_factor():.9g},"
+            f" chunks {pace.chunks}, missed {pace.missed}, share {pace.missed_share:.9g},"
+            f" fastest {pace.fastest}"
+        )
+    pace.record_chunk(1, 1e-3, 0.0, 0.001)  # time goes back
+    lines.append(f"back: factor {pace.realtime_factor():.9g}")
+    clock.now += 1.5
+    lines.append(f"later: factor {pace.realtime_factor():.9g}, wait {pace.wait_s():.9g} s")
+    pace.rest()
+    lines.append(
+        f"rest: wait {pace.wait_s():.9g} s, chunks {pace.chunks}, ticks {pace.ticks(5e-4)} {pace.ticks(0.5)}"
+    )
+    pace.clear()
+    lines.append(f"clear: chunks {pace.chunks}, missed {pace.missed}, share {pace.missed_share:.9g}")
+    return "\n".join(lines)
+
+
 def shapes_of_modes():
     """Shapes and approaches that modes make of a motion."""
     content = {}
@@ -195,6 +326,8 @@ def choices():
 CASES = {
     "bench_script": a_script_of_commands,
     "bench_shapes": shapes_of_modes,
+    "bench_operators": a_script_of_operators,
+    "bench_pace": a_script_of_the_pace,
     "bench_arguments": arguments_of_commands,
     "bench_choices": choices,
 }
