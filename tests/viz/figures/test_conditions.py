@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
-from spheretwin.viz.figures import conditions, style
+from spheretwin.viz.figures import conditions
 from spheretwin.viz.theme import law_colour
 
 BANDWIDTHS = np.geomspace(20, 1000, 7)
@@ -25,13 +25,6 @@ def drawn() -> Figure:
 @pytest.fixture
 def figure() -> Figure:
     return drawn()
-
-
-def test_same_curves_give_the_same_bytes(tmp_path):
-    paths = [tmp_path / "a.png", tmp_path / "b.png"]
-    for path in paths:
-        style.save(drawn(), path)
-    assert paths[0].read_bytes() == paths[1].read_bytes()
 
 
 def test_axes_have_units_and_are_logarithmic(figure):
