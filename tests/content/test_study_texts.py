@@ -113,7 +113,7 @@ def table_of_a_study():
 
 def trials_of_a_tuning():
     """Trials, best gains and page of a tuning with two objectives, limits and further seeds."""
-    folder = scratch("tuning")
+    folder = scratch("trials")
     chosen = tuning.study(folder, **tuning.TWO, fresh=2, trials=12, together=4)
     with warnings_only():
         outcome = tune(chosen, folder / "out", threads=1)
@@ -147,7 +147,7 @@ def trials_of_each_sampler():
         ("random", {"trials": 4, "prune": False}),
         ("local", local),
     ):
-        folder = scratch(f"tuning_{sampler}")
+        folder = scratch(f"trials_{sampler}")
         gains = (
             tuning.gain(start=100.0),
             {
