@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from spheretwin import outputs, replay
+from spheretwin import run as run_module
 from spheretwin import scenario as scenarios
 from spheretwin.active_config import initial_config, warnings_of
 from spheretwin.control.laws import LAWS
@@ -336,6 +337,10 @@ def of_sessions():
     return "\n".join(lines)
 
 
+def _not_installed(package):
+    raise ModuleNotFoundError(package)
+
+
 def run_objects():
     """Text, page, tables and files of a run."""
     run = simulate(
@@ -354,6 +359,12 @@ def run_objects():
     lines += [f"log {line}" for line in run._log()]
     record = run.provenance
     lines += tree({"status": record.status, "journal": list(record.journal), "ticks": record.ticks})
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(run_module, "import_module", _not_installed)
+        for convert in (run.to_pandas, run.to_polars, run.to_xarray):
+            with pytest.raises(InputError) as refusal:
+                convert()
+            lines.append(f"{convert.__name__}: {refusal.value}")
     for name in ("a.csv", "a", "b.parquet", "b.rrd"):
         try:
             run.save(folder / name)
