@@ -17,6 +17,7 @@ from spheretwin.study.tuning.trials import Ended, FinishedTrial, Tried
 from spheretwin.study.tuning.tuning import Holdout, LawResult, ReportedTrial, TuningResult
 from spheretwin.viz.pages import magnetics, markdown
 from tests.content.content import Cases, check, command, scratch
+from tests.content.figures import captured
 from tests.content.pages import folder_text, html_text
 from tests.content.values import tree
 from tests.content.verdicts import (
@@ -168,7 +169,22 @@ def html_page() -> str:
     return html_text(markdown.page("A title", text))
 
 
+def formats() -> str:
+    """One figure in every format: the SVG before its width is that of a paper."""
+    from spheretwin.viz.figures import faults
+
+    out = []
+    for kind in ("svg", "png", "pdf", "pdf-one-column", "pdf-two-columns"):
+        figure = faults.shares({"a": {1: 0.5, 3: 1.0}, "b": {2: 0.25}}, "x of the figure", "y", "A title")
+        drawing = markdown.Drawing("one.svg", "What it shows.", figure)
+        with captured() as texts:
+            markdown.save_drawings(scratch("formats"), [drawing], kind)
+        out += [f"--- {kind}", *(line for name, text in texts.items() for line in (name, text))]
+    return "\n".join(out)
+
+
 CASES: Cases = {
+    "page_formats": formats,
     **{f"study_{name}": partial(study_page, name) for name in STUDIES},
     "tuning_page": tuning_page,
     "crosscheck_page": crosscheck_page,
