@@ -58,8 +58,18 @@ def _axes(axes: Axes) -> list[str]:
         )
     hidden = "" if axes.get_visible() and axes.axison else " hidden"
     titles = [axes.get_title(loc) for loc in ("left", "center", "right")]
-    spines = [name for name, spine in axes.spines.items() if spine.get_visible()]
-    frame = f"aspect {axes.get_aspect()} spines {' '.join(spines)} face {_colour(axes.get_facecolor())}"
+    spines = [
+        f"{name} {_colour(spine.get_edgecolor())} {number(spine.get_linewidth())}"
+        for name, spine in axes.spines.items()
+        if spine.get_visible()
+    ]
+    frame = f"below {axes.get_axisbelow()} aspect {axes.get_aspect()} spines {', '.join(spines)}"
+    frame += f" face {_colour(axes.get_facecolor())}"
+    if bar := getattr(axes, "_colorbar", None):
+        shape = {
+            name: value for name, value in axes._colorbar_info.items() if name in ("shrink", "aspect", "pad")
+        }
+        frame += f" colour bar {bar.orientation} extend {bar.extend} {shape}"
     out = [f"axes {axes.name}{hidden}{where} title {titles!r} {_look(axes.title)} {frame}"]
     for name, axis in axes._axis_map.items():
         out += _axis(name, axis, getattr(axes, f"get_{name}lim")())
@@ -89,13 +99,18 @@ def _axis(name: str, axis: Axis, limits) -> list[str]:
         label for label in axis.get_minor_formatter().format_ticks(axis.get_minorticklocs()) if label
     ]
     on = axis.get_tick_params()
+    looks = sorted((name, value) for name, value in on.items() if name[:5] != "label" and name != "gridOn")
+    looks.append(("labelsize", on.get("labelsize", "")))
     drawn = [side for side in ("labelleft", "labelbottom", "labelright", "labeltop") if on.get(side)]
-    grid = " grid" if on.get("gridOn") else ""
+    grid = ""
+    if on.get("gridOn"):
+        (line, *_) = [*axis.get_gridlines(), None]
+        grid = f" grid {_colour(line.get_color())} {_dash(line)}{_common(line)}" if line else " grid"
     rotation = {label.get_rotation() for label in axis.get_majorticklabels()}
     turned = f" rotation {sorted(rotation)}" if rotation - {0.0} else ""
     small = f" minor labels {words(minor_labels)}" if minor_labels else ""
     head = f"  {name}: label {axis.get_label_text()!r} scale {axis.get_scale()} limits {array(limits)}"
-    ticks_text = f"ticks {array(np.array(ticks))} {words(shown)} minor {minor}{small}{grid}{turned}"
+    ticks_text = f"ticks {array(np.array(ticks))} {words(shown)} minor {minor}{small}{grid}{turned} {looks}"
     return [f"{head} {ticks_text} {' '.join(drawn)}"]
 
 
@@ -194,6 +209,8 @@ def _mapped(mapped) -> str:
 
 def _legend(legend: Legend) -> list[str]:
     place = f"columns {legend._ncols} at {legend._get_loc()} {legend._outside_loc}"
+    sizes = {text.get_fontsize() for text in legend.get_texts()}
+    place += f" frame {legend.get_frame_on()} handles {number(legend.handlelength)} texts {sorted(sizes)} pt"
     out = [f"legend title {legend.get_title().get_text()!r} {place}"]
     for label, handle in zip(legend.get_texts(), legend.legend_handles, strict=True):
         look = _artist(handle)[0].partition(" x [")[0].partition(" x n=")[0] if handle is not None else ""
@@ -223,7 +240,9 @@ def _common(artist) -> str:
     alpha = artist.get_alpha()
     faint = "" if alpha is None else f" alpha {array(alpha) if np.ndim(alpha) else number(float(alpha))}"
     beyond = "" if artist.get_clip_on() else " unclipped"
-    return f"{named} z {number(artist.get_zorder())}{faint}{hidden}{beyond}"
+    effects = f" effects {len(artist.get_path_effects())}" if artist.get_path_effects() else ""
+    pixels = " rasterized" if artist.get_rasterized() else ""
+    return f"{named} z {number(artist.get_zorder())}{faint}{hidden}{beyond}{effects}{pixels}"
 
 
 def _colour(colour) -> str:
