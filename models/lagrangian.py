@@ -18,7 +18,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from spheretwin.models.base.compiled import compiled
+from spheretwin.models.base.compiled import compiled, inlined
 
 GRAVITY_m_s2 = 9.81
 
@@ -250,7 +250,7 @@ def inertia_entries(at: Turns, inertia: Triple) -> InertiaEntries:
     )
 
 
-@compiled
+@inlined
 def coriolis_rows(at: Turns, qdot: Triple, inertia: Triple) -> tuple[Triple, Triple, Triple]:
     """Return the rows of `coriolis_matrix` (kg·m²/s)."""
     J1, J2, J3 = inertia
@@ -279,13 +279,13 @@ def coriolis_rows(at: Turns, qdot: Triple, inertia: Triple) -> tuple[Triple, Tri
     return first, second, third
 
 
-@compiled
+@inlined
 def gravity_entries(at: Turns, weight_moment: float) -> Triple:
     """Return the entries of `gravity_torque` (N·m)."""
     return -weight_moment * at.sa * at.cb, -weight_moment * at.ca * at.sb, 0.0
 
 
-@compiled
+@inlined
 def acceleration_entries(
     at: Turns, qdot: Triple, torque: Triple, inertia: Triple, weight_moment: float
 ) -> Triple:

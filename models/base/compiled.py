@@ -69,6 +69,14 @@ def part_of_its_caller(function: F) -> F:
     return _compiled(function, **_ALLOCATION_FREE, inline="always")
 
 
+def inlined(function: F) -> F:
+    """Compile a formula on scalars, as `allocation_free` does, always into its caller.
+
+    A loop in which a call is left is not vectorised.
+    """
+    return _compiled(function, **_ALLOCATION_FREE, forceinline=True)
+
+
 def for_types_of(function: Any, *arguments: Any) -> Callable[..., Any]:
     """Return the machine code of a compiled function for the types of the given arguments.
 

@@ -1,4 +1,4 @@
-"""Plant: public step of the plant, control period of the loop, two rotor engines, friction.
+"""Plant: public step of one plant and of many, control period of the loop, two rotor engines, friction.
 
 >>> from spheretwin import plant
 >>> parameters = plant.parameters("nutation", {"plant.payload_kg": 0.1})
@@ -11,8 +11,10 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from spheretwin.plant.plant_step import Parameters, State, step, torque_matrix
+    from spheretwin.plant.plants import Plants
 
 _MODULES = {
+    "Plants": "spheretwin.plant.plants",
     "Parameters": "spheretwin.plant.plant_step",
     "State": "spheretwin.plant.plant_step",
     "step": "spheretwin.plant.plant_step",
@@ -21,7 +23,7 @@ _MODULES = {
     "linearise": "spheretwin.linear",
 }
 
-__all__ = ["Parameters", "State", "linearise", "parameters", "step", "torque_matrix"]
+__all__ = ["Parameters", "Plants", "State", "linearise", "parameters", "step", "torque_matrix"]
 
 
 def __getattr__(name: str) -> Any:

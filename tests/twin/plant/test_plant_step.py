@@ -170,5 +170,5 @@ def test_changes_need_a_name():
 
 
 def test_a_name_that_the_package_has_not_is_refused():
-    with pytest.raises(AttributeError, match="it has Parameters, State"):
+    with pytest.raises(AttributeError, match="it has Parameters, Plants, State"):
         _ = plant.stepp

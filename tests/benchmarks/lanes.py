@@ -1,0 +1,136 @@
+"""Speed of plants in lockstep as ratios to single plants: ``python tests/benchmarks/lanes.py [--json]``.
+
+One core, 64 plants, 50 steps a call; the vectors of the processor decide, so its widest are named.
+"""
+
+import argparse
+import json
+import sys
+
+import llvmlite.binding
+import numpy as np
+from measuring import fastest, ratio, seconds_of, tell
+
+from spheretwin import plant
+from spheretwin.models.base.compiled import allocation_free, compiled
+from spheretwin.plant.friction import friction, slow_down
+from spheretwin.plant.lagrangian_rotor import LagrangianData
+from spheretwin.plant.lagrangian_rotor import step as step_rotor
+from spheretwin.plant.plant_step import step
+
+PLANTS, STEPS, CALLS = 64, 50, 20
+dt = 1e-9  # s: friction must not bring the rotor to rest, where numbers are denormal and slow
+FRICTION = {"plant.coulomb_Nm": [2e-3] * 3, "plant.viscous_Nm_s": [1e-4] * 3}
+STATE = plant.State(np.array([0.1, 0.2, 0.3]), np.array([0.0, 0.0, 5.0]))
+
+
+def single(changes):
+    """Time of a public step of one plant, called from compiled code, s."""
+    parameters, steps = plant.parameters("nutation", changes), PLANTS * STEPS * CALLS
+    return lambda: seconds_of(lambda: _coast(steps, STATE, np.zeros(18), np.zeros(3), parameters)) / steps
+
+
+def lockstep(changes):
+    """Time of the same step of one of many plants, s."""
+    plants = _plants(changes)
+    step = lambda: [plants.step(np.zeros(18), np.zeros(3), dt, STEPS) for _ in range(CALLS)]  # noqa: E731
+    return lambda: seconds_of(step) / (PLANTS * STEPS * CALLS)
+
+
+def single_without_field():
+    """Time of a step of rotor and friction of one plant, s."""
+    parameters, steps = plant.parameters("nutation", FRICTION), PLANTS * STEPS * CALLS
+    inertia, warnings = parameters.inertia_kg_m2, np.zeros(1, np.int32)
+    resistance = friction(
+        parameters.coulomb_Nm, parameters.viscous_Nm_s, parameters.friction_smoothing_rad_s, inertia, dt
+    )
+
+    def work():
+        rotor = LagrangianData(
+            dt, None, inertia, 0.0, STATE.q_rad.copy(), STATE.qdot_rad_s.copy(), np.zeros(3), warnings
+        )
+        return seconds_of(lambda: _coast_without_field(steps, rotor, resistance, np.zeros(3))) / steps
+
+    return work
+
+
+def lockstep_without_field():
+    """Time of the same step of one of many plants, s."""
+    plants = _plants(FRICTION)
+    step = lambda: [plants.step_torque(np.zeros(3), dt, STEPS) for _ in range(CALLS)]  # noqa: E731
+    return lambda: seconds_of(step) / (PLANTS * STEPS * CALLS)
+
+
+def _plants(changes):
+    plants = plant.Plants(plant.parameters("nutation", changes), PLANTS)
+    plants.set_state(STATE.q_rad, STATE.qdot_rad_s)
+    return plants
+
+
+@compiled
+def _coast(calls, state, currents, disturbance, parameters):
+    for _ in range(calls):
+        state = step(state, currents, disturbance, parameters, dt)
+
+
+@allocation_free
+def _coast_without_field(calls, rotor, resistance, friction_q):
+    for _ in range(calls):
+        slow_down(resistance, rotor.q, rotor.qdot, friction_q)
+        step_rotor(rotor)
+        slow_down(resistance, rotor.q, rotor.qdot, friction_q)
+
+
+def vectors() -> str:
+    """Widest vectors of this processor."""
+    features = llvmlite.binding.get_host_cpu_features()
+    names = [name for name in ("avx512f", "avx2", "neon") if features.get(name)]
+    return f"{llvmlite.binding.get_host_cpu_name()}, {names[0] if names else 'no wide vectors'}"
+
+
+def ratios():
+    """Measure everything."""
+    taken = fastest(
+        {
+            "single": single({}),
+            "lockstep": lockstep({}),
+            "single, friction": single(FRICTION),
+            "lockstep, friction": lockstep(FRICTION),
+            "single, no field": single_without_field(),
+            "lockstep, no field": lockstep_without_field(),
+        },
+        rounds=9,
+    )
+    return [
+        ratio("one plant over one of 64, rotor and field", taken["single"], taken["lockstep"], at_least=2.0),
+        ratio(
+            "one plant over one of 64, rotor, field and friction",
+            taken["single, friction"],
+            taken["lockstep, friction"],
+            at_least=2.0,
+        ),
+        ratio(
+            "one plant over one of 64, rotor and friction",
+            taken["single, no field"],
+            taken["lockstep, no field"],
+            at_least=5.0,
+        ),
+    ]
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--json", action="store_true")
+    options = parser.parse_args()
+    rows = ratios()
+    if options.json:
+        print(json.dumps({"processor": vectors(), "ratios": rows}))
+    else:
+        print(vectors())
+        for row in rows:
+            tell(row)
+    return 0 if all(row["ok"] for row in rows) else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())

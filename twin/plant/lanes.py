@@ -1,0 +1,269 @@
+"""Compiled step of many plants at a time: a plant in each lane of the vector unit.
+
+The operations and the formulas are those of `plant_step`. Three things differ, because the compiler
+vectorises only loops without branches and calls: sine and cosine are polynomials, the complex system of the
+friction is solved in real arithmetic, and all numbers of a block of plants are in one vector. The reads of
+the torque table are scattered: the field is computed plant by plant.
+"""
+
+from __future__ import annotations
+
+from math import sqrt
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spheretwin.models.base.compiled import allocation_free, inlined
+from spheretwin.models.base.trigonometry import sine_cosine
+from spheretwin.models.lagrangian import (
+    InertiaEntries,
+    Triple,
+    Turns,
+    acceleration_entries,
+    inertia_entries,
+    solve_inertia,
+)
+from spheretwin.models.magnetics import TorqueModel, fill_torque_matrix, rotor_torque
+from spheretwin.plant.friction import momentum
+
+Array = NDArray[np.float64]
+
+LANES = 16
+"""Plants of a block, a constant of the compiled code. Loops over 8 would be unrolled, not vectorised."""
+
+# First number of each quantity in a block. A row has an entry for each plant; most quantities have three.
+_TRIPLE = 3 * LANES
+Q, QDOT, TORQUE, HELD, INERTIA, COULOMB = (_TRIPLE * place for place in range(6))
+VISCOUS, SPRING, MIDDLE_Q, TORQUE_S, ACCELERATION = (_TRIPLE * place for place in range(6, 11))
+STAGE_Q, STAGE_QDOT, SUM_Q, SUM_QDOT = (_TRIPLE * place for place in range(11, 15))
+COSINE, SINE = (_TRIPLE * place for place in range(15, 17))
+WEIGHT, SMOOTHING, ROWS = 51 * LANES, 52 * LANES, 53
+
+
+class LaneField(NamedTuple):
+    """Magnetics of all plants, and working space."""
+
+    line_axes: Array  # (n, lines, 3), as in `TorqueModel`
+    line_weights: Array  # (n, lines)
+    group_axes: Array  # (n, 3, groups)
+    tables: Array  # (tables, intervals, 4)
+    table_of: NDArray[np.int64]  # (n,) number of each plant's table
+    pair_gain: Array  # (n, 2, pairs)
+    pair_stretch: Array  # (n, 2, pairs)
+    torque_gain: Array  # (n, groups)
+    G: Array  # (3, groups)
+    scratch: Array  # (5, pairs)
+    vectors: Array  # (3, largest of 3 and groups)
+
+
+@allocation_free
+def advance(blocks: Array, field: LaneField, currents: Array, dt: float, steps: int, slows: bool) -> None:
+    """Advance all plants under held currents.
+
+    Parameters
+    ----------
+    blocks : (blocks, ROWS * LANES) array
+        Changed in place; HELD has the torque on the hinges besides field, spring and friction.
+    field : LaneField
+    currents : (n, groups) array, A
+        At most as many plants as there are lanes.
+    dt : float, s
+    steps : int
+    slows : bool
+        False if no plant has friction.
+    """
+    for number in range(blocks.shape[0]):
+        block, first = blocks[number], number * LANES
+        plants = min(LANES, currents.shape[0] - first)
+        for _ in range(steps):
+            _predict(block, dt)
+            if slows:
+                _slow_down(block, dt)
+            for lane in range(plants):
+                _compute_field(block, lane, field, first + lane, currents[first + lane])
+            _collect_torque(block)
+            _step_rotor(block, dt)
+            if slows:
+                _slow_down(block, dt)
+
+
+@allocation_free
+def advance_without_field(blocks: Array, dt: float, steps: int, slows: bool) -> None:
+    """Advance all plants under HELD, the torque on the hinges besides spring and friction."""
+    for number in range(blocks.shape[0]):
+        block = blocks[number]
+        for i in range(TORQUE_S, TORQUE_S + _TRIPLE):
+            block[i] = 0.0
+        for _ in range(steps):
+            _predict(block, dt)
+            if slows:
+                _slow_down(block, dt)
+            _collect_torque(block)
+            _step_rotor(block, dt)
+            if slows:
+                _slow_down(block, dt)
+
+
+@inlined
+def _triple(block: Array, first: int, lane: int) -> Triple:
+    return block[first + lane], block[first + LANES + lane], block[first + 2 * LANES + lane]
+
+
+@inlined
+def _turns(block: Array, lane: int) -> Turns:
+    ca, cb, cg = _triple(block, COSINE, lane)
+    sa, sb, sg = _triple(block, SINE, lane)
+    return Turns(ca, sa, cb, sb, cg, sg)
+
+
+@allocation_free
+def _turn(block: Array, pose: int) -> None:
+    """Compute cosine and sine of all angles of a pose."""
+    for i in range(_TRIPLE):
+        block[SINE + i], block[COSINE + i] = sine_cosine(block[pose + i])
+
+
+@allocation_free
+def _predict(block: Array, dt: float) -> None:
+    """Predict the pose in the middle of the step."""
+    for i in range(_TRIPLE):
+        block[MIDDLE_Q + i] = block[Q + i] + 0.5 * dt * block[QDOT + i]
+
+
+@allocation_free
+def _compute_field(block: Array, lane: int, field: LaneField, plant: int, current: Array) -> None:
+    """Compute the torque of the coils of one plant in the stator frame."""
+    model = TorqueModel(
+        field.line_axes[plant],
+        field.line_weights[plant],
+        field.group_axes[plant],
+        field.tables[field.table_of[plant]],
+        field.pair_gain[plant],
+        field.pair_stretch[plant],
+    )
+    q, effective, torque_S = field.vectors[0], field.vectors[1], field.vectors[2]
+    gain, groups = field.torque_gain[plant], field.torque_gain.shape[1]
+    for i in range(3):
+        q[i] = block[MIDDLE_Q + i * LANES + lane]
+    fill_torque_matrix(q, model, field.G, field.scratch)
+    for j in range(groups):
+        effective[j] = gain[j] * current[j]
+    rotor_torque(field.G, effective[:groups], torque_S)
+    for i in range(3):
+        block[TORQUE_S + i * LANES + lane] = torque_S[i]
+
+
+@allocation_free
+def _collect_torque(block: Array) -> None:
+    """Compute the torque on the hinges, held over the step: that of the coils as `generalised_torque`."""
+    _turn(block, MIDDLE_Q)
+    for lane in range(LANES):
+        at, (x, y, z) = _turns(block, lane), _triple(block, TORQUE_S, lane)
+        block[TORQUE + lane], block[TORQUE + LANES + lane] = x, at.ca * y + at.sa * z
+        block[TORQUE + 2 * LANES + lane] = at.sb * x + at.cb * (at.ca * z - at.sa * y)
+    for i in range(_TRIPLE):
+        block[TORQUE + i] += block[HELD + i] - block[SPRING + i] * block[MIDDLE_Q + i]
+
+
+@allocation_free
+def _step_rotor(block: Array, dt: float) -> None:
+    """Advance angles and rates by a Runge-Kutta step, as `lagrangian_rotor.step` does."""
+    for i in range(_TRIPLE):
+        block[STAGE_Q + i], block[STAGE_QDOT + i] = block[Q + i], block[QDOT + i]
+        block[SUM_Q + i] = block[SUM_QDOT + i] = 0.0
+    for stage in range(4):
+        _turn(block, STAGE_Q)
+        _accelerate(block)
+        weight = 2.0 if stage == 1 or stage == 2 else 1.0
+        time = dt if stage == 2 else 0.5 * dt
+        for i in range(_TRIPLE):
+            rate, acceleration = block[STAGE_QDOT + i], block[ACCELERATION + i]
+            block[SUM_Q + i] += weight * rate
+            block[SUM_QDOT + i] += weight * acceleration
+            block[STAGE_Q + i] = block[Q + i] + time * rate
+            block[STAGE_QDOT + i] = block[QDOT + i] + time * acceleration
+    for i in range(_TRIPLE):
+        block[Q + i] += dt / 6 * block[SUM_Q + i]
+        block[QDOT + i] += dt / 6 * block[SUM_QDOT + i]
+
+
+@allocation_free
+def _accelerate(block: Array) -> None:
+    """Compute the accelerations at the stage."""
+    for lane in range(LANES):
+        alpha, beta, gamma = acceleration_entries(
+            _turns(block, lane),
+            _triple(block, STAGE_QDOT, lane),
+            _triple(block, TORQUE, lane),
+            _triple(block, INERTIA, lane),
+            block[WEIGHT + lane],
+        )
+        block[ACCELERATION + lane], block[ACCELERATION + LANES + lane] = alpha, beta
+        block[ACCELERATION + 2 * LANES + lane] = gamma
+
+
+@allocation_free
+def _slow_down(block: Array, dt: float) -> None:
+    """Advance the rates by half a step under friction alone, as `friction.slow_down` does."""
+    t = 0.5 * dt
+    _turn(block, Q)
+    for lane in range(LANES):
+        M = inertia_entries(_turns(block, lane), _triple(block, INERTIA, lane))
+        rates = _triple(block, QDOT, lane)
+        before = momentum(M, rates, None)
+        a, b, c = _factors(block, lane, rates)
+        middle = solve_inertia(_with_diagonal(M, 0.5 * t * a, 0.5 * t * b, 0.5 * t * c), before, None)
+        a, b, c = _factors(block, lane, middle)
+        alpha, beta, gamma = _slowed(M, (0.5 * t * a, 0.5 * t * b, 0.5 * t * c), before)
+        block[QDOT + lane], block[QDOT + LANES + lane] = alpha, beta
+        block[QDOT + 2 * LANES + lane] = gamma
+
+
+@inlined
+def _factors(block: Array, lane: int, rates: Triple) -> Triple:
+    """Return the friction of each hinge divided by its rate, N·m·s."""
+    a, b, c = _triple(block, VISCOUS, lane)
+    coulomb, square = _triple(block, COULOMB, lane), block[SMOOTHING + lane] ** 2
+    return (
+        a + coulomb[0] / sqrt(rates[0] ** 2 + square),
+        b + coulomb[1] / sqrt(rates[1] ** 2 + square),
+        c + coulomb[2] / sqrt(rates[2] ** 2 + square),
+    )
+
+
+@inlined
+def _with_diagonal(M: InertiaEntries, alpha: float, beta: float, gamma: float) -> InertiaEntries:
+    return InertiaEntries(
+        M.alpha + alpha, M.beta + beta, M.gamma + gamma, M.alpha_beta, M.alpha_gamma, M.beta_gamma
+    )
+
+
+@inlined
+def _slowed(M: InertiaEntries, damping: Triple, before: Triple) -> Triple:
+    """Return the real part of ``(1 - i) u``, where ``(M + (1 + i) diag(damping)) u = before``.
+
+    It is the elimination of `solve_inertia` for an ideal joint, with real and imaginary parts apart.
+    """
+    a, b, c = damping
+    # Reciprocals of the two diagonal entries that are eliminated.
+    beta_re, beta_im = M.beta + b, b
+    share = 1.0 / (beta_re * beta_re + beta_im * beta_im)
+    beta_re, beta_im = share * beta_re, -share * beta_im
+    gamma_re, gamma_im = M.gamma + c, c
+    share = 1.0 / (gamma_re * gamma_re + gamma_im * gamma_im)
+    gamma_re, gamma_im = share * gamma_re, -share * gamma_im
+    left_re = M.alpha + a - beta_re * M.alpha_beta**2 - gamma_re * M.alpha_gamma**2
+    left_im = a - beta_im * M.alpha_beta**2 - gamma_im * M.alpha_gamma**2
+    share = 1.0 / (left_re * left_re + left_im * left_im)
+    from_beta, from_gamma = M.alpha_beta * before[1], M.alpha_gamma * before[2]
+    rest_re = before[0] - beta_re * from_beta - gamma_re * from_gamma
+    rest_im = -beta_im * from_beta - gamma_im * from_gamma
+    alpha_re = share * (rest_re * left_re + rest_im * left_im)
+    alpha_im = share * (rest_im * left_re - rest_re * left_im)
+    on_beta_re, on_beta_im = before[1] - M.alpha_beta * alpha_re, -M.alpha_beta * alpha_im
+    on_gamma_re, on_gamma_im = before[2] - M.alpha_gamma * alpha_re, -M.alpha_gamma * alpha_im
+    # The real part of (1 - i) u is the sum of both parts of u.
+    beta = beta_re * (on_beta_re + on_beta_im) + beta_im * (on_beta_re - on_beta_im)
+    gamma = gamma_re * (on_gamma_re + on_gamma_im) + gamma_im * (on_gamma_re - on_gamma_im)
+    return alpha_re + alpha_im, beta, gamma

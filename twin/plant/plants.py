@@ -1,0 +1,252 @@
+"""Many plants that are advanced together, each with parameters of its own."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from spheretwin.models.base.errors import InputError
+from spheretwin.models.magnetics import TorqueModel, scratch_of
+from spheretwin.plant import lanes
+from spheretwin.plant.lanes import LANES, LaneField
+from spheretwin.plant.plant_step import Parameters, State, step
+
+Array = NDArray[np.float64]
+
+
+class Plants:
+    """Plants in lockstep on one core; each step is that of `plant.step`, within rounding.
+
+    Plants with an ideal joint are computed in blocks of 16, one in each lane of the vector unit. A plant with
+    a general joint is computed by `plant.step` itself.
+
+    Parameters
+    ----------
+    parameters : Parameters or sequence of Parameters
+        Of all plants, or of each; all with equal numbers of pole lines and groups.
+    count : int, optional
+        Number of plants; only with parameters of all.
+
+    Raises
+    ------
+    InputError
+        No plant, a count with a sequence, or different numbers of pole lines or groups.
+
+    Examples
+    --------
+    >>> plants = Plants(plant.parameters("nutation"), 64)
+    >>> plants.step(currents, np.zeros(3), 5e-4, steps=2)
+    >>> plants.q_rad  # (64, 3)
+    """
+
+    def __init__(self, parameters: Parameters | Sequence[Parameters], count: int | None = None) -> None:
+        if isinstance(parameters, Parameters):
+            each = [parameters] * (1 if count is None else count)
+        elif count is None:
+            each = list(parameters)
+        else:
+            raise InputError(f"plants: expected a count with one set of parameters, received {count}")
+        if not each:
+            raise InputError("plants: expected at least one plant, received none")
+        self._parameters = each
+        models = [one.magnetics for one in each]
+        pairs = max(model.pair_gain.shape[1] for model in models)
+        lines, groups = models[0].line_axes.shape[0], models[0].group_axes.shape[1]
+        n, blocks = len(each), -(-len(each) // LANES)
+        self._field = LaneField(
+            line_axes=np.empty((n, lines, 3)),
+            line_weights=np.empty((n, lines)),
+            group_axes=np.empty((n, 3, groups)),
+            tables=models[0].table[None],
+            table_of=np.zeros(n, np.int64),
+            pair_gain=np.empty((n, 2, pairs)),
+            pair_stretch=np.empty((n, 2, pairs)),
+            torque_gain=np.empty((n, groups)),
+            G=np.empty((3, groups)),
+            scratch=scratch_of(models[0]),
+            vectors=np.empty((3, max(3, groups))),
+        )
+        self._blocks = np.zeros((blocks, lanes.ROWS * LANES))
+        # A lane without a plant: at rest, of inertia 1.
+        self._write(lanes.INERTIA, np.ones((blocks * LANES, 3)))
+        self._blocks[:, lanes.SMOOTHING : lanes.SMOOTHING + LANES] = 1.0
+        self._constant_Nm = np.zeros((n, 3))
+        for number, one in enumerate(each):
+            self._set(number, one)
+        self._classify()
+
+    def __len__(self) -> int:
+        return len(self._parameters)
+
+    @property
+    def groups(self) -> int:
+        """Number of coil groups."""
+        return self._field.torque_gain.shape[1]
+
+    @property
+    def q_rad(self) -> Array:
+        """Hinge angles (n, 3), a copy."""
+        return self._read(lanes.Q)
+
+    @property
+    def qdot_rad_s(self) -> Array:
+        """Hinge rates (n, 3), a copy."""
+        return self._read(lanes.QDOT)
+
+    def set_state(
+        self, q_rad: ArrayLike, qdot_rad_s: ArrayLike, plants: ArrayLike | slice = slice(None)
+    ) -> None:
+        """Set angles and rates.
+
+        Parameters
+        ----------
+        q_rad, qdot_rad_s : (3,) or (m, 3) arrays
+            For all, or for each.
+        plants : indices or mask, optional
+            Which plants; default: all.
+        """
+        for first, values in ((lanes.Q, q_rad), (lanes.QDOT, qdot_rad_s)):
+            present = self._read(first)
+            present[plants] = values
+            self._write(first, present)
+
+    def set_parameters(self, number: int, parameters: Parameters) -> None:
+        """Give one plant other parameters; its state stays.
+
+        Raises
+        ------
+        InputError
+            Another number of pole lines or groups than that of the first plant.
+        """
+        self._set(number, parameters)
+        self._classify()
+
+    def step(self, currents: ArrayLike, disturbance: ArrayLike, dt: float, steps: int = 1) -> None:
+        """Advance all plants under held currents.
+
+        Parameters
+        ----------
+        currents : (groups,) or (n, groups) array, A
+            Of each group.
+        disturbance : (3,) or (n, 3) array, N·m
+            Generalised torque, subtracted in (1).
+        dt : float, s
+            Length of a step.
+        steps : int
+            Number of steps.
+
+        Raises
+        ------
+        InputError
+            Another shape, or a number that is not finite.
+        """
+        currents, disturbance = (
+            self._each("currents", currents, self.groups),
+            self._each("disturbance", disturbance),
+        )
+        general = self._advance_general(currents, disturbance, dt, steps)
+        self._write(lanes.HELD, -(disturbance + self._constant_Nm))
+        lanes.advance(self._blocks, self._field, currents, dt, steps, self._slows)
+        self._put(general)
+
+    def step_torque(self, torque_q: ArrayLike, dt: float, steps: int = 1) -> None:
+        """Advance all plants under held torques on the hinges, without currents.
+
+        Parameters
+        ----------
+        torque_q : (3,) or (n, 3) array, N·m
+            Generalised torque, held over the steps.
+        dt : float, s
+        steps : int
+        """
+        torque_q = self._each("torque_q", torque_q)
+        general = self._advance_general(np.zeros((len(self), self.groups)), -torque_q, dt, steps)
+        self._write(lanes.HELD, torque_q - self._constant_Nm)
+        lanes.advance_without_field(self._blocks, dt, steps, self._slows)
+        self._put(general)
+
+    def _set(self, number: int, parameters: Parameters) -> None:
+        model, field = parameters.magnetics, self._field
+        if model.line_axes.shape != field.line_axes[0].shape or model.group_axes.shape[1] != self.groups:
+            raise InputError(
+                f"plants: expected {field.line_axes.shape[1]} pole lines and {self.groups} groups,"
+                f" received {model.line_axes.shape[0]} and {model.group_axes.shape[1]}"
+            )
+        self._parameters[number] = parameters
+        block, lane = divmod(number, LANES)
+        column = self._blocks[block].reshape(lanes.ROWS, LANES)[:, lane]
+        for first, values in (
+            (lanes.INERTIA, parameters.inertia_kg_m2),
+            (lanes.COULOMB, parameters.coulomb_Nm),
+            (lanes.VISCOUS, parameters.viscous_Nm_s),
+            (lanes.SPRING, parameters.spring_Nm_rad),
+        ):
+            column[first // LANES : first // LANES + 3] = values
+        column[lanes.WEIGHT // LANES] = parameters.weight_moment_Nm
+        column[lanes.SMOOTHING // LANES] = parameters.friction_smoothing_rad_s
+        self._constant_Nm[number] = parameters.constant_torque_Nm
+        field.torque_gain[number] = parameters.torque_gain
+        self._set_model(number, model)
+
+    def _classify(self) -> None:
+        """Note which plants have a general joint, and whether any has friction."""
+        self._general = [place for place, one in enumerate(self._parameters) if one.joint is not None]
+        self._slows = bool(np.any(self._read(lanes.COULOMB)) or np.any(self._read(lanes.VISCOUS)))
+
+    def _set_model(self, number: int, model: TorqueModel) -> None:
+        field, pairs = self._field, model.pair_gain.shape[1]
+        if pairs > field.pair_gain.shape[2]:  # the first plant with scatter
+            shape = len(self), 2, pairs
+            field = field._replace(pair_gain=np.zeros(shape), pair_stretch=np.zeros(shape))
+            field.pair_gain[:, 0] = 1.0
+        field.line_axes[number], field.line_weights[number] = model.line_axes, model.line_weights
+        field.group_axes[number] = model.group_axes
+        if field.pair_gain.shape[2]:
+            field.pair_gain[number] = model.pair_gain if pairs else ([1.0], [0.0])
+            field.pair_stretch[number] = model.pair_stretch if pairs else 0.0
+        known = [place for place, table in enumerate(field.tables) if np.array_equal(table, model.table)]
+        if not known:
+            known, field = [len(field.tables)], field._replace(tables=np.stack([*field.tables, model.table]))
+        field.table_of[number] = known[0]
+        self._field = field
+
+    def _advance_general(
+        self, currents: Array, disturbance: Array, dt: float, steps: int
+    ) -> dict[int, State]:
+        """Return the states that plants with a general joint reach, by their number."""
+        if not self._general:
+            return {}
+        reached, q, qdot = {}, self.q_rad, self.qdot_rad_s
+        for number in self._general:
+            state = State(q[number], qdot[number])
+            for _ in range(steps):
+                state = step(state, currents[number], disturbance[number], self._parameters[number], dt)
+            reached[number] = state
+        return reached
+
+    def _put(self, states: dict[int, State]) -> None:
+        for number, state in states.items():
+            self.set_state(*state, number)
+
+    def _each(self, name: str, values: ArrayLike, width: int = 3) -> Array:
+        """Return values for each plant, (n, width)."""
+        given = np.asarray(values, np.float64)
+        if given.shape not in ((width,), (len(self), width)) or not np.all(np.isfinite(given)):
+            raise InputError(
+                f"plants: expected {name} of {width} finite numbers, for all or for each of {len(self)},"
+                f" received {'an array of ' + str(given.shape) if given.size > width else given}"
+            )
+        return np.ascontiguousarray(np.broadcast_to(given, (len(self), width)))
+
+    def _read(self, first: int) -> Array:
+        rows = self._blocks[:, first : first + 3 * LANES].reshape(-1, 3, LANES)
+        return rows.transpose(0, 2, 1).reshape(-1, 3)[: len(self)].copy()
+
+    def _write(self, first: int, values: Array) -> None:
+        """Write three rows of the blocks from values (at most lanes, 3)."""
+        complete = np.zeros((len(self._blocks) * LANES, 3))
+        complete[: len(values)] = values
+        rows = complete.reshape(-1, LANES, 3).transpose(0, 2, 1)
+        self._blocks[:, first : first + 3 * LANES] = rows.reshape(len(self._blocks), -1)
