@@ -15,7 +15,7 @@ FACES = {
 }  # fmt: skip
 
 # Their init is public API: it imports on demand and has an example in its docstring.
-PUBLIC_API = ("twin", "twin/plant")
+PUBLIC_API = ("twin", "twin/envs", "twin/plant")
 
 CACHES = {"__pycache__", ".hypothesis", ".DS_Store"}
 

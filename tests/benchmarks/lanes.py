@@ -1,4 +1,4 @@
-"""Speed of plants in lockstep as ratios to single plants: ``python tests/benchmarks/lanes.py [--json]``.
+"""Speed of plants in lockstep, and of environments: ``python tests/benchmarks/lanes.py [--json]``.
 
 One core, 64 plants, 50 steps a call; the vectors of the processor decide, so its widest are named.
 """
@@ -7,10 +7,12 @@ import argparse
 import json
 import sys
 
+import gymnasium
 import llvmlite.binding
 import numpy as np
 from measuring import fastest, ratio, seconds_of, tell
 
+import spheretwin.envs  # noqa: F401 (registers the environments)
 from spheretwin import plant
 from spheretwin.models.base.compiled import allocation_free, compiled
 from spheretwin.plant.friction import friction, slow_down
@@ -81,6 +83,14 @@ def _coast_without_field(calls, rotor, resistance, friction_q):
         slow_down(resistance, rotor.q, rotor.qdot, friction_q)
 
 
+def environment(actions):
+    """Time of one control period of one of many plants in an environment, s."""
+    envs = gymnasium.make_vec("spheretwin/Track-v0", num_envs=PLANTS, actions=actions, variants=4)
+    envs.reset(seed=0)
+    rest = np.zeros(envs.action_space.shape, np.float32)
+    return lambda: seconds_of(lambda: [envs.step(rest) for _ in range(STEPS * CALLS)]) / (PLANTS * STEPS * CALLS)
+
+
 def vectors() -> str:
     """Widest vectors of this processor."""
     features = llvmlite.binding.get_host_cpu_features()
@@ -98,6 +108,8 @@ def ratios():
             "lockstep, friction": lockstep(FRICTION),
             "single, no field": single_without_field(),
             "lockstep, no field": lockstep_without_field(),
+            "torques": environment("torque"),
+            "currents": environment("current"),
         },
         rounds=9,
     )
@@ -115,6 +127,8 @@ def ratios():
             taken["lockstep, no field"],
             at_least=5.0,
         ),
+        ratio("control periods of 64 plants per second, torques", 1.0, taken["torques"], at_least=3e6),
+        ratio("control periods of 64 plants per second, currents", 1.0, taken["currents"], at_least=1e6),
     ]
 
 

@@ -29,6 +29,11 @@ class Plants:
     count : int, optional
         Number of plants; only with parameters of all.
 
+    Attributes
+    ----------
+    blocks, field
+        State and parameters for the compiled code of `lanes`.
+
     Raises
     ------
     InputError
@@ -55,7 +60,7 @@ class Plants:
         pairs = max(model.pair_gain.shape[1] for model in models)
         lines, groups = models[0].line_axes.shape[0], models[0].group_axes.shape[1]
         n, blocks = len(each), -(-len(each) // LANES)
-        self._field = LaneField(
+        self.field = LaneField(
             line_axes=np.empty((n, lines, 3)),
             line_weights=np.empty((n, lines)),
             group_axes=np.empty((n, 3, groups)),
@@ -68,10 +73,10 @@ class Plants:
             scratch=scratch_of(models[0]),
             vectors=np.empty((3, max(3, groups))),
         )
-        self._blocks = np.zeros((blocks, lanes.ROWS * LANES))
+        self.blocks = np.zeros((blocks, lanes.ROWS * LANES))
         # A lane without a plant: at rest, of inertia 1.
         self._write(lanes.INERTIA, np.ones((blocks * LANES, 3)))
-        self._blocks[:, lanes.SMOOTHING : lanes.SMOOTHING + LANES] = 1.0
+        self.blocks[:, lanes.SMOOTHING : lanes.SMOOTHING + LANES] = 1.0
         self._constant_Nm = np.zeros((n, 3))
         for number, one in enumerate(each):
             self._set(number, one)
@@ -83,7 +88,7 @@ class Plants:
     @property
     def groups(self) -> int:
         """Number of coil groups."""
-        return self._field.torque_gain.shape[1]
+        return self.field.torque_gain.shape[1]
 
     @property
     def q_rad(self) -> Array:
@@ -148,7 +153,7 @@ class Plants:
         )
         general = self._advance_general(currents, disturbance, dt, steps)
         self._write(lanes.HELD, -(disturbance + self._constant_Nm))
-        lanes.advance(self._blocks, self._field, currents, dt, steps, self._slows)
+        lanes.advance(self.blocks, self.field, currents, dt, steps, self._slows)
         self._put(general)
 
     def step_torque(self, torque_q: ArrayLike, dt: float, steps: int = 1) -> None:
@@ -164,11 +169,11 @@ class Plants:
         torque_q = self._each("torque_q", torque_q)
         general = self._advance_general(np.zeros((len(self), self.groups)), -torque_q, dt, steps)
         self._write(lanes.HELD, torque_q - self._constant_Nm)
-        lanes.advance_without_field(self._blocks, dt, steps, self._slows)
+        lanes.advance_without_field(self.blocks, dt, steps, self._slows)
         self._put(general)
 
     def _set(self, number: int, parameters: Parameters) -> None:
-        model, field = parameters.magnetics, self._field
+        model, field = parameters.magnetics, self.field
         if model.line_axes.shape != field.line_axes[0].shape or model.group_axes.shape[1] != self.groups:
             raise InputError(
                 f"plants: expected {field.line_axes.shape[1]} pole lines and {self.groups} groups,"
@@ -176,7 +181,7 @@ class Plants:
             )
         self._parameters[number] = parameters
         block, lane = divmod(number, LANES)
-        column = self._blocks[block].reshape(lanes.ROWS, LANES)[:, lane]
+        column = self.blocks[block].reshape(lanes.ROWS, LANES)[:, lane]
         for first, values in (
             (lanes.INERTIA, parameters.inertia_kg_m2),
             (lanes.COULOMB, parameters.coulomb_Nm),
@@ -196,7 +201,7 @@ class Plants:
         self._slows = bool(np.any(self._read(lanes.COULOMB)) or np.any(self._read(lanes.VISCOUS)))
 
     def _set_model(self, number: int, model: TorqueModel) -> None:
-        field, pairs = self._field, model.pair_gain.shape[1]
+        field, pairs = self.field, model.pair_gain.shape[1]
         if pairs > field.pair_gain.shape[2]:  # the first plant with scatter
             shape = len(self), 2, pairs
             field = field._replace(pair_gain=np.zeros(shape), pair_stretch=np.zeros(shape))
@@ -210,7 +215,7 @@ class Plants:
         if not known:
             known, field = [len(field.tables)], field._replace(tables=np.stack([*field.tables, model.table]))
         field.table_of[number] = known[0]
-        self._field = field
+        self.field = field
 
     def _advance_general(
         self, currents: Array, disturbance: Array, dt: float, steps: int
@@ -241,12 +246,12 @@ class Plants:
         return np.ascontiguousarray(np.broadcast_to(given, (len(self), width)))
 
     def _read(self, first: int) -> Array:
-        rows = self._blocks[:, first : first + 3 * LANES].reshape(-1, 3, LANES)
+        rows = self.blocks[:, first : first + 3 * LANES].reshape(-1, 3, LANES)
         return rows.transpose(0, 2, 1).reshape(-1, 3)[: len(self)].copy()
 
     def _write(self, first: int, values: Array) -> None:
         """Write three rows of the blocks from values (at most lanes, 3)."""
-        complete = np.zeros((len(self._blocks) * LANES, 3))
+        complete = np.zeros((len(self.blocks) * LANES, 3))
         complete[: len(values)] = values
         rows = complete.reshape(-1, LANES, 3).transpose(0, 2, 1)
-        self._blocks[:, first : first + 3 * LANES] = rows.reshape(len(self._blocks), -1)
+        self.blocks[:, first : first + 3 * LANES] = rows.reshape(len(self.blocks), -1)

@@ -1,0 +1,53 @@
+"""Environments for reinforcement learning: importing it registers them with Gymnasium.
+
+>>> import gymnasium
+>>> import spheretwin.envs
+>>> envs = gymnasium.make_vec("spheretwin/Track-v0", num_envs=64)
+"""
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+from spheretwin.models.base.errors import InputError
+
+try:
+    import gymnasium
+except ModuleNotFoundError:
+    raise InputError(
+        "environments: expected gymnasium, which the extra rl installs: pip install 'spheretwin[rl]'"
+    ) from None
+
+from spheretwin.envs.settings import TASKS
+
+if TYPE_CHECKING:
+    from spheretwin.envs.environment import TwinEnv
+    from spheretwin.envs.episode import OBSERVATION, REWARD_TERMS
+    from spheretwin.envs.settings import Settings
+    from spheretwin.envs.stable_baselines import StableBaselinesEnv
+    from spheretwin.envs.vector import TwinVectorEnv
+
+_MODULES = {
+    "OBSERVATION": "spheretwin.envs.episode",
+    "REWARD_TERMS": "spheretwin.envs.episode",
+    "Settings": "spheretwin.envs.settings",
+    "StableBaselinesEnv": "spheretwin.envs.stable_baselines",
+    "TwinEnv": "spheretwin.envs.environment",
+    "TwinVectorEnv": "spheretwin.envs.vector",
+}
+
+__all__ = ["OBSERVATION", "REWARD_TERMS", "Settings", "StableBaselinesEnv", "TwinEnv", "TwinVectorEnv"]
+
+for _task in TASKS:
+    gymnasium.register(
+        id=f"spheretwin/{_task}-v0",
+        entry_point="spheretwin.envs.environment:TwinEnv",
+        vector_entry_point="spheretwin.envs.vector:TwinVectorEnv",
+        kwargs={"task": _task},
+    )
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _MODULES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}; it has {', '.join(__all__)}")
+    value = globals()[name] = getattr(import_module(_MODULES[name]), name)
+    return value

@@ -1,0 +1,180 @@
+"""Compiled control period of many episodes: action, physics, observation, reward, end."""
+
+from __future__ import annotations
+
+from math import isfinite, sqrt
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spheretwin.electronics.coil import CurrentLag, advance_lag
+from spheretwin.models.base.compiled import allocation_free
+from spheretwin.plant.lanes import HELD, LANES, QDOT, LaneField, Q, advance, advance_without_field
+
+Array = NDArray[np.float64]
+
+RUNNING, LEFT_WORKSPACE, DIVERGED, COMPLETED = 0, 1, 2, 3
+STATUS = ("running", "left_workspace", "diverged", "completed")
+
+REWARD_TERMS = ("tracking", "rate", "effort", "failure")
+
+
+class Observed(NamedTuple):
+    """Part of an observation: three numbers, of alpha, beta and gamma."""
+
+    name: str
+    unit: str
+    bound: float
+    description: str
+
+
+OBSERVATION = (
+    Observed("error_rad", "rad", 10.0, "hinge angles minus their reference"),
+    Observed("error_rate_rad_s", "rad/s", 1e3, "hinge rates minus their reference"),
+    Observed("q_rad", "rad", 10.0, "hinge angles"),
+    Observed("qdot_rad_s", "rad/s", 1e3, "hinge rates"),
+    Observed("qddot_ref_rad_s2", "rad/s²", 1e5, "acceleration of the reference"),
+)
+BOUNDS = np.repeat([part.bound for part in OBSERVATION], 3)
+
+
+class Episodes(NamedTuple):
+    """Episodes in progress, one for each of n plants."""
+
+    tick: NDArray[np.int64]  # (n,) control periods since the start
+    variant: NDArray[np.int64]  # (n,)
+    code: NDArray[np.int64]  # (n,) `RUNNING`, or how the episode ended
+    reference: Array  # (v, ticks + 1, 3, 3)
+    disturbance: Array  # (v, ticks, 3) N·m
+    constant: Array  # (v, 3) N·m, subtracted as a disturbance is
+    hinge_range: Array  # (3, 2) rad
+    weights: Array  # (4,) of the terms of the reward
+    bounds: Array  # (15,) of the observation
+    current: Array  # (n, groups) A
+    mean_current: Array  # (n, groups) A, over a physics step
+    lag: CurrentLag
+    squares: Array  # (n,) rad², sum of squares of the error
+    largest: Array  # (n,) rad, largest error
+
+
+class Physics(NamedTuple):
+    """Constants of the physics steps of a control period."""
+
+    step_s: float
+    substeps: int
+    slows: bool
+    by_current: bool
+    limit: float  # of an action, N·m or A
+
+
+@allocation_free
+def advance_episodes(
+    blocks: Array,
+    field: LaneField,
+    episodes: Episodes,
+    physics: Physics,
+    actions: Array,
+    observations: NDArray[np.float32],
+    rewards: Array,
+    terms: Array,
+) -> int:
+    """Advance all episodes by one control period.
+
+    Parameters
+    ----------
+    blocks, field
+        Of `lanes.advance`; blocks are changed.
+    episodes : Episodes
+        Changed; an episode that has ended stays as it is.
+    physics : Physics
+    actions : (n, 3) or (n, groups) array, N·m or A
+        Cut at the limit.
+    observations, rewards, terms : (n, 15), (n,) and (n, 4) arrays
+        Result; the reward of an episode that has ended is 0.
+
+    Returns
+    -------
+    int
+        Episodes that ended in this period.
+    """
+    n, limit = actions.shape[0], physics.limit
+    for i in range(n):
+        variant, tick = episodes.variant[i], min(episodes.tick[i], episodes.disturbance.shape[1] - 1)
+        block, lane = blocks[i // LANES], i % LANES
+        for k in range(3):
+            held = -episodes.disturbance[variant, tick, k] - episodes.constant[variant, k]
+            if not physics.by_current:
+                held += min(max(actions[i, k], -limit), limit)
+            block[HELD + k * LANES + lane] = held
+    if physics.by_current:
+        for _ in range(physics.substeps):
+            for i in range(n):
+                advance_lag(episodes.lag, actions[i], episodes.current[i], episodes.mean_current[i])
+            advance(blocks, field, episodes.mean_current, physics.step_s, 1, physics.slows)
+    else:
+        advance_without_field(blocks, physics.step_s, physics.substeps, physics.slows)
+    ended = 0
+    for i in range(n):
+        block, lane = blocks[i // LANES], i % LANES
+        rewards[i] = 0.0
+        for k in range(4):
+            terms[i, k] = 0.0
+        if episodes.code[i] == RUNNING:
+            episodes.tick[i] += 1
+            episodes.code[i] = _judge(block, lane, i, episodes)
+            _reward(block, lane, i, episodes, actions[i], limit, terms[i])
+            for k in range(4):
+                rewards[i] += terms[i, k]
+            ended += episodes.code[i] != RUNNING
+        observe(block, lane, i, episodes, observations[i])
+    return ended
+
+
+@allocation_free
+def observe(block: Array, lane: int, i: int, episodes: Episodes, row: NDArray[np.float32]) -> None:
+    """Write the observation of episode i; numbers beyond their bounds are cut, NaN is 0."""
+    reference = episodes.reference[episodes.variant[i], episodes.tick[i]]
+    for k in range(3):
+        q, qdot = block[Q + k * LANES + lane], block[QDOT + k * LANES + lane]
+        row[k], row[3 + k] = q - reference[0, k], qdot - reference[1, k]
+        row[6 + k], row[9 + k], row[12 + k] = q, qdot, reference[2, k]
+    for place in range(15):
+        bound = episodes.bounds[place]
+        row[place] = min(max(row[place], -bound), bound) if row[place] == row[place] else 0.0
+
+
+@allocation_free
+def _judge(block: Array, lane: int, i: int, episodes: Episodes) -> int:
+    """Return how episode i goes on after its control period."""
+    for k in range(3):
+        if not (isfinite(block[Q + k * LANES + lane]) and abs(block[QDOT + k * LANES + lane]) < 1e6):
+            return DIVERGED
+    for k in range(3):
+        q = block[Q + k * LANES + lane]
+        if not episodes.hinge_range[k, 0] <= q <= episodes.hinge_range[k, 1]:
+            return LEFT_WORKSPACE
+    return COMPLETED if episodes.tick[i] == episodes.disturbance.shape[1] else RUNNING
+
+
+@allocation_free
+def _reward(
+    block: Array, lane: int, i: int, episodes: Episodes, action: Array, limit: float, terms: Array
+) -> None:
+    """Write the terms of the reward, and add to the figures of the episode."""
+    weights, code = episodes.weights, episodes.code[i]
+    if code == DIVERGED or code == LEFT_WORKSPACE:  # noqa: SIM109 (no tuple in compiled code)
+        terms[3] = -weights[3]
+    if code == DIVERGED:
+        return
+    reference = episodes.reference[episodes.variant[i], episodes.tick[i]]
+    angle = rate = effort = 0.0
+    for k in range(3):
+        angle += (block[Q + k * LANES + lane] - reference[0, k]) ** 2
+        rate += (block[QDOT + k * LANES + lane] - reference[1, k]) ** 2
+    for k in range(action.shape[0]):
+        effort += (min(max(action[k], -limit), limit) / limit) ** 2
+    terms[0], terms[1] = -weights[0] * sqrt(angle) / 0.1, -weights[1] * sqrt(rate) / 10.0
+    terms[2] = -weights[2] * effort / action.shape[0]
+    episodes.squares[i] += angle
+    episodes.largest[i] = max(episodes.largest[i], sqrt(angle))
