@@ -14,6 +14,8 @@ from spheretwin.plant.lanes import LANES, LaneField
 from spheretwin.plant.plant_step import Parameters, State, step
 
 Array = NDArray[np.float64]
+Plant = int | NDArray[np.integer] | NDArray[np.bool_]
+"""Number of one plant, numbers of some, or a mask."""
 
 
 class Plants:
@@ -101,7 +103,7 @@ class Plants:
         return self._read(lanes.QDOT)
 
     def set_state(
-        self, q_rad: ArrayLike, qdot_rad_s: ArrayLike, plants: ArrayLike | slice = slice(None)
+        self, q_rad: ArrayLike, qdot_rad_s: ArrayLike, plants: Plant | slice = slice(None)
     ) -> None:
         """Set angles and rates.
 
@@ -109,12 +111,12 @@ class Plants:
         ----------
         q_rad, qdot_rad_s : (3,) or (m, 3) arrays
             For all, or for each.
-        plants : indices or mask, optional
+        plants : int, indices or mask, optional
             Which plants; default: all.
         """
         for first, values in ((lanes.Q, q_rad), (lanes.QDOT, qdot_rad_s)):
             present = self._read(first)
-            present[plants] = values
+            present[plants] = np.asarray(values, np.float64)
             self._write(first, present)
 
     def set_parameters(self, number: int, parameters: Parameters) -> None:

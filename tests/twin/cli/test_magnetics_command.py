@@ -99,19 +99,39 @@ def test_a_warning_of_the_model_is_printed_with_the_verdict_on_a_curve(capsys, u
     assert "settotalmass" in one_line(err)
 
 
+@pytest.fixture(scope="module")
+def results():
+    """Results of the long computations, by their arguments."""
+    return {}
+
+
+def computed_once(monkeypatch, results, module, name):
+    """Let a function of a module return the result of an earlier test for the same arguments."""
+    function = getattr(module, name)
+
+    def from_results(*arguments):
+        key = name, repr([argument for argument in arguments if not callable(argument)])
+        if key not in results:
+            results[key] = function(*arguments)
+        return results[key]
+
+    monkeypatch.setattr(module, name, from_results)
+
+
 @pytest.mark.usefixtures("few_samples")
-def test_computed_curve_gives_its_figures_as_json(capsys, monkeypatch):
-    compute, results = curve_check.compute, []
+def test_computed_curve_gives_its_figures_as_json(capsys, monkeypatch, results):
+    computed_once(monkeypatch, results, curve_check, "compute")
+    compute, computations = curve_check.compute, []
 
     def compute_and_keep(*arguments):
         computed = compute(*arguments)
         mesh = computed.doubled_mesh._replace(worst=3 * computed.doubled_mesh.peak)
-        results.append(computed._replace(doubled_mesh=mesh))
-        return results[-1]
+        computations.append(computed._replace(doubled_mesh=mesh))
+        return computations[-1]
 
     monkeypatch.setattr(curve_check, "compute", compute_and_keep)
     _, out, _ = here(capsys, "curve", "--json")
-    figures, (computed,) = json.loads(out), results
+    figures, (computed,) = json.loads(out), computations
     assert figures["doubled_mesh_moves_peak"] == computed.doubled_mesh.peak
     assert figures["doubled_mesh_moves_worst_sample"] == computed.doubled_mesh.worst
     assert figures["lookup_error"] == computed.lookup_error
@@ -120,7 +140,8 @@ def test_computed_curve_gives_its_figures_as_json(capsys, monkeypatch):
 
 
 @pytest.mark.usefixtures("few_samples")
-def test_computed_curve_is_written_and_judged(capsys, tmp_path):
+def test_computed_curve_is_written_and_judged(capsys, tmp_path, monkeypatch, results):
+    computed_once(monkeypatch, results, curve_check, "compute")
     out = tmp_path / "curve.csv"
     code, text, err = here(capsys, "curve", "--out", out)
     assert (code, err) == (0, "")
@@ -152,7 +173,12 @@ def coarse(monkeypatch):
     monkeypatch.setattr(direct_summation, "STANDARD", COARSE)
 
 
-def test_check_gives_its_verdict_as_json(capsys, coarse, monkeypatch):
+@pytest.fixture
+def one_check(monkeypatch, coarse, results):
+    computed_once(monkeypatch, results, field_verdict, "judge")
+
+
+def test_check_gives_its_verdict_as_json(capsys, one_check, monkeypatch):
     judge, verdicts = field_verdict.judge, []
 
     def judge_and_keep(actuator, poses, seed, *more):
@@ -171,15 +197,15 @@ def test_check_gives_its_verdict_as_json(capsys, coarse, monkeypatch):
     assert figures["sources"] == verdict.sources._asdict()
 
 
-def test_check_prints_a_table(capsys, coarse):
-    code, out, err = here(capsys, "check", "--poses", 1)
+def test_check_prints_a_table(capsys, one_check):
+    code, out, err = here(capsys, "check", "--poses", 2, "--seed", 5)
     assert (code, err) == (0, "")
     assert "0° to 12°" in out
     assert "Sources of the error" in out
     assert "8 of 8 checks hold" in out
 
 
-def test_check_writes_a_page(capsys, coarse, tmp_path):
+def test_check_writes_a_page(capsys, one_check, tmp_path):
     code, out, err = here(capsys, "check", "--poses", 2, "--seed", 5, "--out", tmp_path, "--json")
     assert (code, err) == (0, "")
     figures = json.loads(out)
