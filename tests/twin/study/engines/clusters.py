@@ -1,6 +1,11 @@
-"""A study, and a sweep of it on a Ray cluster."""
+"""A study, and sweeps of it on a Ray cluster."""
 
-from spheretwin.study import runner
+import subprocess
+import sys
+
+from spheretwin.study import journal, runner
+from tests.twin.study.cases import rows_of
+from tests.waiting import wait_for
 
 STUDY = """
 name = "small"
@@ -30,3 +35,26 @@ def run(study, folder, machines, **options):
 
 def same_table(folder, wanted):
     return (folder / "table.parquet").read_bytes() == (wanted / "table.parquet").read_bytes()
+
+
+LIMIT = 60
+LONG_STUDY = STUDY.replace("samples = 120", "samples = 100_000")  # it does not end before it is stopped
+
+
+def started(source, folder, *options):
+    """The command line in a process of its own, when ten rows are in its journal."""
+    program = "import sys; from spheretwin.cli import main; sys.exit(main(sys.argv[1:]))"
+    command = [sys.executable, "-c", program, "sweep", str(source), "--out", str(folder), "--engine", "ray"]
+    going = subprocess.Popen([*command, *options], stderr=subprocess.PIPE, text=True, start_new_session=True)
+    path = folder / journal.NAME
+    wait_for(lambda: going.poll() is not None or (path.exists() and path.read_bytes().count(b"\n") > 10))
+    return going
+
+
+def goes_on_locally(source, folder, before):
+    """Run the first rows of a study that was stopped: its results are kept, and the others are added."""
+    found = runner.run(str(source), folder / "out", limit=LIMIT)
+    assert found.resumed >= 10
+    assert (folder / "out" / journal.NAME).read_bytes().startswith(before)
+    runner.run(str(source), folder / "local", limit=LIMIT)
+    assert rows_of(folder / "out")[:LIMIT] == rows_of(folder / "local")

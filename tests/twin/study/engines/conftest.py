@@ -1,4 +1,4 @@
-"""A Ray cluster of two nodes, and the results of the local engine to compare with; each file has its own."""
+"""A Ray cluster of two nodes, and the results of the local engine to compare with."""
 
 import os
 
@@ -28,8 +28,8 @@ def wanted(study, tmp_path_factory):
 @pytest.fixture(scope="module")
 def machines():
     """Two nodes of a core each, on 127.0.0.1 alone."""
-    environment = dict(os.environ)
     ray_cluster._ray(local=True)
+    environment = dict(os.environ)  # with the token of this process, which Ray reads once
     from ray.cluster_utils import Cluster
 
     # A killed node is missed within seconds, not a quarter of a minute.

@@ -1,11 +1,28 @@
 """Sweeps on a Ray cluster of two nodes: the same table, whatever happens to it on the way."""
 
+import socket
+
 import pytest
 
-from spheretwin.models.base.errors import SpheretwinError
-from spheretwin.study import journal
+from spheretwin.models.base.errors import InputError, SpheretwinError
+from spheretwin.study import journal, runner
 from spheretwin.study.engines import engine, ray_worker
-from tests.twin.study.engines.clusters import ROWS, run, same_table
+from tests.package_copy import copy_package
+from tests.twin.study.engines.clusters import (
+    LONG_STUDY,
+    ROWS,
+    goes_on_locally,
+    run,
+    same_table,
+    started,
+)
+
+# A copy of the package is found before the installed one, whichever way that is installed.
+FIRST = """
+import sys
+
+sys.meta_path[:] = [finder for finder in sys.meta_path if "editable" not in repr(finder)]
+"""
 
 
 def blocked_on(node_id, folder):
@@ -75,3 +92,57 @@ def test_a_fault_on_a_node_stops_the_study_and_keeps_what_is_finished(study, mac
     monkeypatch.setattr(ray_worker, "run_batch", carried_out)
     assert (tmp_path / "table.parquet").exists()
     assert len((tmp_path / journal.NAME).read_text().splitlines()) < 1 + ROWS
+
+
+def test_a_row_that_takes_its_process_along_is_told_of(study, machines, tmp_path, monkeypatch):
+    monkeypatch.setattr(engine, "MOST_LOSSES", 1)
+    (tmp_path / "own.py").write_text("import os\n\n\ndef dies(run):\n    os._exit(1)\n")
+    fatal = study.model_copy(update={"metrics": (f"{tmp_path}/own.py:dies",), "telemetry": ()})
+    with pytest.raises(SpheretwinError, match="expected row 0 to leave its process alive, received Worker"):
+        run(fatal, tmp_path / "out", machines, limit=1)
+
+
+def test_a_node_with_other_sources_is_refused_in_one_line(study, machines, wanted, tmp_path):
+    package = copy_package(tmp_path / "other")
+    with (package / "loop.py").open("a") as file:
+        file.write("# another one\n")
+    (tmp_path / "other" / "sitecustomize.py").write_text(FIRST)
+    environment = {"PYTHONPATH": str(tmp_path / "other")}
+    other = machines.add_node(num_cpus=1, env_vars=environment)
+    try:
+        with pytest.raises(SpheretwinError, match="received other sources; none of its rows") as refusal:
+            run(study, tmp_path / "out", machines)
+    finally:
+        machines.remove_node(other)
+    assert "\n" not in str(refusal.value)
+    kept, of_local = (
+        (folder / journal.NAME).read_text().splitlines() for folder in (tmp_path / "out", wanted)
+    )
+    assert set(kept) <= set(of_local)
+
+
+def test_an_address_where_nobody_answers_loses_nothing(study, machines, wanted, tmp_path):
+    runner.run(study, tmp_path, limit=20)
+    kept = (tmp_path / journal.NAME).read_bytes()
+    with socket.socket() as unused:
+        unused.bind(("127.0.0.1", 0))
+        address = f"127.0.0.1:{unused.getsockname()[1]}"
+        with pytest.raises(InputError, match=f"at {address}, received no answer"):
+            runner.run(study, tmp_path, engine="ray", address=address)
+    assert (tmp_path / journal.NAME).read_bytes() == kept
+    found = run(study, tmp_path, machines)
+    assert (found.rows, found.resumed) == (ROWS, 20)
+    assert same_table(tmp_path, wanted)
+
+
+# The last one: it leaves no cluster.
+def test_a_cluster_that_is_lost_is_told_of_in_one_line(machines, tmp_path):
+    source = tmp_path / "long.toml"
+    source.write_text(LONG_STUDY)
+    going = started(source, tmp_path / "out", "--threads", "1", "--address", machines.address)
+    machines.head_node.kill_gcs_server(check_alive=False)
+    told = going.communicate()[1]
+    assert going.returncode == 1
+    (line,) = told.splitlines()
+    assert "expected the cluster to stay, received no answer from it any more" in line
+    goes_on_locally(source, tmp_path, (tmp_path / "out" / journal.NAME).read_bytes())
