@@ -88,7 +88,9 @@ def environment(actions):
     envs = gymnasium.make_vec("spheretwin/Track-v0", num_envs=PLANTS, actions=actions, variants=4)
     envs.reset(seed=0)
     rest = np.zeros(envs.action_space.shape, np.float32)
-    return lambda: seconds_of(lambda: [envs.step(rest) for _ in range(STEPS * CALLS)]) / (PLANTS * STEPS * CALLS)
+    return lambda: (
+        seconds_of(lambda: [envs.step(rest) for _ in range(STEPS * CALLS)]) / (PLANTS * STEPS * CALLS)
+    )
 
 
 def vectors() -> str:
