@@ -54,7 +54,6 @@ def declare(parser: Parser) -> None:
     parser.add_argument(
         "--live-window",
         type=number("a number of s above 0", lambda window_s: window_s > 0),
-        default=LIVE_WINDOW_S,
         metavar="S",
         help=f"time that the plots of the live view show; the last {LIVE_WINDOW_S:g} s unless given",
     )
@@ -88,6 +87,10 @@ def run(options: argparse.Namespace) -> bool:
         raise InputError(
             f"command line: expected --view with --record or --live, received {options.view} alone"
         )
+    if options.live_window is not None and not options.live:
+        raise InputError(
+            f"command line: expected --live-window with --live, received {options.live_window:g} alone"
+        )
     own = load_metrics(options.metric)
     outputs.check([path for path in (options.record, options.telemetry) if path])
     outputs.check_rate(options.record_rate, options.record, plan.scenario.controller.period_s)
@@ -105,7 +108,7 @@ def run(options: argparse.Namespace) -> bool:
             options.view or OVERVIEW,
             options.record_rate,
             plan.first_tick,
-            options.live_window,
+            options.live_window or LIVE_WINDOW_S,
         )
         try:
             with progress, timers_stopped(), _code_of_the_user(session, options.json):

@@ -35,7 +35,7 @@ MAGNETICS = {"mjcf": MJCF_PATH, "json": False, "verbose": False, "out": None}
 DEFAULTS = {
     "simulate hold": {
         "scenario": "hold", "record": None, "record_rate": None, "telemetry": None, "live": False,
-        "live_window": 10.0, "view": None, "replay": None, "metric": [], "json": False, "fields": [],
+        "live_window": None, "view": None, "replay": None, "metric": [], "json": False, "fields": [],
     },
     "bench": {
         "scenario": "hold", "port": 8080, "no_browser": False, "hold_after": 2.0, "record": None,
@@ -162,6 +162,10 @@ def test_own_metrics_can_be_repeated(received):
         (
             ["simulate", "hold", "--view", "control"],
             "expected --view with --record or --live, received control",
+        ),
+        (
+            ["simulate", "hold", "--live-window", "3"],
+            "expected --live-window with --live, received 3 alone",
         ),
         (
             ["simulate", "hold", "--replay", "a.parquet"],
