@@ -132,7 +132,8 @@ def clouds(
     figure = Figure(figsize=(1.25 * WIDTH_in, 4.6), layout="constrained")
     sides = figure.subplots(1, len(panels), sharex=True, sharey=True, squeeze=False)[0]
     for axes, (name, points) in zip(sides, panels.items(), strict=True):
-        x, y, number = np.array([point for point in points if np.all(np.isfinite(point))]).T
+        finite = [point for point in points if np.all(np.isfinite(point))]
+        x, y, number = np.array(finite).reshape(-1, 3).T
         cloud = axes.scatter(x, y, c=number, norm=scale, cmap=COLOURS, s=7, linewidths=0, rasterized=True)
         _dashed(axes, bounds)
         axes.set(xscale="log", yscale="log")

@@ -81,6 +81,14 @@ def test_panels_without_a_point_or_a_square_are_drawn_too(tmp_path):
     style.save(cloud, tmp_path / "cloud.png")
 
 
+def test_a_panel_without_a_finite_point_is_empty():
+    panels = {"told": [(0.5, 3.0, 9)], "detecting": [(0.5, np.inf, 9), (np.nan, 1.0, 9)]}
+    told, detecting, _ = faults.clouds(panels, ("torque", "error", "groups"), (1.0, 2.0), "clouds").axes
+    assert len(told.collections[0].get_offsets()) == 1
+    assert len(detecting.collections[0].get_offsets()) == 0
+
+
+
 def test_what_remains_falls_at_each_time_and_ends_at_what_never_comes():
     figure = faults.remaining({"open": [0.004, 0.005, 0.2, np.inf]}, "s", "%", "latency")
     (line,) = figure.axes[0].get_lines()
