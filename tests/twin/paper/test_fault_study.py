@@ -29,7 +29,7 @@ from spheretwin.paper.fault_cases import (
     on_other_engine,
     shorted,
 )
-from spheretwin.paper.fault_outcomes import FaultData, reason, reduce, row_fields, tracks
+from spheretwin.paper.fault_outcomes import FaultData, RemainingTorque, reason, reduce, row_fields, tracks
 from spheretwin.paper.page import rows
 from spheretwin.paper.runner import make_plan, run_plan, scenario_of, unexpected_ends
 from spheretwin.session import Session
@@ -293,3 +293,14 @@ def test_shares_are_not_rounded_up_to_all():
     assert fault_sections.percent([True] * 2000 + [False]) == "99.9 %"
     assert fault_sections.percent([True, True]) == "100 %"
     assert fault_sections.percent([False] * 2000 + [True]) == "0.1 %"
+
+
+def test_the_ten_smallest_sets_that_do_not_track_are_listed():
+    remaining = RemainingTorque(
+        torque=0.5, least_norm=0.4, least_share=0.3, singular_value_Nm_per_A=0.1, rank=3
+    )
+    sets = {tuple(range(size)): [outcome(100.0, remaining=remaining)] for size in range(14, 1, -1)}
+    listed = fault_study._smallest(sets | {(0,): [outcome(1.0, remaining=remaining)]}, REPORTED)
+    assert len(listed) == fault_study.LISTED == 10
+    assert listed[0] == fault_study._listed((0, 1), sets[0, 1], REPORTED)
+    assert listed[-1] == fault_study._listed(tuple(range(11)), sets[tuple(range(11))], REPORTED)

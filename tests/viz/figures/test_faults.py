@@ -88,7 +88,6 @@ def test_a_panel_without_a_finite_point_is_empty():
     assert len(detecting.collections[0].get_offsets()) == 0
 
 
-
 def test_what_remains_falls_at_each_time_and_ends_at_what_never_comes():
     figure = faults.remaining({"open": [0.004, 0.005, 0.2, np.inf]}, "s", "%", "latency")
     (line,) = figure.axes[0].get_lines()
