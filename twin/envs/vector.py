@@ -102,6 +102,7 @@ class TwinVectorEnv(VectorEnv[Any, Any, Any]):
             squares=np.zeros(num_envs),
             largest=np.zeros(num_envs),
         )
+        self._any_over = False
         # Numba's check of the types of all arguments would take as long as the physics.
         self._advance = for_types_of(
             advance_episodes,
@@ -183,7 +184,7 @@ class TwinVectorEnv(VectorEnv[Any, Any, Any]):
                 f"environment: expected finite actions of shape {self.action_space.shape},"
                 f" received {actions if actions.shape == self.action_space.shape else actions.shape}"
             )
-        over = episodes.code != RUNNING
+        over = episodes.code != RUNNING if self._any_over else np.zeros(n, np.bool_)
         observations = np.empty((n, len(BOUNDS)), np.float32)
         rewards, terms = np.empty(n), np.empty((n, len(REWARD_TERMS)))
         plants = self._plants
@@ -198,7 +199,9 @@ class TwinVectorEnv(VectorEnv[Any, Any, Any]):
             terms,
         )
         infos: dict[str, Any] = {"reward_terms": terms, "_reward_terms": np.ones(n, np.bool_)}
-        if self.autoreset_mode is AutoresetMode.NEXT_STEP and over.any():
+        if not (ended or self._any_over):  # the usual case, in a fifth less time
+            return observations, rewards, np.zeros(n, np.bool_), np.zeros(n, np.bool_), infos
+        if self.autoreset_mode is AutoresetMode.NEXT_STEP:
             self._start(np.flatnonzero(over))
             self._observe(np.flatnonzero(over), observations)
         code = episodes.code
@@ -208,6 +211,7 @@ class TwinVectorEnv(VectorEnv[Any, Any, Any]):
             infos |= self._infos_of_end((code != RUNNING) & ~over)
             if self.autoreset_mode is AutoresetMode.SAME_STEP:
                 self._restart(np.flatnonzero(code != RUNNING), observations, infos)
+        self._any_over = bool(np.any(code != RUNNING))
         return observations, rewards, terminations, truncations, infos
 
     def share_generator(self, generator: np.random.Generator) -> None:
@@ -228,6 +232,7 @@ class TwinVectorEnv(VectorEnv[Any, Any, Any]):
         self._plants.set_state(variants.q_rad[chosen], variants.qdot_rad_s[chosen], plants)
         for column in (episodes.tick, episodes.code, episodes.current, episodes.squares, episodes.largest):
             column[plants] = 0
+        self._any_over = bool(np.any(episodes.code != RUNNING))
 
     def _restart(
         self, plants: NDArray[np.intp], observations: NDArray[np.float32], infos: dict[str, Any]

@@ -80,9 +80,9 @@ class Plants:
         self._write(lanes.INERTIA, np.ones((blocks * LANES, 3)))
         self.blocks[:, lanes.SMOOTHING : lanes.SMOOTHING + LANES] = 1.0
         self._constant_Nm = np.zeros((n, 3))
+        self._tables = [models[0].table]
         for number, one in enumerate(each):
             self._set(number, one)
-        self._classify()
 
     def __len__(self) -> int:
         return len(self._parameters)
@@ -102,9 +102,7 @@ class Plants:
         """Hinge rates (n, 3), a copy."""
         return self._read(lanes.QDOT)
 
-    def set_state(
-        self, q_rad: ArrayLike, qdot_rad_s: ArrayLike, plants: Plant | slice = slice(None)
-    ) -> None:
+    def set_state(self, q_rad: ArrayLike, qdot_rad_s: ArrayLike, plants: Plant | slice = slice(None)) -> None:
         """Set angles and rates.
 
         Parameters
@@ -127,8 +125,8 @@ class Plants:
         InputError
             Another number of pole lines or groups than that of the first plant.
         """
-        self._set(number, parameters)
-        self._classify()
+        if parameters is not self._parameters[number]:
+            self._set(number, parameters)
 
     def step(self, currents: ArrayLike, disturbance: ArrayLike, dt: float, steps: int = 1) -> None:
         """Advance all plants under held currents.
@@ -197,10 +195,9 @@ class Plants:
         field.torque_gain[number] = parameters.torque_gain
         self._set_model(number, model)
 
-    def _classify(self) -> None:
-        """Note which plants have a general joint, and whether any has friction."""
-        self._general = [place for place, one in enumerate(self._parameters) if one.joint is not None]
-        self._slows = bool(np.any(self._read(lanes.COULOMB)) or np.any(self._read(lanes.VISCOUS)))
+    @property
+    def _slows(self) -> bool:
+        return bool(np.any(self._read(lanes.COULOMB)) or np.any(self._read(lanes.VISCOUS)))
 
     def _set_model(self, number: int, model: TorqueModel) -> None:
         field, pairs = self.field, model.pair_gain.shape[1]
@@ -213,20 +210,23 @@ class Plants:
         if field.pair_gain.shape[2]:
             field.pair_gain[number] = model.pair_gain if pairs else ([1.0], [0.0])
             field.pair_stretch[number] = model.pair_stretch if pairs else 0.0
-        known = [place for place, table in enumerate(field.tables) if np.array_equal(table, model.table)]
-        if not known:
-            known, field = [len(field.tables)], field._replace(tables=np.stack([*field.tables, model.table]))
-        field.table_of[number] = known[0]
+        if not any(table is model.table for table in self._tables):
+            self._tables.append(model.table)
+            field = field._replace(tables=np.stack(self._tables))
+        field.table_of[number] = next(
+            place for place, table in enumerate(self._tables) if table is model.table
+        )
         self.field = field
 
     def _advance_general(
         self, currents: Array, disturbance: Array, dt: float, steps: int
     ) -> dict[int, State]:
         """Return the states that plants with a general joint reach, by their number."""
-        if not self._general:
+        general = [number for number, one in enumerate(self._parameters) if one.joint is not None]
+        if not general:
             return {}
         reached, q, qdot = {}, self.q_rad, self.qdot_rad_s
-        for number in self._general:
+        for number in general:
             state = State(q[number], qdot[number])
             for _ in range(steps):
                 state = step(state, currents[number], disturbance[number], self._parameters[number], dt)
