@@ -104,6 +104,9 @@ def main():
     rows = {"policy at 5 ms": policy}
     for period_s in (PERIOD_s, 1e-3):
         rows[f"PID at {1e3 * period_s:g} ms"] = [error_of_pid(scenario, period_s) for scenario in scenarios]
+    for part in np.array_split(np.arange(len(curve.periods)), 10):
+        rms_mrad = 1e3 * np.median(np.array(curve.rms_rad)[part])
+        print(f"after {curve.periods[part[-1]]:>9,} periods: RMS error {rms_mrad:.0f} mrad, with exploration")
     print(f"{options.periods} control periods of {options.plants} plants in {taken:.0f} s")
     for name, errors in rows.items():
         low, median, high = 1e3 * np.quantile(errors, [0, 0.5, 1])
