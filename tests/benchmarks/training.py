@@ -89,7 +89,7 @@ def error_of_pid(scenario, period_s):
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--periods", type=int, default=3_000_000)
+    parser.add_argument("--periods", type=int, default=5_000_000)
     parser.add_argument("--plants", type=int, default=64)
     parser.add_argument("--seed", type=int, default=0)
     options = parser.parse_args()
