@@ -9,7 +9,7 @@ import rerun.blueprint as rrb
 from spheretwin.viz.comparison.ghosts import ROTOR
 from spheretwin.viz.layout.layout import blueprint, eye
 from spheretwin.viz.layout.plots import time_axis, time_range
-from spheretwin.viz.layout.view import EVENTS, STATES, application_of
+from spheretwin.viz.layout.view import EVENTS, application_of
 from spheretwin.viz.scene.entities import TRAIL_S
 from spheretwin.viz.scene.meshes import WORLD
 
@@ -124,7 +124,7 @@ def _legend(view: ComparisonView) -> rrb.Spatial2DView:
 
 
 def _states(view: ComparisonView) -> rrb.StateTimelineView:
-    contents = [f"/{run}/{STATES}/**" for run in view.states]
+    contents = [f"/{run}/**" for run in view.states]
     return rrb.StateTimelineView(
         origin="/", contents=contents, name="states", time_view=time_axis(view.duration_s)
     )

@@ -27,6 +27,7 @@ from spheretwin.viz.layout.view import TIMELINE
 from spheretwin.viz.quantities import COMPARED_QUANTITIES
 from spheretwin.viz.scene.entities import shaft_tip
 from tests.twin.analysis.runs import written
+from tests.viz.comparison.merged import Merged
 
 APART_mrad = 3.0
 
@@ -61,38 +62,6 @@ def failed(files, tmp_path_factory):
     out = folder / "all.rrd"
     assert cli.main(["review", str(files["slow"]), str(path), "--merge", str(out)]) == 0
     return read(path), Merged(out)
-
-
-class Merged:
-    """What a merged recording holds, read chunk by chunk."""
-
-    def __init__(self, path):
-        self.path, self.entities, self.columns, self.names, self.static = path, set(), {}, {}, {}
-        for chunk in RrdReader(path).stream():
-            self.entities.add(chunk.entity_path)
-            batch = chunk.to_record_batch()
-            if "Scalars:scalars" in batch.schema.names:
-                self.take(batch, chunk.entity_path, batch.column("Scalars:scalars"))
-            if "values_0" in batch.schema.names:
-                rows = batch.column("values_0").flatten()
-                for field in rows.type:
-                    self.take(batch, f"{chunk.entity_path}:{field.name}", rows.field(field.name))
-            for column in batch.schema.names:
-                if ":" in column and "Scalars" not in column and "indicator" not in column:
-                    self.static.setdefault((chunk.entity_path, column), batch.column(column).to_pylist())
-            if "SeriesLines:names" in batch.schema.names:
-                self.names[chunk.entity_path] = batch.column("SeriesLines:names").to_pylist()[0]
-
-    def take(self, batch, name, column):
-        t_ns = np.asarray(batch.column(TIMELINE).cast(pa.int64()))
-        values = np.asarray(column.flatten()).reshape(len(t_ns), -1)
-        self.columns.setdefault(name, []).append((t_ns, values))
-
-    def values(self, entity):
-        return np.concatenate([values for _, values in sorted(self.columns[entity], key=lambda c: c[0][0])])
-
-    def t_ns(self, entity):
-        return np.concatenate([t_ns for t_ns, _ in sorted(self.columns[entity], key=lambda c: c[0][0])])
 
 
 def test_every_signal_of_every_run_is_there_bit_for_bit(files, merged):
@@ -296,7 +265,7 @@ def test_a_failed_run_does_not_flatten_the_other_and_the_text_states_its_values(
     farthest = of_failed[np.argmax(np.abs(of_failed))][0]
     assert abs(farthest) > 2 * max(abs(low), abs(high))
     ((text,),) = merged.static["/runs", "TextDocument:text"]
-    assert f"- error of α (mrad): run 2 reaches {number(farthest)} (" in text
+    assert f"- α error (mrad): run 2 reaches {number(farthest)} (" in text
 
 
 def paths_of(merged, entity):
@@ -353,7 +322,7 @@ def test_titles_of_plots_with_values_outside_say_so(merged, failed):
         }
         ((text,),) = recording.static["/runs", "TextDocument:text"]
         assert cut == set(re.findall(r"^- ([^,\n]*) \([^)\n]*\): run", text, re.MULTILINE))
-    assert "error of α" in cut
+    assert "α error" in cut
 
 
 def test_plots_have_titles_with_units_and_a_wide_line_under_the_reference(merged):
@@ -462,7 +431,7 @@ def test_a_recording_that_keeps_some_rows_gives_those_and_no_others(files, tmp_p
     thin = read(path)
     assert len(thin.table) < len(thin.every_tick) == 500
     assert thin.record.ticks == 500
-    found = Merged(out)
+    result = Merged(out)
     for signal in thin.table.signals:
         column = thin.table[signal.name].reshape(len(thin.table), -1)
-        assert found.values(f"/run_1_thin/telemetry:{signal.name}").tobytes() == column.tobytes()
+        assert result.values(f"/run_1_thin/telemetry:{signal.name}").tobytes() == column.tobytes()

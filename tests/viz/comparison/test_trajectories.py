@@ -19,15 +19,15 @@ def test_every_law_has_its_errors_and_its_tip_on_one_timeline(tmp_path, actuator
     path = write(
         tmp_path / "side.rrd", {"PD": flight("pd", 20), "tuned PID": flight("pid", 50)}, actuator, "both"
     )
-    found: dict[str, int] = {}
+    result: dict[str, int] = {}
     for chunk in RrdReader(path).stream().filter(has_timeline=TIMELINE):
-        found[chunk.entity_path] = found.get(chunk.entity_path, 0) + chunk.to_record_batch().num_rows
-    assert found["/world/desired/tip"] == 50
+        result[chunk.entity_path] = result.get(chunk.entity_path, 0) + chunk.to_record_batch().num_rows
+    assert result["/world/desired/tip"] == 50
     for label, ticks in (("PD", 20), ("tuned_PID", 50)):
-        assert found[f"/world/{label}/tip"] == ticks
+        assert result[f"/world/{label}/tip"] == ticks
         for angle in "αβγ":
-            assert found[f"/error/{angle}/{label}"] == ticks
-        assert found[f"/torque/{label}"] == ticks
+            assert result[f"/error/{angle}/{label}"] == ticks
+        assert result[f"/torque/{label}"] == ticks
     assert [each.name for each in tmp_path.iterdir()] == ["side.rrd"]
 
 

@@ -1,0 +1,196 @@
+"""MCAP files with topics of ROS 2 messages `sensor_msgs/msg/JointState` in CDR encoding, without ROS.
+
+Rerun, Foxglove and PlotJuggler show their numbers by name; messages in JSON or protobuf stay opaque in Rerun.
+"""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Mapping, Sequence
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spheretwin.models.base.errors import InputError, without_breaks
+from spheretwin.models.base.extras import missing
+from spheretwin.models.base.files import whole_file
+
+Array = NDArray[np.float64]
+
+FIELDS = ("position", "velocity", "effort")
+TYPE, ENCODING = "sensor_msgs/msg/JointState", "cdr"
+DEFINITION = """std_msgs/Header header
+string[] name
+float64[] position
+float64[] velocity
+float64[] effort
+
+================================================================================
+MSG: std_msgs/Header
+builtin_interfaces/Time stamp
+string frame_id
+================================================================================
+MSG: builtin_interfaces/Time
+int32 sec
+uint32 nanosec
+"""
+METADATA = "spheretwin"
+ANGLE_NAMES = ("alpha", "beta", "gamma")
+_SECOND_ns = 10**9
+_LITTLE_ENDIAN = b"\x00\x01\x00\x00"
+
+
+class Topic(NamedTuple):
+    """Joint states over time; a field without columns is empty in each message."""
+
+    names: Sequence[str]
+    """Of the joints, or of whatever has the numbers."""
+    fields: Mapping[str, Array]
+    """Numbers of ``position``, ``velocity`` or ``effort``, each (n, names)."""
+
+
+def write(path: Path, t_s: Array, topics: Mapping[str, Topic], metadata: Mapping[str, str]) -> None:
+    """Write a message of each topic for each time, completely or not at all.
+
+    Times have a resolution of 1 ns, and are finite and not negative.
+
+    Raises
+    ------
+    InputError
+        The package mcap is not installed, a time cannot be represented, or no file can be made there.
+    """
+    _package()
+    from mcap.writer import Writer
+
+    if not np.all((t_s >= 0) & (t_s < 2**31)):
+        raise InputError(f"MCAP {path}: expected times from 0 to 2**31 s, received others")
+    stamps = np.rint(t_s * _SECOND_ns).astype(np.int64).tolist()
+    with whole_file(path) as temporary, temporary.open("wb") as file:
+        writer = Writer(file)
+        writer.start(profile="ros2", library="spheretwin")
+        writer.add_metadata(METADATA, dict(metadata))
+        schema = writer.register_schema(TYPE, "ros2msg", DEFINITION.encode())
+        channels = [
+            (writer.register_channel(f"/{name}", ENCODING, schema), Encoder(topic))
+            for name, topic in topics.items()
+        ]
+        for row, stamp in enumerate(stamps):
+            for channel, encoder in channels:
+                writer.add_message(channel, stamp, encoder.message(row, stamp), stamp)
+        writer.finish()  # type: ignore[no-untyped-call] # in mcap it has no annotations
+
+
+def group_names(groups: int) -> list[str]:
+    """Return the names of coil groups."""
+    return [str(group) for group in range(groups)]
+
+
+class Encoder:
+    """Messages of a topic: a stamp, the same names each time, and a row of each field.
+
+    Parameters
+    ----------
+    topic : Topic
+    """
+
+    def __init__(self, topic: Topic) -> None:
+        names = struct.pack("<I", len(topic.names))
+        for name in topic.names:
+            text = name.encode() + b"\0"
+            names = _aligned(names, 4) + struct.pack("<I", len(text)) + text
+        # CDR aligns numbers to their size, counted from the end of the four bytes of its header.
+        self._head = _aligned(struct.pack("<IB", 1, 0), 4) + names  # empty frame_id
+        self._fields = [np.ascontiguousarray(topic.fields.get(field, np.empty((0, 0)))) for field in FIELDS]
+
+    def message(self, row: int, stamp_ns: int) -> bytes:
+        """Return the message of a row at a time, ns."""
+        body = struct.pack("<iI", *divmod(stamp_ns, _SECOND_ns)) + self._head
+        for values in self._fields:
+            body = _aligned(body, 4) + struct.pack("<I", values.shape[1])
+            if values.size:
+                body = _aligned(body, 8) + values[row].tobytes()
+        return _LITTLE_ENDIAN + body
+
+
+def _aligned(body: bytes, size: int) -> bytes:
+    return body + bytes(-len(body) % size)
+
+
+def read(path: Path) -> tuple[dict[str, Array], dict[str, str]]:
+    """Read every number of the joint states of a file, and the metadata that `write` stored.
+
+    Returns
+    -------
+    dict of (n,) array
+        ``t_s``, the stamps of the messages, and the numbers by ``topic/field/name``. Consecutive messages of
+        different topics with the same stamp are one row; a number is NaN in rows without a message of it.
+    dict
+        Metadata; empty for a file of another program.
+
+    Raises
+    ------
+    InputError
+        The package mcap is not installed, the file cannot be read, or has no joint states.
+    """
+    _package()
+    from mcap.exceptions import McapError
+    from mcap.reader import make_reader
+
+    rows: list[dict[str, float]] = []
+    metadata: dict[str, str] = {}
+    try:
+        with path.open("rb") as file:
+            reader = make_reader(file)
+            for record in reader.iter_metadata():
+                metadata |= record.metadata if record.name == METADATA else {}
+            for schema, channel, message in reader.iter_messages(log_time_order=False):
+                if schema is None or schema.name != TYPE or channel.message_encoding != ENCODING:
+                    continue
+                stamp_s, numbers = _decode(channel.topic.strip("/"), message.data)
+                if not rows or rows[-1]["t_s"] != stamp_s or not numbers.keys().isdisjoint(rows[-1]):
+                    rows.append({"t_s": stamp_s})
+                rows[-1] |= numbers
+    except (OSError, McapError, struct.error, ValueError, IndexError) as error:
+        raise InputError(f"MCAP {path}: expected a readable file, {without_breaks(error)}") from None
+    if not rows:
+        raise InputError(f"MCAP {path}: expected messages {TYPE} in CDR, received none")
+    names = dict.fromkeys(name for row in rows for name in row)
+    return {name: np.array([row.get(name, np.nan) for row in rows]) for name in names}, metadata
+
+
+def _decode(topic: str, data: bytes) -> tuple[float, dict[str, float]]:
+    """Return the stamp, s, and the numbers of a message by ``topic/field/name``."""
+    if data[1] > 1:
+        raise ValueError(f"topic {topic}: expected CDR of version 1, received another encoding")
+    order, place = "<" if data[1] else ">", 4
+
+    def number(code: str, count: int = 1) -> tuple[Any, ...]:
+        nonlocal place
+        size = struct.calcsize(code)
+        place += -(place - 4) % size if count else 0
+        values = struct.unpack_from(f"{order}{count}{code}", data, place)
+        place += size * count
+        return values
+
+    def text() -> str:
+        nonlocal place
+        (length,) = number("I")
+        place += length
+        return data[place - length : place - 1].decode()
+
+    stamp_s = (number("i")[0] * _SECOND_ns + number("I")[0]) / _SECOND_ns
+    text()  # frame_id
+    names = [text() for _ in range(number("I")[0])]
+    numbers: dict[str, float] = {}
+    for field in FIELDS:
+        values = number("d", number("I")[0])
+        numbers |= {f"{topic}/{field}/{name}": value for name, value in zip(names, values, strict=False)}
+    return stamp_s, numbers
+
+
+def _package() -> None:
+    if not find_spec("mcap"):
+        raise missing("MCAP", "mcap", "machine")

@@ -1,0 +1,85 @@
+"""Joint states in MCAP: every number comes back, and the bytes are CDR as the OMG specifies it."""
+
+import struct
+
+import numpy as np
+import pytest
+from mcap.reader import make_reader
+from mcap.writer import Writer
+
+from spheretwin.models.base.errors import InputError
+from spheretwin.models.telemetry import joint_states
+from spheretwin.models.telemetry.joint_states import ANGLE_NAMES, DEFINITION, TYPE, Topic
+
+TIMES = np.array([0.0, 0.001, 1.5, 12345.678901234])
+NUMBERS = np.arange(12.0).reshape(4, 3) / 7
+
+
+@pytest.fixture
+def path(tmp_path):
+    topics = {
+        "angles": Topic(("alpha", "beta", "gamma"), {"position": NUMBERS, "velocity": -NUMBERS}),
+        "currents": Topic(("0", "11"), {"effort": NUMBERS[:, :2]}),
+    }
+    joint_states.write(path := tmp_path / "run.mcap", TIMES, topics, {"currents": "commanded"})
+    return path
+
+
+def test_numbers_come_back(path):
+    columns, metadata = joint_states.read(path)
+    assert metadata == {"currents": "commanded"}
+    assert list(columns) == [
+        "t_s", *(f"angles/{field}/{name}" for field in ("position", "velocity") for name in ANGLE_NAMES),
+        "currents/effort/0", "currents/effort/11",
+    ]  # fmt: skip
+    assert np.max(np.abs(columns["t_s"] - TIMES)) <= 5e-10  # nanoseconds
+    assert np.array_equal(columns["angles/velocity/beta"], -NUMBERS[:, 1])
+    assert np.array_equal(columns["currents/effort/11"], NUMBERS[:, 1])
+
+
+def test_messages_are_little_endian_cdr_with_their_schema(path):
+    with path.open("rb") as file:
+        schema, channel, message = next(
+            iter(make_reader(file).iter_messages(topics=["/currents"], reverse=True))
+        )
+    assert (schema.name, schema.encoding, channel.message_encoding) == (TYPE, "ros2msg", "cdr")
+    assert schema.data.decode() == DEFINITION
+    assert message.log_time == 12345678901234
+    # Written by hand: header, stamp, empty frame_id, two names, two empty lists, two numbers aligned to 8.
+    numbers = NUMBERS[3, :2].tolist()
+    values = 0, 1, 0, 12345, 678901234, 1, 0, 2, 2, b"0\0", 3, b"11\0", 0, 0, 2, *numbers
+    expected = struct.pack("<BBH iI IB3x I I2s2x I3sx I I I2d", *values)
+    body, tail = expected[:-16], expected[-16:]
+    body += bytes(-(len(body) - 4) % 8)
+    assert message.data == body + tail
+
+
+def test_big_endian_messages_are_read(tmp_path):
+    body = struct.pack(">iI I1s3x I I2s2x Id I I", 1, 500, 1, b"\0", 1, 2, b"a\0", 1, 2.5, 0, 0)
+    with (path := tmp_path / "big.mcap").open("wb") as file:
+        writer = Writer(file)
+        writer.start()
+        schema = writer.register_schema(TYPE, "ros2msg", DEFINITION.encode())
+        channel = writer.register_channel("/robot/joints", "cdr", schema)
+        writer.add_message(channel, 1, b"\0\0\0\0" + body, 1)
+        writer.finish()
+    columns, metadata = joint_states.read(path)
+    assert {name: values.tolist() for name, values in columns.items()} == {
+        "t_s": [1.0000005], "robot/joints/position/a": [2.5]
+    }  # fmt: skip
+    assert metadata == {}
+
+
+@pytest.mark.parametrize("damage", ["cut", "text", "missing"])
+def test_a_file_that_cannot_be_read_is_refused(path, damage):
+    content = path.read_bytes()
+    path.write_bytes({"cut": content[: len(content) // 2], "text": b"t_s,a\n", "missing": b""}[damage])
+    if damage == "missing":
+        path.unlink()
+    with pytest.raises(InputError, match=r"MCAP .*run\.mcap: expected"):
+        joint_states.read(path)
+
+
+def test_times_before_zero_are_refused(tmp_path):
+    with pytest.raises(InputError, match="expected times from 0"):
+        joint_states.write(tmp_path / "a.mcap", np.array([-1.0, 0.0]), {}, {})

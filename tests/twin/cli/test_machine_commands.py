@@ -1,0 +1,133 @@
+"""Verbs `machine` and `drive`: both together, files, refusals and exit codes."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from spheretwin import cli
+from spheretwin.models.telemetry.table import read_parquet
+from tests.waiting import PATIENCE_S
+
+
+def machine(*flags, scenario="sinusoid", **options):
+    command = [
+        sys.executable,
+        "-m",
+        "spheretwin",
+        "machine",
+        scenario,
+        "--listen",
+        "udp://:0",
+        "--idle-s",
+        "600",
+        *flags,
+    ]
+    return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, **options)
+
+
+def port_of(process):
+    return process.stderr.readline().strip().rpartition(":")[2]
+
+
+def test_both_verbs_write_their_files_in_real_time(tmp_path, capsys):
+    """No number depends on the load of the computer: the timeouts are long, and only files are compared."""
+    names = {name: tmp_path / name for name in ("m.parquet", "d.parquet", "d.rrd", "log.parquet")}
+    flags = ["--duration", "0.3", "--json", "--timeout-ms", str(1000 * PATIENCE_S)]
+    with machine("--real-time", "--telemetry", str(names["m.parquet"]), *flags) as process:
+        files = [
+            text
+            for flag, name in (("telemetry", "d.parquet"), ("record", "d.rrd"), ("log", "log.parquet"))
+            for text in (f"--{flag}", str(names[name]))
+        ]
+        address = f"udp://:{port_of(process)}"
+        code = cli.main(
+            ["drive", "sinusoid", "--machine", address, "--arm", "--ramp-s", "0.1", *flags, *files]
+        )
+        out, _ = process.communicate(timeout=PATIENCE_S)
+    assert code in (0, 1)  # 1: the clock of the machine had run 0.3 s before that of the controller
+    ours, theirs = json.loads(capsys.readouterr().out), json.loads(out)
+    assert {ours["status"], theirs["status"]} <= {"completed", "interrupted"}
+    assert ours["link"]["jitter"]["max_ms"] >= ours["link"]["jitter"]["p50_ms"] > 0
+    assert theirs["link"]["jitter"]["max_ms"] > 0
+    assert all(path.stat().st_size for path in names.values())
+    rows, metadata = read_parquet(names["d.parquet"])
+    assert len(rows) > 100
+    assert json.loads(metadata["journal"]) == [[0, "external", f"a machine at {address}"]]
+    truth, metadata = read_parquet(names["m.parquet"])
+    assert json.loads(metadata["journal"]) == [[0, "external", "a controller at udp://:0"]]
+    assert np.any(truth["current_A"])
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
+def test_an_interrupted_machine_says_so():
+    with machine() as process:
+        port_of(process)
+        process.send_signal(signal.SIGINT)
+        _, err = process.communicate(timeout=PATIENCE_S)
+    assert process.returncode == 1
+    assert "interrupted, a stop was requested" in err
+
+
+def test_frames_through_a_pipe(tmp_path):
+    """The machine reads commands from standard input, and its frames are alone on standard output."""
+    from tests.twin.machine.link.lines import MEASUREMENT, command
+
+    frames = b"".join(
+        [command(1, flags=2), *(command(i, current=0.5) for i in range(2, 12)), command(12, flags=4)]
+    )
+    done = subprocess.run(
+        [sys.executable, "-m", "spheretwin", "machine", "sinusoid", "--listen", "-", "--duration", "1"],
+        input=frames, capture_output=True, check=False, env={**os.environ, "COLUMNS": "200"},
+    )  # fmt: skip
+    assert done.returncode == 1
+    assert b"interrupted, the controller ended the run" in done.stderr
+    size = MEASUREMENT.size
+    answers = [MEASUREMENT.decode(done.stdout[at : at + size]) for at in range(0, len(done.stdout), size)]
+    assert [answer["echo"] for answer in answers[:-1]] == list(range(1, 12))
+    assert np.any(answers[-1]["angle"])  # the currents have moved the rotor
+
+
+REFUSALS = [
+    (["machine"], "expected a scenario"),
+    (["machine", "sinusoid"], "expected --listen ADDRESS, received none"),
+    (["drive", "sinusoid"], "expected --machine ADDRESS, received none"),
+    (["machine", "sinusoid", "--listen", "tcp://:1"], "expected udp://HOST:PORT"),
+    (["drive", "sinusoid", "--machine", "-", "--json"], "expected --json without the address -"),
+    (["drive", "sinusoid", "--machine", "udp://:5", "--frame", "ventusff_pose"],
+     "expected a description with a command"),
+    (["machine", "sinusoid", "--listen", "udp://:0", "--frame", "mine"], "expected spheretwin"),
+    (["drive", "sinusoid", "--machine", "udp://:5", "--ramp-s", "-1"],
+     "expected a number of s from 0 on, received -1"),
+    (["drive", "sinusoid", "--machine", "udp://:5", "--timeout-ms", "0"],
+     "expected a number of ms above 0, received 0"),
+    (["drive", "sinusoid", "--machine", "udp://:5", "--log", "/no/such/folder/log.parquet"], "log.parquet"),
+    (["machine", "hold", "--listen", "udp://:0", "--manual.currents-A", str([0.0] * 18)],
+     "expected no manual currents"),
+    (["drive", "sinusoid", "--machine", "udp://:5", "--armed"], "did you mean --arm"),
+    (["machine", "sinusoid", "--listen", "udp://:0", "--controller.lav", "pd"], "did you mean law?"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("arguments", "message"), REFUSALS, ids=[" ".join(a)[:40] for a, _ in REFUSALS])
+def test_bad_input_is_refused_in_one_line(arguments, message, capsys):
+    assert cli.main(arguments) == 2
+    said = capsys.readouterr()
+    assert message in said.err
+    assert said.err.count("\n") == 1
+    assert not said.out
+
+
+def test_a_machine_that_does_not_answer_is_a_failure(capsys, monkeypatch):
+    from spheretwin.cli import drive
+
+    settings = drive._settings
+    monkeypatch.setattr(
+        drive, "_settings", lambda options: settings(options).model_copy(update={"connect_s": 0.1})
+    )
+    assert cli.main(["drive", "sinusoid", "--machine", "udp://127.0.0.1:9", "--arm"]) == 1
+    assert "expected a measurement within 0.1 s" in capsys.readouterr().err

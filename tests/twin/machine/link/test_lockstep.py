@@ -1,0 +1,177 @@
+"""Lockstep: our controller on the twin as a machine gives the bytes of a simulation."""
+
+import threading
+import time
+
+import numpy as np
+import pytest
+
+from spheretwin import scenario as scenarios
+from spheretwin.external import Measurement
+from spheretwin.machine.link import frame_format
+from spheretwin.machine.link.channel import Channel
+from spheretwin.machine.link.controller_scenario import check_measurement, controller_scenario, left_out
+from spheretwin.machine.link.limits import Limits
+from spheretwin.machine.link.machine_link import Link, LinkSettings
+from spheretwin.machine.link.machine_server import MachineServer
+from spheretwin.models.base.errors import InputError
+from spheretwin.session import Session
+from tests.twin.machine.link.lines import GROUPS, Line, PERIOD_s, heat
+from tests.waiting import PATIENCE_S
+
+TICKS = 400
+
+
+class Run:
+    """The same scenario simulated, and driven over a line."""
+
+    def __init__(
+        self,
+        frame="spheretwin",
+        name="nutation",
+        damage=None,
+        ticks=TICKS,
+        line=None,
+        now=time.monotonic,
+        **changes,
+    ):
+        scenario = scenarios.load(name, {key.replace("__", "."): value for key, value in changes.items()})
+        with Session(scenario) as session:
+            self.simulated = session.advance(ticks)
+        line, frames = line or Line(), frame_format.load(frame)
+        end = line.other_end()
+        channel = Channel(damage(end) if damage else end, frames.measurement, frames.command, GROUPS)
+        server = MachineServer(channel, "a test", GROUPS, PERIOD_s, idle_s=1e6)
+        thread = threading.Thread(target=self.serve, args=(scenario, server, ticks), daemon=True)
+        thread.start()
+        limits = Limits(current_A=8.0)
+        settings = LinkSettings(armed=True, ramp_s=0.0, lockstep=True, timeout_s=1000.0, connect_s=1000.0)
+        channel = Channel(line, frames.command, frames.measurement, GROUPS)
+        self.link = Link(channel, "a test", settings, limits, heat(), PERIOD_s, now=now)
+        with self.link.session(scenario) as session:
+            self.controller = session.advance(ticks)
+            self.status = session.status
+        self.link.release()
+        thread.join(PATIENCE_S)
+
+    def serve(self, scenario, server, ticks):
+        with Session(scenario, external=server) as session:
+            self.machine = session.advance(ticks)
+            server.finish(session.t_s, session.q_rad)
+
+
+LAW = ("sliding_s", "fuzzy_torque_Nm", "switching_torque_Nm", "switching_gain", "bound_gain")
+CONTROLLER = (
+    "t_s",
+    "q_ref_rad",
+    "qdot_ref_rad_s",
+    "torque_command_Nm",
+    "current_command_A",
+    "allocation_scale",
+)
+PLANT = ("t_s", "q_rad", "qdot_rad_s", "error_rad", "torque_Nm", "disturbance_Nm", "current_command_A",
+         "current_A", "mean_current_A")  # fmt: skip
+KALMAN, PROTOTYPE = {"estimator__kind": "kalman"}, {"hardware": "prototype"}
+
+
+def check_bytes(run, measured, extra=()):
+    assert run.status == "running"
+    assert len(run.machine) == len(run.controller) == len(run.simulated)
+    for table, columns in (
+        (run.machine, (*PLANT, *measured, *extra)),
+        (run.controller, (*CONTROLLER, *LAW, *measured)),
+    ):
+        for column in columns:
+            assert table[column].tobytes() == run.simulated[column].tobytes(), column
+
+
+@pytest.mark.parametrize("frame", ["spheretwin", "spheretwin_json"])
+def test_the_bytes_of_true_rates(frame):
+    run = Run(frame)
+    check_bytes(run, ())
+    # Together both sides have every column.
+    assert {signal.name for signal in run.simulated.signals} == {*PLANT, *CONTROLLER, *LAW}
+
+
+def test_the_bytes_of_an_estimator():
+    check_bytes(Run(**KALMAN), ("q_measured_rad", "qdot_estimated_rad_s"))
+
+
+def test_the_bytes_of_the_prototype_with_its_electronics():
+    run = Run(**PROTOTYPE, **KALMAN)
+    measured = ("q_measured_rad", "qdot_estimated_rad_s")
+    check_bytes(run, measured, ("coil_temperature_degC", "copper_loss_W", "friction_Nm"))
+    np.testing.assert_array_equal(run.controller["q_rad"], run.simulated["q_measured_rad"])
+
+
+def test_a_line_that_loses_and_repeats_frames_changes_no_byte():
+    class Damaged(Line):
+        """Three of four answers are lost, repeated, or follow noise; a lost one is empty."""
+
+        sent = 0
+
+        def send(self, content):
+            self.sent += 1
+            noise = b"\xa5\x5a" + bytes(range(200))
+            for datagram in ([b""], [content], [content, content], [noise, content])[self.sent % 4]:
+                super().send(datagram)
+
+    class Ear(Line):
+        """End with a clock that only silence moves: then the command is sent again."""
+
+        t_s = 0.0
+
+        def receive(self, timeout_s):
+            content = super().receive(timeout_s)
+            self.t_s += 0.0 if content else timeout_s
+            return content
+
+    ear = Ear()
+    run = Run(damage=lambda line: Damaged(line.sink, line.source), ticks=50, line=ear, now=lambda: ear.t_s)
+    check_bytes(run, ())
+    counts = run.link.figures()["frames"]
+    assert counts["duplicated"] > 10
+    assert counts["corrupt"] > 10
+
+
+def test_rates_that_nobody_measures_need_an_estimator():
+    resolved = Session(scenarios.load("sinusoid")).initial_scenario
+    with pytest.raises(
+        InputError, match=r"expected an estimator of the rates, such as --estimator\.kind kalman"
+    ):
+        check_measurement(resolved, Measurement(np.zeros(3), None, np.zeros(18)))
+
+
+def test_a_detector_needs_measured_currents():
+    resolved = Session(scenarios.load("sinusoid", {"detector.detect": True})).initial_scenario
+    with pytest.raises(InputError, match="expected a machine that reports currents"):
+        check_measurement(resolved, Measurement(np.zeros(3), np.zeros(3), None))
+
+
+def test_the_controller_has_nothing_of_the_plant():
+    changes = {
+        "hardware": "prototype",
+        "plant.modelling_error": 0.2,
+        "disturbance.load": 1.0,
+        "fault": [{"target": "coil.03", "mode": "open", "start_s": 0.1, "detection": True}],
+        "event": [
+            {"t_s": 0.1, "set": "disturbance.load", "value": 2.0},
+            {"t_s": 0.2, "set": "controller.law", "value": "pd"},
+        ],
+    }
+    resolved = Session(scenarios.load("sinusoid", changes)).initial_scenario
+    first = Measurement(np.array([0.1, 0.2, 0.3]), None, np.zeros(18))
+    scenario = controller_scenario(resolved, first, 2.0)
+    assert left_out(resolved) == [
+        "the fault coil.03 open does not occur: the machine is real",
+        "the event that sets disturbance.load does not occur: the machine is real",
+    ]
+    assert scenario.plant.modelling_error == 0.0
+    assert not scenario.fault
+    assert scenario.detector.detect
+    assert scenario.watchdog.on
+    assert [event.set for event in scenario.event] == ["controller.law"]
+    assert scenario.plant.initial_rad == (0.1, 0.2, 0.3)
+    assert scenario.nominal.current_limit_A == 2.0
+    assert scenario.nominal.inertia_kg_m2 == resolved.nominal.inertia_kg_m2
+    assert scenario.nominal.angle_noise_rad == resolved.nominal.angle_noise_rad

@@ -1,0 +1,203 @@
+"""Programs in C on both ends: a firmware with a plant of its own, and the example of a controller."""
+
+import contextlib
+import json
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from spheretwin import cli, simulation
+from spheretwin import scenario as scenarios
+from spheretwin.bench import Bench
+from spheretwin.models.telemetry.table import read_parquet
+from tests.waiting import PATIENCE_S
+
+COMPILER = shutil.which("cc") or shutil.which("gcc") or shutil.which("clang")
+HERE, ROOT = Path(__file__).parent, Path(__file__).parents[4]
+CURVE = ROOT / "models" / "torque_curve.csv"
+EXAMPLE = ROOT / "twin" / "machine" / "link" / "examples" / "pid_controller.c"
+
+pytestmark = pytest.mark.skipif(not COMPILER or sys.platform == "win32", reason="no C compiler with POSIX")
+
+
+def built(source, folder):
+    program = folder / source.stem
+    options = ["-std=c99", "-O2", "-Wall", "-Wextra", "-pedantic", "-Werror"]
+    subprocess.run([COMPILER, *options, "-o", program, source, "-lm"], check=True)
+    return program
+
+
+@pytest.fixture(scope="module")
+def firmware(tmp_path_factory):
+    program = built(HERE / "firmware.c", tmp_path_factory.mktemp("firmware"))
+
+    @contextlib.contextmanager
+    def run():
+        process = subprocess.Popen([program, CURVE], stdout=subprocess.PIPE, text=True)
+        try:
+            yield int(process.stdout.readline())
+            assert process.wait(PATIENCE_S) == 0  # it has heard the end
+        finally:
+            process.kill()
+            process.wait()
+            process.stdout.close()
+
+    return run
+
+
+SAME_PLANT = {
+    "controller.law": "pid",
+    "estimator.kind": "kalman",
+    "plant.modelling_error": 0.0,
+    "plant.modelling_torque_Nm": [0.0, 0.0, 0.0],
+    "disturbance.load": 0.0,
+    "disturbance.random_bound_Nm": 0.0,
+}
+
+
+def driven(firmware, capsys, *flags):
+    with firmware() as port:
+        common = ["drive", "sinusoid", "--controller.law", "pid", "--estimator.kind", "kalman", "--json"]
+        link = ["--machine", f"udp://:{port}", "--frame", str(HERE / "firmware.toml"), "--lockstep"]
+        code = cli.main([*common, *link, "--timeout-ms", str(1000 * PATIENCE_S), *flags])
+    return code, json.loads(capsys.readouterr().out)
+
+
+def test_an_independent_firmware_tracks_as_the_twin_does(firmware, capsys, tmp_path):
+    """Attitude by rotation matrices, Euler equations, other steps and another interpolation."""
+    paths = {name: tmp_path / f"{name}.parquet" for name in ("telemetry", "log")}
+    files = [text for name, path in paths.items() for text in (f"--{name}", str(path))]
+    code, result = driven(firmware, capsys, "--arm", "--ramp-s", "0", "--duration", "2", *files)
+    assert (code, result["status"]) == (0, "completed")
+    twin = simulation.simulate("sinusoid", {**SAME_PLANT, "duration": 2.0})
+    # They differ by the firmware's friction (1e-4 N·m·s: about 1 % of the torque), by its sampling of the
+    # currents and by its rounding of angles to 1 µrad: 2 % was measured.
+    for name in ("max_abs_error_rad", "rms_error_rad"):
+        np.testing.assert_allclose(result[name], twin.figures[name], rtol=0.05)
+    telemetry, metadata = read_parquet(paths["telemetry"])
+    # The motion itself differs by no more than a part of these errors of 3 mrad.
+    np.testing.assert_allclose(telemetry["q_rad"], twin.telemetry["q_rad"], atol=2e-4)
+    assert "a machine at udp://" in metadata["journal"]
+    log, _ = _log(paths["log"])
+    np.testing.assert_array_equal(log["angle_rad"], telemetry["q_rad"])
+    np.testing.assert_array_equal(log["current_A"], telemetry["current_command_A"])
+    assert cli.main(["simulate", "--replay", str(paths["telemetry"])]) == 2
+    assert "expected a run of the twin alone, received one with a machine at udp" in capsys.readouterr().err
+
+
+def _log(path):
+    from pyarrow import parquet
+
+    table = parquet.read_table(path)
+    columns = {name: np.array(table[name].to_pylist()) for name in table.column_names}
+    return columns, table.schema.metadata
+
+
+def test_without_arming_the_firmware_does_not_move(firmware, capsys):
+    code, result = driven(firmware, capsys, "--duration", "0.2")
+    assert (code, result["status"], result["link"]["armed"]) == (0, "completed", False)
+    assert result["max_abs_current_A"] == 0.0
+    # It stays at 0 while the reference moves by 0.2 sin(0.2 π) rad.
+    assert result["max_abs_error_rad"] == pytest.approx([0.2 * np.sin(0.199 * np.pi)] * 3, rel=1e-3)
+
+
+def test_currents_rise_with_the_ramp(firmware, capsys, tmp_path):
+    path = tmp_path / "run.parquet"
+    code, _ = driven(
+        firmware, capsys, "--arm", "--ramp-s", "0.2", "--duration", "0.1", "--telemetry", str(path)
+    )
+    assert code == 0
+    rows, _ = read_parquet(path)
+    assert not np.any(rows["current_command_A"][0])
+    assert np.any(rows["current_command_A"][1])
+    full = np.abs(rows["torque_command_Nm"]).max(axis=1)
+    sent = np.abs(rows["torque_Nm"]).max(axis=1)
+    assert np.all(sent[1:20] < 0.15 * full[1:20])  # 20 ms are a tenth of the ramp
+
+
+def test_the_bench_drives_the_firmware(firmware, monkeypatch):
+    """The verb itself, whose page presses start and stop: it tracks as a bench with its own plant does."""
+    pytest.importorskip("viser")
+    from spheretwin.viz.bench.page import Page
+
+    ticks, states = 500, []
+
+    def press(bench):
+        bench.do("start")
+        assert bench.advance(ticks) == ticks
+        states.append(bench.state())
+        bench.do("stop")
+        bench.advance(20)
+        states.append(bench.state())
+
+    monkeypatch.setattr(Bench, "begin", lambda bench: None)  # no thread with the pace of the clock
+    monkeypatch.setattr(Page, "show", lambda page, ended: press(page._bench))
+    words = ["bench", "sinusoid", "--controller.law", "pid", "--estimator.kind", "kalman"]
+    with firmware() as port:
+        link = ["--machine", f"udp://:{port}", "--frame", str(HERE / "firmware.toml"), "--lockstep", "--arm"]
+        limits = ["--timeout-ms", str(1000 * PATIENCE_S), "--ramp-s", "0", "--port", "0", "--no-browser"]
+        assert cli.main([*words, *link, *limits]) == 0
+    with Bench(scenarios.load("sinusoid", SAME_PLANT)) as own:
+        press(own)
+    driven, stopped, twin, _ = states
+    assert driven.t_s == twin.t_s
+    # As for `drive` above.
+    np.testing.assert_allclose(driven.q_rad, twin.q_rad, atol=2e-4)
+    assert np.abs(driven.q_rad).max() > 0.1
+    assert any(driven.current_command_A)
+    assert not any(stopped.current_command_A)
+
+
+LIMITS = [
+    (("--limit-angle-deg", "5"), "the rotor is at the edge of its workspace"),
+    # From one sample to the next the rotor may move by the limit times the period.
+    (("--limit-rate-rad-s", "0.3"), "a measurement jumped further than the rotor can"),
+    (("--limit-temperature-degC", "20.0002"), "a coil is too hot"),
+]
+
+
+@pytest.mark.parametrize(("flags", "reason"), LIMITS, ids=[flags[0] for flags, _ in LIMITS])
+def test_a_limit_ends_the_run_without_currents(firmware, capsys, tmp_path, flags, reason):
+    path = tmp_path / "run.parquet"
+    code, result = driven(
+        firmware, capsys, "--arm", "--ramp-s", "0", "--duration", "1", "--telemetry", str(path), *flags
+    )
+    assert (code, result["status"], result["reason"]) == (1, "failsafe", reason)
+    rows, _ = read_parquet(path)
+    trip = int(np.argmax(rows["failsafe_reason"] > 0))
+    assert 0 < trip < 500
+    assert np.any(rows["current_command_A"][trip - 1])
+    # The measurement that is beyond a limit of the link answers the command of its tick.
+    assert not np.any(rows["current_command_A"][trip + 1 :])
+
+
+def test_the_limit_of_the_current_holds(firmware, capsys):
+    code, result = driven(
+        firmware, capsys, "--arm", "--ramp-s", "0", "--duration", "0.3", "--limit-current-A", "0.5"
+    )
+    assert code == 0
+    assert result["max_abs_current_A"] == 0.5
+
+
+def test_the_example_of_a_controller_tracks(tmp_path, capsys):
+    program = built(EXAMPLE, tmp_path)
+    command = [sys.executable, "-m", "spheretwin", "machine", "sinusoid", "--listen", "udp://:0", "--json"]
+    with subprocess.Popen(
+        [*command, "--duration", "1"], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=tmp_path
+    ) as machine:
+        port = machine.stderr.readline().strip().rpartition(":")[2]
+        done = subprocess.run(
+            [program, "127.0.0.1", port, CURVE, "1"], capture_output=True, text=True, timeout=PATIENCE_S
+        )
+        out, err = machine.communicate(timeout=PATIENCE_S)
+    assert (done.returncode, machine.returncode) == (0, 0), done.stderr + err
+    result = json.loads(out)
+    assert result["status"] == "completed"
+    # Our own law of the same gains has 6.3 mrad at most under the same load; the start is that of a rotor
+    # at rest under a moving reference.
+    assert max(result["max_abs_error_rad"]) < 7e-3
+    assert float(done.stdout.split()[-2]) < 3.0  # mrad, in the second half

@@ -1,0 +1,150 @@
+"""Streams of measurements: the same estimates as from a file, and how a stream ends."""
+
+import os
+import threading
+
+import numpy as np
+import pytest
+
+from spheretwin.machine import Log, Shadow, shadow
+from spheretwin.machine.link import frame_format
+from spheretwin.machine.link.codec import Codec
+from spheretwin.machine.link.frame_format import Flags
+from spheretwin.machine.link.stream import RunningShadow, is_address, played, streamed
+from spheretwin.machine.link.transports import Udp
+from spheretwin.machine.log import joined
+from spheretwin.machine.model import model_of
+from spheretwin.models.base.errors import InputError, SpheretwinError
+from tests.twin.machine.machine_logs import KNOWN, SCENARIO, changing_log
+
+
+@pytest.fixture(scope="module")
+def log():
+    measured = changing_log(0.5)
+    return Log(measured.t_s, measured.current_A, measured.angle_rad, "measured", "stream")
+
+
+@pytest.fixture(scope="module")
+def model():
+    return model_of(SCENARIO, KNOWN)
+
+
+def frames_of(log, *, end=True):
+    codec = Codec(frame_format.load("spheretwin").measurement, 18)
+    for row in range(len(log)):
+        last = end and row == len(log) - 1
+        yield codec.encode(
+            {
+                "sequence": row,
+                "echo": 0,
+                "flags": int(Flags.END) if last else 0,
+                "time": log.t_s[row],
+                "angle": log.angle_rad[row],
+                "rate": np.zeros(3),
+                "current": log.current_A[row],
+                "temperature": 20.0,
+            }
+        )
+
+
+def received(monkeypatch, content, **options):
+    """Blocks of a stream on standard input."""
+    reading, writing = os.pipe()
+    before = os.dup(0), os.dup(1)
+    os.dup2(reading, 0)
+    thread = threading.Thread(target=lambda: (os.write(writing, content), os.close(writing)))
+    thread.start()
+    try:
+        return list(streamed("-", 18, **options))
+    finally:
+        thread.join()
+        os.dup2(before[0], 0)
+        os.dup2(before[1], 1)
+        for number in (*before, reading):
+            os.close(number)
+
+
+def test_a_stream_is_the_log_of_its_frames(monkeypatch, log, model):
+    blocks = received(monkeypatch, b"".join(frames_of(log)))
+    whole = joined(blocks)
+    assert len(blocks) > 1
+    assert whole.digest == log.digest
+    running = Shadow(model)
+    values = np.vstack([running.advance(block).values for block in blocks])
+    assert np.array_equal(values, shadow(log, model).telemetry.values)
+
+
+def test_a_stream_ends_with_its_sender(monkeypatch, log):
+    """Closed without the end flag; bytes that are no frame are skipped."""
+    content = b"noise" + b"".join(frames_of(log, end=False))
+    assert joined(received(monkeypatch, content)).digest == log.digest
+
+
+def test_a_stream_without_frames_is_refused(monkeypatch):
+    with pytest.raises(SpheretwinError, match="expected frames, received 1 texts"):
+        received(monkeypatch, b"no frame at all")
+
+
+def test_a_stream_ends_after_a_silence(log):
+    clock = iter(np.arange(0.0, 1e4, 0.5))
+    address = "udp://127.0.0.1:0"
+    frames = iter(frames_of(log, end=False))
+
+    class Loopback:
+        """In place of a socket: some frames, then nothing."""
+
+        datagrams, foreign, is_closed = True, 0, False
+
+        def receive(self, timeout_s):
+            return next(frames, b"")
+
+        def accept(self):
+            pass
+
+        def close(self):
+            pass
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("spheretwin.machine.link.stream.open_transport", lambda *a, **k: Loopback())
+        blocks = list(streamed(address, 18, now=lambda: next(clock)))
+    assert joined(blocks).digest == log.digest
+
+
+def test_frames_need_times_angles_and_currents():
+    with pytest.raises(InputError, match="expected measurements with time, current"):
+        list(streamed("udp://127.0.0.1:0", 18, "ventusff_pose"))
+
+
+def test_the_port_is_free_after_a_stop():
+    free = Udp("127.0.0.1", 0, listening=True)
+    port = free.port
+    free.close()
+    with pytest.raises(SpheretwinError, match="expected frames"):
+        list(streamed(f"udp://127.0.0.1:{port}", 18, stop_requested=lambda: True))
+    Udp("127.0.0.1", port, listening=True).close()
+
+
+def test_a_log_is_played_at_the_pace_of_its_times(log):
+    waits = []
+    blocks = list(played(log, now=lambda: 100.0, wait_until=waits.append))
+    assert joined(blocks).digest == log.digest
+    ends_s = np.array([block.t_s[-1] for block in blocks])
+    assert np.allclose(waits, 100.0 + ends_s - log.t_s[0], rtol=0, atol=1e-12)  # rounding of 100 s
+    assert list(played(log, stop_requested=lambda: True, wait_until=waits.append)) == []
+
+
+def test_the_shadow_beside_a_link_is_that_of_the_log(log, model):
+    commanded = Log(log.t_s, log.current_A, log.angle_rad)
+    running = RunningShadow(Shadow(model))
+    assert running.telemetry() is None
+    for t_s, current_A, angle_rad in zip(log.t_s, log.current_A, log.angle_rad, strict=True):
+        running.advance(t_s, current_A, angle_rad)
+    assert np.array_equal(running.telemetry().values, shadow(commanded, model).telemetry.values)
+
+
+@pytest.mark.parametrize(
+    ("source", "expected"),
+    [("-", True), ("udp://:5005", True), ("serial:/dev/ttyACM0@115200", True), ("run.parquet", False)],
+)
+def test_addresses_are_told_from_files(source, expected):
+    assert is_address(source) is expected

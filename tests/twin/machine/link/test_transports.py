@@ -1,0 +1,150 @@
+"""Transports: addresses, UDP with strangers, serial lines on a pseudo-terminal, pipes."""
+
+import contextlib
+import os
+import socket
+import subprocess
+import sys
+
+import pytest
+
+from spheretwin.machine.link.transports import Stream, Udp, open_transport
+from spheretwin.models.base.errors import InputError, SpheretwinError
+
+SOON_s = 30.0  # a bound of a hang: everything is local
+
+
+@pytest.fixture
+def listener():
+    with contextlib.closing(open_transport("udp://:0", listening=True)) as end:
+        yield end
+
+
+@pytest.fixture
+def sender(listener):
+    with contextlib.closing(open_transport(f"udp://127.0.0.1:{listener.port}")) as end:
+        yield end
+
+
+def test_it_listens_at_the_loopback_unless_an_address_is_given(listener):
+    assert listener._socket.getsockname()[0] == "127.0.0.1"
+
+
+def test_datagrams_pass_both_ways_once_the_peer_is_known(listener, sender):
+    listener.send(b"to nobody")
+    sender.send(b"one")
+    assert listener.receive(SOON_s) == b"one"
+    listener.accept()
+    listener.send(b"two")
+    assert sender.receive(SOON_s) == b"two"
+    assert sender.receive(0.0) == b""
+
+
+def test_a_stranger_is_not_heard_after_the_peer(listener, sender):
+    with contextlib.closing(open_transport(f"udp://:{listener.port}")) as stranger:
+        stranger.send(b"a stranger whose frame was not valid")
+        assert listener.receive(SOON_s)
+        sender.send(b"the peer")
+        assert listener.receive(SOON_s) == b"the peer"
+        listener.accept()
+        stranger.send(b"currents")
+        assert listener.receive(SOON_s) == b""
+        assert listener.foreign == 1
+        listener.send(b"answer")
+        assert sender.receive(SOON_s) == b"answer"
+        assert stranger.receive(0.0) == b""
+
+
+def test_nobody_at_the_address_is_silence():
+    with contextlib.closing(socket.socket(socket.AF_INET, socket.SOCK_DGRAM)) as free:
+        free.bind(("127.0.0.1", 0))
+        port = free.getsockname()[1]
+    with contextlib.closing(Udp("127.0.0.1", port, listening=False)) as end:
+        for _ in range(3):  # the system reports the refusal of a datagram at the next call
+            end.send(b"anyone")
+            assert end.receive(0.01) == b""
+
+
+@pytest.mark.skipif(not hasattr(os, "openpty"), reason="no pseudo-terminals")
+def test_a_serial_line_carries_bytes_of_any_value():
+    ours, theirs = os.openpty()
+    everything = bytes(range(256))
+    with contextlib.closing(open_transport(f"serial:{os.ttyname(theirs)}@230400")) as line:
+        assert not line.datagrams
+        os.write(ours, everything)
+        received = b""
+        while len(received) < 256:
+            part = line.receive(SOON_s)
+            assert part
+            received += part
+        assert received == everything
+        line.send(everything)
+        sent = b""
+        while len(sent) < 256:
+            sent += os.read(ours, 256)
+        assert sent == everything
+    os.close(ours)
+    os.close(theirs)
+
+
+def test_the_end_of_a_pipe_is_noticed():
+    source, sink = os.pipe()
+    ours, theirs = os.pipe()
+    stream = Stream(source, theirs)
+    os.write(sink, b"last words")
+    os.close(sink)
+    assert (stream.receive(SOON_s), stream.is_closed) == (b"last words", False)
+    assert (stream.receive(SOON_s), stream.is_closed) == (b"", True)
+    for descriptor in (source, ours, theirs):
+        os.close(descriptor)
+
+
+def test_a_peer_that_does_not_read_is_an_error(monkeypatch):
+    monkeypatch.setattr("spheretwin.machine.link.transports.WRITE_s", 0.01)
+    source, sink = os.pipe()
+    os.set_blocking(sink, False)
+    with pytest.raises(SpheretwinError, match="expected a peer that reads"):
+        Stream(source, sink).send(bytes(2**22))  # more than any pipe holds
+    os.close(source)
+    os.close(sink)
+
+
+def test_standard_output_is_for_frames_alone():
+    code = (
+        "from spheretwin.machine.link.transports import open_transport\n"
+        "line = open_transport('-')\n"
+        "print('for people')\n"
+        "line.send(line.receive(30.0)[::-1])\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code], input=b"emarf", capture_output=True, check=True)
+    assert (done.stdout, done.stderr.strip()) == (b"frame", b"for people")
+
+
+@pytest.mark.parametrize(
+    "address",
+    ["", "udp", "udp://", "udp://host", "udp://:x", "udp://:99999", "tcp://:5", "serial:",
+     "serial:/dev/x@fast", "udp://:5/path", "udp://:0", "--"],
+)  # fmt: skip
+def test_a_wrong_address_is_refused(address):
+    with pytest.raises(InputError, match="expected udp://HOST:PORT, serial:DEVICE@BAUD, or - for standard"):
+        open_transport(address)
+
+
+@pytest.mark.parametrize("address", ["serial:/dev/no-such-line@9600", "serial:/dev/null"])
+def test_a_line_that_cannot_be_opened_is_refused(address):
+    with pytest.raises(InputError, match="expected a serial line that can be opened, received /dev/"):
+        open_transport(address)
+
+
+def test_an_address_of_another_machine_cannot_be_bound():
+    # TEST-NET-1 of RFC 5737: no machine has it.
+    with pytest.raises(
+        InputError, match=r"expected an address that can be used, received udp://192\.0\.2\.1"
+    ):
+        open_transport("udp://192.0.2.1:5005", listening=True)
+
+
+def test_without_pyserial_the_message_names_the_extra(monkeypatch):
+    monkeypatch.setitem(sys.modules, "serial", None)
+    with pytest.raises(InputError, match="expected pyserial, which the extra machine installs: "):
+        open_transport("serial:/dev/ttyS0")

@@ -1,0 +1,49 @@
+"""Logs of short simulated runs, as a laboratory would record them."""
+
+from functools import cache
+
+import numpy as np
+
+import spheretwin as st
+from spheretwin.machine import Log
+
+# Different frequencies on each axis: no exchange of axes leaves the motion as it is.
+MULTISINE = {
+    "duration": 1.5,
+    "controller.law": "computed_torque",
+    "trajectory.shape": "multisine",
+    "trajectory.components": [
+        {"amplitude_rad": [0.2, 0.15, 0.3], "frequency_Hz": [1.3, 1.7, 0.9]},
+        {"amplitude_rad": [0.04, 0.05, 0.06], "frequency_Hz": [2.9, 2.3, 3.1], "phase_rad": [1.0, 2.0, 0.5]},
+    ],
+}
+
+
+@cache
+def run(scenario="hold", hardware="electronics", changes=()):
+    return st.simulate(scenario, {"hardware": hardware, **dict(changes)})
+
+
+def multisine(hardware="electronics"):
+    """Log of a multisine on three axes."""
+    return log_of(_multisine(hardware))
+
+
+@cache
+def _multisine(hardware):
+    return st.simulate("hold", {"hardware": hardware, **MULTISINE})
+
+
+def log_of(run):
+    """Commanded currents, and angles after the sensors."""
+    table = run.telemetry
+    names = [signal.name for signal in table.signals]
+    angles = table["q_measured_rad" if "q_measured_rad" in names else "q_rad"]
+    return Log(table["t_s"], table["current_command_A"], angles)
+
+
+def relabelled(log, order, signs):
+    """The log if hinge i has column order[i] and the sign signs[i]."""
+    angles = np.empty_like(log.angle_rad)
+    angles[:, list(order)] = log.angle_rad * np.array(signs)
+    return angles

@@ -1,0 +1,159 @@
+"""Files of logs: each format gives the same log back, and other programs read it."""
+
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet
+import pytest
+
+import spheretwin as st
+from spheretwin import machine
+from spheretwin.machine import Log
+from spheretwin.models.base.errors import InputError
+from spheretwin.models.telemetry import joint_states
+from spheretwin.models.telemetry.joint_states import Topic
+
+TIMES = np.arange(50) * 1e-3
+RANDOM = np.random.default_rng(0)
+LOG = Log(
+    TIMES, RANDOM.normal(size=(50, 18)), RANDOM.normal(size=(50, 3)), "measured", "a",
+    {"plant.payload_kg": 0.05}, ("gaps",),
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("suffix", [".parquet", ".csv", ".mcap"])
+def test_a_log_comes_back(tmp_path, suffix):
+    machine.write(LOG, path := tmp_path / f"log{suffix}")
+    log = machine.read(path, accepted=("jitter",))
+    assert np.array_equal(log.current_A, LOG.current_A)
+    assert np.array_equal(log.angle_rad, LOG.angle_rad)
+    # MCAP counts nanoseconds.
+    assert np.array_equal(log.t_s, TIMES) if suffix != ".mcap" else np.max(np.abs(log.t_s - TIMES)) < 1e-12
+    assert (log.currents, log.name) == ("measured", str(path))
+    if suffix != ".csv":
+        assert (log.conditions, log.accepted) == ({"plant.payload_kg": 0.05}, ("gaps", "jitter"))
+
+
+def test_a_column_without_a_number_is_missing_and_no_column_stands_twice(tmp_path):
+    machine.write(replace(LOG, angle_rad=np.full((50, 3), np.nan)), path := tmp_path / "log.csv")
+    assert np.all(np.isnan(machine.read(path).angle_rad))
+    path.write_text(path.read_text().replace("angle_rad_beta", "angle_rad_alpha"))
+    with pytest.raises(InputError, match="expected each column once, received angle_rad_alpha twice"):
+        machine.read(path)
+
+
+def test_columns_are_scalars_with_plain_names(tmp_path):
+    machine.write(replace(LOG, currents="commanded"), path := tmp_path / "log.parquet")
+    schema = pyarrow.parquet.read_schema(path)
+    assert schema.names == [
+        "t_s", "angle_rad_alpha", "angle_rad_beta", "angle_rad_gamma",
+        *(f"current_command_A_{group}" for group in range(18)),
+    ]  # fmt: skip
+    assert set(schema.types) == {pa.float64()}
+
+
+def test_telemetry_is_a_log(tmp_path):
+    run = st.simulate("hold", {"duration": 0.1})
+    run.save(path := tmp_path / "run.parquet")
+    log = machine.read(path)
+    assert np.array_equal(log.angle_rad, run.telemetry["q_rad"])
+    assert np.array_equal(log.current_A, run.telemetry["current_command_A"])
+
+
+def test_tables_of_other_programs_are_read(tmp_path):
+    """Vectors of any length, whole numbers, missing numbers, texts."""
+    columns = {
+        "stamp": pa.array([0, 1000, 2000]),
+        "pose": pa.FixedSizeListArray.from_arrays(pa.array(np.arange(9.0)), 3),
+        "i": pa.array([1.0, None, 3.0]),
+        "note": pa.array(["a", "b", "c"]),
+    }
+    pyarrow.parquet.write_table(pa.table(columns), path := tmp_path / "other.parquet")
+    fields = {
+        "time": {"column": "stamp", "unit": "us"},
+        "angles": {"columns": ["pose_2", "pose_1", "pose_0"]},
+        "currents": {"columns": ["i"]},
+    }
+    log = machine.read(path, fields)
+    assert log.t_s == pytest.approx([0, 1e-3, 2e-3])
+    assert log.angle_rad[1].tolist() == [5.0, 4.0, 3.0]
+    assert np.array_equal(log.current_A[:, 0], [1.0, np.nan, 3.0], equal_nan=True)
+    (path := tmp_path / "other.csv").write_text("stamp,pose_0,pose_1,pose_2,i\n0,1,2,3,\n1000,4,5,6,7.5\n")
+    assert np.array_equal(machine.read(path, fields).current_A[:, 0], [np.nan, 7.5], equal_nan=True)
+    with pytest.raises(InputError, match="expected a column note of numbers"):
+        machine.read(tmp_path / "other.parquet", {**fields, "currents": {"columns": ["note"]}})
+    with pytest.raises(InputError, match="expected a column map"):
+        machine.read(path)
+
+
+def test_topics_with_times_of_their_own_have_rows_of_their_own(tmp_path):
+    # As in a recording of ROS: angles and currents arrive in turn, and neither has the other's stamps.
+    joint_states.write(tmp_path / "a.mcap", np.array([0.0, 0.002]), {
+        "angles": Topic(joint_states.ANGLE_NAMES, {"position": np.ones((2, 3))}),
+    }, {})  # fmt: skip
+    columns, _ = joint_states.read(tmp_path / "a.mcap")
+    assert columns["t_s"].tolist() == [0.0, 0.002]
+    from mcap.writer import Writer
+
+    with (path := tmp_path / "b.mcap").open("wb") as file:
+        writer = Writer(file)
+        writer.start()
+        schema = writer.register_schema(joint_states.TYPE, "ros2msg", joint_states.DEFINITION.encode())
+        topics = {
+            "/angles": Topic(joint_states.ANGLE_NAMES, {"position": np.ones((2, 3))}),
+            "/currents": Topic(["0", "1"], {"effort": np.full((2, 2), 2.0)}),
+        }
+        channels = {name: writer.register_channel(name, "cdr", schema) for name in topics}
+        for row in range(2):
+            for place, (name, topic) in enumerate(topics.items()):
+                stamp_ns = 1000 * (2 * row + place)
+                message = joint_states.Encoder(topic).message(row, stamp_ns)
+                writer.add_message(channels[name], stamp_ns, message, stamp_ns)
+        writer.finish()
+    log = machine.read(path)
+    assert log.t_s == pytest.approx([0, 1e-6, 2e-6, 3e-6], abs=1e-12)
+    assert np.isnan(log.current_A[:, 0]).tolist() == [True, False, True, False]
+    assert np.isnan(log.angle_rad[:, 0]).tolist() == [False, True, False, True]
+
+
+def test_rerun_shows_each_number_by_name(tmp_path):
+    machine.write(LOG, path := tmp_path / "log.mcap")
+    rerun = Path(sys.executable).with_name("rerun")
+    out = tmp_path / "log.rrd"
+    subprocess.run([rerun, "mcap", "convert", path, "-o", out], check=True, capture_output=True)
+    import rerun as rr
+
+    names, values = {}, {}
+    for chunk in rr.chunk.RrdReader(str(out)).stream():
+        batch = chunk.to_record_batch().to_pydict()
+        for row in batch.get("SeriesLines:names", []):
+            names[chunk.entity_path] = row or names.get(chunk.entity_path)
+        for row in filter(None, batch.get("Scalars:scalars", [])):
+            values.setdefault(chunk.entity_path, []).append(row)
+    assert np.array_equal(values["/angles/position"], LOG.angle_rad)
+    assert np.array_equal(values["/currents/effort"], LOG.current_A)
+    assert names["/angles/position"] == ["alpha", "beta", "gamma"]
+
+
+@pytest.mark.parametrize("suffix", [".parquet", ".csv", ".mcap", ".txt"])
+def test_a_file_that_cannot_be_read_is_refused(tmp_path, suffix):
+    (path := tmp_path / f"log{suffix}").write_bytes(b"\x00\x01no log")
+    with pytest.raises(InputError, match="expected"):
+        machine.read(path)
+    with pytest.raises(InputError, match="expected"):
+        machine.read(tmp_path / f"missing{suffix}")
+
+
+def test_another_suffix_is_refused(tmp_path):
+    with pytest.raises(InputError, match=r"expected a file .parquet, .csv or .mcap"):
+        machine.write(LOG, tmp_path / "log.txt")
+
+
+def test_names_of_findings_are_checked(tmp_path):
+    machine.write(LOG, path := tmp_path / "log.csv")
+    with pytest.raises(InputError, match="did you mean gaps"):
+        machine.read(path, accepted=("gap",))

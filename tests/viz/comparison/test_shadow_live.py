@@ -1,0 +1,74 @@
+"""Live view of a shadow: a viewer gets rows of 60 Hz, the verdict, and the windows and alarms of a watch."""
+
+import urllib.request
+
+import numpy as np
+import pytest
+
+from spheretwin.analysis.comparison import subject_of
+from spheretwin.machine import Log
+from spheretwin.machine.model import model_of
+from spheretwin.machine.state_estimation import followed, signals
+from spheretwin.viz.comparison.shadow_live import ALARMS, WINDOWS, ShadowView
+from spheretwin.viz.comparison.shadow_recording import TEXT
+from spheretwin.viz.recording.live import RECORDING
+from tests.viz.recording.panels import columns
+
+ROWS, BLOCK = 1500, 20
+
+
+@pytest.fixture(scope="module")
+def log():
+    t_s = 5.0 + 1e-3 * np.arange(ROWS)
+    noise_rad = np.random.default_rng(0).normal(0, 1e-4, (ROWS, 3))
+    angle_rad = 0.1 * np.sin(2 * np.pi * t_s)[:, None] * [1.0, -1.0, 2.0] + noise_rad
+    return Log(t_s, np.zeros((ROWS, 18)), angle_rad)
+
+
+def received(log, folder, *, watched):
+    """Telemetry of the shadow of a log, and what a viewer gets that asks after the first block."""
+    model = model_of("hold", {"hardware": "electronics"})
+    view = ShadowView(subject_of(model.scenario, model.actuator), signals(False), watched=watched)
+    viewers = []
+
+    def show(block, telemetry, verdict):
+        view.write(telemetry, block.current_A, verdict.markdown(block))
+        if watched:
+            view.judge([(float(block.t_s[-1]), 1.1, 0.2)], [(float(block.t_s[0]), "torque_scale -0.03")])
+        viewers[:] = viewers or [urllib.request.urlopen(view.address.rstrip("/") + RECORDING)]
+
+    blocks = (log.rows(first, first + BLOCK) for first in range(0, ROWS, BLOCK))
+    _, result = followed(blocks, model, report=show)
+    view.flush()
+    view.close()
+    path = folder / "received.rrd"
+    path.write_bytes(viewers[0].read())
+    return result.telemetry, columns(path)
+
+
+def test_a_viewer_gets_the_first_row_of_each_frame_and_the_verdict(log, tmp_path):
+    telemetry, (values, times) = received(log, tmp_path, watched=False)
+    firsts = np.flatnonzero(np.diff(np.floor(telemetry["t_s"] * 60 + 1e-6), prepend=0))
+    key = "/plots/angle", "Scalars:scalars"
+    np.testing.assert_array_equal(np.concatenate(times[key]), np.round(1e9 * telemetry["t_s"][firsts]))
+    drawn = np.array([row for part in values[key] for row in part.to_pylist()])
+    expected = np.hstack([telemetry["q_measured_rad"], telemetry["q_estimated_rad"]])[firsts]
+    np.testing.assert_array_equal(drawn, expected)
+    rates = [row for part in values["/plots/qdot_estimated_rad_s", key[1]] for row in part.to_pylist()]
+    rates = np.array(rates, dtype=float)
+    assert np.all(np.isnan(rates[0]))  # of the first row nothing is known: its band would hide all others
+    np.testing.assert_array_equal(rates[-1, ::3], telemetry["qdot_estimated_rad_s"][firsts[-1]])
+    assert len(values["/machine/world/rotor", "Transform3D:quaternion"]) == 2  # a second, and the rest
+    assert len(values["/twin/world/rotor", "Transform3D:quaternion"]) == 2
+    texts = [text for part in values[f"/{TEXT}", "TextDocument:text"] for (text,) in part.to_pylist()]
+    assert texts[-1].startswith("**log: model and measurement are not consistent.**")
+
+
+def test_a_watch_has_a_lane_and_its_alarms_as_text(log, tmp_path):
+    telemetry, (values, times) = received(log, tmp_path, watched=True)
+    key = f"/{WINDOWS}", "Scalars:scalars"
+    ends = np.round(1e9 * telemetry["t_s"][BLOCK - 1 :: BLOCK])
+    np.testing.assert_array_equal(np.concatenate(times[key]), ends)
+    assert all(row == [1.1, 0.2, 1.0] for part in values[key] for row in part.to_pylist())
+    alarms = values[f"/{ALARMS}", "TextLog:text"]
+    assert [text for part in alarms for (text,) in part.to_pylist()] == ["torque_scale -0.03"] * len(ends)

@@ -1,0 +1,191 @@
+"""``spheretwin identify LOG...``: parameters of a machine from its logs."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from spheretwin.cli.common import print_json, print_message
+from spheretwin.cli.log_options import add_logs, changes_of, check_given, read_logs, scenario_of
+from spheretwin.cli.options import Parser, number, whole
+from spheretwin.machine.excitation import DesignSettings, design
+from spheretwin.machine.identification import Identified, IdentifySettings, identify
+from spheretwin.machine.parameters import KINDS
+from spheretwin.machine.twin_file import write_twin
+from spheretwin.models.base.errors import InputError
+from spheretwin.models.base.files import check_writable
+from spheretwin.models.telemetry.table import Table
+from spheretwin.scenario.writing import as_toml
+from spheretwin.viz.pages.markdown import save_text
+from spheretwin.viz.terminal import runs
+from spheretwin.viz.terminal.progress import counted, tracked
+
+DEFAULT = ("torque_scale", "plant.coulomb_Nm")
+
+
+def declare(parser: Parser) -> None:
+    """Declare the arguments of the verb."""
+    parser.description = (
+        "Identify parameters of a machine from logs, with 95 % intervals, judged by held-out windows."
+        " Exit code 1 if the data do not determine the parameters or the result is not better."
+    )
+    add_logs(parser, many=True)
+    parser.add_argument(
+        "--design",
+        action="store_true",
+        help="instead of logs take a scenario, and find the motion whose log determines the parameters best",
+    )
+    parser.add_argument(
+        "--payload",
+        type=number("a number of kg, at least 0", lambda payload_kg: payload_kg >= 0),
+        action="append",
+        default=[],
+        metavar="KG",
+        help="known payload of the designed experiment; repeatable",
+    )
+    parser.add_argument(
+        "--candidates",
+        type=whole(10_000, first=2),
+        metavar="N",
+        help="motions that a design tries (default: 24)",
+    )
+    parser.add_argument("--currents", type=Path, metavar="FILE.csv", help="write the currents of the design")
+    parser.add_argument(
+        "--parameter",
+        action="append",
+        default=[],
+        metavar="NAME",
+        help=f"parameter, or one part of it such as plant.coulomb_Nm.0; repeatable (default:"
+        f" {', '.join(DEFAULT)}): {', '.join(KINDS)}",
+    )
+    parser.add_argument(
+        "--window",
+        type=number("a number of s above 0", lambda window_s: window_s > 0),
+        metavar="S",
+        help="length of the windows (default: 0.2 s), or of a designed experiment (default: 4 s)",
+    )
+    parser.add_argument(
+        "--out",
+        type=Path,
+        metavar="FILE.toml",
+        help="write the twin, if it is accepted; or the designed scenario",
+    )
+    parser.add_argument("--json")
+    parser.set_run(run, has_fields=True)
+
+
+def run(options: argparse.Namespace) -> bool:
+    """Run the verb; return True if the result is accepted."""
+    check_given(options)
+    for path in (options.out, options.currents):
+        if path:
+            check_writable(path)
+    if options.design:
+        return _design(options)
+    if options.payload or options.candidates or options.currents:
+        raise InputError("command line: expected --payload, --candidates and --currents with --design")
+    logs, changes = read_logs(options), changes_of(options)
+    settings = IdentifySettings(**({"window_s": options.window} if options.window else {}))
+    names = options.parameter or list(DEFAULT)
+    with counted("identify", "evaluations") as report:
+        result = identify(logs, scenario_of(options), names, changes, settings, report)
+    if options.json:
+        print_json(_figures(result))
+    else:
+        _print(result)
+    if result.accepted and options.out:
+        write_twin(options.out, result, scenario_of(options), changes, logs)
+        if not options.json:
+            runs.print_written([options.out])
+    for reason in result.reasons:
+        print_message(f"identify: not accepted: {reason}")
+    return result.accepted
+
+
+def _design(options: argparse.Namespace) -> bool:
+    """Print the best motion, and write it."""
+    scenario, *others = (str(path) for path in options.logs)
+    if others or options.scenario:
+        raise InputError(
+            f"command line: expected --design with one scenario, as identify --design sinusoid, received"
+            f" {' '.join([scenario, *others, *filter(None, [options.scenario])])}"
+        )
+    given = {"duration_s": options.window, "candidates": options.candidates, "payloads_kg": options.payload}
+    settings = DesignSettings(**{name: value for name, value in given.items() if value})
+    names = options.parameter or list(DEFAULT)
+    excitation = design(
+        scenario,
+        names,
+        changes_of(options),
+        settings,
+        tracked("design"),
+    )
+    written = []
+    if options.out:
+        save_text(options.out, as_toml(excitation.scenario))
+        written.append(options.out)
+    if options.currents:
+        save_text(options.currents, _currents(excitation.runs[0]))
+        written.append(options.currents)
+    if options.json:
+        print_json(
+            {
+                "deviations": excitation.deviations,
+                "nutation": excitation.reference,
+                "narrower": excitation.narrower,
+            }
+        )
+        return True
+    rows = [
+        [name, f"{value:.3g}", f"{excitation.reference[name]:.3g}", f"{excitation.narrower[name]:.2f}"]
+        for name, value in excitation.deviations.items()
+    ]
+    head = ["parameter", "standard deviation", "with the nutation", "times narrower"]
+    runs.print_rows("design", head, rows, 1)
+    runs.print_written(written)
+    return True
+
+
+def _currents(run: Table) -> str:
+    """Return the currents of a run as the file of a scenario's manual.file."""
+    current_A = run["current_command_A"]
+    head = ",".join(["t_s", *(f"current_{j:02d}_A" for j in range(current_A.shape[1]))])
+    rows = (
+        ",".join(repr(float(value)) for value in (t_s, *row))
+        for t_s, row in zip(run["t_s"], current_A, strict=True)
+    )
+    return "\n".join([head, *rows, ""])
+
+
+def _figures(result: Identified) -> dict[str, object]:
+    return {
+        "accepted": result.accepted,
+        "parameters": {
+            name: {"value": one.value, "interval": list(one.interval), "unit": one.unit}
+            for name, one in result.parameters.items()
+        },
+        "refused": [{"parameters": list(one.parameters), "why": one.why} for one in result.refused],
+        "correlations": list(result.correlations),
+        "chi2": {
+            "train": result.train.chi2 if result.train else None,
+            "held_out": result.held_out.chi2 if result.held_out else None,
+        },
+        "improvement": result.improvement,
+    }
+
+
+def _print(result: Identified) -> None:
+    if result.parameters:
+        rows = [
+            [name, f"{one.value:.5g}", f"{one.interval[0]:.5g}", f"{one.interval[1]:.5g}", one.unit]
+            for name, one in result.parameters.items()
+        ]
+        runs.print_rows("identified", ["parameter", "value", "from", "to (95 %)", "unit"], rows, 1)
+    for line in result.correlations:
+        print(line)
+    if result.held_out and result.held_out_before:
+        before, after = result.held_out_before, result.held_out
+        print(
+            f"held-out windows: mean square over that of the noise {before.chi2:.3f} before, {after.chi2:.3f}"
+            f" after; error {result.improvement:.1%} smaller"
+        )

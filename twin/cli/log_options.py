@@ -1,0 +1,160 @@
+"""Common arguments of the verbs that start from logs of a machine."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from spheretwin.cli.common import keep_viewer
+from spheretwin.cli.options import Parser
+from spheretwin.machine.files import read
+from spheretwin.machine.link.frame_format import DEFAULT_FRAME, shipped
+from spheretwin.machine.link.stream import is_address, played, streamed
+from spheretwin.machine.log import Log
+from spheretwin.machine.model import Model
+from spheretwin.machine.twin_file import read_twin
+from spheretwin.machine.verdict import check
+from spheretwin.models.base.errors import InputError, SpheretwinError
+from spheretwin.models.telemetry.signals import Signal
+from spheretwin.scenario import reading
+from spheretwin.scenario.sections import Scenario
+
+if TYPE_CHECKING:
+    from spheretwin.viz.comparison.shadow_live import ShadowView
+
+
+def add_logs(parser: Parser, *, many: bool) -> None:
+    """Declare logs, their columns, the scenario of the machine and its twin."""
+    if many:
+        parser.add_argument("logs", type=Path, nargs="*", metavar="LOG", help="Parquet, CSV or MCAP")
+    else:
+        parser.add_argument("logs", nargs="?", metavar="LOG", help="Parquet, CSV or MCAP")
+    parser.add_argument("--columns", type=Path, metavar="MAP.toml", help="column map of the logs")
+    parser.add_argument("--scenario", metavar="SCENARIO", help="scenario of the machine (default: hold)")
+    parser.add_argument("--twin", type=Path, metavar="TWIN.toml", help="identified parameters of the machine")
+    parser.add_argument(
+        "--accept",
+        action="append",
+        default=[],
+        metavar="FINDING",
+        help="accept a finding of `log check`; repeatable",
+    )
+
+
+def scenario_of(options: argparse.Namespace) -> str:
+    """Return the name or the file of the scenario of the machine."""
+    return options.scenario or "hold"
+
+
+def check_given(options: argparse.Namespace) -> None:
+    """Refuse a verb without a log; help does not need one.
+
+    Raises
+    ------
+    InputError
+        No log.
+    """
+    if not options.logs:
+        raise InputError("command line: expected LOG, received none")
+
+
+def add_stream(parser: Parser) -> None:
+    """Declare one log, or the address of a stream."""
+    add_logs(parser, many=False)
+    parser.add_argument(
+        "--frame",
+        default=DEFAULT_FRAME,
+        metavar="NAME",
+        help="frames of a stream, which udp://:PORT, serial:DEVICE@BAUD or - in place of LOG names:"
+        f" {', '.join(shipped())}, or a .toml file (default: {DEFAULT_FRAME})",
+    )
+    parser.add_argument(
+        "--live",
+        action="store_true",
+        help="follow the data in a viewer on 127.0.0.1; a file is played at the pace of its times",
+    )
+
+
+def file_log(options: argparse.Namespace) -> Log | None:
+    """Return the log of a file, which a check has accepted; None if a stream is named."""
+    return None if is_address(options.logs) else read_logs(options)[0]
+
+
+def known_fields(options: argparse.Namespace, log: Log | None) -> dict[str, Any]:
+    """Return the fields of the scenario that twin, command line and conditions of a log set."""
+    return {**changes_of(options), **(log.conditions if log else {})}
+
+
+def blocks(
+    options: argparse.Namespace, log: Log | None, groups: int, stop_requested: Callable[[], bool]
+) -> Iterator[Log]:
+    """Return the blocks of a stream, or the log of a file: with a live view as time goes by, else at once."""
+    if log is None:
+        return streamed(options.logs, groups, options.frame, stop_requested=stop_requested)
+    return played(log, stop_requested=stop_requested) if options.live else iter([log])
+
+
+@contextmanager
+def live_view(
+    options: argparse.Namespace,
+    model: Model,
+    signals: Sequence[Signal],
+    stop_requested: Callable[[], bool],
+    *,
+    watched: bool = False,
+) -> Iterator[ShadowView | None]:
+    """Yield the live view of a shadow, which stays until Ctrl-C; None without `--live`."""
+    if not options.live:
+        yield None
+        return
+    from spheretwin.analysis.comparison import subject_of  # Rerun is slow to import
+    from spheretwin.viz.comparison.shadow_live import ShadowView
+
+    view = ShadowView(subject_of(model.scenario, model.actuator), signals, watched=watched)
+    try:
+        print(f"watch: {view.address}", file=sys.stderr, flush=True)
+        yield view
+        view.flush()
+        keep_viewer(stop_requested)
+    finally:
+        view.close()
+
+
+def changes_of(options: argparse.Namespace) -> dict[str, Any]:
+    """Return the fields of the scenario that the twin and the command line set."""
+    twin = read_twin(options.twin) if options.twin else {}
+    return {**twin, **reading.overrides(options.fields)}
+
+
+def read_logs(options: argparse.Namespace) -> list[Log]:
+    """Read the logs, each of which a check has accepted.
+
+    Raises
+    ------
+    InputError
+        A log cannot be read.
+    SpheretwinError
+        A log is not accepted.
+    """
+    from spheretwin import scenario as scenarios
+
+    paths = options.logs if isinstance(options.logs, list) else [Path(options.logs)]
+    scenario = scenarios.load(scenario_of(options), changes_of(options))
+    return [_accepted(path, options, scenario) for path in paths]
+
+
+def _accepted(path: Path, options: argparse.Namespace, scenario: Scenario) -> Log:
+    log = read(path, options.columns, tuple(options.accept))
+    verdict = check(log, scenario)
+    if not verdict.accepted:
+        names = [
+            one.name for one in verdict.findings if one.severity == "error" and one.name not in log.accepted
+        ]
+        raise SpheretwinError(
+            f"log {path}: expected one that `spheretwin log check` accepts, received {', '.join(names)}"
+        )
+    return log

@@ -1,0 +1,202 @@
+"""``spheretwin machine SCENARIO --listen ADDRESS``: the twin as a machine for an external controller."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from spheretwin import outputs
+from spheretwin import scenario as scenarios
+from spheretwin.cli.common import interruptible, print_json, print_message
+from spheretwin.cli.options import Parser, number
+from spheretwin.machine.link import frame_format
+from spheretwin.machine.link.channel import Channel
+from spheretwin.machine.link.frame_format import DEFAULT_FRAME
+from spheretwin.machine.link.machine_server import MachineServer
+from spheretwin.machine.link.transports import Transport, Udp, open_transport
+from spheretwin.metrics import BAND_rad
+from spheretwin.models.base.errors import InputError
+from spheretwin.models.base.mujoco_library import timers_stopped
+from spheretwin.models.telemetry.status import Status
+from spheretwin.outputs import Outputs
+from spheretwin.reduction import PlannedRun
+from spheretwin.run import Figures, summary
+from spheretwin.scenario import reading
+from spheretwin.scenario.reading import shipped
+from spheretwin.scenario.sections import Scenario
+from spheretwin.session import Session
+from spheretwin.simulation import Sink, follow
+from spheretwin.viz.terminal import runs
+
+STANDARD_STREAMS = "-"
+
+
+def declare(parser: Parser) -> None:
+    """Declare the arguments of the verb."""
+    parser.description = (
+        "Simulate the machine (drive, plant, sensors) for a controller in another program. By default each"
+        " command advances it by one control period (lockstep)."
+    )
+    parser.usage = "spheretwin machine SCENARIO --listen ADDRESS [options] [--section.field VALUE ...]"
+    parser.add_argument("scenario", help=f"{', '.join(shipped())}, or a .toml file")
+    parser.add_argument(
+        "--listen", metavar="ADDRESS", help="udp://HOST:PORT, serial:DEVICE@BAUD, or - for stdin and stdout"
+    )
+    parser.add_argument(
+        "--real-time", action="store_true", help="advance by the clock; the newest command applies"
+    )
+    parser.add_argument(
+        "--timeout-ms",
+        type=number("a number of ms above 0", lambda value: value > 0),
+        default=20.0,
+        metavar="MS",
+        help="in real time: age of a command at which the currents are removed; 20 unless given",
+    )
+    parser.add_argument(
+        "--idle-s",
+        type=number("a number of s above 0", lambda value: value > 0),
+        default=60.0,
+        metavar="S",
+        help="time without commands after which the run ends; 60 unless given",
+    )
+    add_common_options(parser)
+    parser.set_run(run, has_fields=True)
+
+
+def add_common_options(parser: Parser) -> None:
+    """Add the options of the verbs with an external part."""
+    add_frame_option(parser)
+    parser.add_argument("--record", help="write a Rerun recording")
+    parser.add_argument("--telemetry", type=Path, metavar="FILE.parquet", help="write the telemetry")
+    parser.add_argument("--json", help="print the figures as JSON, alone on stdout")
+
+
+def add_frame_option(parser: Parser, *, listed: bool = True) -> None:
+    """Add the option that names the frames of a link; the help leaves it out unless it is `listed`."""
+    names = f"frames: {', '.join(frame_format.shipped())}, or a .toml file; {DEFAULT_FRAME} unless given"
+    parser.add_argument(
+        "--frame",
+        default=DEFAULT_FRAME,
+        metavar="NAME",
+        help=names if listed else argparse.SUPPRESS,
+    )
+
+
+def run(options: argparse.Namespace) -> bool:
+    """Run the verb; return True if the run completed."""
+    scenario = read_scenario(options, "listen")
+    if scenario.manual.on:
+        raise InputError(
+            "machine: expected no manual currents, which an external controller replaces, received some"
+        )
+    frames = frame_format.load(options.frame).for_both_directions(options.frame)
+    with interruptible() as stop_requested:
+        transport = open_transport(options.listen, listening=True)
+        try:
+            groups = len(Session(scenario).actuator.groups)
+            channel = Channel(transport, frames.measurement, frames.command, groups)
+            server = MachineServer(
+                channel,
+                f"a controller at {options.listen}",
+                groups,
+                scenario.controller.period_s,
+                real_time=options.real_time,
+                timeout_s=1e-3 * options.timeout_ms,
+                idle_s=options.idle_s,
+                stop_requested=stop_requested,
+            )
+            with Session(scenario, external=server) as session:
+                session.compile()  # the controller does not wait for it
+                print_message(f"listening at {_address(options.listen, transport)}")
+                return run_session(
+                    session,
+                    options,
+                    "an external controller",
+                    server.figures,
+                    lambda: server.ending,
+                    lambda: server.finish(session.t_s, session.q_rad),
+                )
+        finally:
+            transport.close()
+
+
+def read_scenario(options: argparse.Namespace, address: str) -> Scenario:
+    """Return the scenario of the command line, whose address and files are valid.
+
+    Raises
+    ------
+    InputError
+        Scenario or address is missing, or a file cannot be written.
+    """
+    if options.scenario is None:
+        raise InputError(f"command line: expected a scenario ({', '.join(shipped())}), received none")
+    value = getattr(options, address)
+    if value is None:
+        raise InputError(f"command line: expected --{address} ADDRESS, received none")
+    if value == STANDARD_STREAMS and options.json:
+        raise InputError("command line: expected --json without the address -, which uses stdout for frames")
+    paths = (options.record, options.telemetry, getattr(options, "log", None))
+    outputs.check([path for path in paths if path])
+    return scenarios.load(options.scenario, reading.overrides(options.fields))
+
+
+def _address(given: str, transport: Transport) -> str:
+    """Return the address of a transport with the port that the system has chosen."""
+    return f"{given.rpartition(':')[0]}:{transport.port}" if isinstance(transport, Udp) else given
+
+
+def run_session(
+    session: Session,
+    options: argparse.Namespace,
+    law: str,
+    figures_of_link: Callable[[], Mapping[str, Any]],
+    ending: Callable[[], str],
+    finish: Callable[[], object],
+    sinks: Sequence[Sink] = (),
+) -> bool:
+    """Run a session with an external part to its end, and report it; return True if it completed.
+
+    Parameters
+    ----------
+    session : Session
+    options : Namespace
+        Of the command line.
+    law : str
+        Name of the controller, for the title.
+    figures_of_link : callable
+        Counts of frames and distributions of times.
+    ending : callable
+        Reason for which the external part ended the run.
+    finish : callable
+        Called once after the last tick, also after an error.
+    sinks : sequence of Sink
+        Further receivers of the rows.
+    """
+    scenario = session.initial_scenario
+    figures = Figures(PlannedRun(scenario, session.actuator, scenario.ticks))
+    files = Outputs(session, options.record, options.telemetry)
+    try:
+        with timers_stopped():
+            try:
+                status = follow(session, scenario.ticks, [figures, *sinks, *files.sinks])
+            finally:
+                finish()
+    finally:
+        errors = files.close()
+    warnings = [*session.warnings(), *figures.warnings()]
+    result = {**summary(session, status, figures.values(), warnings), "link": figures_of_link()}
+    why = session.reason.text if session.reason else ending() or None
+    result["reason"] = why
+    if options.json:
+        print_json(result)
+    else:
+        runs.print_run(law, scenario.duration, result, band_rad=BAND_rad, why=why)
+        runs.print_link(result["link"])
+        runs.print_files(files.record, files.telemetry)
+    for error in errors:
+        print_message(str(error))
+    if status != Status.COMPLETED:
+        print_message(f"the run ended at {session.t_s:.3f} s of {scenario.duration:g} s: {status}, {why}")
+    return status == Status.COMPLETED and not errors

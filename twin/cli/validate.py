@@ -1,0 +1,87 @@
+"""``spheretwin validate LOG``: judge a twin by a log that has not identified it."""
+
+from __future__ import annotations
+
+import argparse
+
+from spheretwin.cli.common import print_json, print_message
+from spheretwin.cli.log_options import add_logs, changes_of, check_given, read_logs, scenario_of
+from spheretwin.cli.options import Parser
+from spheretwin.machine.twin_file import read_uncertainty
+from spheretwin.machine.validation import CHI2, Validation, validate
+from spheretwin.viz.terminal import runs
+
+MOST_LINES = 5
+
+
+def declare(parser: Parser) -> None:
+    """Declare the arguments of the verb."""
+    parser.description = (
+        "Judge a twin by a log: residuals by hinge, pose and rate, and what would explain those that noise"
+        " does not. Exit code 1 if the twin is not accepted."
+    )
+    add_logs(parser, many=False)
+    parser.add_argument("--json")
+    parser.set_run(run, has_fields=True)
+
+
+def run(options: argparse.Namespace) -> bool:
+    """Run the verb; return True if the twin is accepted."""
+    check_given(options)
+    (log,) = read_logs(options)
+    uncertainty = read_uncertainty(options.twin) if options.twin else None
+    result = validate(log, scenario_of(options), changes_of(options), uncertainty=uncertainty)
+    if options.json:
+        print_json(
+            {
+                "accepted": result.accepted,
+                "accepted_findings": list(log.accepted),
+                "chi2": {"all": result.chi2, **result.hinge_chi2},
+                "structure": result.structure,
+                "bins": result.bins,
+            }
+        )
+    else:
+        _print(result)
+    if not result.accepted:
+        print_message(f"validate: {_why(result)}")
+    return result.accepted
+
+
+def _why(result: Validation) -> str:
+    if result.structure:
+        first = result.structure[0]
+        return (
+            f"not accepted: the residuals show {first.what} {first.size:+.3g} {first.unit}"
+            f" ({abs(first.deviations):.0f} standard deviations)"
+        )
+    return (
+        f"not accepted: expected a mean square from {CHI2[0]:g} to {CHI2[1]:g} of that of the noise, received"
+        f" {result.chi2:.3g}"
+    )
+
+
+def _print(result: Validation) -> None:
+    rows = [[name, f"{value:.3f}"] for name, value in {"all": result.chi2, **result.hinge_chi2}.items()]
+    runs.print_rows("residuals", ["hinge", "mean square over that of the noise"], rows, 1)
+    if result.structure:
+        rows = [
+            [one.what, f"{one.size:+.3g}", one.unit, f"{one.deviations:+.1f}"]
+            for one in result.structure[:MOST_LINES]
+        ]
+        head = ["a change alone of", "explains", "unit", "standard deviations from 0"]
+        runs.print_rows("what the residuals show", head, rows, 1)
+    worst = sorted(result.bins, key=lambda one: -abs(one.mean_rad) * one.rows**0.5 / one.rms_rad)[:MOST_LINES]
+    rows = [
+        [
+            one.hinge,
+            one.by.rpartition("_rad")[0],
+            f"{one.low:.3g} to {one.high:.3g}",
+            str(one.rows),
+            f"{1e3 * one.mean_rad:+.3f}",
+            f"{1e3 * one.rms_rad:.3f}",
+        ]
+        for one in worst
+    ]
+    head = ["hinge", "by", "range, rad or rad/s", "rows", "mean residual mrad", "rms mrad"]
+    runs.print_rows("largest mean residuals", head, rows, 2)

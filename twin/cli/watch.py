@@ -1,0 +1,93 @@
+"""``spheretwin watch LOG``: alarms when a machine changes."""
+
+from __future__ import annotations
+
+import argparse
+
+import numpy as np
+
+from spheretwin.cli.common import interruptible, print_json, print_message
+from spheretwin.cli.log_options import (
+    add_stream,
+    blocks,
+    check_given,
+    file_log,
+    known_fields,
+    live_view,
+    scenario_of,
+)
+from spheretwin.cli.options import Parser, number
+from spheretwin.machine.model import model_of
+from spheretwin.machine.state_estimation import Shadow, signals
+from spheretwin.machine.watching import WATCHED, Watch, WatchSettings
+from spheretwin.models.base.errors import SpheretwinError
+
+MOST_VARIANCE = 1.5
+"""Mean square of the residuals, over that of the noise, above which the twin is not that of the machine."""
+
+
+def declare(parser: Parser) -> None:
+    """Declare the arguments of the verb."""
+    parser.description = (
+        "Watch over a machine: print a line of JSON for each change of its parameters. Exit code 1 if there"
+        " was one."
+    )
+    add_stream(parser)
+    parser.add_argument(
+        "--parameter",
+        action="append",
+        default=[],
+        metavar="NAME",
+        help=f"parameter to watch; repeatable (default: {', '.join(WATCHED)})",
+    )
+    parser.add_argument(
+        "--false-alarms",
+        type=number("a number above 0", lambda rate: rate > 0),
+        default=0.1,
+        metavar="RATE",
+        help="largest mean rate of alarms without a change, 1/h (default: 0.1)",
+    )
+    parser.add_argument("--json", help="print nothing but the lines of JSON, also no summary on stderr")
+    parser.set_run(run, has_fields=True)
+
+
+def run(options: argparse.Namespace) -> bool:
+    """Run the verb; return True if nothing has changed."""
+    check_given(options)
+    settings = WatchSettings(false_alarms_per_hour=options.false_alarms)
+    scenario, log = scenario_of(options), file_log(options)
+    known = known_fields(options, log)
+    model = model_of(scenario, known)
+    watch = Watch(scenario, known, options.parameter or WATCHED, settings)
+    count, seconds = 0, 0.0
+    with (
+        interruptible() as stop_requested,
+        live_view(options, model, signals(False), stop_requested, watched=True) as view,
+    ):
+        estimator = Shadow(model) if view else None
+        for block in blocks(options, log, model.groups, stop_requested):
+            alarms = watch.advance(block)
+            for alarm in alarms:
+                print_json({**alarm._asdict(), "accepted_findings": list(block.accepted)})
+            if view and estimator:
+                view.judge(watch.judged, [(alarm.t_s, alarm.text()) for alarm in alarms])
+                view.write(estimator.advance(block), block.current_A)
+            count += len(alarms)
+            seconds += len(block) * float(np.median(np.diff(block.t_s)))
+    if seconds <= settings.calibration_s + settings.window_s:
+        raise SpheretwinError(
+            f"watch: expected more than {settings.calibration_s + settings.window_s:g} s of data, of which"
+            f" the first {settings.calibration_s:g} s measure the noise, received {seconds:.3g} s"
+        )
+    if watch.variance > MOST_VARIANCE:
+        print_message(
+            f"warning: in the first {settings.calibration_s:g} s the mean square of the residuals is"
+            f" {watch.variance:.3g} times that of the noise: the twin lacks something that the machine has;"
+            " validate it first"
+        )
+    if not options.json:
+        print_message(
+            f"watch: alarms: {count} in {seconds:.3g} s; without a change, fewer than"
+            f" {options.false_alarms:g} in an hour on average"
+        )
+    return not count

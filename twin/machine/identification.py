@@ -1,0 +1,416 @@
+"""Identification: parameters of a machine from logs, with intervals, refusals and held-out data."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from itertools import count
+from typing import Annotated, Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import BaseModel, ConfigDict, Field
+from scipy.optimize import least_squares
+
+from spheretwin.machine.intervals import Cost, Uncertainty, interval
+from spheretwin.machine.log import Log
+from spheretwin.machine.parameters import Machine, Parameter, priors, selected, short_names
+from spheretwin.machine.windows import Part, Shooting, Window, windows_of
+from spheretwin.models.base.errors import InputError
+
+Array = NDArray[np.float64]
+
+
+_MOST_EVALUATIONS = 30
+
+
+class IdentifySettings(BaseModel):
+    """Settings of an identification."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+    window_s: Annotated[float, Field(gt=0, le=60)] = Field(0.2, description="length of a window, s")
+    held_out: Annotated[float, Field(ge=0.1, le=0.5)] = Field(
+        0.25, description="share of the windows that only judge the result, spread evenly over the logs"
+    )
+    nuisance: bool = Field(
+        True, description="whether errors that the data sheets of sensors and drive state are estimated too"
+    )
+    least_improvement: Annotated[float, Field(ge=0, lt=1)] = Field(
+        0.05, description="relative decrease of the held-out error that a twin needs"
+    )
+    chi2_limit: Annotated[float, Field(gt=0, lt=1)] = Field(
+        0.1, description="largest difference of the held-out mean square from 1, in the noise of the sensors"
+    )
+
+
+class Estimate(NamedTuple):
+    """Value of a parameter."""
+
+    value: float
+    interval: tuple[float, float]
+    """95 %."""
+    unit: str
+
+
+class Refusal(NamedTuple):
+    """Parameters that the data do not determine."""
+
+    parameters: tuple[str, ...]
+    why: str
+
+
+class Fit(NamedTuple):
+    """Agreement of a machine with windows."""
+
+    chi2: float
+    """Mean square of the residuals in the noise of the sensors."""
+    rms_rad: Array
+    """(3,) root mean square of the residuals of each angle."""
+
+
+class Identified(NamedTuple):
+    """Result of `identify`."""
+
+    accepted: bool
+    parameters: dict[str, Estimate]
+    refused: tuple[Refusal, ...]
+    correlations: tuple[str, ...]
+    """Sentences on parameters that are nearly indistinguishable."""
+    train: Fit | None
+    held_out: Fit | None
+    held_out_before: Fit | None
+    improvement: float | None
+    """Relative decrease of the held-out error."""
+    reasons: tuple[str, ...]
+    """Why it is not accepted."""
+    covariance: Array | None
+    fields: dict[str, Any]
+    """Fields of a scenario with the found values."""
+
+    @property
+    def uncertainty(self) -> Uncertainty | None:
+        """Uncertainty of the found values; None if there are none."""
+        values = {name: one.value for name, one in self.parameters.items()}
+        return None if self.covariance is None else Uncertainty.of(values, self.covariance)
+
+
+def identify(
+    logs: Log | Sequence[Log],
+    scenario: str,
+    parameters: Sequence[str],
+    changes: Mapping[str, Any] | None = None,
+    settings: IdentifySettings | None = None,
+    report: Callable[[int, int], object] = lambda done, most: None,
+) -> Identified:
+    """Identify parameters of a machine.
+
+    Parameters
+    ----------
+    logs : Log or sequence of Log
+        Each with its conditions, such as a known payload.
+    scenario : str
+        Name or file of the scenario that describes the machine otherwise.
+    parameters : sequence of str
+        Names of `parameters.KINDS`, of whole kinds or of parts.
+    changes : mapping, optional
+        Fields of the scenario by dotted name and their values.
+    settings : IdentifySettings, optional
+    report : callable
+        Takes the evaluations that are done and the largest number of them.
+
+    Raises
+    ------
+    InputError
+        A name is unknown, the scenario cannot be used, a log does not fit it, or its windows are too few.
+    """
+    settings = settings or IdentifySettings()
+    logs = [logs] if isinstance(logs, Log) else list(logs)
+    problem = Problem(logs, scenario, parameters, changes or {}, settings)
+    refused = problem.refusals(problem.initial)
+    if refused:
+        return _refused(refused)
+    values, information, train = problem.solve(report)
+    refused = problem.refusals(values)
+    if refused:
+        return _refused(refused)
+    covariance = np.asarray(np.linalg.inv(information), np.float64)
+    return problem.result(values, covariance, train)
+
+
+TELLING = (
+    "torque_scale",
+    "plant.modelling_error",
+    "plant.coulomb_Nm",
+    "plant.viscous_Nm_s",
+    "plant.payload_kg",
+)
+"""Parameters of which a check of a log says whether it determines them."""
+
+
+def identifiability(log: Log, scenario: str, changes: Mapping[str, Any] | None = None) -> tuple[str, ...]:
+    """Return sentences on the parameters that a log determines, each alone and all together.
+
+    Raises
+    ------
+    InputError
+        The scenario cannot be used, or the log is shorter than a few windows.
+    """
+    problem = Problem([log], scenario, TELLING, changes or {}, IdentifySettings(nuisance=False))
+    information, _ = problem.normal(problem.initial)
+    alone = np.diag(information) * problem.sizes**2 >= _WORST
+    lines = []
+    for can, verb in ((True, "determines"), (False, "does not determine")):
+        chosen = [one for one, known in zip(problem.wanted, alone, strict=True) if known == can]
+        if chosen:
+            lines.append(f"each alone, the log {verb} {', '.join(short_names(chosen, problem.wanted))}")
+    return (*lines, *(one.why for one in problem.refusals(problem.initial)))
+
+
+def _refused(refused: tuple[Refusal, ...]) -> Identified:
+    reasons = tuple(one.why for one in refused)
+    return Identified(False, {}, refused, (), None, None, None, None, reasons, None, {})
+
+
+class Problem:
+    """Least squares of an identification; the arguments are those of `identify`."""
+
+    def __init__(
+        self,
+        logs: Sequence[Log],
+        scenario: str,
+        names: Sequence[str],
+        changes: Mapping[str, Any],
+        settings: IdentifySettings | None = None,
+    ) -> None:
+        self.settings = settings = settings or IdentifySettings()
+        machines = [Machine(scenario, {**changes, **log.conditions}) for log in logs]
+        self._machines, self.machine = machines, machines[0]
+        self.wanted = selected(names, self.machine.model.actuator)
+        if not self.wanted:
+            raise InputError("identification: expected at least one parameter, received none")
+        prior = priors(self.machine) if settings.nuisance else {}
+        nuisance = [parameter for parameter in prior if parameter not in self.wanted]
+        self.parameters: list[Parameter] = [*self.wanted, *nuisance]
+        self.initial = np.array([self.machine.nominal(parameter) for parameter in self.parameters])
+        # A wanted parameter has no prior: its interval comes from the data alone.
+        self.deviations = np.array([*[np.inf] * len(self.wanted), *[prior[one] for one in nuisance]])
+        self.least = np.array([parameter.kind.least for parameter in self.parameters])
+        self.sizes = np.array([parameter.kind.size for parameter in self.parameters])
+        train, held_out = _split(logs, machines, settings)
+        self.train = Shooting(train, self.parameters)
+        self.held_out = Shooting(held_out, self.parameters)
+
+    def refusals(self, values: Array) -> tuple[Refusal, ...]:
+        """Return the combinations of wanted parameters that no data determine at some values."""
+        information, _ = self.normal(values)
+        combinations = unidentifiable(information * np.outer(self.sizes, self.sizes), self.wanted)
+        return combinations or self._without_reference()
+
+    def _without_reference(self) -> tuple[Refusal, ...]:
+        """Return torque, inertia and friction as one combination if no log has a known payload.
+
+        A cable or gimbal rings of the scenario would be one in the model, but nobody has measured them.
+        """
+        kinds = {one.kind.name for one in self.wanted}
+        is_payload_known = "plant.payload_kg" not in kinds and any(
+            machine.model.scenario.plant.payload_kg for machine in self._machines
+        )
+        if is_payload_known or not kinds.issuperset({"torque_scale", "plant.modelling_error"}):
+            return ()
+        together = [one for one in self.wanted if one.kind.name in TELLING]
+        return (_refusal(together, self.wanted),)
+
+    def information(self) -> tuple[Array, list[str]]:
+        """Return the information of the training windows on the wanted parameters, and their names.
+
+        Nuisance parameters are eliminated; without any information, a parameter has that of its size times
+        1000.
+        """
+        information, _ = self.normal(self.initial)
+        known = information + np.diag((1e3 * self.sizes) ** -2.0)
+        covariance = np.linalg.inv(known)[: len(self.wanted), : len(self.wanted)]
+        return np.linalg.inv(covariance), [parameter.name for parameter in self.wanted]
+
+    def solve(self, report: Callable[[int, int], object]) -> tuple[Array, Array, list[Part]]:
+        """Return the best values, their information, and the windows; `report` is that of `identify`."""
+        latest: dict[bytes, tuple[Array, Array, Array, list[Part]]] = {}
+        evaluations = count(1)
+
+        def evaluated(scaled: Array) -> tuple[Array, Array, Array, list[Part]]:
+            """Return residuals and slopes in the few directions of the slopes; then information, windows."""
+            if (key := scaled.tobytes()) not in latest:
+                latest.clear()
+                values = self.initial + scaled * self.sizes
+                parts = self.train.parts(values, slopes=True)
+                information, gradient = self._normal(parts, values)
+                factor = np.linalg.cholesky(information * np.outer(self.sizes, self.sizes))
+                along = np.linalg.solve(factor, gradient * self.sizes)
+                across = max(self._squares(parts, values) - float(along @ along), 0.0) ** 0.5
+                slopes = np.vstack([factor.T, np.zeros(len(scaled))])
+                latest[key] = np.append(along, across), slopes, information, parts
+                report(next(evaluations), _MOST_EVALUATIONS)
+            return latest[key]
+
+        solution = least_squares(
+            lambda scaled: evaluated(scaled)[0],
+            np.zeros(len(self.initial)),
+            jac=lambda scaled: evaluated(scaled)[1],
+            bounds=((self.least - self.initial) / self.sizes, np.inf),
+            ftol=1e-10,
+            xtol=1e-6,
+            max_nfev=_MOST_EVALUATIONS,
+        )
+        _, _, information, parts = evaluated(solution.x)
+        return self.initial + solution.x * self.sizes, information, parts
+
+    def _cost(self, values: Array) -> float:
+        """Return half the sum of the squares of all residuals, priors included."""
+        return 0.5 * self._squares(self.train.parts(values, slopes=False), values)
+
+    def _squares(self, parts: Sequence[Part], values: Array) -> float:
+        departures = (values - self.initial) / self.deviations
+        return float(sum(part.squares for part in parts) + departures @ departures)
+
+    def normal(self, values: Array) -> tuple[Array, Array]:
+        """Return information and gradient at some values, priors included."""
+        return self._normal(self.train.parts(values, slopes=True), values)
+
+    def _normal(self, parts: Sequence[Part], values: Array) -> tuple[Array, Array]:
+        """Return information and gradient of all windows and of the priors."""
+        weights = self.deviations**-2
+        information = sum((part.information for part in parts), np.diag(weights))
+        gradient = sum((part.gradient for part in parts), weights * (values - self.initial))
+        return information, gradient
+
+    def result(self, values: Array, covariance: Array, train: list[Part]) -> Identified:
+        """Return the result, judged by the held-out windows."""
+        before = _fit(self.held_out.parts(self.initial, slopes=False), self.held_out)
+        after = _fit(self.held_out.parts(values, slopes=False), self.held_out)
+        improvement = 1 - np.sqrt(after.chi2 / before.chi2)
+        reasons = list(self._reasons(after, improvement))
+        cost = Cost(self._cost, self.normal, values, self._cost(values), self.least)
+        fields = self.machine.fields(self.wanted, values[: len(self.wanted)].tolist())
+        return Identified(
+            accepted=not reasons,
+            parameters={
+                self.parameters[i].name: Estimate(
+                    float(values[i]),
+                    interval(cost, covariance, i),
+                    self.parameters[i].kind.unit,
+                )
+                for i in range(len(self.wanted))
+            },
+            refused=(),
+            correlations=tuple(_correlations(covariance, self.wanted)),
+            train=_fit(train, self.train),
+            held_out=after,
+            held_out_before=before,
+            improvement=float(improvement),
+            reasons=tuple(reasons),
+            covariance=covariance[: len(self.wanted), : len(self.wanted)],
+            fields=fields,
+        )
+
+    def _reasons(self, after: Fit, improvement: float) -> list[str]:
+        reasons, limit = [], self.settings.chi2_limit
+        if not improvement >= self.settings.least_improvement:
+            reasons.append(
+                f"expected a held-out error at least {self.settings.least_improvement:.0%} smaller, received"
+                f" {improvement:.1%}"
+            )
+        if not abs(after.chi2 - 1) <= limit:
+            reasons.append(
+                f"expected a held-out mean square from {1 - limit:g} to {1 + limit:g} of that of the noise,"
+                f" received {after.chi2:.3g}: the model lacks something that the machine has"
+            )
+        return reasons
+
+
+def _split(
+    logs: Sequence[Log], machines: Sequence[Machine], settings: IdentifySettings
+) -> tuple[list[Window], list[Window]]:
+    """Return windows for training and held-out ones."""
+    train: list[Window] = []
+    held_out: list[Window] = []
+    turn = round(1 / settings.held_out)
+    for log, machine in zip(logs, machines, strict=True):
+        for number, window in enumerate(windows_of(log, machine, settings.window_s)):
+            (held_out if number % turn == turn - 1 else train).append(window)
+    if not held_out or not train:
+        raise InputError(
+            f"identification: expected at least {turn} windows of {settings.window_s:g} s, received"
+            f" {len(train) + len(held_out)}"
+        )
+    return train, held_out
+
+
+def _fit(parts: Sequence[Part], shooting: Shooting) -> Fit:
+    squares = sum(part.squares for part in parts)
+    used = sum(part.used for part in parts)
+    deviations, measured = (np.concatenate([one[place] for one in shooting.observed]) for place in (1, 0))
+    residual_rad = np.concatenate([part.residual for part in parts]) * deviations
+    residual_rad[np.isnan(measured)] = np.nan
+    return Fit(squares / used, np.sqrt(np.nanmean(residual_rad**2, axis=0)))
+
+
+# Information of a direction in which the data only determine changes that matter; with less it is refused. In
+# it, parameters with at least this share of the largest take part.
+_WORST, _SHARE = 1.0, 0.2
+
+# Information that is left of that of the parameters alone: less of it is the error of the slopes, which are
+# differences over a thousandth of a parameter's size.
+_LEFT = 1e-5
+
+
+def unidentifiable(information: Array, wanted: Sequence[Parameter]) -> tuple[Refusal, ...]:
+    """Return the combinations of parameters that data do not determine.
+
+    Parameters
+    ----------
+    information : (p, p) array
+        Of the parameters in units of their sizes; wanted ones first.
+    wanted : sequence of Parameter
+    """
+    values, directions = np.linalg.eigh(information)
+    together: list[set[int]] = []
+    for value, direction in zip(values, directions.T, strict=True):
+        share = np.abs(direction[: len(wanted)])
+        least = max(_WORST, _LEFT * float(direction**2 @ np.diag(information)))
+        if value >= least or share.max() < _SHARE:
+            continue
+        # Several such directions of the same parameters are any basis of these: one refusal.
+        named = {int(place) for place in np.flatnonzero(share >= _SHARE * share.max())}
+        named = named.union(*(others for others in together if others & named))
+        together = [others for others in together if not others & named] + [named]
+    return tuple(_refusal([wanted[place] for place in sorted(places)], wanted) for places in together)
+
+
+def _refusal(parameters: Sequence[Parameter], wanted: Sequence[Parameter]) -> Refusal:
+    return Refusal(tuple(one.name for one in parameters), _why(short_names(parameters, wanted)))
+
+
+def _why(names: Sequence[str]) -> str:
+    if len(names) == 1:
+        return f"{names[0]} cannot be determined from these data: they hardly depend on it"
+    listed = f"{', '.join(names[:-1])} and {names[-1]}"
+    return (
+        f"{listed} cannot be distinguished in these data: changed together, they give the same angles;"
+        " fix one, or add a log under another known condition, such as a payload"
+    )
+
+
+# Above it, the interval of a parameter is more than three times as wide as with the other one known.
+_CORRELATED = 0.95
+
+
+def _correlations(covariance: Array, wanted: Sequence[Parameter]) -> list[str]:
+    count = len(wanted)
+    deviation = np.sqrt(np.diag(covariance))[:count]
+    correlation = covariance[:count, :count] / np.outer(deviation, deviation)
+    return [
+        f"{wanted[i].name} and {wanted[j].name} are hardly distinguished in these data"
+        f" (correlation {correlation[i, j]:+.3f})"
+        for i in range(count)
+        for j in range(i)
+        if abs(correlation[i, j]) > _CORRELATED
+    ]

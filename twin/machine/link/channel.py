@@ -1,0 +1,107 @@
+"""Channel: frames of two directions over one transport."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import asdict
+from typing import Any
+
+from spheretwin.machine.link.codec import Codec, Values
+from spheretwin.machine.link.decoder import Counts, Decoder
+from spheretwin.machine.link.frame_format import FrameFormat
+from spheretwin.machine.link.transports import Transport
+
+SHOWN_FRAMES = 3
+"""Frames of each direction that a channel reports."""
+
+LONGEST_BACKLOG = 10_000
+"""Texts that may have arrived before a run: some seconds of frames."""
+
+
+class Channel:
+    """Frames of two directions over one transport.
+
+    Parameters
+    ----------
+    transport : Transport
+    sends, receives : FrameFormat
+    groups : int
+        Coil groups of the machine.
+    report : callable, optional
+        Receives a line for each of the first frames.
+
+    Attributes
+    ----------
+    counts : Counts
+        Of the received frames.
+    groups : int
+    has_echo : bool
+        True if received frames name the command that they answer.
+    modulus : int
+        Sequence numbers of the sent frames run from 0 to the one below.
+    """
+
+    def __init__(
+        self,
+        transport: Transport,
+        sends: FrameFormat,
+        receives: FrameFormat,
+        groups: int,
+        report: Callable[[str], None] | None = None,
+    ) -> None:
+        self.transport, self.groups = transport, groups
+        self._encoder = Codec(sends, groups)
+        self._decoder = Decoder(Codec(receives, groups), datagrams=transport.datagrams)
+        self._report = report
+        self.has_echo = receives.has("echo")
+        self.modulus = min(sends.modulus("sequence"), receives.modulus("echo"))
+        self._shown = {"sent": 0, "received": 0}
+
+    @property
+    def counts(self) -> Counts:
+        """Received frames by their fate."""
+        return self._decoder.counts
+
+    def figures(self) -> dict[str, int]:
+        """Return the counts by name, with the datagrams of other senders."""
+        return {**asdict(self.counts), "foreign": self.transport.foreign}
+
+    def send(self, values: Mapping[str, Any]) -> bytes:
+        """Send a frame; return its bytes."""
+        content = self._encoder.encode(values)
+        self.transport.send(content)
+        self._show("sent", content, values)
+        return content
+
+    def receive(self, timeout_s: float) -> list[Values]:
+        """Return the new frames of the bytes that arrive within a time; none if nothing arrives."""
+        content = self.transport.receive(timeout_s)
+        if not content:
+            return []
+        frames = self._decoder.feed(content)
+        if frames:
+            self.transport.accept()
+            self._show("received", content, frames[-1])
+        return frames
+
+    def drain(self) -> list[Values]:
+        """Return the new frames that have arrived so far, of at most `LONGEST_BACKLOG` texts."""
+        frames: list[Values] = []
+        for _ in range(LONGEST_BACKLOG):
+            content = self.transport.receive(0.0)
+            if not content:
+                break
+            frames += self._decoder.feed(content)
+        return frames
+
+    def _show(self, direction: str, content: bytes, values: Mapping[str, Any]) -> None:
+        if self._report and self._shown[direction] < SHOWN_FRAMES:
+            self._shown[direction] += 1
+            texts = ", ".join(f"{name} {_text(value)}" for name, value in values.items() if value is not None)
+            self._report(f"{direction} {len(content)} bytes {content[:16].hex(' ')} …: {texts}")
+
+
+def _text(value: Any) -> str:
+    if hasattr(value, "__len__"):
+        return "[" + " ".join(f"{number:.4g}" for number in value) + "]"
+    return f"{value:.6g}" if isinstance(value, float) else str(int(value))

@@ -1,0 +1,179 @@
+"""Codec of frames: values to bytes, and bytes of any origin to values."""
+
+from __future__ import annotations
+
+import json
+import math
+import struct
+from binascii import crc_hqx
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spheretwin.machine.link.frame_format import QUANTITIES, TYPE_CODES, FieldFormat, FrameFormat
+
+Array = NDArray[np.float64]
+Values = dict[str, Any]
+"""Values of a frame in SI units by field: an int for integers, a float for one number, else an array."""
+
+CRC_START, CRC_BYTES = 0xFFFF, 2
+LARGEST_FRAME = 65536
+"""Bytes; a longer line is no frame."""
+
+_JSON_CRC = b',"crc16":'
+
+
+def crc16(content: bytes) -> int:
+    """Return CRC-16/CCITT-FALSE: 0x29B1 for the text 123456789."""
+    return crc_hqx(content, CRC_START)
+
+
+class _Field:
+    """Field for a number of coil groups: its count and its conversion."""
+
+    def __init__(self, field: FieldFormat, groups: int) -> None:
+        self.name, self.count = field.name, field.numbers(groups)
+        self.scale, self.offset = field.si_scale, field.si_offset
+        self.is_exact = (self.scale, self.offset) == (1.0, 0.0)
+        self.is_integer = QUANTITIES[self.name].is_integer
+        self.is_float = "float" in field.type
+        bits = int(field.type.lstrip("uintfloa"))
+        signed = not field.type.startswith("u")
+        self.lowest = -(2 ** (bits - 1)) if signed else 0
+        self.highest = 2 ** (bits - signed) - 1
+        # Numbers that no sensor reports stand for one that is missing.
+        self.missing = self.lowest if signed else self.highest
+
+    def numbers(self, values: Mapping[str, Any]) -> list[Any]:
+        """Return the numbers of the frame for its values; a value that is not given is missing."""
+        value = values.get(self.name)
+        if self.is_integer:
+            return [int(value or 0) & self.highest if self.lowest == 0 else int(value or 0)]
+        if value is None:
+            return [math.nan if self.is_float else self.missing] * self.count
+        raw = np.ravel(value).tolist()
+        if not self.is_exact:
+            raw = [(number - self.offset) / self.scale for number in raw]
+        return raw if self.is_float else [self._whole(number) for number in raw]
+
+    def _whole(self, number: float) -> int:
+        if not math.isfinite(number):
+            return self.missing
+        return min(max(round(number), self.lowest), self.highest)
+
+    def value(self, raw: tuple[Any, ...] | list[Any]) -> Any:
+        """Return the value in SI units of the numbers of the frame."""
+        if self.is_integer:
+            return raw[0]
+        if not (self.is_float or self.name == "unused"):
+            raw = [math.nan if number == self.missing else number for number in raw]
+        value = np.array(raw, np.float64)
+        if not self.is_exact:
+            value = self.scale * value + self.offset
+        return value if self.count > 1 else float(value[0])
+
+
+class Codec:
+    """Encoder and decoder of one frame format.
+
+    Parameters
+    ----------
+    frame : FrameFormat
+    groups : int
+        Coil groups of the machine.
+
+    Attributes
+    ----------
+    size : int
+        Bytes of a binary frame.
+    """
+
+    def __init__(self, frame: FrameFormat, groups: int) -> None:
+        self.frame = frame
+        self._fields = [_Field(field, groups) for field in frame.field]
+        order = "<" if frame.byte_order == "little" else ">"
+        codes = (
+            f"{field.count}{TYPE_CODES[declared.type]}"
+            for field, declared in zip(self._fields, frame.field, strict=True)
+        )
+        self._struct = struct.Struct(order + "".join(codes))
+        self._crc = struct.Struct(f"{order}H")
+        self.start, self._end = bytes(frame.start), bytes(frame.end)
+        self._has_crc = frame.checksum == "crc16"
+        crc_size = CRC_BYTES if self._has_crc else 0
+        self.size = len(self.start) + self._struct.size + crc_size + len(self._end)
+
+    def encode(self, values: Mapping[str, Any]) -> bytes:
+        """Return the frame of values in SI units; integers saturate, and a field not given is missing."""
+        numbers = [field.numbers(values) for field in self._fields]
+        if self.frame.encoding == "json":
+            return self._encode_line(numbers)
+        content = self.start + self._struct.pack(*(number for field in numbers for number in field))
+        if self._has_crc:
+            content += self._crc.pack(crc16(content))
+        return content + self._end
+
+    def decode(self, content: bytes) -> Values | None:
+        """Return the values of exactly one frame; None for any other bytes."""
+        if self.frame.encoding == "json":
+            return self._decode_line(content)
+        if len(content) != self.size or not content.startswith(self.start) or not content.endswith(self._end):
+            return None
+        last = self.size - len(self._end)
+        if self._has_crc:
+            last -= CRC_BYTES
+            if self._crc.unpack_from(content, last)[0] != crc16(content[:last]):
+                return None
+        numbers, first, values = self._struct.unpack_from(content, len(self.start)), 0, {}
+        for field in self._fields:
+            values[field.name] = field.value(numbers[first : first + field.count])
+            first += field.count
+        return values
+
+    def _encode_line(self, numbers: list[list[Any]]) -> bytes:
+        entries = {}
+        for field, raw in zip(self._fields, numbers, strict=True):
+            plain = [number if math.isfinite(number) else None for number in raw]  # JSON has no NaN
+            entries[field.name] = plain if field.count > 1 else plain[0]
+        text = json.dumps(entries, separators=(",", ":")).encode()
+        if self._has_crc:
+            text = text[:-1]
+            text += _JSON_CRC + f"{crc16(text)}}}".encode()
+        return text + b"\n"
+
+    def _decode_line(self, line: bytes) -> Values | None:
+        line = line.strip()
+        if self._has_crc:
+            content, mark, number = line.rpartition(_JSON_CRC)
+            if not mark or number.rstrip(b"}").strip() != str(crc16(content)).encode():
+                return None
+        try:
+            entries = json.loads(line)
+            if not isinstance(entries, dict):
+                return None
+            return {
+                field.name: field.value(_plain_numbers(entries[field.name], field)) for field in self._fields
+            }
+        except (KeyError, TypeError, ValueError, OverflowError, RecursionError):
+            return None
+
+
+def _plain_numbers(entry: Any, field: _Field) -> list[Any]:
+    """Return the numbers of an entry of a JSON object.
+
+    Raises
+    ------
+    TypeError, ValueError
+        It has another count or type.
+    """
+    raw = entry if isinstance(entry, list) else [entry]
+    if len(raw) != field.count:
+        raise ValueError(field.name)
+    for number in raw:
+        if isinstance(number, bool) or not isinstance(number, int | float | None):
+            raise TypeError(field.name)
+        if field.is_integer and not (isinstance(number, int) and field.lowest <= number <= field.highest):
+            raise ValueError(field.name)
+    return [math.nan if number is None else number for number in raw]

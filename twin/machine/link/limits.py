@@ -1,0 +1,72 @@
+"""Limits of a machine: each one that is exceeded removes the currents."""
+
+from __future__ import annotations
+
+from math import exp
+from typing import Annotated
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import BaseModel, ConfigDict, Field
+
+from spheretwin.control.supervision.watchdog import Reason
+from spheretwin.electronics.drive_section import ResolvedDrive
+from spheretwin.external import Measurement
+
+Array = NDArray[np.float64]
+
+Positive = Annotated[float, Field(gt=0, le=1e6)]
+
+
+class Limits(BaseModel):
+    """Limits of the measurements of a machine."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
+
+    current_A: Positive = Field(description="largest commanded current of a group, A")
+    current_excess_A: Positive = Field(
+        1.0, description="excess of a measured current over current_A, A (assumed: overshoot and noise)"
+    )
+    tilt_rad: Positive | None = Field(
+        None, description="largest magnitude of α and β, rad; the range of the hinges unless given"
+    )
+    temperature_degC: Positive = Field(120.0, description="highest temperature of a coil, °C (assumed)")
+
+    def exceeded(self, measurement: Measurement, temperature_degC: float) -> Reason:
+        """Return the reason to remove the currents for a finite measurement, if there is one."""
+        angle, current = measurement.angle_rad, measurement.current_A
+        if self.tilt_rad is not None and not np.all(np.abs(angle[:2]) <= self.tilt_rad):
+            return Reason.EDGE
+        if current is not None and np.any(np.abs(current) > self.current_A + self.current_excess_A):
+            return Reason.CURRENT
+        if temperature_degC > self.temperature_degC:
+            return Reason.TEMPERATURE
+        return Reason.NONE
+
+
+class CoilHeat:
+    """Temperatures of the coils by the currents that were sent, for a machine that reports none.
+
+    The resistance is that of the highest allowed temperature, so that the estimate is on the safe side.
+
+    Parameters
+    ----------
+    drive : ResolvedDrive
+        Resistance, heat capacity and thermal resistance of a group.
+    limits : Limits
+    period_s : float
+    """
+
+    def __init__(self, drive: ResolvedDrive, limits: Limits, period_s: float) -> None:
+        hot = 1 + drive.resistance_per_K * max(limits.temperature_degC - drive.ambient_degC, 0.0)
+        time_constant_s = drive.heat_capacity_J_K * drive.thermal_resistance_K_W
+        self._decay = exp(-period_s / time_constant_s) if time_constant_s > 0 else 0.0
+        self._rise_K_A2 = drive.resistance_ohm * hot * drive.thermal_resistance_K_W
+        self._ambient_degC = drive.ambient_degC
+        self._rise_K: Array | float = 0.0
+
+    def advance(self, current_A: Array) -> float:
+        """Advance by a control period with the currents (n,); return the highest temperature, °C."""
+        final_K = self._rise_K_A2 * current_A**2
+        self._rise_K = final_K + self._decay * (self._rise_K - final_K)
+        return self._ambient_degC + float(np.max(self._rise_K))

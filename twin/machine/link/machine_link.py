@@ -1,0 +1,378 @@
+"""Link to a machine: sends the currents of our controller, and receives measurements."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from typing import Annotated, Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import BaseModel, ConfigDict, Field
+
+from spheretwin.control.supervision.watchdog import Reason
+from spheretwin.external import Measurement
+from spheretwin.machine.link import frame_format
+from spheretwin.machine.link.channel import Channel
+from spheretwin.machine.link.codec import Values
+from spheretwin.machine.link.controller_scenario import check_measurement, controller_scenario
+from spheretwin.machine.link.frame_format import DEFAULT_FRAME, Flags
+from spheretwin.machine.link.limits import CoilHeat, Limits
+from spheretwin.machine.link.timing import Distribution
+from spheretwin.machine.link.transports import open_transport
+from spheretwin.models.base.errors import SpheretwinError
+from spheretwin.scenario.sections import ResolvedScenario, Scenario
+from spheretwin.session import Session
+
+Array = NDArray[np.float64]
+
+HELLO_s = 0.1
+"""Time between two requests for a first measurement."""
+
+RETRIES = 4
+"""Times that a command is sent within the timeout, in lockstep."""
+
+RELEASES = 3
+"""Frames without currents at the end: one of them may be lost."""
+
+SENT_TIMES = 256
+"""Commands whose time is stored for the latency."""
+
+
+class ParallelShadow(Protocol):
+    """Estimator of the state of the machine that runs in parallel."""
+
+    def advance(self, t_s: float, current_A: Array, angle_rad: Array) -> None:
+        """Receive the currents (n,) that were sent at a tick and the angles (3,) at its start.
+
+        The angles are NaN if no new measurement had arrived.
+        """
+
+
+class LinkSettings(BaseModel):
+    """Settings of the drive of a machine."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
+
+    armed: bool = Field(False, description="whether currents are sent; otherwise all are 0: a dry run")
+    ramp_s: Annotated[float, Field(ge=0, le=1e3)] = Field(
+        1.0, description="time in which the share of the commands that is sent rises from 0 to 1, s"
+    )
+    timeout_s: Annotated[float, Field(gt=0, le=1e3)] = Field(
+        0.01, description="age of the newest measurement at which the currents are removed, s (assumed)"
+    )
+    connect_s: Annotated[float, Field(gt=0, le=1e3)] = Field(
+        60.0, description="longest wait for the first measurement, s: a machine may have to compile first"
+    )
+    lockstep: bool = Field(
+        False, description="whether a tick waits for the reply of the machine instead of the clock"
+    )
+
+
+class Link:
+    """Machine behind a channel, in place of the plant of a session.
+
+    The currents are removed when a measurement, or the answer to a command, is missing for
+    `LinkSettings.timeout_s`, when a limit is exceeded, and when the machine reports that it has switched off.
+
+    Parameters
+    ----------
+    channel : Channel
+        Sends commands, receives measurements.
+    name : str
+        Entry of the journal.
+    settings : LinkSettings
+    limits : Limits
+    heat : CoilHeat
+    period_s : float
+        Control period.
+    shadow : ParallelShadow, optional
+    stop_requested : callable
+        True ends the run.
+    now : callable
+        Clock, s.
+
+    Attributes
+    ----------
+    authority : float
+        Share of the commands that is sent at the next tick.
+    ending : str
+        Reason for which the run ended early; empty otherwise.
+    late_ticks : set of int
+        Ticks that had no new measurement.
+    latency, jitter : Distribution
+        Time from a command to the measurement that answers it; delay of the ticks.
+    """
+
+    def __init__(
+        self,
+        channel: Channel,
+        name: str,
+        settings: LinkSettings,
+        limits: Limits,
+        heat: CoilHeat,
+        period_s: float,
+        *,
+        shadow: ParallelShadow | None = None,
+        stop_requested: Callable[[], bool] = lambda: False,
+        now: Callable[[], float] = time.monotonic,
+    ) -> None:
+        self.channel, self.name, self.ending = channel, name, ""
+        self.authority = 1.0 if settings.armed and settings.ramp_s == 0 else 0.0
+        self.latency, self.jitter = Distribution(), Distribution()
+        self.late_ticks: set[int] = set()
+        self._settings, self._limits, self._heat, self._period_s = settings, limits, heat, period_s
+        self._shadow, self._stop_requested, self._now = shadow, stop_requested, now
+        self._sequence = 0
+        self._sent_s: dict[int, float] = {}
+        self._newest: Values | None = None
+        self._arrival_s = self._answered_s = 0.0
+        self._is_new = True
+        self._start_s: float | None = None
+        self._reason = Reason.NONE
+        self._is_released = False
+
+    @classmethod
+    def open(
+        cls,
+        address: str,
+        scenario: Scenario,
+        settings: LinkSettings | None = None,
+        limits: Limits | None = None,
+        *,
+        frame: str = DEFAULT_FRAME,
+        report: Callable[[str], None] | None = None,
+        **options: Any,
+    ) -> Link:
+        """Open a link to the machine at an address.
+
+        Parameters
+        ----------
+        address : str
+            ``udp://HOST:PORT``, ``serial:DEVICE@BAUD``, or ``-`` for standard input and output.
+        scenario : Scenario
+            Controller, and the data sheet of the coils.
+        settings : LinkSettings, optional
+            Default: a dry run.
+        limits : Limits, optional
+            Default: the nominal current limit of the scenario.
+        frame : str
+            Shipped name or TOML file of the frames.
+        report : callable, optional
+            Receives a line for each of the first frames.
+        **options
+            `shadow`, `stop_requested` and `now`.
+
+        Raises
+        ------
+        InputError
+            The address or the frames cannot be used, or the frames have no command.
+        """
+        frames, complete = frame_format.load(frame).for_both_directions(frame), Session(scenario)
+        resolved, groups = complete.initial_scenario, len(complete.actuator.groups)
+        limits = limits or Limits(current_A=resolved.nominal.current_limit_A)
+        period_s = resolved.controller.period_s
+        channel = Channel(open_transport(address), frames.command, frames.measurement, groups, report)
+        heat = CoilHeat(resolved.drive, limits, period_s)
+        return cls(
+            channel, f"a machine at {address}", settings or LinkSettings(), limits, heat, period_s, **options
+        )
+
+    def session(self, scenario: Scenario) -> Session:
+        """Return a session of the controller of a scenario whose plant is the machine, ready to run.
+
+        Raises
+        ------
+        InputError
+            The machine does not report what the controller needs.
+        SpheretwinError
+            No first measurement arrives.
+        """
+        with Session(scenario) as complete:
+            resolved = complete.initial_scenario
+        # The machine does not wait for the compiler: the same loop is compiled before.
+        stand_in = Measurement(np.array(resolved.plant.initial_rad), np.zeros(3))
+        self._session_from(resolved, stand_in).compile()
+        first = self.connect()
+        check_measurement(resolved, first)
+        return self._session_from(resolved, first)
+
+    def _session_from(self, resolved: ResolvedScenario, first: Measurement) -> Session:
+        return Session(controller_scenario(resolved, first, self._limits.current_A), external=self)
+
+    def __enter__(self) -> Link:
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        self.release()
+        self.channel.transport.close()
+
+    def connect(self) -> Measurement:
+        """Request and return the first measurement; the machine does not advance.
+
+        Raises
+        ------
+        SpheretwinError
+            None arrives in time, or it is not finite.
+        """
+        start_s = hello_s = self._now()
+        while self._newest is None:
+            now_s = self._now()
+            if now_s - start_s > self._settings.connect_s or self.channel.transport.is_closed:
+                raise SpheretwinError(
+                    f"link {self.name}: expected a measurement within {self._settings.connect_s:g} s,"
+                    f" received {self.channel.counts.corrupt} texts that are no frame"
+                )
+            if self._stop_requested():
+                raise SpheretwinError(f"link {self.name}: expected a measurement, received a stop")
+            if now_s >= hello_s:  # not at each answer that is no frame
+                self._send(Flags.HELLO, 0.0, None)
+                hello_s = now_s + HELLO_s
+            self._receive(hello_s - now_s)
+        self._sent_s.clear()  # the machine may have been starting
+        measurement = _measurement(self._newest)
+        if not _is_finite(measurement):
+            raise SpheretwinError(f"link {self.name}: expected finite numbers, received others")
+        return measurement
+
+    def advance(self, t_s: float, current_A: Array) -> tuple[Measurement, Reason] | None:
+        """Send the currents of a tick; return the next measurement and a reason to remove the currents."""
+        if self._newest is None or self._stop_requested():
+            self.ending = "a stop was requested"
+            return None
+        if self._newest.get("flags", 0) & Flags.END:
+            self.ending = "the machine ended the run"
+            return None
+        before = self._newest
+        if self._shadow:
+            angle = before["angle"] if self._is_new else np.full(3, np.nan)
+            self._shadow.advance(t_s, current_A, angle)
+        is_armed = self._settings.armed and self._reason == Reason.NONE
+        flags = Flags.ARMED if is_armed else Flags(0)
+        temperature_degC = self._heat.advance(current_A)
+        if self._settings.lockstep:
+            self._wait_for_reply(flags, t_s, current_A)
+        else:
+            self._wait_for_clock(flags, t_s, current_A)
+        self._is_new = self._newest is not before
+        if not self._is_new:
+            self.channel.counts.late += 1
+            self.late_ticks.add(round(t_s / self._period_s) + 1)
+        self._raise_authority(t_s + self._period_s)
+        measurement = _measurement(self._newest)
+        if not self._reason:
+            reported = measurement.temperature_degC
+            self._reason = self._check(measurement, temperature_degC if reported is None else reported)
+        if not _is_finite(measurement):
+            self._newest = before
+            measurement = _measurement(before)
+        return measurement, self._reason
+
+    def release(self) -> None:
+        """Tell the machine once that the run has ended, without currents."""
+        if self._is_released:
+            return
+        self._is_released = True
+        for _ in range(RELEASES):
+            self._send(Flags.END, 0.0, None)
+
+    def figures(self) -> dict[str, Any]:
+        """Return counts of frames and distributions of times."""
+        return {
+            "armed": self._settings.armed,
+            "frames": self.channel.figures(),
+            "latency": self.latency.figures(),
+            "jitter": self.jitter.figures(),
+        }
+
+    def _check(self, measurement: Measurement, temperature_degC: float) -> Reason:
+        """Return the reason to remove the currents, if there is one."""
+        now_s, timeout_s = self._now(), self._settings.timeout_s
+        if not self._is_new and now_s - self._arrival_s >= timeout_s:
+            return Reason.STALE
+        # The command of this tick was sent a period ago. Measurements that answer older commands are late, or
+        # the machine does not receive the commands.
+        if self.channel.has_echo and now_s - self._answered_s - self._period_s >= timeout_s:
+            return Reason.STALE
+        if self._newest and self._newest.get("flags", 0) & Flags.FAILSAFE:
+            return Reason.MACHINE
+        if not _is_finite(measurement):
+            return Reason.MEASUREMENT
+        return self._limits.exceeded(measurement, temperature_degC)
+
+    def _raise_authority(self, t_s: float) -> None:
+        """Set the share of the commands of the tick at a time."""
+        if self._settings.armed:
+            ramp_s = self._settings.ramp_s
+            self.authority = 1.0 if t_s >= ramp_s else t_s / ramp_s
+
+    def _send(self, flags: Flags, t_s: float, current_A: Array | None) -> None:
+        self._sequence = (self._sequence + 1) % self.channel.modulus
+        self._sent_s[self._sequence] = self._now()
+        self._sent_s.pop((self._sequence - SENT_TIMES) % self.channel.modulus, None)
+        self._values = {"sequence": self._sequence, "flags": flags, "time": t_s, "current": current_A}
+        if current_A is None:
+            self._values["current"] = np.zeros(self.channel.groups)
+        self.channel.send(self._values)
+
+    def _receive(self, timeout_s: float) -> bool:
+        """Store the newest measurement that arrives; return True if it answers the last command."""
+        is_reply = False
+        for frame in self.channel.receive(timeout_s):
+            self._newest, self._arrival_s = frame, self._now()
+            echo = frame.get("echo", self._sequence)
+            sent_s = self._sent_s.pop(echo, None)
+            if sent_s is not None:
+                self.latency.add(self._arrival_s - sent_s)
+                self._answered_s = sent_s
+            is_reply = echo == self._sequence
+        return is_reply
+
+    def _wait_for_reply(self, flags: Flags, t_s: float, current_A: Array) -> None:
+        """Send a command, again while no reply arrives, and wait for the reply."""
+        start_s, before = self._now(), self._newest
+        self._send(flags, t_s, current_A)
+        timeout_s = 0.0 if self._reason == Reason.STALE else self._settings.timeout_s
+        for attempt in range(1, RETRIES + 1):
+            end_s = start_s + attempt * timeout_s / RETRIES
+            while True:
+                if self._receive(max(end_s - self._now(), 0.0)):
+                    return
+                if self._now() >= end_s:
+                    break
+            if attempt < RETRIES and timeout_s:
+                self.channel.send(self._values)  # the machine applies it once
+        self._newest = before  # an answer to an earlier command is no reply
+
+    def _wait_for_clock(self, flags: Flags, t_s: float, current_A: Array) -> None:
+        """Send a command, and receive until the next tick is due."""
+        if self._start_s is None:
+            for frame in self.channel.drain():  # sent while files were opened
+                self._newest = frame
+            self._start_s = self._arrival_s = self._answered_s = self._now()
+        self._send(flags, t_s, current_A)
+        self._start_s += self._period_s
+        while (left_s := self._start_s - self._now()) > 0:
+            self._receive(left_s)
+        self._receive(0.0)
+        delay_s = self._now() - self._start_s
+        self.jitter.add(delay_s)
+        if delay_s > self._period_s:  # do not hurry after a pause of the system
+            self._start_s += delay_s
+
+
+def _measurement(frame: Values) -> Measurement:
+    """Return the values of a frame; None for those that it does not have, or that are all NaN."""
+    rate, current, temperature = (frame.get(name) for name in ("rate", "current", "temperature"))
+    return Measurement(
+        frame["angle"],
+        *(None if np.all(np.isnan(_numbers(value))) else value for value in (rate, current, temperature)),
+    )
+
+
+def _numbers(value: Any) -> Any:
+    return np.nan if value is None else value
+
+
+def _is_finite(measurement: Measurement) -> bool:
+    return all(value is None or np.all(np.isfinite(value)) for value in measurement)

@@ -1,0 +1,149 @@
+"""Measurements of a machine as a stream of logs, and the shadow that runs beside a link."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spheretwin.machine.link import frame_format
+from spheretwin.machine.link.codec import Codec, Values
+from spheretwin.machine.link.decoder import Decoder
+from spheretwin.machine.link.frame_format import DEFAULT_FRAME, Flags
+from spheretwin.machine.link.transports import open_transport
+from spheretwin.machine.log import COMMANDED, MEASURED, Log
+from spheretwin.machine.state_estimation import Shadow
+from spheretwin.models.base.errors import InputError, SpheretwinError
+from spheretwin.models.telemetry.table import Table
+from spheretwin.simulation import sleep_until
+
+Array = NDArray[np.float64]
+
+ADDRESSES = ("udp://", "serial:")
+"""Beginnings of addresses; ``-`` is standard input."""
+
+BLOCK_ROWS = 20
+"""Rows that are handled together: at 1 kHz the estimate is at most 20 ms late."""
+
+SILENCE_s = 2.0
+"""Silence after the first frame that ends a stream."""
+
+
+def is_address(source: str) -> bool:
+    """Return whether a source of measurements is an address and not a file."""
+    return source == "-" or source.startswith(ADDRESSES)
+
+
+def streamed(
+    address: str,
+    groups: int,
+    frame: str = DEFAULT_FRAME,
+    *,
+    stop_requested: Callable[[], bool] = lambda: False,
+    now: Callable[[], float] = time.monotonic,
+) -> Iterator[Log]:
+    """Yield the measurements that arrive at an address, until the end flag, a silence or a stop.
+
+    Parameters
+    ----------
+    address : str
+        UDP port to listen to, serial line, or ``-``.
+    groups : int
+        Coil groups of the machine.
+    frame : str
+        Shipped name or TOML file of the frames.
+
+    Raises
+    ------
+    InputError
+        The address or the frames cannot be used, or the frames have no times, angles or currents.
+    SpheretwinError
+        The stream ended before the first block was complete.
+    """
+    format_ = frame_format.load(frame).measurement
+    if lacking := [name for name in ("time", "angle", "current") if not format_.has(name)]:
+        raise InputError(f"frame {frame}: expected measurements with {', '.join(lacking)}, received none")
+    transport = open_transport(address, listening=True)
+    decoder = Decoder(Codec(format_, groups), datagrams=transport.datagrams)
+    frames: list[Values] = []
+    yielded, heard_s, ended = 0, None, False
+    try:
+        while not (ended or stop_requested()):
+            content = transport.receive(0.1)
+            if content and (new := decoder.feed(content)):
+                transport.accept()
+                heard_s, frames = now(), frames + new
+                ended = bool(new[-1].get("flags", 0) & Flags.END)
+            elif transport.is_closed or (heard_s is not None and now() - heard_s > SILENCE_s):
+                ended = True
+            if len(frames) >= BLOCK_ROWS:
+                yield _log(frames, address)
+                yielded, frames = yielded + len(frames), []
+        if len(frames) > 1:
+            yield _log(frames, address)
+        elif not yielded:
+            raise SpheretwinError(
+                f"stream {address}: expected frames, received {decoder.counts.corrupt} texts that are none"
+            )
+    finally:
+        transport.close()
+
+
+def played(
+    log: Log,
+    *,
+    stop_requested: Callable[[], bool] = lambda: False,
+    now: Callable[[], float] = time.perf_counter,
+    wait_until: Callable[[float], object] = sleep_until,
+) -> Iterator[Log]:
+    """Yield the rows of a log in blocks, each when it would have arrived from the machine."""
+    started_s = now() - float(log.t_s[0])
+    for first in range(0, len(log), BLOCK_ROWS):
+        if stop_requested():
+            return
+        block = log.rows(first, first + BLOCK_ROWS)
+        wait_until(started_s + float(block.t_s[-1]))
+        yield block
+
+
+def _log(frames: list[Values], name: str) -> Log:
+    times, currents, angles = (
+        np.array([frame[field] for frame in frames]) for field in ("time", "current", "angle")
+    )
+    return Log(times.ravel(), currents, angles, MEASURED, name)
+
+
+class RunningShadow:
+    """Shadow beside a link: receives each tick, and estimates block by block.
+
+    Parameters
+    ----------
+    shadow : Shadow
+    """
+
+    def __init__(self, shadow: Shadow) -> None:
+        self.shadow = shadow
+        self._rows: list[tuple[float, Array, Array]] = []
+        self._tables: list[Table] = []
+
+    def advance(self, t_s: float, current_A: Array, angle_rad: Array) -> None:
+        """Receive the currents (n,) that were sent at a tick and the angles (3,) at its start."""
+        self._rows.append((t_s, np.array(current_A), np.array(angle_rad)))
+        if len(self._rows) >= BLOCK_ROWS:
+            self._estimate()
+
+    def telemetry(self) -> Table | None:
+        """Return the estimates so far, without a single last row; None if there are none."""
+        if len(self._rows) > 1:
+            self._estimate()
+        if not self._tables:
+            return None
+        return Table(self._tables[0].signals, np.vstack([table.values for table in self._tables]))
+
+    def _estimate(self) -> None:
+        times, currents, angles = zip(*self._rows, strict=True)
+        log = Log(np.array(times), np.array(currents), np.array(angles), COMMANDED, "link")
+        self._tables.append(self.shadow.advance(log))
+        self._rows.clear()

@@ -1,0 +1,117 @@
+"""Log of a machine: currents and angles over time."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Any, Final, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spheretwin.models.base.errors import InputError
+
+Array = NDArray[np.float64]
+
+COMMANDED: Final = "commanded"
+MEASURED: Final = "measured"
+
+
+@dataclass(frozen=True)
+class Log:
+    """Currents and angles of a machine, one row per sample.
+
+    Attributes
+    ----------
+    t_s : (n,) array
+        Time of the sample on the clock of the machine.
+    current_A : (n, groups) array
+        Current of each group; NaN where none was received.
+    angle_rad : (n, 3) array
+        Hinge angles as the sensors report them; NaN where none was received.
+    currents : str
+        ``commanded``: sent to the amplifiers at the time of the row, and held until the next;
+        ``measured``: in the coils at the time of the row.
+    name : str
+        Name for messages and reports, such as the path of its file.
+    conditions : mapping
+        Known fields of the scenario under which it was recorded, such as ``{"plant.payload_kg": 0.05}``.
+    accepted : tuple of str
+        Findings of `check` that the user has accepted.
+
+    Raises
+    ------
+    InputError
+        Fewer than two rows, shapes that do not fit each other, or another kind of currents.
+    """
+
+    t_s: Array
+    current_A: Array
+    angle_rad: Array
+    currents: Literal["commanded", "measured"] = COMMANDED
+    name: str = "log"
+    conditions: Mapping[str, Any] = field(default_factory=dict)
+    accepted: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        for column in _COLUMNS:
+            values = np.array(getattr(self, column), np.float64, order="C")
+            values.setflags(write=False)
+            object.__setattr__(self, column, values)
+        rows = len(self.t_s) if self.t_s.ndim == 1 else 0
+        if rows < 2:
+            raise InputError(
+                f"log {self.name}: expected at least two rows, received t_s of shape {self.t_s.shape}"
+            )
+        if self.current_A.ndim != 2 or len(self.current_A) != rows or self.angle_rad.shape != (rows, 3):
+            raise InputError(
+                f"log {self.name}: expected currents of ({rows}, groups) and angles of ({rows}, 3), received"
+                f" {self.current_A.shape} and {self.angle_rad.shape}"
+            )
+        if self.currents not in (COMMANDED, MEASURED):
+            raise InputError(
+                f"log {self.name}: expected currents {COMMANDED} or {MEASURED}, received {self.currents!r}"
+            )
+
+    def __len__(self) -> int:
+        return len(self.t_s)
+
+    @cached_property
+    def digest(self) -> str:
+        """SHA-256 of the numbers, in hexadecimal; the same for each file format."""
+        content = hashlib.sha256(self.currents.encode())
+        for column in _COLUMNS:
+            content.update(getattr(self, column).tobytes())
+        return content.hexdigest()
+
+    def rows(self, first: int, last: int) -> Log:
+        """Return the rows from `first` to `last`, exclusive."""
+        columns = {name: getattr(self, name)[first:last] for name in _COLUMNS}
+        return replace(self, **columns)
+
+
+_COLUMNS = ("t_s", "current_A", "angle_rad")
+
+
+def joined(logs: Sequence[Log]) -> Log:
+    """Return logs that follow each other as one, with the name and the conditions of the first.
+
+    Raises
+    ------
+    InputError
+        No log, or other kinds of currents.
+    """
+    if not logs:
+        raise InputError("log: expected at least one part, received none")
+    first = logs[0]
+    for other in logs:
+        if other.currents != first.currents:
+            raise InputError(
+                f"log {first.name}: expected {first.currents} currents as before, received {other.currents}"
+            )
+    columns: dict[str, Any] = {
+        name: np.concatenate([getattr(log, name) for log in logs]) for name in _COLUMNS
+    }
+    return replace(first, **columns)

@@ -1,0 +1,170 @@
+"""File of a twin: the parameters that logs have given, their covariance, and where they come from."""
+
+from __future__ import annotations
+
+import json
+import tomllib
+from collections.abc import Mapping, Sequence
+from importlib.metadata import version
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spheretwin.machine.intervals import Uncertainty
+from spheretwin.machine.log import Log
+from spheretwin.models.base.errors import InputError, shown, without_breaks
+from spheretwin.models.base.files import whole_file
+
+if TYPE_CHECKING:
+    from spheretwin.machine.identification import Identified
+
+FORMAT = 1
+
+
+def write_twin(
+    path: Path, result: Identified, scenario: str, changes: Mapping[str, Any], logs: Sequence[Log]
+) -> None:
+    """Write the file of a twin, completely or not at all.
+
+    Parameters
+    ----------
+    path : Path
+    result : Identified
+        Accepted.
+    scenario : str
+        Name or file of the scenario that was identified.
+    changes : mapping
+        Its fields that were known.
+    logs : sequence of Log
+
+    Raises
+    ------
+    InputError
+        The result is not accepted, or no file can be made there.
+    """
+    if not result.accepted or result.covariance is None or result.held_out is None:
+        raise InputError(f"twin {path}: expected an accepted identification, received {result.reasons[0]}")
+    lines = [
+        f"format = {FORMAT}",
+        f"scenario = {_text(scenario)}",
+        f"versions = {_text({name: version(name) for name in ('spheretwin', 'numpy', 'scipy')})}",
+        f"held_out_chi2 = {result.held_out.chi2!r}",
+        f"improvement = {result.improvement!r}",
+        "",
+        "# Fields of the scenario with the values that were found, after those that were known.",
+        "[fields]",
+        *(f"{_text(name)} = {_text(value)}" for name, value in {**changes, **result.fields}.items()),
+        "",
+        "# 95 % intervals.",
+        *(
+            f"[parameters.{_text(name)}]\nvalue = {one.value!r}\ninterval = {_text(list(one.interval))}\n"
+            f"unit = {_text(one.unit)}\n"
+            for name, one in result.parameters.items()
+        ),
+        "# Rows in the order of the parameters.",
+        "[covariance]",
+        f"matrix = {_text(result.covariance.tolist())}",
+        "",
+        *(
+            f"[[log]]\nname = {_text(log.name)}\nsha256 = {_text(log.digest)}\n"
+            f"conditions = {_text(dict(log.conditions))}\naccepted = {_text(list(log.accepted))}\n"
+            for log in logs
+        ),
+    ]
+    with whole_file(path) as temporary:
+        temporary.write_text("\n".join(lines), encoding="utf-8")
+
+
+def read_twin(path: Path) -> dict[str, Any]:
+    """Return the fields of a scenario that a twin states, by dotted name.
+
+    Raises
+    ------
+    InputError
+        The file cannot be read or is not that of a twin.
+    """
+    fields: dict[str, Any] = _content(path)["fields"]
+    return fields
+
+
+def read_uncertainty(path: Path) -> Uncertainty:
+    """Return the uncertainty of the identified parameters of a twin.
+
+    Raises
+    ------
+    InputError
+        The file cannot be read or is not that of a twin.
+    """
+    _, values, covariance = _identified(path)
+    return Uncertainty.of(values, covariance)
+
+
+def draw_fields(path: Path, count: int, seed: int = 0) -> dict[str, list[Any]]:
+    """Return fields of machines that the logs of a twin allow: values of each field, drawn together.
+
+    Parameters
+    ----------
+    path : Path
+        File of a twin.
+    count : int
+        Machines: normal draws with mean and covariance of the identified parameters, within their ranges.
+    seed : int
+
+    Raises
+    ------
+    InputError
+        The file cannot be read or is not that of a twin, or its scenario cannot be used.
+    """
+    from spheretwin.machine.parameters import Machine, selected  # loads the magnetics of the actuator
+
+    fields = read_twin(path)
+    scenario, values, covariance = _identified(path)
+    names, mean = list(values), np.array(list(values.values()))
+    drawn = np.random.default_rng(seed).multivariate_normal(mean, covariance, count)
+    if "torque_scale" in names:  # a part of the gains, which are drawn with it
+        scale = mean[names.index("torque_scale")]
+        fields["plant.group_gain"] = [gain / scale for gain in fields["plant.group_gain"]]
+    machine = Machine(scenario, fields)
+    parameters = selected(names, machine.model.actuator)
+    drawn = np.maximum(drawn, [one.kind.least for one in parameters])
+    machines = [machine.fields(parameters, row.tolist()) for row in drawn]
+    return {name: [one[name] for one in machines] for name in machines[0]}
+
+
+def _identified(path: Path) -> tuple[str, dict[str, float], NDArray[np.float64]]:
+    """Return scenario, identified values by name, and their covariance."""
+    content = _content(path)
+    try:
+        scenario = str(content["scenario"])
+        values = {name: float(one["value"]) for name, one in content["parameters"].items()}
+        covariance = np.array(content["covariance"]["matrix"], np.float64)
+        if covariance.shape != (len(values), len(values)):
+            raise ValueError(f"{len(values)} parameters, covariance of shape {covariance.shape}")
+    except (KeyError, TypeError, ValueError, AttributeError) as error:
+        raise InputError(
+            f"twin {path}: expected scenario, parameters and a covariance of them, received others"
+            f" ({without_breaks(error)})"
+        ) from None
+    return scenario, values, covariance
+
+
+def _content(path: Path) -> dict[str, Any]:
+    try:
+        content = tomllib.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        raise InputError(f"twin {path}: expected a readable TOML file, {without_breaks(error)}") from None
+    if content.get("format") != FORMAT or not isinstance(content.get("fields"), dict):
+        raise InputError(
+            f"twin {path}: expected format = {FORMAT} and a table [fields], received format"
+            f" {content.get('format', 'none')!r} and fields {shown(content.get('fields', 'none'))}"
+        )
+    return content
+
+
+def _text(value: Any) -> str:
+    """Return the text of a value in TOML, which is that of JSON but for mappings."""
+    if isinstance(value, Mapping):
+        return f"{{{', '.join(f'{_text(name)} = {_text(entry)}' for name, entry in value.items())}}}"
+    return json.dumps(value, ensure_ascii=False)

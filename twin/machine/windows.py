@@ -1,0 +1,261 @@
+"""Windows of logs: their angles under given parameters from free starts, and the slopes of these.
+
+In each window the plant starts from a state of its own (multiple shooting). The start is eliminated: at its
+best value the residuals are orthogonal to their slopes by it, and slopes by parameters count only in their
+part that no start can explain (variable projection).
+
+An angle that counts is used where its count changes: between two rows it has passed the edge between the
+counts, at a time within the period that is not known. The middle of the two computed angles is compared with
+the edge; the difference is uniform within half of the angle that the hinge turns in a period. Within a count
+the error of the centre repeats with the motion, which white noise would not do.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import pairwise
+from math import ceil
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spheretwin.electronics.logged_currents import mean_currents
+from spheretwin.machine.log import MEASURED, Log
+from spheretwin.machine.model import EDGE_SHARE
+from spheretwin.machine.parameters import Machine, Parameter, Setup, sensor_angles
+from spheretwin.machine.state_estimation import Shadow, hold_last_value
+from spheretwin.models.base.errors import InputError
+from spheretwin.plant.plants import Plants
+
+Array = NDArray[np.float64]
+
+# Rows may be this share of their distance from where they should be; the plant step assumes equal distances.
+_JITTER = 0.2
+
+# Differences for the slopes by the start.
+_START_STEP = np.repeat([1e-5, 1e-4], 3)  # rad, rad/s
+
+# Of the size of a parameter.
+_STEP_SHARE = 1e-3
+
+# Coulomb friction acts around each step: with 1 ms, angles were wrong by up to 90 µrad after a reversal, and
+# inertia had a bias of half of its standard deviation; with half of it they are within 5 µrad of MuJoCo's.
+_LONGEST_STEP_s = 5e-4
+
+_START_ITERATIONS = 4
+
+# Of the deviation that the noise gives: a start that moves less has arrived.
+_ARRIVED = 1e-2
+
+
+class Window(NamedTuple):
+    """Part of a log without gaps."""
+
+    log: Log
+    machine: Machine
+    first: int
+    """Row of the start."""
+    rows: int
+    """Rows after the start."""
+    start: Array
+    """(6,) angles and rates at the start as the shadow estimates them."""
+    rate_rad_s: Array
+    """(rows, 3) rates after the start, estimated by the shadow."""
+
+    def observed(self) -> tuple[Array, Array]:
+        """Return measured angles and the standard deviations of their errors, (rows, 3), rad.
+
+        NaN where none was measured. One that counts is an edge between counts; in a window without an edge,
+        the count is used once.
+        """
+        model, rows = self.machine.model, self.log.angle_rad[self.first : self.first + self.rows + 1]
+        measured, deviation = rows[1:].copy(), np.tile(model.noise_rad, (self.rows, 1))
+        rates_rad_s = np.vstack([self.start[3:], self.rate_rad_s])
+        turned_by_rad = 0.5 * np.abs(rates_rad_s[1:] + rates_rad_s[:-1]) * _period_s(self)
+        for i in np.flatnonzero(model.half_count_rad):
+            count_rad = 2 * model.half_count_rad[i]
+            turned_rad = turned_by_rad[:, i]
+            measured[:, i] = np.where(rows[:-1, i] == rows[1:, i], np.nan, 0.5 * (rows[:-1, i] + rows[1:, i]))
+            if not np.any(np.isfinite(measured[:, i])):
+                measured[self.rows // 2, i] = rows[self.rows // 2, i]
+                turned_rad = np.full(self.rows, count_rad)
+            spread_rad = np.clip(turned_rad, EDGE_SHARE * count_rad, count_rad) / np.sqrt(12)
+            deviation[:, i] = np.hypot(deviation[:, i], spread_rad)
+        return measured, deviation
+
+
+class Part(NamedTuple):
+    """Window under given parameters, with the best start."""
+
+    residual: Array
+    """(rows, 3) angles, measured minus computed over the deviation of the error; 0 if not measured."""
+    information: Array
+    """(p, p): JᵀJ of the slopes J of the residuals that no start explains."""
+    gradient: Array
+    """(p,): Jᵀ times the residuals."""
+    squares: float
+    """Sum of the squares of the residuals, those of a known start included."""
+    used: int
+    """Angles that were measured, less the six numbers of a free start."""
+
+
+def windows_of(log: Log, machine: Machine, window_s: float) -> list[Window]:
+    """Cut a log into windows.
+
+    Raises
+    ------
+    InputError
+        No part of the log without gaps is as long as a window, or a window has too few rows.
+    """
+    period_s = float(np.median(np.diff(log.t_s)))
+    rows = round(window_s / period_s)
+    if rows < 10:
+        raise InputError(
+            f"log {log.name}: expected windows of at least ten rows, {10 * period_s:.3g} s, received"
+            f" {window_s:.3g} s"
+        )
+    even = np.abs(np.diff(log.t_s) - period_s) < _JITTER * period_s
+    ends = np.concatenate([[-1], np.flatnonzero(~even), [len(even)]])
+    firsts = [
+        int(first) for before, until in pairwise(ends) for first in range(before + 1, until - rows + 1, rows)
+    ]
+    if not firsts:
+        raise InputError(
+            f"log {log.name}: expected {window_s:.3g} s without gaps, received at most"
+            f" {period_s * (np.max(np.diff(ends)) - 1):.3g} s"
+        )
+    estimated = Shadow(machine.model).advance(log)
+    q_rad, qdot_rad_s = estimated["q_estimated_rad"], estimated["qdot_estimated_rad_s"]
+    return [
+        Window(
+            log,
+            machine,
+            first,
+            rows,
+            np.concatenate([q_rad[first], qdot_rad_s[first]]),
+            qdot_rad_s[first + 1 : first + rows + 1],
+        )
+        for first in firsts
+    ]
+
+
+class Shooting:
+    """All windows, with their starts, which follow the parameters.
+
+    Parameters
+    ----------
+    windows : sequence of Window
+    parameters : sequence of Parameter
+    known : sequence of (6, 6) arrays, optional
+        Covariance of the start of each window; free starts unless given.
+    """
+
+    def __init__(
+        self,
+        windows: Sequence[Window],
+        parameters: Sequence[Parameter],
+        known: Sequence[Array] | None = None,
+    ) -> None:
+        self.windows, self._parameters, self._known = list(windows), list(parameters), known
+        self._starts = [window.start for window in self.windows]
+        self.observed = [window.observed() for window in self.windows]
+
+    def parts(self, values: Array, *, slopes: bool) -> list[Part]:
+        """Return all windows under some values of the parameters, at their best starts.
+
+        Parameters
+        ----------
+        values : (p,) array
+        slopes : bool
+            False: without slopes by the parameters.
+        """
+        steps = _STEP_SHARE * np.array([parameter.kind.size for parameter in self._parameters])
+        points = [values, *(values + np.diag(steps) if slopes else ())]
+        setups = {
+            machine: [machine.setup(self._parameters, point) for point in points]
+            for machine in {window.machine for window in self.windows}
+        }
+        return [
+            self._part(number, setups[window.machine], steps) for number, window in enumerate(self.windows)
+        ]
+
+    def _part(self, number: int, setups: Sequence[Setup], steps: Array) -> Part:
+        """Return a window under the first setup, with slopes from the others."""
+        setup, *moved = setups
+        for _ in range(_START_ITERATIONS):
+            residual, by_start = self._shoot(number, setup)
+            basis, triangle = np.linalg.qr(by_start)
+            move = np.linalg.lstsq(triangle, -basis.T @ residual, rcond=None)[0]
+            self._starts[number] = self._starts[number] + move
+            if np.linalg.norm(triangle @ move) < _ARRIVED:
+                break
+        residual = residual - basis @ (basis.T @ residual)
+        angles = 3 * self.windows[number].rows
+        used = int(np.count_nonzero(np.isfinite(self.observed[number][0]))) - 6 * (not self._known)
+        squares, by_row = float(residual @ residual), residual[:angles].reshape(-1, 3)
+        if not moved:
+            return Part(by_row, np.empty((0, 0)), np.empty(0), squares, used)
+        starts = np.tile(self._starts[number], (len(setups), 1))
+        residuals = self._residuals(number, self._angles(number, setups, starts))
+        columns = np.zeros((len(residual), len(steps)))
+        columns[:angles] = (residuals[1:] - residuals[0]).T / steps
+        columns -= basis @ (basis.T @ columns)
+        return Part(by_row, columns.T @ columns, columns.T @ residual, squares, used)
+
+    def _shoot(self, number: int, setup: Setup) -> tuple[Array, Array]:
+        """Return residuals from the present start, and their slopes by it."""
+        start = self._starts[number]
+        moved = np.vstack([start, start + np.diag(_START_STEP)])
+        computed = self._angles(number, [setup] * len(moved), moved)
+        residuals = self._residuals(number, computed)
+        residual, by_start = residuals[0], (residuals[1:] - residuals[0]).T / _START_STEP
+        if self._known:  # the start is six more measurements
+            weight = np.linalg.inv(np.linalg.cholesky(self._known[number]))
+            residual = np.concatenate([residual, weight @ (start - self.windows[number].start)])
+            by_start = np.vstack([by_start, weight])
+        return residual, by_start
+
+    def _angles(self, number: int, setups: Sequence[Setup], starts: Array) -> Array:
+        """Return what the sensors report at each start and after it, (lanes, rows + 1, 3)."""
+        window = self.windows[number]
+        plants = Plants([setup.plant for setup in setups])
+        plants.set_state(starts[:, :3], starts[:, 3:])
+        means = {times: _currents(window, *times) for times in {(one.delay_s, one.lag_s) for one in setups}}
+        currents = np.stack([means[one.delay_s, one.lag_s] + one.current_offset_A for one in setups], axis=1)
+        steps = ceil(_period_s(window) / _LONGEST_STEP_s - 0.05)
+        angles_rad = plants.roll_out(currents, np.zeros(3), _period_s(window) / steps, steps)
+        reached = np.concatenate([starts[None, :, :3], angles_rad])
+        return np.stack([sensor_angles(setup, reached[:, lane]) for lane, setup in enumerate(setups)])
+
+    def _residuals(self, number: int, angles: Array) -> Array:
+        measured, deviation = self.observed[number]
+        counted = self.windows[number].machine.model.half_count_rad > 0
+        computed = np.where(counted, 0.5 * (angles[:, 1:] + angles[:, :-1]), angles[:, 1:])
+        difference = (measured - computed) / deviation
+        return np.where(np.isnan(difference), 0.0, difference).reshape(len(computed), -1)
+
+
+def _period_s(window: Window) -> float:
+    times = window.log.t_s[window.first : window.first + window.rows + 1]
+    return float(times[-1] - times[0]) / window.rows
+
+
+def _currents(window: Window, delay_s: float, lag_s: float) -> Array:
+    """Return the mean currents between the rows of a window, (rows, groups)."""
+    log, measured = window.log, window.log.currents == MEASURED
+    # Some rows before and after: for delays, for shifted clocks, and until the lag has forgotten its start.
+    first = max(window.first - _ROWS_BEFORE, 0)
+    last = min(window.first + window.rows + 1 + _ROWS_BEFORE, len(log))
+    samples = hold_last_value(log.current_A[first:last])
+    edges = log.t_s[first : window.first + window.rows + 1]
+    means = np.empty((len(edges) - 1, samples.shape[1]))
+    if measured:  # behind the drive
+        delay_s, lag_s = delay_s - window.machine.model.delay_s, 0.0
+    mean_currents(
+        log.t_s[first:last], samples, edges, delay_s, max(lag_s, 0.0), measured, samples[0].copy(), means
+    )
+    return means[window.first - first :]
+
+
+_ROWS_BEFORE = 20

@@ -1,0 +1,315 @@
+"""Complete workflow on a hidden machine: design, logs, identification, shadow, validation and watch.
+
+MuJoCo plays the machine, with sensors and drive; its parameters are drawn from a seed. The twin starts from a
+nominal scenario that does not know them, and steps its own plant.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from typing import Annotated, Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import BaseModel, ConfigDict, Field
+
+from spheretwin import scenario as scenarios
+from spheretwin.machine.excitation import Design, DesignSettings, design
+from spheretwin.machine.identification import Identified, identify
+from spheretwin.machine.intervals import Uncertainty
+from spheretwin.machine.log import Log
+from spheretwin.machine.model import model_of
+from spheretwin.machine.noise_fit import fit_noise
+from spheretwin.machine.parameters import Machine, selected
+from spheretwin.machine.state_estimation import Shadowed, shadow
+from spheretwin.machine.validation import Validation, validate
+from spheretwin.machine.verdict import Verdict, check
+from spheretwin.machine.watching import Alarm, Watch
+from spheretwin.models import actuator as actuators
+from spheretwin.models.base.errors import SpheretwinError
+from spheretwin.session import Session
+
+Array = NDArray[np.float64]
+
+SCENARIO = "sinusoid"
+NOMINAL: dict[str, Any] = {
+    "plant.engine": "mujoco",
+    "hardware": "electronics",
+    "controller.law": "pid",
+    "disturbance.load": 0.0,
+    "disturbance.random_bound_Nm": 0.0,
+    "plant.modelling_error": 0.0,
+    "plant.modelling_torque_Nm": [0.0, 0.0, 0.0],
+    # Calibrated sensors and converters: their errors would be nuisance parameters, and minutes of computing.
+    "sensors.potentiometer.nonlinearity_rad": 0.0,
+    "sensors.adc.offset_V": 0.0,
+    "sensors.adc.gain_error": 0.0,
+    "drive.dac_bits": 0,
+    "drive.amplifier_offset_V": 0.0,
+}
+"""What is known of the machine; the values to identify are those of the data sheet."""
+
+WANTED = ("torque_scale", "plant.modelling_error", "plant.coulomb_Nm")
+PAYLOADS_kg = (0.0, 0.1)
+OTHER_PAYLOAD_kg = 0.05
+"""Of the log that judges the twin."""
+
+CHANGED_s, AFTER_s = 2.5, 1.0
+"""Time of a change, after the watch has measured the noise, and time that follows it."""
+
+
+class WorkflowSettings(BaseModel):
+    """Settings of the workflow."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+    seed: Annotated[int, Field(ge=0)] = Field(0, description="seed of the hidden machine and of its sensors")
+    design: DesignSettings = Field(
+        DesignSettings(
+            duration_s=2.0,
+            candidates=16,
+            sines=2,
+            payloads_kg=PAYLOADS_kg,
+            largest_angle_rad=1.0,
+            fastest_Hz=5.0,
+            largest_rate_rad_s=20.0,
+            largest_current_A=7.5,
+        ),
+        description="settings of the design",
+    )
+    judged_s: Annotated[float, Field(ge=1.0, le=60)] = Field(
+        3.0, description="length of the log that judges the twin, s"
+    )
+
+
+class Played(NamedTuple):
+    """What a run of the hidden machine left."""
+
+    log: Log
+    q_rad: Array
+    """True angles, (n, 3)."""
+    qdot_rad_s: Array
+
+
+class Judged(NamedTuple):
+    """A twin on the log that judges it."""
+
+    shadowed: Shadowed
+    validation: Validation
+
+
+class Change(NamedTuple):
+    """Change of the machine during a log."""
+
+    label: str
+    field: str
+    value: Any
+    what: str
+    """Parameter that an alarm should name, or its beginning."""
+    size: float
+
+
+class Watched(NamedTuple):
+    """Result of the watch over a log with a change, or without one."""
+
+    change: Change | None
+    alarms: tuple[Alarm, ...]
+    t_s: Array
+    """End of each window."""
+    sums: dict[str, Array]
+    """Cumulative sum of each change after each window, before an alarm resets it."""
+    threshold: float
+
+    @property
+    def named(self) -> Alarm | None:
+        """First alarm after the change that names it."""
+        if self.change is None:
+            return None
+        return next((one for one in self.alarms if self._names(one)), None)
+
+    @property
+    def others(self) -> list[Alarm]:
+        """Alarms before `named`, or all of them if there is none."""
+        place = self.alarms.index(self.named) if self.named else len(self.alarms)
+        return list(self.alarms[:place])
+
+    def _names(self, alarm: Alarm) -> bool:
+        return bool(self.change and alarm.t_s > CHANGED_s and alarm.what.startswith(self.change.what))
+
+
+class Workflow(NamedTuple):
+    """Results of the workflow."""
+
+    true: dict[str, float]
+    """Parameters of the hidden machine, by the names of `identify`."""
+    nominal: dict[str, float]
+    design: Design
+    logs: tuple[Played, ...]
+    """Of the designed experiment under each payload, then the one that judges the twin."""
+    verdicts: tuple[Verdict, ...]
+    without_payload: Identified
+    """From the first log alone."""
+    identified: Identified
+    before: Judged
+    after: Judged
+    watched: tuple[Watched, ...]
+
+
+def run_workflow(
+    settings: WorkflowSettings | None = None,
+    track: Callable[[range], Iterable[int]] = lambda steps: steps,
+) -> Workflow:
+    """Run the workflow.
+
+    Parameters
+    ----------
+    settings : WorkflowSettings, optional
+    track : callable
+        As for `design`.
+
+    Raises
+    ------
+    SpheretwinError
+        A run of the hidden machine ended early, or no motion stays within the limits of the design.
+    """
+    settings = settings or WorkflowSettings()
+    nominal = Machine(SCENARIO, NOMINAL)
+    true = hidden_machine(settings.seed)
+    designed = design(SCENARIO, WANTED, NOMINAL, settings.design, track)
+    motion = {"trajectory.shape": "multisine", "trajectory.components": _components(designed)}
+    hidden = {**NOMINAL, **_fields(true)}
+    logs = [
+        _play({**hidden, **motion}, payload_kg, settings.design.duration_s, settings.seed + place)
+        for place, payload_kg in enumerate(settings.design.payloads_kg)
+    ]
+    judge = _play(hidden, OTHER_PAYLOAD_kg, settings.judged_s, settings.seed + len(logs))
+    identified = identify([one.log for one in logs], SCENARIO, WANTED, NOMINAL)
+    twin = {**NOMINAL, **identified.fields}
+    return Workflow(
+        true=true,
+        nominal={one.name: nominal.nominal(one) for one in selected(WANTED, nominal.model.actuator)},
+        design=designed,
+        logs=(*logs, judge),
+        verdicts=tuple(check(one.log, scenarios.load(SCENARIO, NOMINAL)) for one in (*logs, judge)),
+        without_payload=identify(logs[0].log, SCENARIO, WANTED, NOMINAL),
+        identified=identified,
+        before=_judge(judge.log, NOMINAL, None),
+        after=_judge(judge.log, twin, identified.uncertainty),
+        watched=tuple(
+            _watch({**hidden, **motion}, twin, change, settings.seed) for change in (None, *_changes(true))
+        ),
+    )
+
+
+def hidden_machine(seed: int) -> dict[str, float]:
+    """Return the true parameters of a machine, by the names of `identify`."""
+    generator = np.random.default_rng(seed)
+    friction_Nm = generator.uniform(1.5e-3, 3.5e-3) * generator.uniform(0.9, 1.1, 3)
+    return {
+        "torque_scale": float(generator.uniform(0.92, 1.08)),
+        "plant.modelling_error": float(generator.uniform(-0.1, 0.1)),
+        **{f"plant.coulomb_Nm.{hinge}": float(value) for hinge, value in enumerate(friction_Nm)},
+    }
+
+
+def _fields(true: Mapping[str, float]) -> dict[str, Any]:
+    """Return the fields of a scenario of a machine with some parameters."""
+    return {
+        "plant.modelling_error": true["plant.modelling_error"],
+        "plant.coulomb_Nm": [true[f"plant.coulomb_Nm.{hinge}"] for hinge in range(3)],
+        "plant.group_gain": [true["torque_scale"]] * len(actuators.load().groups),
+    }
+
+
+def _components(designed: Design) -> Any:
+    return designed.scenario.model_dump(mode="json")["trajectory"]["components"]
+
+
+def _play(
+    fields: Mapping[str, Any], payload_kg: float, duration_s: float, seed: int, change: Change | None = None
+) -> Played:
+    """Return what the hidden machine leaves; a change takes place at `CHANGED_s`."""
+    conditions = {"plant.payload_kg": payload_kg}
+    scenario = scenarios.load(SCENARIO, {**fields, **conditions, "duration": duration_s, "seed": seed})
+    period_s, parts = scenario.controller.period_s, []
+    with Session(scenario) as session:
+        for until_s in (CHANGED_s, duration_s) if change else (duration_s,):
+            rows = session.advance(round(until_s / period_s) - session.tick)
+            parts.append([rows[name].copy() for name in _COLUMNS])
+            if change and until_s < duration_s:
+                session.set(change.field, change.value)
+        if session.tick < round(duration_s / period_s):
+            raise SpheretwinError(
+                f"workflow: expected a run of {duration_s:g} s, received {session.status} after"
+                f" {session.t_s:.3g} s"
+            )
+    t_s, current_A, angle_rad, q_rad, qdot_rad_s = (
+        np.concatenate(column) for column in zip(*parts, strict=True)
+    )
+    name = f"payload {1e3 * payload_kg:g} g"
+    return Played(Log(t_s, current_A, angle_rad, name=name, conditions=conditions), q_rad, qdot_rad_s)
+
+
+_COLUMNS = ("t_s", "current_command_A", "q_measured_rad", "q_rad", "qdot_rad_s")
+
+_FIT_s = 1.0  # rows for the noise of the shadow
+
+
+def _judge(log: Log, fields: Mapping[str, Any], uncertainty: Uncertainty | None) -> Judged:
+    """Return the shadow, with fitted noise, and the validation of a twin."""
+    model = model_of(SCENARIO, {**fields, **log.conditions})
+    rows = int(np.searchsorted(log.t_s, log.t_s[0] + _FIT_s))
+    fitted = fit_noise(log.rows(0, rows), model)
+    validation = validate(log, SCENARIO, fields, uncertainty=uncertainty)
+    return Judged(shadow(log, model, settings=fitted.settings), validation)
+
+
+def _changes(true: Mapping[str, float]) -> list[Change]:
+    """Return the changes that the watch should name."""
+    gains, friction_Nm = (_fields(true)[name] for name in ("plant.group_gain", "plant.coulomb_Nm"))
+    weak = [0.8 * gain if group == _WEAK else gain for group, gain in enumerate(gains)]
+    offset_rad = float(np.radians(0.1))
+    return [
+        Change("torque −3 %", "plant.group_gain", [0.97 * gain for gain in gains], "torque_scale", -0.03),
+        Change(
+            f"group {_WEAK} −20 %", "plant.group_gain", weak, f"plant.group_gain.{_WEAK}", -0.2 * gains[_WEAK]
+        ),
+        Change(
+            "offset of α +0.1°",
+            "sensors.angle_offset_rad",
+            [offset_rad, 0.0, 0.0],
+            "sensors.angle_offset_rad.0",
+            offset_rad,
+        ),
+        Change(
+            "friction doubled",
+            "plant.coulomb_Nm",
+            [2 * value for value in friction_Nm],
+            "plant.coulomb_Nm",
+            float(np.mean(friction_Nm)),
+        ),
+    ]
+
+
+_WEAK = 5  # a group that the motion needs
+
+
+def _watch(hidden: Mapping[str, Any], twin: Mapping[str, Any], change: Change | None, seed: int) -> Watched:
+    """Return the alarms of a log, judged window by window."""
+    log = _play(hidden, max(PAYLOADS_kg), CHANGED_s + AFTER_s, seed, change).log
+    watch = Watch(SCENARIO, {**twin, **log.conditions})
+    count = round(watch.settings.window_s / float(np.median(np.diff(log.t_s))))
+    alarms: list[Alarm] = []
+    times: list[float] = []
+    sums: list[dict[str, float]] = []
+    for end in range(count + 2, len(log) + 1, count):  # the last row of a window, and that which starts it
+        alarms += watch.advance(log.rows(end - count if times else 0, end))
+        times.append(float(log.t_s[end - 1]))
+        sums.append(watch.sums)
+    return Watched(
+        change,
+        tuple(alarms),
+        np.array(times),
+        {name: np.array([one[name] for one in sums]) for name in watch.sums},
+        watch.threshold,
+    )

@@ -1,0 +1,293 @@
+"""Page of the workflow on a hidden machine: its checks, tables and figures."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spheretwin.machine.parameters import KINDS
+from spheretwin.machine.state_estimation import HINGE_NAMES
+from spheretwin.machine.validation import Bin
+from spheretwin.machine.watching import WatchSettings
+from spheretwin.machine.workflow import CHANGED_s, Watched, Workflow
+from spheretwin.machine.workflow_checks import TRUE_COLUMNS, checks_of, rms_error, settled_errors
+from spheretwin.models.telemetry.signals import ANGLES
+from spheretwin.viz.pages import markdown
+from spheretwin.viz.pages.markdown import Drawing, write_page
+
+Array = NDArray[np.float64]
+
+NAME = "twin"
+TITLE = "Digital twin of a hidden machine"
+
+CALIBRATED_s = WatchSettings().calibration_s
+
+LABELS = ("before identification", "after identification")
+
+
+def figures(result: Workflow) -> dict[str, Any]:
+    """Return the results for JSON."""
+    return {
+        "parameters": {
+            name: {"true": result.true[name], "nominal": result.nominal[name], **one._asdict()}
+            for name, one in result.identified.parameters.items()
+        },
+        "refused": result.without_payload.refused,
+        "chi2": {"before": result.before.validation.chi2, "after": result.after.validation.chi2},
+        "watch": [
+            {"change": one.change.label if one.change else None, "alarms": one.alarms}
+            for one in result.watched
+        ],
+    }
+
+
+def write(folder: Path, result: Workflow, command: str, figure_format: str = "svg") -> list[Path]:
+    """Write the page and its figures; return both forms of the page.
+
+    Parameters
+    ----------
+    folder : Path
+        Exists.
+    result : Workflow
+    command, figure_format : str
+        As in `markdown.write_page`.
+
+    Raises
+    ------
+    InputError
+        A file cannot be written there.
+    """
+    checks, drawings = checks_of(result), _drawings(result)
+    shadow, residuals, sums = map(markdown.figure, drawings)
+    summary = [
+        "MuJoCo plays a machine with noisy sensors; its torque, inertia and friction are hidden."
+        " A twin that starts from the data sheet designs an experiment, identifies the machine from"
+        f" logs of it, follows its state, is validated, and watches it. {markdown.verdict(checks)}"
+    ]
+    sections = [
+        *_section("1. Design", DESIGN_TEXT, _design_rows(result)),
+        *_section("2. Logs", LOGS_TEXT, _log_rows(result)),
+        *_section("3. Identification", _identification_text(result), _parameter_rows(result)),
+        *_section("4. Shadow", SHADOW_TEXT, _shadow_rows(result)),
+        shadow,
+        *_section("5. Validation", _validation_text(result), _structure_rows(result)),
+        residuals,
+        *_section("6. Watch", WATCH_TEXT, _watch_rows(result)),
+        sums,
+        *markdown.checks_section(checks),
+    ]
+    return write_page(folder, NAME, TITLE, summary, sections, drawings, command, figure_format)
+
+
+DESIGN_TEXT = (
+    "`identify --design`: expected standard deviations under the multisine with the largest determinant of"
+    " the information, and under the nutation of the same length; both with each known payload."
+)
+LOGS_TEXT = (
+    "`log check`: the designed experiment without and with a known payload, and another motion with another"
+    " payload, which judges the twin. The check accepts a log or states what to record instead."
+)
+SHADOW_TEXT = (
+    "`shadow --fit`: errors of the estimated angles and rates against the truth in the log that judges the"
+    " twin. The noise of the shadow is fitted to the first second of it: a wrong model needs more"
+    " disturbance torque."
+)
+WATCH_TEXT = (
+    "`watch`: the identified twin watches the machine with a payload in the designed motion. The first"
+    f" {CALIBRATED_s:g} s measure the noise; {CHANGED_s:g} s after the start the machine changes. The size of"
+    " an alarm is that which some windows of 0.1 s show; the watch goes on from it, and a further alarm"
+    " corrects it."
+)
+
+WORDS = (
+    "parameter", "log", "accepted", "findings", "hinge", "a change alone of", "unit", "change", "named as",
+    "further alarms",
+)  # fmt: skip
+"""Headings of columns of words; the others are numbers."""
+
+Rows = list[tuple[str, ...]]
+"""Heading, then rows."""
+
+
+def _section(title: str, text: str, rows: Rows) -> list[str]:
+    head, *others = rows
+    numbers = [name not in WORDS for name in head]
+    return [f"## {title}", "", text, "", *markdown.table(head, others, numbers), ""]
+
+
+def _design_rows(result: Workflow) -> Rows:
+    design = result.design
+    return [
+        ("parameter", "designed", "nutation", "unit", "times narrower"),
+        *(
+            (
+                name,
+                f"{value:.2g}",
+                f"{design.reference[name]:.2g}",
+                next(kind.unit for kind in KINDS.values() if name.startswith(kind.name)),
+                f"{design.narrower[name]:.2f}",
+            )
+            for name, value in design.deviations.items()
+        ),
+    ]
+
+
+def _log_rows(result: Workflow) -> Rows:
+    return [
+        ("log", "length, s", "rows", "accepted", "findings"),
+        *(
+            (
+                played.log.name,
+                f"{played.log.t_s[-1] - played.log.t_s[0]:.3g}",
+                str(len(played.log)),
+                "yes" if verdict.accepted else "**no**",
+                "; ".join(f"{one.name} ({one.severity}): {one.where}" for one in verdict.findings) or "none",
+            )
+            for played, verdict in zip(result.logs, result.verdicts, strict=True)
+        ),
+    ]
+
+
+def _identification_text(result: Workflow) -> str:
+    identified = result.identified
+    lines = [f"`identify`, from the log without payload: {why}" for why in result.without_payload.reasons]
+    if identified.improvement is not None:
+        lines.append(f"From both logs: the error of held-out windows is {identified.improvement:.0%} smaller")
+    lines += [*identified.correlations, *(f"Not accepted: {why}" for why in identified.reasons)]
+    return "\n\n".join(f"{line}." for line in lines)
+
+
+def _parameter_rows(result: Workflow) -> Rows:
+    return [
+        ("parameter", "nominal", "true", "found", "from", "to (95 %)", "unit"),
+        *(
+            (
+                name,
+                *(
+                    f"{value:.5g}"
+                    for value in (result.nominal[name], result.true[name], one.value, *one.interval)
+                ),
+                one.unit,
+            )
+            for name, one in result.identified.parameters.items()
+        ),
+    ]
+
+
+def _shadow_rows(result: Workflow) -> Rows:
+    head = ["hinge"]
+    columns = []
+    for label, judged in zip(LABELS, (result.before, result.after), strict=True):
+        for name, quantity, unit in zip(TRUE_COLUMNS, ("angle", "rate"), ("mrad", "mrad/s"), strict=True):
+            error, half = settled_errors(result, judged, name)
+            head += [f"{quantity} {label.split()[0]}, rms {unit}", "within its 95 % band"]
+            columns += [
+                [f"{1e3 * value:.3g}" for value in rms_error(result, judged, name)],
+                [f"{100 * share:.0f} %" for share in np.mean(np.abs(error) <= half, axis=0)],
+            ]
+    return [tuple(head), *zip(ANGLES, *columns, strict=True)]
+
+
+def _validation_text(result: Workflow) -> str:
+    before, after = result.before.validation, result.after.validation
+    wrong = [len(one.structure) for one in (before, after)]
+    return (
+        "`validate`: the mean square of the residuals over that of the noise, in the log that has not"
+        f" identified the twin, is {before.chi2:.2f} before and {after.chi2:.2f} after identification."
+        f" Parameters that the residuals show to be wrong: {wrong[0]} before, {wrong[1]} after. The table has"
+        " the five clearest before. Each is tested alone, so a wrong torque also shows as others."
+    )
+
+
+def _structure_rows(result: Workflow) -> Rows:
+    return [
+        ("a change alone of", "explains", "unit", "standard deviations from 0"),
+        *(
+            (one.what, f"{one.size:+.3g}", one.unit, f"{one.deviations:+.1f}")
+            for one in result.before.validation.structure[:5]
+        ),
+    ]
+
+
+def _watch_rows(result: Workflow) -> Rows:
+    head = ("change", "named as", "true size", "size", "unit", "after, s", "confidence", "further alarms")
+    return [head, *map(_watch_row, result.watched)]
+
+
+def _watch_row(watched: Watched) -> tuple[str, ...]:
+    change, named = watched.change, watched.named
+    further = [one for one in watched.alarms if one is not named]
+    alarms = "; ".join(
+        f"{one.what}{'' if one.size is None else f' {one.size:+.2g}'} at {one.t_s:.2f} s" for one in further
+    )
+    if change is None:
+        return "none", "–", "–", "–", "–", "–", "–", alarms or "none"
+    size = f"{change.size:+.3g}"
+    if named is None:
+        return change.label, "**not named**", size, "–", "–", "–", "–", alarms or "none"
+    return (
+        change.label,
+        named.what,
+        size,
+        "–" if named.size is None else f"{named.size:+.3g}",
+        named.unit,
+        f"{named.t_s - CHANGED_s:.1f}",
+        f"{named.confidence:.3f}",
+        alarms or "none",
+    )
+
+
+def _drawings(result: Workflow) -> list[Drawing]:
+    from spheretwin.viz.figures import twin  # Matplotlib is optional
+
+    times = result.logs[-1].log.t_s
+    columns: dict[str, dict[str, twin.ErrorTrace]] = {"angle, mrad": {}, "rate, mrad/s": {}}
+    residuals: dict[str, dict[str, twin.ResidualBins]] = {hinge: {} for hinge in ANGLES}
+    for label, judged in zip(LABELS, (result.before, result.after), strict=True):
+        for quantity, name in zip(columns, TRUE_COLUMNS, strict=True):
+            error, half = settled_errors(result, judged, name)
+            columns[quantity][label] = twin.ErrorTrace(times[-len(error) :], 1e3 * error, 1e3 * half)
+        for hinge, name in zip(ANGLES, HINGE_NAMES, strict=True):
+            bins = [one for one in judged.validation.bins if (one.hinge, one.by) == (name, "rate_rad_s")]
+            residuals[hinge][label] = _bins(bins)
+    panels = {
+        one.change.label if one.change else "no change": twin.Sums(
+            one.t_s[one.t_s > CALIBRATED_s],
+            {what: values[one.t_s > CALIBRATED_s] for what, values in one.sums.items()},
+            one.named.what if one.named else None,
+            CHANGED_s if one.change else None,
+            [alarm.t_s for alarm in one.alarms],
+        )
+        for one in result.watched
+    }
+    threshold = result.watched[0].threshold
+    return [
+        Drawing(
+            "twin_shadow.svg",
+            "Errors of the estimated angles and rates over time, before and after identification, with 95 %"
+            " bands.",
+            twin.errors(columns, ANGLES, "Shadow: errors against the truth"),
+        ),
+        Drawing(
+            "twin_residuals.svg",
+            "Mean residuals of the validation by the rate of each hinge, before and after identification.",
+            twin.residuals(residuals, "rate, rad/s", "mean residual, mrad", "Validation: residuals"),
+        ),
+        Drawing(
+            "twin_watch.svg",
+            "Cumulative sums of the watch over time, linear up to the threshold and logarithmic above; after"
+            " an alarm the sums start again from 0. An alarm names the change that explains the windows best"
+            " with a size of its own, not the largest sum.",
+            twin.sums(panels, threshold, "Watch: sums of likelihood ratios"),
+        ),
+    ]
+
+
+def _bins(bins: list[Bin]) -> Any:
+    from spheretwin.viz.figures import twin
+
+    middle = np.array([0.5 * (one.low + one.high) for one in bins])
+    return twin.ResidualBins(middle, 1e3 * np.array([one.mean_rad for one in bins]))

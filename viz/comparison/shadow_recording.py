@@ -1,0 +1,263 @@
+"""Recording of a shadow: the machine as measured, its twin as a ghost, and what the twin estimates."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import NamedTuple, cast
+
+import numpy as np
+import rerun as rr
+import rerun.blueprint as rrb
+from numpy.typing import NDArray
+
+from spheretwin.models.telemetry.signals import ANGLES, Signal
+from spheretwin.models.telemetry.table import Table
+from spheretwin.viz import theme
+from spheretwin.viz.comparison.ghosts import ROTOR, bodies
+from spheretwin.viz.comparison.merged_recording import SubtreeStream, recorded
+from spheretwin.viz.layout.extents import labelled
+from spheretwin.viz.layout.layout import blueprint, eye
+from spheretwin.viz.layout.plots import time_axis
+from spheretwin.viz.layout.styles import MIDDLE, THICK, THIN
+from spheretwin.viz.layout.view import application_of
+from spheretwin.viz.recording.part import RecordingSubject, drawable, scalars, time_index
+from spheretwin.viz.recording.recorder import MOST_ROWS
+from spheretwin.viz.scene.entities import size_of
+from spheretwin.viz.scene.meshes import WORLD
+
+Array = NDArray[np.float64]
+
+MACHINE, TWIN, TEXT, PLOTS = "machine", "twin", "verdict", "plots"
+
+CONFIDENCE = 1.96
+"""Standard deviations on each side of a 95 % band."""
+
+_FARTHEST = 8.0  # innovations beyond it are cut
+
+
+class Line(NamedTuple):
+    """A line of a plot for some rows, and its style."""
+
+    label: str
+    values: Array
+    colour: theme.Colour
+    width: float
+
+
+class Plot(NamedTuple):
+    """Lines of a plot for some rows."""
+
+    name: str
+    lines: tuple[Line, ...]
+    limits: tuple[float, float]
+
+
+ANGLE, INNOVATION = "angle", "innovation"
+
+BANDS = {
+    "qdot_estimated_rad_s": ("hinge rates with 95 % band [rad/s]", 1.0),
+    "disturbance_estimated_Nm": ("disturbance torque with 95 % band [mN·m]", 1e3),
+    "offset_estimated_rad": ("offsets of the sensors with 95 % band [mrad]", 1e3),
+}
+"""Title and scale of the plots of an estimate, by its signal."""
+
+TITLES = {
+    ANGLE: "hinge angles, estimated above measured (grey) [rad]",
+    INNOVATION: "measured minus predicted angle over its expected deviation [1]; 95 % within the grey lines",
+    **{name: title for name, (title, _) in BANDS.items()},
+}
+"""Titles of the plots by their names."""
+
+
+def titles_of(signals: Sequence[Signal]) -> dict[str, str]:
+    """Return the titles of the plots of a shadow with some signals."""
+    names = {signal.name for signal in signals}
+    return {name: title for name, title in TITLES.items() if name not in BANDS or name in names}
+
+
+class ShadowContent:
+    """Content of the recording of a shadow: bodies and lines.
+
+    Parameters
+    ----------
+    recording : RecordingStream
+    subject : RecordingSubject
+        Actuator and facts; its signals are not used.
+    """
+
+    def __init__(self, recording: rr.RecordingStream, subject: RecordingSubject) -> None:
+        self._recording = recording
+        self._bodies = [
+            (cast(rr.RecordingStream, SubtreeStream(recording, below)), part, angles)
+            for below, angles in ((MACHINE, "q_measured_rad"), (TWIN, "q_estimated_rad"))
+            for part in bodies(subject, theme.ESTIMATE, ghost=below == TWIN)
+        ]
+        for stream, part, _ in self._bodies:
+            part.begin(stream)
+
+    def write(self, telemetry: Table, current_A: Array, plots: Sequence[Plot]) -> None:
+        """Record rows of the telemetry, the currents (n, groups) in A, and the plots of the rows."""
+        for stream, part, angles in self._bodies:
+            part.write(stream, _motion(telemetry["t_s"], telemetry[angles], current_A))
+        for plot in plots:
+            send_lines(self._recording, f"{PLOTS}/{plot.name}", telemetry["t_s"], plot.lines)
+
+
+def send_lines(recording: rr.RecordingStream, entity: str, t_s: Array, lines: Sequence[Line]) -> None:
+    """Send some lines of one plot; of rows that share a pixel, the lowest and the highest are drawn."""
+    look = rr.SeriesLines(
+        names=[line.label for line in lines],
+        colors=[line.colour for line in lines],
+        widths=[line.width for line in lines],
+        aggregation_policy=rr.components.AggregationPolicy.MinMax,
+    )
+    recording.log(entity, look, static=True)
+    values = np.stack([line.values for line in lines], axis=1)
+    recording.send_columns(entity, time_index(t_s), [scalars(values, len(lines))])
+
+
+def write(path: Path, telemetry: Table, current_A: Array, subject: RecordingSubject, text: str) -> None:
+    """Write the recording of a shadow.
+
+    Parameters
+    ----------
+    path : Path
+    telemetry : Table
+        Of `machine.shadow`, at least one row.
+    current_A : (n, groups) array, A
+        Currents of the log; NaN is drawn as 0.
+    subject : RecordingSubject
+        Actuator and facts; its signals are not used.
+    text : str
+        Verdict, in Markdown.
+
+    Raises
+    ------
+    InputError
+        No file can be made there, or a mesh of the model cannot be read.
+    SpheretwinError
+        Writing failed; the previous file is unchanged.
+    """
+    _ = subject.meshes  # a missing one is reported before there is a file
+    plots = plots_of(telemetry)
+    application = application_of("spheretwin-shadow", repr([plot._replace(lines=()) for plot in plots]))
+    limits = {plot.name: plot.limits for plot in plots}
+    axis, titles = time_axis(float(telemetry["t_s"][-1])), titles_of(telemetry.signals)
+    text_view = rrb.TextDocumentView(origin=f"/{TEXT}", name="verdict")
+    views = layout(subject, titles, axis, text_view, limits)
+    with recorded(path, application, blueprint(views)) as recording:
+        recording.send_recording_name("shadow")
+        recording.log(TEXT, rr.TextDocument(drawable(text), media_type=rr.MediaType.MARKDOWN), static=True)
+        content = ShadowContent(recording, subject)
+        for first in range(0, len(telemetry), MOST_ROWS):
+            rows = slice(first, first + MOST_ROWS)
+            chunk = [plot._replace(lines=tuple(_part(line, rows) for line in plot.lines)) for plot in plots]
+            content.write(telemetry.rows(first, first + MOST_ROWS), current_A[rows], chunk)
+
+
+def _part(line: Line, rows: slice) -> Line:
+    return line._replace(values=line.values[rows])
+
+
+def plots_of(telemetry: Table) -> list[Plot]:
+    """Return the plots of some rows: a quantity of all hinges in each."""
+    measured, estimated = telemetry["q_measured_rad"], telemetry["q_estimated_rad"]
+    before = [Line(f"{ANGLES[i]} measured", measured[:, i], theme.COMMAND, THICK) for i in range(3)]
+    above = [Line(f"{ANGLES[i]} estimated", estimated[:, i], theme.AXIS_COLOURS[i], THIN) for i in range(3)]
+    normalised = telemetry["innovation_normalised"]
+    limit = np.full(len(telemetry), CONFIDENCE)
+    farthest = float(np.clip(1.1 * np.nanmax(np.abs(normalised), initial=CONFIDENCE), 0.0, _FARTHEST))
+    innovations = [Line(ANGLES[i], normalised[:, i], theme.AXIS_COLOURS[i], THIN) for i in range(3)]
+    limits = [
+        Line("upper limit", limit, theme.COMMAND, MIDDLE),
+        Line("lower limit", -limit, theme.COMMAND, MIDDLE),
+    ]
+    plots = [
+        Plot(ANGLE, (*before, *above), _range(measured)),
+        Plot(INNOVATION, (*innovations, *limits), (-farthest, farthest)),
+    ]
+    for name, (_, scale) in BANDS.items():
+        if name in (signal.name for signal in telemetry.signals):
+            lines = tuple(_band(telemetry, name, scale))
+            settled = settled_rows(telemetry, name)
+            plots.append(Plot(name, lines, _range(np.stack([line.values[settled] for line in lines]))))
+    return plots
+
+
+def settled_rows(telemetry: Table, name: str) -> NDArray[np.bool_]:
+    """Return True for rows whose band is not much wider than usual.
+
+    Before the first rows the filter knows nothing: its band would hide all that follows.
+    """
+    deviation = telemetry[f"{name}_std"]
+    return np.all(deviation <= 3 * np.median(deviation, axis=0), axis=1)
+
+
+def _range(values: Array) -> tuple[float, float]:
+    """Return limits of a plot of some values."""
+    finite = values[np.isfinite(values)]
+    low, high = (float(finite.min()), float(finite.max())) if finite.size else (0.0, 0.0)
+    return labelled(low, high, 1e-6)
+
+
+def _band(telemetry: Table, name: str, scale: float) -> Iterator[Line]:
+    """Yield an estimate and the limits of its band, for each hinge."""
+    mean, half = scale * telemetry[name], scale * CONFIDENCE * telemetry[f"{name}_std"]
+    for i, colour in enumerate(theme.AXIS_COLOURS):
+        yield Line(ANGLES[i], mean[:, i], colour, MIDDLE)
+        yield Line(f"{ANGLES[i]} + 95 %", (mean + half)[:, i], colour, THIN)
+        yield Line(f"{ANGLES[i]} − 95 %", (mean - half)[:, i], colour, THIN)
+
+
+def _motion(t_s: Array, q_rad: Array, current_A: Array) -> Table:
+    """Return the columns from which bodies and coils are drawn."""
+    signals = (
+        Signal("t_s", "s", 1, "time"),
+        Signal("q_rad", "rad", 3, "hinge angles", ANGLES),
+        Signal("current_A", "A", current_A.shape[1], "group currents"),
+    )
+    return Table(signals, np.hstack([t_s[:, None], q_rad, np.nan_to_num(current_A)]))
+
+
+def layout(
+    subject: RecordingSubject,
+    titles: Mapping[str, str],
+    axis: rrb.TimeAxis,
+    below: rrb.View | rrb.Container,
+    limits: Mapping[str, tuple[float, float]] | None = None,
+) -> rrb.Container:
+    """Return the views of a shadow: the scene with another view below it, and the plots.
+
+    Parameters
+    ----------
+    subject : RecordingSubject
+    titles : mapping
+        Title of each plot by its name.
+    axis : TimeAxis
+    below : View or Container
+    limits : mapping, optional
+        Range of each plot; that of its visible values unless given.
+    """
+    scene = rrb.Spatial3DView(
+        origin="/",
+        contents=[f"/{MACHINE}/{WORLD}/**", f"/{TWIN}/{ROTOR}/**"],
+        name="machine as measured; the twin's estimate as a ghost",
+        line_grid=False,
+        eye_controls=eye(size_of(subject.actuator)),
+    )
+    plots = [
+        rrb.TimeSeriesView(
+            origin=f"/{PLOTS}/{name}",
+            name=title,
+            axis_x=axis,
+            axis_y=rrb.ScalarAxis(range=limits[name]) if limits else None,
+        )
+        for name, title in titles.items()
+    ]
+    return rrb.Horizontal(
+        rrb.Vertical(scene, below, row_shares=[3, 2]),
+        rrb.Vertical(*plots),
+        column_shares=[2, 3],
+        name="shadow",
+    )

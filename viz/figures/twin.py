@@ -1,0 +1,151 @@
+"""Figures of the twin of a machine: errors of its shadow, its residuals, and the sums of its watch."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+from matplotlib.figure import Figure
+from matplotlib.ticker import NullLocator
+from numpy.typing import NDArray
+
+from spheretwin.viz.figures.style import BROKEN, FAINT, INK, SERIES, WIDTH_in, common_legend, plain
+
+Array = NDArray[np.float64]
+
+COLOURS = (SERIES[1], SERIES[0])
+"""Of a machine before and after its identification."""
+
+MOST_SAMPLES = 400
+
+
+class ErrorTrace(NamedTuple):
+    """Error of an estimate."""
+
+    t_s: Array
+    error: Array  # (n, hinges)
+    half_width: Array  # (n, hinges), of the band
+
+
+class ResidualBins(NamedTuple):
+    """Mean residuals of one hinge by a quantity."""
+
+    middle: Array
+    mean: Array
+
+
+class Sums(NamedTuple):
+    """Cumulative sums over the windows of a log."""
+
+    t_s: Array
+    by_name: Mapping[str, Array]
+    named: str | None
+    """Sum of the change that took place."""
+    change_s: float | None
+    alarms_s: Sequence[float]
+
+
+def errors(columns: Mapping[str, Mapping[str, ErrorTrace]], hinges: Sequence[str], title: str) -> Figure:
+    """Draw errors of estimates with their bands: a column a quantity, a row a hinge, a colour a model.
+
+    Parameters
+    ----------
+    columns : mapping of quantity to mapping of label to ErrorTrace
+        At most two labels.
+    hinges : sequence of str
+    title : str
+    """
+    figure = Figure(figsize=(WIDTH_in, 6.0), layout="constrained")
+    grid = figure.subplots(len(hinges), len(columns), sharex=True, sharey="col", squeeze=False)
+    for column, (quantity, by_label) in zip(grid.T, columns.items(), strict=True):
+        for hinge, (panel, name) in enumerate(zip(column, hinges, strict=True)):
+            for (label, trace), colour in zip(by_label.items(), COLOURS, strict=False):
+                chosen = slice(None, None, -(-len(trace.t_s) // MOST_SAMPLES))
+                t_s, half = trace.t_s[chosen], trace.half_width[chosen, hinge]
+                panel.fill_between(
+                    t_s, -half, half, color=colour, alpha=0.2, linewidth=0, label=f"95 % band {label}"
+                )
+                panel.plot(
+                    t_s, trace.error[chosen, hinge], color=colour, linewidth=0.9, label=f"error {label}"
+                )
+            plain(panel, f"{name}: {quantity}")
+        column[-1].set_xlabel("time, s", fontsize="small")
+    common_legend(figure, [grid[0, 0]], 2)
+    figure.suptitle(title, fontsize="medium")
+    return figure
+
+
+def residuals(panels: Mapping[str, Mapping[str, ResidualBins]], x: str, y: str, title: str) -> Figure:
+    """Draw mean residuals by a quantity: a panel a hinge, a colour a model.
+
+    Parameters
+    ----------
+    panels : mapping of hinge to mapping of label to ResidualBins
+        At most two labels.
+    x, y, title : str
+    """
+    figure = Figure(figsize=(WIDTH_in, 3.2), layout="constrained")
+    row = figure.subplots(1, len(panels), sharey=True, squeeze=False)[0]
+    for panel, (name, by_label) in zip(row, panels.items(), strict=True):
+        for (label, bins), colour, marker in zip(by_label.items(), COLOURS, "os", strict=False):
+            panel.plot(bins.middle, bins.mean, color=colour, marker=marker, markersize=4, label=label)
+        panel.axhline(0.0, color=INK, linewidth=0.8)
+        plain(panel, "")
+        panel.set_xlabel(f"{name}: {x}", fontsize="small")
+    row[0].set_ylabel(y, fontsize="small")
+    common_legend(figure, row, 2)
+    figure.suptitle(title, fontsize="medium")
+    return figure
+
+
+def sums(panels: Mapping[str, Sums], threshold: float, title: str) -> Figure:
+    """Draw cumulative sums over time: a panel a log, one line each change that is watched for.
+
+    Parameters
+    ----------
+    panels : mapping of title to Sums
+    threshold : float
+        Of an alarm.
+    title : str
+    """
+    figure = Figure(figsize=(WIDTH_in, 1.0 + 1.35 * len(panels)), layout="constrained")
+    column = figure.subplots(len(panels), 1, sharex=True, sharey=True, squeeze=False)[:, 0]
+    for panel, (name, watched) in zip(column, panels.items(), strict=True):
+        for what, values in watched.by_name.items():
+            if what != watched.named:
+                panel.plot(watched.t_s, values, color=FAINT, linewidth=0.6, label="other changes")
+        if watched.named:
+            panel.plot(
+                watched.t_s,
+                watched.by_name[watched.named],
+                color=SERIES[0],
+                linewidth=1.8,
+                label="change that took place",
+            )
+        panel.axhline(threshold, color=BROKEN, linestyle="--", linewidth=1.0, label="threshold")
+        if watched.change_s is not None:
+            panel.axvline(
+                watched.change_s, color=INK, linestyle=":", linewidth=1.2, label="the machine changes"
+            )
+        panel.plot(
+            watched.alarms_s,
+            [threshold] * len(watched.alarms_s),
+            "v",
+            color=BROKEN,
+            markersize=7,
+            linestyle="",
+            label="alarm",
+            zorder=4,
+        )
+        plain(panel, "sum")
+        panel.set_title(name, fontsize="small", loc="left")
+    # Linear up to the threshold: a large change exceeds it hundreds of times within a window.
+    column[0].set_yscale("symlog", linthresh=threshold, linscale=1.5)
+    column[0].set_ylim(bottom=0.0)
+    column[0].set_yticks([0, 10, 100, 1000], ["0", "10", "100", "1000"])
+    column[0].yaxis.set_minor_locator(NullLocator())
+    column[-1].set_xlabel("time, s", fontsize="small")
+    common_legend(figure, column, 3)
+    figure.suptitle(title, fontsize="medium")
+    return figure
