@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import time
+from collections.abc import Callable
 from types import TracebackType
 from typing import Any
 
@@ -10,24 +12,38 @@ from numpy.typing import NDArray
 from pydantic.fields import FieldInfo
 
 from spheretwin.bench.bench_state import BenchState
-from spheretwin.bench.command_queue import By, Command, Ticket, check_arguments, settled_ticket
-from spheretwin.bench.commands import find_command
+from spheretwin.bench.command_queue import (
+    By,
+    Command,
+    Outcome,
+    Ticket,
+    check_arguments,
+    settled_ticket,
+)
+from spheretwin.bench.commands import SIMULATED_ONLY, find_command
 from spheretwin.bench.cycle import CommandProcessor, Cycle, Thread
+from spheretwin.bench.folder import Folder
+from spheretwin.bench.history import Bins
 from spheretwin.bench.operators import Operators
-from spheretwin.bench.status import BenchStatus, bench_status
+from spheretwin.bench.status import BenchStatus
 from spheretwin.models.actuator import Actuator
 from spheretwin.models.base.errors import InputError, SpheretwinError
 from spheretwin.scenario.reading import described_fields
 from spheretwin.scenario.sections import Scenario
 from spheretwin.scenario.writing import as_command, as_toml
+from spheretwin.session import Session
+
+# Period at which `until` looks at the status.
+POLL_s = 0.005
 
 
 class Bench:
     """Twin that executes commands at the pace of the clock.
 
     ``with Bench(scenario) as bench: bench.begin()`` runs it in a separate thread. Without `begin`, only
-    `advance` moves time. The bench begins paused, in the mode of its scenario. The clock decides only at
-    which tick a command acts: the same commands at the same ticks give the same bytes.
+    `advance` and `until` move time. `do` executes a command and raises its refusal, `until` waits for a
+    condition of the status, `command` never waits. The bench begins paused, in the mode of its scenario. The
+    clock decides only at which tick a command acts: the same commands at the same ticks give the same bytes.
 
     Parameters
     ----------
@@ -35,6 +51,12 @@ class Bench:
         From `scenario.load`.
     operators : Operators, optional
         Clients and their permission to command.
+    folder : Folder, optional
+        Folder of the files that commands name, which must be below it; default: the working folder, and files
+        may be anywhere.
+    machine : Session, optional
+        Session of the scenario whose plant is a machine, from `machine.Link.session`. Commands that stop or
+        change the time, or that only a simulated plant can follow, are refused: `SIMULATED_ONLY`.
 
     Notes
     -----
@@ -45,6 +67,7 @@ class Bench:
     ``step``, ticks=1                   while paused: run this many control ticks
     ``speed``, factor                   0.1 to as fast as possible (1e6); 1 is the clock's pace
     ``stop``                            STOP: currents to zero, latched until ``reset``
+    ``stop_mode``, mode                 ``off``: so; ``hold``: STOP holds until the rotor rests, then so
     ``reset``                           tick 0 of the present settings and the pending ones; paused
     ``load``, source, overrides={}      tick 0 of another scenario, by name or file; paused
     ``snapshot``, ``restore``, name     save the complete state of the twin; return to it
@@ -53,17 +76,24 @@ class Bench:
     ``point``, pose_rad                 go there, within ``limits``
     ``trajectory``, fields=None         follow ``{"shape": "sinusoid", ...}``; default: the last one
     ``jog``, rates_rad_s                turn at these rates, up to the edge of the workspace
-    ``manual``, currents_A=None, group=None, current_A=1.0
-                                        these currents, or a single group at a current
+    ``manual``                          currents_A=None, group=None, current_A=1.0: these currents, or a
+                                        single group at a current
     ``replay``, file                    show the rows of a recorded run; the twin is paused meanwhile, and
                                         any mode, for example ``hold``, ends the replay
-    ``limits``, rate_rad_s=None, acceleration_rad_s2=None
-                                        limits of the approach to a pose or a shape
+    ``seek``, t_s                       show the row of the replay at a time
+    ``limits``                          rate_rad_s=None, acceleration_rad_s2=None: of the approach to a
+                                        pose or a shape
     ``set``, name, value                any field of the scenario, dotted; fixed ones wait for ``reset``
     ``add_fault``, fault                ``{"target": "coil.07", "mode": "open"}``; default start: now
-    ``clear_faults``, place=None        all of them, or one by its place
-    ``record``, recording=None, telemetry=None
-                                        write .rrd and .parquet from now on
+    ``clear_faults``                    place=None, target=None: all of them, one by its place, or those of
+                                        a target
+    ``record``                          recording=None, telemetry=None, rate_Hz=None: write .rrd and
+                                        .parquet from now on; an existing name is numbered; the .rrd with
+                                        all rows, or with some a second, extremes and events
+    ``capture``, on                     signal="error_rad", entry=0, level=0.0, edge="rising", before_s=0.5,
+                                        length_s=2.0: keep every row around the next event: ``level``,
+                                        ``fault`` or ``saturation``; ``off`` for none; `captured` returns
+                                        them
     ``keep``                            end that, and complete the files
     ``save``, file                      write the present settings as a scenario (TOML)
     ``hello``, ``beat``, ``leave``      a client connects, is present, or leaves (client=...)
@@ -71,8 +101,14 @@ class Bench:
     ==================================  ================================================================
     """
 
-    def __init__(self, scenario: Scenario, operators: Operators | None = None) -> None:
-        self._bench_state = BenchState(scenario, operators or Operators())
+    def __init__(
+        self,
+        scenario: Scenario,
+        operators: Operators | None = None,
+        folder: Folder | None = None,
+        machine: Session | None = None,
+    ) -> None:
+        self._bench_state = BenchState(scenario, operators or Operators(), folder, machine)
         self._processor = CommandProcessor(self._bench_state)
         self._cycle = Cycle(self._bench_state, self._processor)
         self._thread = Thread(self._bench_state, self._processor, self._cycle)
@@ -103,6 +139,8 @@ class Bench:
         try:
             command = find_command(name)
             values = check_arguments(command, arguments)
+            if self._bench_state.is_machine and name in SIMULATED_ONLY:
+                raise InputError(f"bench: expected a command for a real machine, received {name}")
             if command.by is By.CLIENT:
                 return self._client_command(command, client, values)
             if command.by is By.OPERATOR:
@@ -112,24 +150,103 @@ class Bench:
             self._bench_state.refused = f"{error}"
             return settled_ticket(str(error))
 
+    def may_command(self, client: str) -> bool:
+        """Return True if a client operates now."""
+        return self._bench_state.operators.may_command(client)
+
+    @property
+    def stalled(self) -> bool:
+        """True if the loop does not return."""
+        return self._processor.stalled
+
+    def do(self, name: str, /, timeout_s: float = 60.0, **arguments: Any) -> BenchStatus:
+        """Execute a command and wait for it; return the status after it.
+
+        Parameters
+        ----------
+        name : str
+            Name of the command.
+        timeout_s : float, s
+            Time to wait; the first use of a law or of a fault may have to be compiled.
+        **arguments
+            Arguments of the command, in JSON types.
+
+        Raises
+        ------
+        InputError
+            The command was refused.
+        SpheretwinError
+            It was not executed in time; it may be executed later.
+        """
+        ticket = self.command(name, **arguments)
+        if not self._thread.started:
+            self.advance(0)
+        match ticket.wait(timeout_s):
+            case Outcome.REFUSED:
+                raise InputError(f"{ticket.refused}")
+            case Outcome.TIMED_OUT:
+                raise SpheretwinError(
+                    f"bench: expected {name} to be executed within {timeout_s:g} s, received no outcome"
+                )
+        return self.state()
+
+    def until(self, condition: Callable[[BenchStatus], object], timeout_s: float = 60.0) -> BenchStatus:
+        """Wait until a condition of the status is true; return that status.
+
+        Parameters
+        ----------
+        condition : callable
+            Takes the status.
+        timeout_s : float, s
+            Longest time to wait, of the clock; of a bench without `begin`, which is advanced meanwhile, of
+            the simulation.
+
+        Raises
+        ------
+        SpheretwinError
+            The condition was not true in time, or the run has ended before.
+        """
+        status, end_s = self.state(), time.monotonic() + timeout_s
+        end_tick = status.tick + round(timeout_s / status.period_s)
+        while not condition(status):
+            in_time = time.monotonic() < end_s if self._thread.started else status.tick < end_tick
+            if status.mode == "fault" or not in_time:
+                reason = status.reason or f"it was not within {timeout_s:g} s"
+                raise SpheretwinError(f"bench: expected the condition to become true, received: {reason}")
+            if self._thread.started:
+                time.sleep(POLL_s)
+            elif not self.advance(1):
+                raise SpheretwinError("bench: expected time to run until the condition, received a pause")
+            status = self.state()
+        return status
+
     def state(self) -> BenchStatus:
         """Return the latest status; does not wait for the loop."""
         return self._cycle.state
 
-    def history(self) -> dict[str, NDArray[np.float64]]:
-        """Return a copy of the rows of the last 10 s at 50 Hz, as (n,) or (n, size) arrays, oldest first.
+    def bins(self, after: int = -1) -> Bins:
+        """Return the rows of the last minute as bins of 20 ms, of a replay or of the twin.
 
-        ``t_s``, ``q_rad``, ``q_ref_rad``, ``error_rad``, ``torque_command_Nm``, ``torque_Nm``,
-        ``disturbance_Nm``, ``current_command_A``, ``current_A``, ``allocation_scale``, and the rates.
+        Parameters
+        ----------
+        after : int
+            Only bins with a larger number.
+
+        Returns
+        -------
+        Bins
+            Number of the run, numbers of the bins, and by signal, as (n, size) arrays, oldest first: the
+            first row of each bin, and the least and the greatest values of all its rows. Rows at 50 Hz do
+            not show what a current does between them. The signals are ``t_s``, ``q_rad``, ``q_ref_rad``,
+            ``error_rad``, ``torque_command_Nm``, ``torque_Nm``, ``disturbance_Nm``, ``current_command_A``,
+            ``current_A``, ``allocation_scale``, the rates, and ``coil_temperature_degC``, which is NaN if
+            the hardware has no windings with temperatures.
         """
-        return (self._bench_state.player or self._bench_state).history.read()
+        return (self._bench_state.player or self._bench_state).history.read(after)
 
-    def bounds(self) -> tuple[dict[str, NDArray[np.float64]], dict[str, NDArray[np.float64]]]:
-        """Return the least and the greatest values of all ticks in each 20 ms of the last 10 s, as `history`.
-
-        Rows at 50 Hz do not show what a current does between them.
-        """
-        return (self._bench_state.player or self._bench_state).history.read_bounds()
+    def captured(self) -> dict[str, NDArray[np.float64]]:
+        """Return every row of the completed capture by signal, as `bins`; empty without one."""
+        return self._bench_state.capture.read()
 
     def scenario_toml(self) -> str:
         """Return the present settings as a scenario file."""
@@ -178,7 +295,7 @@ class Bench:
         self._processor.close()
         bench_state.recording.end(bench_state.driver.session, None)
         bench_state.recording.join()
-        self._cycle.state = bench_status(bench_state)  # with the files that were completed
+        self._cycle.show()  # with the files that were completed
         bench_state.driver.session.close()
 
     def __enter__(self) -> Bench:

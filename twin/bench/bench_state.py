@@ -2,90 +2,29 @@
 
 from __future__ import annotations
 
-from collections import deque
 from collections.abc import Callable
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from spheretwin.analysis import recorded_run as reviewed
+from spheretwin.bench.capture import Capture, Trigger
 from spheretwin.bench.command_queue import Queue
-from spheretwin.bench.driver import Driver, compiled_session
+from spheretwin.bench.driver import Driver, compiled_session, with_end_stops
+from spheretwin.bench.folder import Folder
+from spheretwin.bench.history import History
 from spheretwin.bench.operators import Operators
 from spheretwin.bench.pace import Pace
 from spheretwin.bench.recording import Recording
 from spheretwin.models.base.errors import InputError
-from spheretwin.models.telemetry.signals import common_signals, width
+from spheretwin.models.telemetry.run_record import RunRecord
+from spheretwin.models.telemetry.signals import common_signals
 from spheretwin.models.telemetry.table import Table
 from spheretwin.scenario.sections import Scenario
 from spheretwin.session import Session
 
-RATE_Hz = 50.0
-LENGTH_s = 10.0
-
-
-class _Bin(NamedTuple):
-    """Rows within 1/50 s: the first of them, and the bounds of all."""
-
-    number: int
-    row: NDArray[np.float64]
-    low: NDArray[np.float64]
-    high: NDArray[np.float64]
-
-
-class History:
-    """Newest rows of the signals of every run, and bounds of all rows; a reader never delays the writer.
-
-    Parameters
-    ----------
-    groups : int
-        Coil groups.
-    period_s : float, s
-        Period of the rows that are written.
-    """
-
-    def __init__(self, groups: int, period_s: float) -> None:
-        self._signals = common_signals(groups)
-        self._width = width(self._signals)
-        self._stride = max(1, round(1 / (RATE_Hz * period_s)))
-        self._bins: deque[_Bin] = deque(maxlen=round(LENGTH_s * RATE_Hz))
-
-    def write(self, first_tick: int, rows: Table) -> None:
-        """Add rows, in any chunks."""
-        if not len(rows):
-            return
-        values = rows.values[:, : self._width]
-        # A run begins its rows with these signals; a recording may have them in another order.
-        if rows.signals[: len(self._signals)] != self._signals:
-            parts = [rows[signal.name].reshape(len(rows), -1) for signal in self._signals]
-            values = np.concatenate(parts, axis=1)
-        numbers = (first_tick + np.arange(len(values))) // self._stride
-        starts = np.flatnonzero(np.diff(numbers, prepend=numbers[0] - 1))[-(self._bins.maxlen or 0) :]
-        values, starts, numbers = values[starts[0] :], starts - starts[0], numbers[starts]
-        low, high = np.minimum.reduceat(values, starts), np.maximum.reduceat(values, starts)
-        for place, number in enumerate(numbers.tolist()):
-            latest = self._bins[-1] if self._bins else None
-            new = _Bin(number, values[starts[place]].copy(), low[place], high[place])
-            if latest and latest.number == number:
-                bounds = np.minimum(latest.low, new.low), np.maximum(latest.high, new.high)
-                self._bins[-1] = _Bin(number, latest.row, *bounds)
-            else:
-                self._bins.append(new)
-
-    def read(self) -> dict[str, NDArray[np.float64]]:
-        """Return the first row of each bin by signal, oldest first; a copy."""
-        return self._by_signal([of.row for of in list(self._bins)])
-
-    def read_bounds(self) -> tuple[dict[str, NDArray[np.float64]], dict[str, NDArray[np.float64]]]:
-        """Return the least and the greatest values of all rows in each bin by signal, oldest first."""
-        bins = list(self._bins)  # in one step: another thread may write
-        return self._by_signal([of.low for of in bins]), self._by_signal([of.high for of in bins])
-
-    def _by_signal(self, rows: list[NDArray[np.float64]]) -> dict[str, NDArray[np.float64]]:
-        table = Table(self._signals, np.array(rows).reshape(len(rows), self._width))
-        return {signal.name: table[signal.name] for signal in self._signals}
+# Rows before the one that is sought that the plots show: more of them would keep STOP waiting.
+SEEK_s = 10.0
 
 
 class Player:
@@ -104,6 +43,8 @@ class Player:
     period_s : float
     place : int
         Rows that have been shown.
+    range_s : (float, float), s
+        Times of the first and the last row.
     history : History
 
     Raises
@@ -115,7 +56,7 @@ class Player:
     def __init__(self, path: Path) -> None:
         run = reviewed.read(path)
         self.path, self.table = path, run.table
-        groups = run.table["current_A"].shape[1] if len(run.table) else 0
+        self._groups = groups = run.table["current_A"].shape[1] if len(run.table) else 0
         known = {signal.name for signal in run.table.signals}
         if not {signal.name for signal in common_signals(max(groups, 1))} <= known:
             raise InputError(
@@ -126,9 +67,8 @@ class Player:
         self.name, self.law = str(scenario["name"]), str(scenario["controller"]["law"])
         self.shape, self.allocation = str(scenario["trajectory"]["shape"]), str(scenario["allocation"])
         self.current_limit_A = float(scenario["nominal"]["current_limit_A"])
-        self.place = 1
-        self.history = History(groups, self.period_s)
-        self.history.write(0, self.row)
+        self.range_s = float(self.table["t_s"].flat[0]), float(self.table["t_s"].flat[-1])
+        self.seek(self.range_s[0])
 
     @property
     def ended(self) -> bool:
@@ -139,6 +79,13 @@ class Player:
     def row(self) -> Table:
         """The row that is shown."""
         return self.table.rows(self.place - 1, self.place)
+
+    def seek(self, t_s: float) -> None:
+        """Show the last row until a time, or the first one, with the rows of some seconds before it."""
+        self.place = max(1, int(np.searchsorted(self.table["t_s"].reshape(-1), t_s + self.period_s / 2)))
+        first = max(0, self.place - round(SEEK_s / self.period_s))
+        self.history = History(self._groups, self.period_s)
+        self.history.write(first, self.table.rows(first, self.place))
 
     def advance(self, ticks: int) -> int:
         """Show some rows more; returns how many there were."""
@@ -155,16 +102,24 @@ class BenchState:
     ----------
     scenario : Scenario
     operators : Operators
+    folder : Folder, optional
+        Folder of the files that commands name; default: the working folder, and files may be anywhere.
+    machine : Session, optional
+        Session whose plant is a machine, instead of one of the scenario.
 
     Attributes
     ----------
+    is_machine : bool
     driver : Driver
     operators : Operators
+    folder : Folder
     pace : Pace
     queue : Queue
     recording : Recording
     history : History
         History of the twin; a player has its own.
+    capture : Capture
+        Triggered capture of the twin.
     player : Player or None
         Run that is shown instead of the twin.
     running : bool
@@ -173,12 +128,24 @@ class BenchState:
         Ticks to be run while it does not.
     note, refused : str or None
         Last event without a command; last command that was refused, and the reason.
+    stop_mode : str
+        ``off`` or ``hold``: currents off at a STOP, or hold and then off.
     tried : set
         Fields and values that were tried outside the loop.
     """
 
-    def __init__(self, scenario: Scenario, operators: Operators) -> None:
-        self.driver, self.operators = Driver(scenario, compiled_session(scenario)), operators
+    def __init__(
+        self,
+        scenario: Scenario,
+        operators: Operators,
+        folder: Folder | None = None,
+        machine: Session | None = None,
+    ) -> None:
+        self.is_machine = machine is not None
+        scenario = machine.initial_scenario if machine else with_end_stops(scenario)
+        self.folder = folder or Folder(None, scenario)
+        self.driver, self.operators = Driver(scenario, machine or compiled_session(scenario)), operators
+        self.stop_mode = "off"
         self.pace, self.queue, self.recording = Pace(), Queue(), Recording(self.set_note)
         self.player: Player | None = None
         self.running, self.steps = False, 0
@@ -186,6 +153,7 @@ class BenchState:
         self.refused: str | None = None
         self.tried: set[tuple[str, object]] = set()
         self.history = self._new_history()
+        self.arm(Trigger())
 
     @property
     def is_active(self) -> bool:
@@ -221,12 +189,14 @@ class BenchState:
         if self.player is None and self.driver.reason is not None:
             raise InputError(f"bench: expected reset, as the run has ended, received {name}")
 
-    def begin(self, settings: Scenario, session: Session) -> None:
+    def begin(self, settings: Scenario, session: Session, record: RunRecord) -> None:
         """Restart with a session at tick 0, paused."""
-        self.driver.begin(settings, session)
+        same_groups = len(session.actuator.groups) == len(self.driver.session.actuator.groups)
+        self.driver.begin(settings, session, record)
         self.player = None
         self.pause()
         self.history = self._new_history()
+        self.arm(self.capture.trigger if same_groups else Trigger())
         self.recording.reset()
         self.pace.clear()
 
@@ -236,6 +206,19 @@ class BenchState:
         self.recording.end(session, "the recording has ended: time went back", end)
         self.recording.resume_from(session)
         self.player, self.history = None, self._new_history()
+        self.capture.clear()
+
+    def arm(self, trigger: Trigger) -> None:
+        """Capture the rows around the next event of a kind.
+
+        Raises
+        ------
+        InputError
+            The trigger has a signal that does not exist, or a time out of range.
+        """
+        session = self.driver.session
+        period_s = session.scenario.controller.period_s
+        self.capture = Capture(trigger, len(session.actuator.groups), period_s)
 
     def _new_history(self) -> History:
         session = self.driver.session

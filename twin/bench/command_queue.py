@@ -7,7 +7,7 @@ import threading
 import time
 from collections import OrderedDict
 from collections.abc import Callable, Mapping
-from enum import Enum
+from enum import Enum, StrEnum
 from typing import Annotated, Any, NamedTuple
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, create_model
@@ -84,6 +84,14 @@ def check_arguments(command: Command, given: Mapping[str, Any]) -> dict[str, Any
 MOST_WAITING = 256
 
 
+class Outcome(StrEnum):
+    """Outcome of waiting for a command."""
+
+    DONE = "done"
+    REFUSED = "refused"
+    TIMED_OUT = "timed out"
+
+
 class Ticket:
     """Outcome of a command.
 
@@ -106,10 +114,11 @@ class Ticket:
         """True if it no longer waits."""
         return self._done.is_set()
 
-    def wait(self, timeout_s: float = 5.0) -> str | None:
-        """Wait until it is executed or refused; return the reason of a refusal."""
-        self._done.wait(timeout_s)
-        return self.refused
+    def wait(self, timeout_s: float = 5.0) -> Outcome:
+        """Wait until it is executed or refused; `refused` has the reason of a refusal."""
+        if not self._done.wait(timeout_s):
+            return Outcome.TIMED_OUT
+        return Outcome.DONE if self.refused is None else Outcome.REFUSED
 
     def settle(self, refused: str | None = None) -> None:
         """Settle the ticket with the outcome."""

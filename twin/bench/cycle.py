@@ -7,18 +7,20 @@ import sys
 import threading
 import time
 from collections.abc import Callable
-from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import replace
 from typing import Any
 
 from spheretwin.bench.bench_state import BenchState, Player
-from spheretwin.bench.command_queue import Command, QueuedCommand, Ticket
+from spheretwin.bench.command_queue import Command, QueuedCommand, Ticket, settled_ticket
+from spheretwin.bench.preparation import Preparation
 from spheretwin.bench.recording import import_writers
 from spheretwin.bench.status import BenchStatus, bench_status
+from spheretwin.bench.supervisor import COMMAND_s, Supervisor, TICKS_s
 from spheretwin.models.base.errors import InputError, SpheretwinError, exception_text, one_line
+from spheretwin.models.base.user_code import only_loaded
 
 
-def run(bench_state: BenchState, ticks: int) -> int:
+def run(bench_state: BenchState, ticks: int, supervisor: Supervisor) -> int:
     """Run some ticks, while paused at most the requested steps; return how many were run."""
     if not bench_state.running:
         ticks = min(ticks, bench_state.steps)
@@ -26,7 +28,9 @@ def run(bench_state: BenchState, ticks: int) -> int:
         return 0
     began = time.monotonic()
     done = (
-        _play(bench_state, bench_state.player, ticks) if bench_state.player else _simulate(bench_state, ticks)
+        _play(bench_state, bench_state.player, ticks)
+        if bench_state.player
+        else _simulate(bench_state, ticks, supervisor)
     )
     bench_state.steps -= min(done, bench_state.steps)
     bench_state.pace.record_chunk(done, bench_state.period_s, bench_state.t_s, time.monotonic() - began)
@@ -40,15 +44,17 @@ def _play(bench_state: BenchState, player: Player, ticks: int) -> int:
     return done
 
 
-def _simulate(bench_state: BenchState, ticks: int) -> int:
+def _simulate(bench_state: BenchState, ticks: int, supervisor: Supervisor) -> int:
     driver, recording, done = bench_state.driver, bench_state.recording, 0
     recording.note_changes(driver.session)
     while done < ticks and driver.reason is None:
         first = driver.session.tick
-        rows = driver.advance(ticks - done)
+        with supervisor.limited(f"the law {driver.session.scenario.controller.law}", TICKS_s):
+            rows = driver.advance(ticks - done)
         if rows is not None and len(rows):
             done += len(rows)
             bench_state.history.write(first, rows)
+            bench_state.capture.write(rows)
             recording.write(rows)
         recording.note_changes(driver.session)
     if driver.reason is not None:
@@ -70,6 +76,8 @@ class CommandProcessor:
         Set when an urgent command arrives.
     outcomes : list of (Ticket, str or None)
         Executed commands, each with the reason if it was refused.
+    stalled : bool
+        Whether the loop has stalled: it executes no command.
     """
 
     def __init__(self, bench_state: BenchState) -> None:
@@ -78,9 +86,8 @@ class CommandProcessor:
         self.outcomes: list[tuple[Ticket, str | None]] = []
         self._urgent: list[QueuedCommand] = []
         self._urgent_s = -math.inf
-        self._preparing: tuple[QueuedCommand, Future[Any]] | None = None
-        self._worker = ThreadPoolExecutor(max_workers=1, thread_name_prefix="bench")
-        self.open = True
+        self._preparing: tuple[QueuedCommand, Preparation] | None = None
+        self.open, self.stalled = True, False
 
     def submit(self, command: Command, arguments: dict[str, Any]) -> Ticket:
         """Queue a command, from any thread; its arguments are checked already.
@@ -88,11 +95,17 @@ class CommandProcessor:
         Raises
         ------
         InputError
-            Too many are waiting.
+            Too many are waiting, or the loop has stalled.
         """
+        if self.stalled:
+            if command.urgent:  # the currents are off
+                return settled_ticket()
+            raise InputError(f"bench: expected Ctrl-C, as the loop has stalled, received {command.name}")
         waiting = QueuedCommand(command, arguments)
         if command.urgent:
             self._urgent_s = waiting.ticket.created_s
+            for same in self._urgent[:1]:  # one that waits is as good
+                return same.ticket
             self._urgent.append(waiting)
             self.wake.set()
         else:
@@ -110,11 +123,11 @@ class CommandProcessor:
         self._process_urgent()
         while self.open:
             if self._preparing:
-                waiting, future = self._preparing
-                if not (waits or future.done()):
+                waiting, preparation = self._preparing
+                if not (waits or preparation.done):
                     return
                 self._preparing = None
-                self._act(waiting, future.result)
+                self._act(waiting, preparation.result)
                 continue
             following = self._bench_state.queue.next()
             if following is None:
@@ -122,8 +135,9 @@ class CommandProcessor:
             self._begin(following)
 
     def close(self) -> None:
-        """Accept no more commands; wait for the one that is being prepared."""
-        self._worker.shutdown()
+        """Abandon the command that is being prepared."""
+        if self._preparing:
+            self._preparing[1].abandon()
 
     def _process_urgent(self) -> None:
         while self._urgent:
@@ -134,11 +148,15 @@ class CommandProcessor:
     def _begin(self, waiting: QueuedCommand) -> None:
         """Execute a command, or start its preparation."""
         prepare = waiting.command.prepare
-        work = prepare(self._bench_state, **waiting.arguments) if prepare else None
+        try:
+            work = prepare(self._bench_state, **waiting.arguments) if prepare else None
+        except InputError as error:
+            self._settle(waiting, f"{error}")
+            return
         if work is None:
             self._act(waiting, lambda: None)
         else:
-            self._preparing = waiting, self._worker.submit(work)
+            self._preparing = waiting, Preparation(waiting.command.name, work)
 
     def _act(self, waiting: QueuedCommand, prepared: Callable[[], Any]) -> None:
         """Execute a command, or refuse it with the reason."""
@@ -146,10 +164,15 @@ class CommandProcessor:
         try:
             if command.cancelled_by_stop and waiting.ticket.created_s <= self._urgent_s:
                 raise InputError(f"bench: expected {command.name} after STOP, received it before")
-            command.action(self._bench_state, prepared(), **waiting.arguments)
+            with only_loaded():
+                command.action(self._bench_state, prepared(), **waiting.arguments)
         # A command loads files and laws of the user, which may raise anything: it is refused.
         except Exception as error:
             refused = f"{error}" if isinstance(error, SpheretwinError) else error_text(error)
+        self._settle(waiting, refused)
+
+    def _settle(self, waiting: QueuedCommand, refused: str | None) -> None:
+        if refused:
             self._bench_state.refused = refused
         self.outcomes.append((waiting.ticket, refused))
 
@@ -172,11 +195,14 @@ class Cycle:
     ----------
     state : BenchStatus
         The latest status.
+    supervisor : Supervisor
+        Notices a chunk that does not return, as long as its thread runs.
     """
 
     def __init__(self, bench_state: BenchState, processor: CommandProcessor) -> None:
         self._bench_state, self._processor = bench_state, processor
         self.state: BenchStatus = bench_status(bench_state)
+        self.supervisor = Supervisor(self._on_stall, self._on_return)
 
     def run_chunk(self, ticks: int, waits: bool) -> int:
         """Execute the waiting commands, then run some ticks; return how many were run.
@@ -191,22 +217,41 @@ class Cycle:
         """
         done = 0
         try:
-            self._processor.process(waits)
-            self._settle()
-            done = run(self._bench_state, ticks)
+            with self.supervisor.limited("a command", COMMAND_s):
+                self._processor.process(waits)
+                self._settle()
+            done = run(self._bench_state, ticks, self.supervisor)
             self._hold_without_operator()
         # Any error: if the thread ended, STOP would no longer be executed.
         except Exception as error:
             self._bench_state.driver.fail(error)
             self._bench_state.pause()
         self._settle()
-        self._show()
+        self.show()
         return done
 
-    def _show(self) -> None:
+    def _on_stall(self, what: str) -> None:
+        """Show and command zero currents, and complete the files; the loop itself cannot be stopped."""
+        bench_state, processor = self._bench_state, self._processor
+        if not processor.stalled:
+            processor.stalled = True
+            bench_state.driver.stall(what)
+            bench_state.pause()
+            bench_state.player = None
+            bench_state.recording.end(bench_state.driver.session, "the recording has ended: the loop stalled")
+        self.show()
+
+    def _on_return(self) -> None:
+        """Accept commands again: the run has ended, and a reset begins another one."""
+        self._processor.stalled = False
+
+    def show(self) -> None:
         """Update the status; if that fails, the last one reports the fault."""
         try:
             self.state = bench_status(self._bench_state)
+            if self._processor.stalled:
+                zero = (0.0,) * len(self.state.current_A)
+                self.state = replace(self.state, current_A=zero, current_command_A=zero)
         # Any error of reading the status: pages must show it, not the last status as the present one.
         except Exception as error:
             self.state = replace(self.state, mode="fault", reason=error_text(error))
@@ -216,7 +261,7 @@ class Cycle:
         processor = self._processor
         if not processor.outcomes:
             return
-        self._show()
+        self.show()
         outcomes, processor.outcomes = processor.outcomes, []
         for ticket, refused in outcomes:
             ticket.settle(refused)
@@ -237,6 +282,9 @@ SWITCH_s = 1e-3
 
 # Period at which an idle bench looks for silent clients.
 REST_s = 0.02
+
+# Time between two chunks beyond which this process was too busy to hear its clients: a compilation.
+BUSY_s = 0.5
 
 
 class Thread:
@@ -265,18 +313,26 @@ class Thread:
         sys.setswitchinterval(SWITCH_s)
         self._thread = threading.Thread(target=self._loop, name="bench", daemon=True)
         self._thread.start()
+        self._cycle.supervisor.begin()
 
     def end(self) -> None:
-        """Wait for the last chunk; no more commands are accepted."""
+        """Wait for the last chunk, unless the loop has stalled; no more commands are accepted."""
         self._processor.wake.set()
         if self._thread and self._thread.is_alive():
-            self._thread.join()
+            while self._thread.is_alive() and not self._processor.stalled:
+                self._thread.join(REST_s)
             sys.setswitchinterval(self._switch_s)
+        self._cycle.supervisor.end()
 
     def _loop(self) -> None:
         """Run chunk by chunk, each at its time; STOP wakes the thread."""
         bench_state, pace, wake = self._bench_state, self._bench_state.pace, self._processor.wake
+        before_s = time.monotonic()
         while self._processor.open:
+            now_s = time.monotonic()
+            if now_s - before_s > BUSY_s:
+                bench_state.operators.excuse(now_s - before_s)
+            before_s = now_s
             moves = bench_state.is_active
             wait_s = pace.wait_s() if moves else REST_s
             if wait_s > 0 and wake.wait(wait_s):

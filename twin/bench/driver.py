@@ -5,9 +5,15 @@ from __future__ import annotations
 import json
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from spheretwin.bench import modes
 from spheretwin.bench.modes import Limits
+from spheretwin.control.law import Law
+from spheretwin.loop import is_user_law
 from spheretwin.models.base.errors import InputError, exception_text
+from spheretwin.models.base.numba_internals import Dispatcher
+from spheretwin.models.telemetry.run_record import RunRecord
 from spheretwin.models.telemetry.table import Table
 from spheretwin.provenance import record_of
 from spheretwin.scenario.changes import FAULT, is_fixed, with_change
@@ -59,6 +65,9 @@ CURRENTS = "manual.currents_A"
 
 MOST_SNAPSHOTS = 16
 
+HELD_s = 1.0
+"""Time at rest after a STOP that holds, until the currents are off."""
+
 
 class DriverSnapshot(NamedTuple):
     """Snapshot of a driver."""
@@ -68,6 +77,7 @@ class DriverSnapshot(NamedTuple):
     pending: dict[str, Any]
     mode: str
     row: Table | None
+    record: RunRecord
 
 
 def compiled_session(scenario: Scenario) -> Session:
@@ -81,8 +91,44 @@ def compiled_session(scenario: Scenario) -> Session:
     if scenario.manual.file is not None:
         raise InputError("bench: expected manual.currents_A or none, received manual.file")
     session = Session(scenario)
+    if runs_in_python(session):
+        # A law in plain Python runs in a loop in plain Python, whose parts its first tick compiles.
+        without_events = scenario.model_copy(update={"event": ()})
+        Session(without_events, Law("idle", _idle, np.empty(0), np.empty(0))).advance(1)
     session.compile()
     return session
+
+
+def runs_in_python(session: Session) -> bool:
+    """True if the law of a session, and so its loop, is plain Python."""
+    return is_user_law(session.law) and not isinstance(session.law.step, Dispatcher)
+
+
+def _idle(*arguments: Any) -> None:
+    """Command no torque."""
+    arguments[-1][:] = 0.0
+
+
+_idle.__module__ = "__main__"  # a function of this package would be compiled
+
+
+def with_end_stops(scenario: Scenario) -> Scenario:
+    """Return a scenario with end stops, unless it states whether it has them."""
+    plant = scenario.plant
+    if plant.end_stops.on is not None:
+        return scenario
+    stops = plant.end_stops.model_copy(update={"on": True})
+    return scenario.model_copy(update={"plant": plant.model_copy(update={"end_stops": stops})})
+
+
+class Trial(NamedTuple):
+    """Settings with a changed field, and a session of them, both made outside the loop."""
+
+    value: Any
+    """New value of the field, with complete paths."""
+    before: Scenario
+    after: Scenario
+    session: Session
 
 
 class Driver:
@@ -117,14 +163,14 @@ class Driver:
     def __init__(self, settings: Scenario, session: Session) -> None:
         self.limits = Limits()
         self.snapshots: dict[str, DriverSnapshot] = {}
-        self.begin(settings, session)
+        self.begin(settings, session, record_of(session))
 
-    def begin(self, settings: Scenario, session: Session) -> None:
-        """Begin with a session at tick 0."""
-        self.settings, self.session = settings, session
-        self.start_record = record_of(session)
+    def begin(self, settings: Scenario, session: Session, record: RunRecord) -> None:
+        """Begin with a session at tick 0 and its record."""
+        self.settings, self.session, self.start_record = settings, session, record
         self.pending: dict[str, Any] = {}
         self.stopped = False
+        self._release_s: float | None = None
         self.reason: str | None = None
         self.row: Table | None = None
         by_hand = session.scenario.manual.currents_A
@@ -134,6 +180,8 @@ class Driver:
         """Run some control ticks; fewer if the columns change, none once the run has ended."""
         if self.reason is not None:
             return None
+        if self._release_s is not None and self.session.t_s >= self._release_s:
+            self._switch_off()
         try:
             rows = self.session.advance(ticks)
         except Exception as error:  # a law of the user's may raise anything: the run ends
@@ -152,16 +200,28 @@ class Driver:
         """End the run by an error."""
         self.reason = exception_text(error)
 
-    def stop(self) -> None:
-        """Take the currents away until the next reset."""
+    def stall(self, what: str) -> None:
+        """End the run, from another thread: work of the loop does not return."""
         self.stopped = True
-        if self.reason is None:
-            self._set_currents("off", [0.0] * len(self.session.actuator.groups))
+        self.reason = f"LOOP STALLED: {what} has not returned in time"
+
+    def stop(self, mode: str = "off") -> None:
+        """Latch STOP until the next reset: currents off, or hold and then off; a second STOP: off at once."""
+        again, self.stopped = self.stopped, True
+        if self.reason is not None or (again and self.mode == "off"):
+            return
+        if mode == "hold" and not again and self.mode != "off":
+            try:
+                self._hold()
+            except InputError:  # a trajectory of the user's gives no motion to begin with
+                self._switch_off()
+        else:
+            self._switch_off()
 
     def off(self) -> None:
         """No currents."""
         self._check_available("off")
-        self._set_currents("off", [0.0] * len(self.session.actuator.groups))
+        self._switch_off()
 
     def manual(self, currents_A: tuple[float, ...] | None, group: int | None, current_A: float) -> None:
         """Apply stated currents, or the current of a single group."""
@@ -177,8 +237,7 @@ class Driver:
     def hold(self) -> None:
         """Come to rest at the present pose."""
         self._check_available("hold")
-        initial_motion = modes.current_motion(self.session)
-        self._approach("hold", modes.hold_shape(initial_motion, self.limits, self._range))
+        self._hold()
 
     def point(self, pose_rad: tuple[float, float, float]) -> None:
         """Approach a pose and rest there."""
@@ -191,38 +250,51 @@ class Driver:
         initial_motion = modes.current_motion(self.session)
         self._approach("jog", modes.jog_shape(initial_motion, rates_rad_s, self.limits, self._range))
 
-    def trajectory(self, fields: dict[str, Any] | None) -> None:
+    def trajectory(self, fields: dict[str, Any] | None, trial: Trial | None = None) -> None:
         """Follow a shape from its beginning; default: the last one."""
         self._check_available("trajectory")
-        after = self.settings if fields is None else with_field(self.settings, "trajectory", fields)
+        after = self.settings
+        if fields is not None:
+            after = self._after("trajectory", trial.value if trial else fields, trial)
         self._approach("trajectory", after.trajectory)
         self.settings = after
 
-    def set(self, name: str, value: Any) -> None:
+    def set(self, name: str, value: Any, trial: Trial | None = None) -> None:
         """Change a field: from the next tick on, or at the next reset where it is fixed for a run.
+
+        Parameters
+        ----------
+        name : str
+        value : any
+            As JSON has it.
+        trial : Trial, optional
+            The same change, made before; its value replaces `value`.
 
         Raises
         ------
         InputError
             A field that is unknown, of the wrong type or out of range, or one that a mode sets.
         """
-        after = with_field(self.settings, name, value)
+        if trial:
+            value = trial.value
+        after = self._after(name, value, trial)
         if self.reason is not None or is_fixed(name):
             self.pending[name] = value
         elif name.split(".")[0] == "trajectory":
             self._change_shape(name, after.trajectory)
         else:
-            self.session.set(name, value)
+            self.session.set(name, value, trial.session if trial else None)
         self.settings = after
 
-    def clear_faults(self, place: int | None) -> None:
-        """Take back all faults, or one."""
+    def clear_faults(self, place: int | None, target: str | None = None) -> None:
+        """Clear all faults, one by its place, or those of a target."""
         planned = self.settings.model_dump(mode="json")[FAULT]
         if place is not None and place >= len(planned):
             raise InputError(f"bench: expected the place of a fault below {len(planned)}, received {place}")
-        after = with_field(self.settings, FAULT, _without(planned, place))
+        after = with_field(self.settings, FAULT, _without(planned, place, target))
         if self.reason is None:
-            self.session.set(FAULT, _without(self.session.scenario.model_dump(mode="json")[FAULT], place))
+            active = self.session.scenario.model_dump(mode="json")[FAULT]
+            self.session.set(FAULT, _without(active, place, target))
         self.settings = after
 
     def snapshot(self, name: str) -> None:
@@ -232,7 +304,9 @@ class Driver:
         if self.reason is not None:
             raise InputError("bench: expected a run in progress, received one that has ended")
         state = self.session.snapshot()
-        self.snapshots[name] = DriverSnapshot(state, self.settings, dict(self.pending), self.mode, self.row)
+        self.snapshots[name] = DriverSnapshot(
+            state, self.settings, dict(self.pending), self.mode, self.row, self.start_record
+        )
 
     def restore(self, name: str) -> None:
         """Go back to a snapshot.
@@ -250,9 +324,9 @@ class Driver:
             )
         snapshot = self.snapshots[name]
         self.session.restore(snapshot.session)
-        self.start_record = record_of(self.session)
+        self.start_record = snapshot.record
         self.settings, self.pending, self.mode = snapshot.settings, dict(snapshot.pending), snapshot.mode
-        self.row, self.reason = snapshot.row, None
+        self.row, self.reason, self._release_s = snapshot.row, None, None
 
     @property
     def may_move_rotor(self) -> bool:
@@ -273,9 +347,26 @@ class Driver:
         if self.reason is not None:
             raise InputError(f"bench: expected reset, as the run has ended, received {name}")
 
+    def _after(self, name: str, value: Any, trial: Trial | None) -> Scenario:
+        """Return the settings with another value of one field: those of the trial, if it began with these."""
+        if trial and trial.before is self.settings:
+            return trial.after
+        return with_field(self.settings, name, value)
+
     def _set_currents(self, mode: str, currents_A: list[float]) -> None:
         self.session.set(CURRENTS, currents_A)
-        self.mode = mode
+        self.mode, self._release_s = mode, None
+
+    def _switch_off(self) -> None:
+        self._set_currents("off", [0.0] * len(self.session.actuator.groups))
+
+    def _hold(self) -> None:
+        """Come to rest at the present pose; after STOP, switch the currents off then."""
+        initial_motion = modes.current_motion(self.session)
+        self._approach("hold", modes.hold_shape(initial_motion, self.limits, self._range))
+        if self.stopped:
+            approach = self.session.scenario.trajectory.approach
+            self._release_s = self.session.t_s + (approach.lasts_s if approach else 0.0) + HELD_s
 
     def _approach(self, mode: str, shape: Shape, shape_s: float = 0.0) -> None:
         """Approach a shape, at a time of the shape, from the present motion."""
@@ -300,5 +391,7 @@ class Driver:
         self._approach("trajectory", shape, own_s if same else 0.0)
 
 
-def _without(planned: list[Any], place: int | None) -> list[Any]:
+def _without(planned: list[Any], place: int | None, target: str | None) -> list[Any]:
+    if target is not None:
+        return [fault for fault in planned if fault["target"] != target]
     return [] if place is None else [fault for i, fault in enumerate(planned) if i != place]

@@ -109,6 +109,10 @@ class Operators:
         with self._lock:
             self._drop(client)
 
+    def may_command(self, client: str) -> bool:
+        """True if a client operates."""
+        return client == self.operator
+
     def check(self, client: str | None) -> None:
         """Check that a client may command; callers in the same process give no name and always may.
 
@@ -117,11 +121,16 @@ class Operators:
         InputError
             Another client operates, or none does.
         """
-        if client is not None and client != self.operator:
+        if client is not None and not self.may_command(client):
             raise InputError(
                 f"bench: expected a command of {self.operator or 'a client that operates'},"
                 f" received one of {shown(client)}"
             )
+
+    def excuse(self, pause_s: float) -> None:
+        """Do not count a time in which this process was too busy to hear its clients."""
+        with self._lock:
+            self._last_heard_s = {client: s + pause_s for client, s in self._last_heard_s.items()}
 
     def check_silence(self) -> bool:
         """Remove silent clients; return True, once, if the twin is without an operator from now on."""

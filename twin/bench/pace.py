@@ -17,7 +17,7 @@ CHUNK_s = 0.02
 
 # A chunk longer than this would keep STOP waiting.
 LONGEST_s, SHORT_s = 0.01, 0.004
-MOST_TICKS = 4096
+FIRST_TICKS, MOST_TICKS = 20, 4096
 
 # Time lost beyond this is not made up.
 LATE_s = 5 * CHUNK_s
@@ -45,7 +45,7 @@ class Pace:
         self._clock = clock
         self.speed = 1.0
         self.chunks = self.missed = 0
-        self._most_ticks = 20
+        self._most_ticks = FIRST_TICKS
         self._due: float | None = None
         self._done: deque[tuple[float, float]] = deque()
 
@@ -70,12 +70,17 @@ class Pace:
     def clear(self) -> None:
         """Reset the counts."""
         self.chunks = self.missed = 0
+        self._most_ticks = min(self._most_ticks, FIRST_TICKS)
         self.rest()
 
     def rest(self) -> None:
         """Clear the deadline: time is paused."""
         self._due = None
         self._done.clear()
+
+    def ease(self) -> None:
+        """Begin with a chunk of one tick again: the next ones may take longer than the last ones."""
+        self._most_ticks = 1
 
     def ticks(self, period_s: float) -> int:
         """Control ticks of the next chunk."""

@@ -9,6 +9,7 @@ from importlib import import_module
 from threading import Semaphore
 
 from spheretwin.bench.driver import Driver
+from spheretwin.bench.folder import release
 from spheretwin.faults.fault_injector import FaultMessages
 from spheretwin.models.base.errors import without_breaks
 from spheretwin.models.telemetry.status import Status
@@ -39,7 +40,8 @@ class RecordingThread:
     """
 
     def __init__(self, files: Outputs, driver: Driver) -> None:
-        self.paths = tuple(str(path) for path in files.paths)
+        self._claimed = files.paths
+        self.paths = tuple(map(str, self._claimed))
         files.begin(driver.session.tick, driver.start_record)
         self._files, self._sinks = files, files.sinks
         self._worker = ThreadPoolExecutor(max_workers=1, thread_name_prefix="recording")
@@ -66,6 +68,7 @@ class RecordingThread:
             for sink in self._sinks:
                 sink.finish(status)
             self.faults.extend(map(str, self._files.close(facts)))
+            release(self._claimed)  # of a file that could not be written, only its name is there
             done(self)
 
         def end(done: Callable[[RecordingThread], None]) -> None:
@@ -102,7 +105,7 @@ class Recording:
     Attributes
     ----------
     completed_files : tuple of str
-        Files that were completed last.
+        Files that were written completely so far.
     """
 
     def __init__(self, report: Callable[[str | None], None]) -> None:
@@ -138,11 +141,12 @@ class Recording:
 
     def write(self, rows: Table) -> None:
         """Take the rows of one chunk, which must not change any more."""
-        if self._active is None:
+        active = self._active  # the supervisor may end it meanwhile
+        if active is None:
             return
-        self._active.write(rows)
+        active.write(rows)
         for t_s, text in self._faults.of(rows):
-            self._active.note(t_s, text)
+            active.note(t_s, text)
 
     def note_changes(self, session: Session) -> None:
         """Write the changes since the last call."""
@@ -174,13 +178,18 @@ class Recording:
         self._report(why)
         (end or files.ending(session))(self._completed)
 
+    def add_completed(self, *paths: str) -> None:
+        """Add files that were written completely."""
+        self.completed_files += paths
+
     def join(self) -> None:
         """Wait until all files are complete."""
         for files in list(self._completing):
             files.join()
 
     def _completed(self, files: RecordingThread) -> None:
-        self.completed_files = () if files.faults else files.paths
         if files.faults:
             self._report(files.faults[0])
+        else:
+            self.add_completed(*files.paths)
         self._completing.remove(files)

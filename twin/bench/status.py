@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import inf
 from typing import Any
 
 import numpy as np
 
 from spheretwin.bench.bench_state import BenchState
-from spheretwin.faults.fault import Fault
+from spheretwin.bench.modes import Limits
+from spheretwin.faults.fault import Fault, find_target
 from spheretwin.models.telemetry.signals import common_signals, width
 from spheretwin.models.telemetry.table import Table, rank_lost, saturated
 from spheretwin.session import Session
+from spheretwin.trajectories.shapes import Hold, Jog
 
 Three = tuple[float, float, float]
 
@@ -28,6 +31,8 @@ class BenchStatus:
         Whether time runs.
     stopped : bool
         Whether STOP is latched; only `reset` releases it.
+    stop_mode : str
+        ``off``: STOP switches the currents off; ``hold``: it holds until the rotor rests, and then does so.
     scenario, law, shape, allocation : str
         Names in the active configuration.
     t_s : float
@@ -67,8 +72,30 @@ class BenchStatus:
         Status of the session, as ``running`` or ``left_workspace``.
     reason : str or None
         Why the mode is ``fault``, in one line.
+    chatter_A_s : float
+        Variation of the commanded currents in the last second, mean over the groups, A/s.
     faults : tuple of str
         Planned and active faults, one line each, in the order of their places.
+    active_faults : tuple of str
+        Targets and modes of the faults that act now.
+    failed_groups : tuple of int
+        Coil groups with an active fault.
+    limits : Limits
+        Limits of the approach to a pose or a shape.
+    pose_rad : tuple of float or None
+        Pose that the mode ``point`` approaches, (3,).
+    jog_rates_rad_s : tuple of float
+        Desired rates in the mode ``jog``, (3,); otherwise 0.
+    manual_currents_A : tuple of float or None
+        Currents of the mode ``manual``, one for each group.
+    replay_file : str or None
+        File whose rows are shown.
+    replay_range_s : (float, float) or None
+        Times of its first and its last row, s.
+    capture : str
+        State of the triggered capture: ``off``, ``armed``, ``triggered`` or ``complete``.
+    capture_t_s : float or None
+        Time of its event, s.
     pending : tuple of (str, str)
         Fields that the next reset will set, and their values as JSON.
     journal : int
@@ -78,7 +105,7 @@ class BenchStatus:
     recording : tuple of str
         Files that are being written.
     completed_files : tuple of str
-        Files that were completed last.
+        Files that were written completely so far.
     note : str or None
         Last event without a command, as the reason why a recording ended.
     operator : str or None
@@ -96,6 +123,7 @@ class BenchStatus:
     mode: str
     running: bool
     stopped: bool
+    stop_mode: str
     scenario: str
     law: str
     shape: str
@@ -127,7 +155,18 @@ class BenchStatus:
     rank_lost: bool
     status: str
     reason: str | None
+    chatter_A_s: float
     faults: tuple[str, ...]
+    active_faults: tuple[str, ...]
+    failed_groups: tuple[int, ...]
+    limits: Limits
+    pose_rad: Three | None
+    jog_rates_rad_s: Three
+    manual_currents_A: tuple[float, ...] | None
+    replay_file: str | None
+    replay_range_s: tuple[float, float] | None
+    capture: str
+    capture_t_s: float | None
     pending: tuple[tuple[str, str], ...]
     journal: int
     snapshots: tuple[str, ...]
@@ -198,6 +237,7 @@ def bench_status(bench_state: BenchState) -> BenchStatus:
         **_names(bench_state),
         running=bench_state.is_active,
         stopped=driver.stopped,
+        stop_mode=bench_state.stop_mode,
         speed=pace.speed,
         realtime_factor=pace.realtime_factor(),
         chunks=pace.chunks,
@@ -205,7 +245,12 @@ def bench_status(bench_state: BenchState) -> BenchStatus:
         missed_share=pace.missed_share,
         status=str(session.status),
         reason=driver.reason,
-        faults=tuple(_fault_text(fault) for fault in session.scenario.fault),
+        chatter_A_s=(bench_state.player or bench_state).history.chatter_A_s,
+        **_faults(session),
+        limits=driver.limits,
+        **_targets(bench_state),
+        capture=bench_state.capture.state,
+        capture_t_s=bench_state.capture.t_s,
         pending=driver.pending_as_json(),
         journal=len(session.journal),
         snapshots=tuple(driver.snapshots),
@@ -250,6 +295,35 @@ def _names(bench_state: BenchState) -> dict[str, Any]:
         "law": scenario.controller.law,
         "shape": scenario.trajectory.shape,
         "allocation": scenario.allocation,
+    }
+
+
+def _faults(session: Session) -> dict[str, Any]:
+    faults = session.scenario.fault
+    active = [
+        fault for fault in faults if fault.start_s <= session.t_s and session.t_s < (fault.end_s or inf)
+    ]
+    return {
+        "faults": tuple(map(_fault_text, faults)),
+        "active_faults": tuple(f"{fault.target} {fault.mode}" for fault in active),
+        "failed_groups": tuple(
+            sorted({find_target(fault.target)[1] for fault in active if fault.target.startswith("coil.")})
+        ),
+    }
+
+
+def _targets(bench_state: BenchState) -> dict[str, Any]:
+    """Return the values that a mode follows, as its controls show them."""
+    scenario, player = bench_state.driver.session.scenario, bench_state.player
+    shape = scenario.trajectory
+    return {
+        "pose_rad": shape.angle_rad
+        if bench_state.driver.mode == "point" and isinstance(shape, Hold)
+        else None,
+        "jog_rates_rad_s": shape.rate_rad_s if isinstance(shape, Jog) else (0.0, 0.0, 0.0),
+        "manual_currents_A": scenario.manual.currents_A,
+        "replay_file": str(player.path) if player else None,
+        "replay_range_s": player.range_s if player else None,
     }
 
 

@@ -102,8 +102,7 @@ class EventHandlers:
 
     def send(self, event: Event, name: str, /, note: Note | None = None, **arguments: Any) -> bool:
         """Send a command in the name of an event's page; return False if the page may not command."""
-        if name not in ANYONES and not self._operates(event):
-            self._warn(event)
+        if name not in ANYONES and not self.accepts(event):
             return False
         self.flush(0.0)  # earlier values of sliders come first
         self._submit(event, name, note, arguments)
@@ -111,8 +110,7 @@ class EventHandlers:
 
     def send_latest(self, event: Event, name: str, /, note: Note | None = None, **arguments: Any) -> bool:
         """Send the latest of a fast sequence of commands, at a limited rate."""
-        if not self._operates(event):
-            self._warn(event)
+        if not self.accepts(event):
             return False
         with self._lock:
             self._latest[name] = (event, note, arguments)
@@ -163,7 +161,7 @@ class EventHandlers:
         return button
 
     def on_change(self, line: Any, act: Callable[[Event], object] | None = None) -> None:
-        """Accept changes of the operator; restore the value on all other pages.
+        """Call a function at each change; `guard_values` has refused those of pages that do not operate.
 
         Parameters
         ----------
@@ -172,24 +170,19 @@ class EventHandlers:
         act : callable, optional
             Called with the event of each change.
         """
-        accepted = line.value
 
         async def update(event: Event) -> None:
-            nonlocal accepted
-            if event.client_id is not None and not self._operates(event):
-                line.value = accepted
-                self._warn(event)
-                return
-            accepted = line.value
             if act and event.client_id is not None:
                 act(event)
 
         line.on_update(update)
 
-    def _operates(self, event: Event) -> bool:
-        state, name = self._bench.state(), client_name(event.client_id)
-        # The status may be older than the page: a client that is not in it passes, and the bench decides.
-        return state.operator == name or (state.operator is None and name not in state.watching)
+    def accepts(self, event: Event) -> bool:
+        """Return True if a page operates; notify it otherwise."""
+        operates = self._bench.may_command(client_name(event.client_id))
+        if not operates:
+            self._warn(event)
+        return operates
 
     def _warn(self, event: Event) -> None:
         """Notify a watching page, and no other, why nothing happens; not at every key."""

@@ -1,18 +1,18 @@
-"""Tab of the modes: hold, approach a pose, follow a shape, jog, or apply manual currents."""
+"""Tab of the modes: approach a pose, follow a shape, jog, apply manual currents, or replay a run."""
 
 from __future__ import annotations
 
 import time
 from functools import partial
 from math import degrees, pi, radians
-from typing import Any
+from typing import Any, cast
 
 import viser
 
 from spheretwin.models.actuator import Actuator
 from spheretwin.models.base.errors import InputError
 from spheretwin.viz.bench.event_handlers import Event, EventHandlers, Note, on_press
-from spheretwin.viz.bench.protocols import BenchProtocol, Choices
+from spheretwin.viz.bench.protocols import BenchProtocol, Choices, FieldSetting
 from spheretwin.viz.bench.scene import Scene
 from spheretwin.viz.bench.settings_tab import Form
 
@@ -28,9 +28,13 @@ ONLY_THIS_A = 1.0
 # Time that a slider which has just been moved, by a person or by the twin, is left unchanged.
 UNTOUCHED_S = 0.5
 
+NO_RUNS = "no run in the folder"
+
+SHAPE = "trajectory.shape"
+
 
 class ModesTab:
-    """Tab of the modes, the keys, and the handles in the scene.
+    """Tab of the modes, the keys, and the handle in the scene.
 
     Parameters
     ----------
@@ -41,7 +45,7 @@ class ModesTab:
     bench : BenchProtocol
         Bench with the initial state.
     choices : Choices
-        Shapes.
+        Shapes and recorded runs.
     scene : Scene
         The picture.
     """
@@ -49,11 +53,11 @@ class ModesTab:
     def __init__(
         self, gui: viser.GuiApi, handlers: EventHandlers, bench: BenchProtocol, choices: Choices, scene: Scene
     ) -> None:
-        self._handlers, self._bench, self._scene = handlers, bench, scene
+        self._handlers, self._bench, self._choices, self._scene = handlers, bench, choices, scene
         actuator = bench.actuator
         self._pose_rad, self._commanded_s = list(bench.state().q_ref_rad), 0.0
-        modes = gui.add_button_group("mode", ("off", "hold", "trajectory"))
-        on_press(modes, handlers.send_selected)
+        self._present, self._replayed = bench.state().shape, cast("str | None", None)
+        self._shape: Form
         self._point(gui, actuator, choices)
         self._follow(gui, choices)
         self._jog(gui)
@@ -62,15 +66,62 @@ class ModesTab:
         self._keys(gui)
         self._picture()
 
+    def enter(self, event: Event, mode: str) -> None:
+        """Enter a mode at the present pose, with zero rates or currents, or with the chosen run."""
+        state = self._bench.state()
+        groups = len(self._bench.actuator.groups)
+        given = {
+            "point": {"pose_rad": list(state.q_ref_rad)},
+            "jog": {"rates_rad_s": [0.0, 0.0, 0.0]},
+            "manual": {"currents_A": [0.0] * groups},
+            "replay": {"file": self._file.value},
+        }
+        if mode != "replay" or self._file.value != NO_RUNS:
+            self._handlers.send(event, mode, **given.get(mode, {}))
+        else:
+            self._handlers.show_refusal("replay: expected a recorded run in the folder, received none")
+
     def show(self, state: Any) -> None:
-        """Update the sliders while the twin moves elsewhere."""
-        if state.mode != "point" and time.monotonic() - self._commanded_s > UNTOUCHED_S:
-            self._pose_rad = list(state.q_ref_rad)
+        """Update the controls while the twin is commanded elsewhere."""
+        if time.monotonic() - self._commanded_s > UNTOUCHED_S:
+            self._pose_rad = list(state.pose_rad or state.q_ref_rad)
         for slider, angle in zip(self._angles, self._pose_rad, strict=True):
             _follow(slider, degrees(angle))
-        if state.mode != "jog":
-            for slider in self._rates:
-                _follow(slider, 0.0)
+        for limit, value in zip(self._limits, state.limits, strict=True):
+            _follow(limit, value)
+        rates = state.jog_rates_rad_s if state.mode == "jog" else (0.0, 0.0, 0.0)
+        for slider, rate in zip(self._rates, rates, strict=True):
+            _follow(slider, degrees(rate))
+        currents = state.manual_currents_A if state.mode == "manual" else None
+        for group, slider in enumerate(self._currents):
+            _follow(slider, currents[group] if currents else 0.0)
+        self._scrubber.visible = state.replay_range_s is not None
+        if state.replay_range_s is not None:
+            if (self._scrubber.min, self._scrubber.max) != state.replay_range_s:
+                self._scrubber.min, self._scrubber.max = state.replay_range_s
+            _follow(self._scrubber, state.t_s)
+
+    def renew(self, state: Any) -> None:
+        """Update the forms and lists."""
+        self._pose.show(_pose_settings(self._pose_rad))
+        present = next((line.text for line in self._choices.settings() if line.name == SHAPE), self._present)
+        if present != self._present:  # set by a script or another page
+            self._present = present
+            self._shapes.options = list(dict.fromkeys([*self._choices.shapes, present]))
+            self._shapes.value = present
+        self._shape.show(self._choices.shape(self._shapes.value))
+        runs = list(self._choices.runs())
+        if state.replay_file and state.replay_file not in runs and state.replay_file != self._replayed:
+            runs.append(state.replay_file)
+        runs = runs or [NO_RUNS]
+        if list(self._file.options) != runs:
+            value = self._file.value
+            self._file.options = runs
+            self._file.value = value if value in runs else runs[0]
+        if state.replay_file != self._replayed:
+            self._replayed = state.replay_file
+            if state.replay_file in runs:
+                self._file.value = state.replay_file
 
     def _point(self, gui: viser.GuiApi, actuator: Actuator, choices: Choices) -> None:
         with gui.add_folder("point: or drag the tip, or ← ↑ ↓ →"):
@@ -87,18 +138,27 @@ class ModesTab:
             rate = gui.add_number(
                 "rate, rad/s", rate_rad_s, step=0.1, hint="largest rate of the approach to a pose"
             )
-            acceleration = gui.add_number("acceleration, rad/s²", acceleration_rad_s2, step=1.0)
+            acceleration = gui.add_number("acceleration, rad/s²", acceleration_rad_s2, step=0.1)
+            self._limits = (rate, acceleration)
             limits = Note(gui, acceleration.order + 0.5)
-            self._handlers.on_change(
-                rate,
-                lambda event: self._handlers.send(event, "limits", limits, rate_rad_s=event.target.value),
-            )
-            self._handlers.on_change(
-                acceleration,
-                lambda event: self._handlers.send(
-                    event, "limits", limits, acceleration_rad_s2=event.target.value
-                ),
-            )
+            for name, line in (("rate_rad_s", rate), ("acceleration_rad_s2", acceleration)):
+                self._handlers.on_change(line, partial(self._on_limit, name, limits))
+            with gui.add_folder("pose as numbers", expand_by_default=False):
+                self._pose = Form(gui, self._handlers, "Go to this pose", whole=True)
+            self._pose.on_apply(self._on_pose)
+            self._pose.show(_pose_settings(self._pose_rad))
+
+    def _on_limit(self, name: str, note: Note, event: Event) -> None:
+        self._handlers.send(event, "limits", note, **{name: event.target.value})
+
+    def _on_pose(self, event: Event, fields: dict[str, str]) -> None:
+        try:
+            pose_rad = [radians(float(text)) for text in fields.values()]
+        except ValueError:
+            received = ", ".join(fields.values())
+            self._handlers.show_refusal(f"expected three angles in °, received {received}", self._pose.note)
+            return
+        self._go(event, pose_rad, self._pose.note)
 
     def _on_slider(self, axis: int, note: Note, event: Event) -> None:
         self._turn(event, axis, radians(event.target.value), note)
@@ -115,10 +175,10 @@ class ModesTab:
 
     def _follow(self, gui: viser.GuiApi, choices: Choices) -> None:
         with gui.add_folder("trajectory", expand_by_default=False):
-            present = self._bench.state().shape
+            present = self._present
             shapes = list(dict.fromkeys([*choices.shapes, present]))
-            shape = gui.add_dropdown("shape", shapes, initial_value=present)
-            form = Form(gui, self._handlers, "Follow this trajectory", whole=True)
+            self._shapes: Any = gui.add_dropdown("shape", shapes, initial_value=present)
+            form = self._shape = Form(gui, self._handlers, "Follow this trajectory", whole=True)
 
             def follow(event: Event, fields: dict[str, str]) -> None:
                 try:
@@ -126,11 +186,13 @@ class ModesTab:
                 except InputError as error:
                     self._handlers.show_refusal(str(error), form.note)
                     return
-                self._handlers.send(event, "trajectory", form.note, fields={"shape": shape.value, **read})
+                self._handlers.send(
+                    event, "trajectory", form.note, fields={"shape": self._shapes.value, **read}
+                )
 
             form.on_apply(follow)
             form.show(choices.shape(present))
-            self._handlers.on_change(shape, lambda event: form.show(choices.shape(event.target.value)))
+            self._handlers.on_change(self._shapes, lambda event: form.show(choices.shape(event.target.value)))
 
     def _jog(self, gui: viser.GuiApi) -> None:
         with gui.add_folder("jog: rates of the hinges", expand_by_default=False):
@@ -148,8 +210,7 @@ class ModesTab:
 
     def _manual(self, gui: viser.GuiApi, actuator: Actuator) -> None:
         groups, limit = len(actuator.groups), float(actuator.group.current_limit_A)
-        with gui.add_folder("manual currents", expand_by_default=False):
-            gui.add_markdown("In this mode, click a coil to apply a current to its group only.")
+        with gui.add_folder("manual currents: or click a coil", expand_by_default=False):
             chosen = gui.add_slider("group", 0, groups - 1, 1, 0)
             self._handlers.on_change(chosen)
             alone = gui.add_button(f"Only this group, at {ONLY_THIS_A:g} A")
@@ -161,24 +222,32 @@ class ModesTab:
                 ),
             )
             with gui.add_folder("all groups", expand_by_default=False):
-                sliders = [
+                self._currents = [
                     gui.add_slider(f"{group:02}, A", -limit, limit, 0.05, 0.0) for group in range(groups)
                 ]
-            for slider in sliders:
+            for slider in self._currents:
                 self._handlers.on_change(
                     slider,
                     lambda event: self._handlers.send_latest(
-                        event, "manual", note, currents_A=[float(current.value) for current in sliders]
+                        event, "manual", note, currents_A=[float(line.value) for line in self._currents]
                     ),
                 )
 
     def _replay(self, gui: viser.GuiApi) -> None:
         with gui.add_folder("replay", expand_by_default=False):
-            file = gui.add_text("file", "", hint="telemetry (.parquet) or recording (.rrd) on this machine")
-            self._handlers.on_change(file)
+            runs = list(self._choices.runs()) or [NO_RUNS]
+            self._file: Any = gui.add_dropdown(
+                "file", runs, hint="telemetry (.parquet) and recordings (.rrd) of the folder"
+            )
+            self._handlers.on_change(self._file)
             play = gui.add_button("Replay")
-            note = Note(gui, play.order + 0.5)
-            on_press(play, lambda event: self._handlers.send(event, "replay", note, file=file.value))
+            self._scrubber: Any = gui.add_slider("time, s", 0.0, 1.0, 0.01, 0.0, visible=False)
+            note = Note(gui, self._scrubber.order + 0.5)
+            on_press(play, lambda event: self._handlers.send(event, "replay", note, file=self._file.value))
+            self._handlers.on_change(
+                self._scrubber,
+                lambda event: self._handlers.send_latest(event, "seek", note, t_s=float(event.target.value)),
+            )
 
     def _keys(self, gui: viser.GuiApi) -> None:
         for key, axis, sign in _ARROWS:
@@ -195,21 +264,23 @@ class ModesTab:
             eye_m = event.client.camera.position
             self._go(event, self._scene.pose_under(event.end_position, eye_m, self._pose_rad[2]))
 
-        @self._scene.coils.on_click
-        async def _(event: Event) -> None:
-            state = self._bench.state()
-            group = self._scene.group_of(event.instance_index)
-            if state.mode == "manual" and group is not None:
-                self._handlers.send(event, "manual", group=group, current_A=ONLY_THIS_A)
+
+def _pose_settings(pose_rad: Any) -> list[FieldSetting]:
+    return [
+        FieldSetting(f"pose.exact {axis}, °", f"{degrees(angle):.2f}", None, f"desired angle {axis}, °")
+        for axis, angle in zip(AXES, pose_rad, strict=True)
+    ]
 
 
-def _follow(slider: Any, value: float) -> None:
-    """Update a slider that was not just moved, if the change is visible."""
-    if time.time() - slider.update_timestamp < UNTOUCHED_S:
+def _follow(line: Any, value: float) -> None:
+    """Update a slider or a number that was not just changed, if the difference is visible."""
+    if time.time() - line.update_timestamp < UNTOUCHED_S:
         return
-    value = min(max(round(value, 1), slider.min), slider.max)
-    if not abs(slider.value - value) < slider.step / 2:
-        slider.value = value
+    value = round(round(value / line.step) * line.step, 6)
+    least, most = (value if bound is None else bound for bound in (line.min, line.max))
+    value = min(max(value, least), most)
+    if not abs(line.value - value) < line.step / 2:
+        line.value = value
 
 
 _ARROWS = (("arrowup", 0, -1.0), ("arrowdown", 0, 1.0), ("arrowleft", 1, -1.0), ("arrowright", 1, 1.0))

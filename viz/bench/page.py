@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import contextlib
+import json
 import socket
 import time
 from collections.abc import Callable
@@ -12,33 +12,35 @@ import numpy as np
 import viser
 
 from spheretwin.viz.bench import server
-from spheretwin.viz.bench.event_handlers import Event, EventHandlers, client_name, on_press
+from spheretwin.viz.bench.access import Access
+from spheretwin.viz.bench.event_handlers import Event, EventHandlers, client_name
+from spheretwin.viz.bench.feed import Feed
 from spheretwin.viz.bench.modes_tab import ModesTab
 from spheretwin.viz.bench.protocols import BenchProtocol, Choices
 from spheretwin.viz.bench.scene import Scene
 from spheretwin.viz.bench.settings_tab import SettingsTab
-from spheretwin.viz.bench.status_panel import TAKE_OVER, currents_html, scale_html, status_html
-from spheretwin.viz.bench.tabs import CurvesPanel, FaultsTab, FilesTab
+from spheretwin.viz.bench.status_panel import status_html
+from spheretwin.viz.bench.tabs import FaultsTab, FilesTab
+from spheretwin.viz.bench.viser_internals import guard_values
 
 FRAME_S = 1 / 30
-"""Period of the scene; text and curves follow every few frames, values of fields rarely."""
+"""Period of the scene; the controls follow every few frames, values of fields rarely."""
 
 FRAMES_A_STATUS = 3
 FRAMES_A_SETTING = 30
 
-LEFT_WIDTH, RIGHT_WIDTH = 255, 290
-STATUS_HEIGHT = 430
-
-SPEEDS = {"0.1×": 0.1, "0.2×": 0.2, "0.5×": 0.5, "1×": 1.0, "2×": 2.0, "5×": 5.0, "10×": 10.0}
-SPEEDS["as fast as possible"] = 1e6
+# Width of the panel in letters of its text, which has the size that fits the window.
+WIDTH_EM = 20.5
+WIDTHS_PX = (235, 480)
 
 TITLE = "bench"
-
-ASK = "Ask to operate"
 
 # A page that is reloaded may connect before the disconnection is known. It operates again; a watching page
 # does not.
 FRESH_S = 5.0
+
+# A page that is being loaded has no heartbeat yet.
+LOADING_S = 10.0
 
 
 class Page:
@@ -58,9 +60,15 @@ class Page:
 
     def __init__(self, bench: BenchProtocol, choices: Choices, listening: socket.socket) -> None:
         self._bench, self._choices, self._handlers = bench, choices, EventHandlers(bench)
-        self._server = server.serve(listening, TITLE)
-        self._watching: dict[int, Any] = {}
-        self._frame, self._shown_s = 0, -1.0
+        self._access = Access(listening.getsockname()[1])
+        self._watching: dict[int, float] = {}
+        self._beating: set[int] = set()
+        self._light: set[int] = set()
+        self._frame = 0
+        self._header: dict[str, Any] = {}
+        self._feed = Feed(bench, lambda: dict(self._header))
+        self._server = server.serve(listening, TITLE, self._access, self._on_control, self._feed.answers)
+        guard_values(self._server, self._handlers.accepts)
         self._server.gui.configure_theme(dark_mode=True, show_logo=False, show_share_button=False)
         self._server.gui.set_panel_label(TITLE)
         _set_camera(self._server)
@@ -69,8 +77,8 @@ class Page:
 
     @property
     def address(self) -> str:
-        """Address to open in a browser."""
-        return server.address(self._server)
+        """Address to open in a browser; it works once, and then there is another one."""
+        return server.address(self._server, self._access)
 
     def show(self, ended: Callable[[], bool]) -> None:
         """Follow the bench until `ended` is true."""
@@ -114,116 +122,117 @@ class Page:
         gui = self._server.gui
         self._actuator = self._bench.actuator
         self._scene = Scene(self._server.scene, self._actuator)
-        self._twin_panel(gui)
-        self._curves_panel(gui)
         self._controls(gui, self._choices)
-
-    def _twin_panel(self, gui: viser.GuiApi) -> None:
-        panel = gui.add_panel()
-        with panel.add_tab("status"):
-            # On top: it stays in view at any scroll position.
-            self._handlers.button(gui, "STOP (space)", "stop", color="red")
-            self._status = gui.add_html("")
-            running = gui.add_button_group("run", ("start", "pause", "step", "reset"))
-            on_press(running, self._handlers.send_selected)
-            speed = gui.add_dropdown("speed", list(SPEEDS), initial_value="1×")
-            self._handlers.on_change(
-                speed,
-                lambda event: self._handlers.send(event, "speed", factor=SPEEDS.get(event.target.value, 1.0)),
-            )
-        panel.dock_left()
-        panel.set_width(LEFT_WIDTH)
-        panel.set_height(STATUS_HEIGHT)
-        self._panel = panel
-        stop = gui.add_command("STOP", hotkey="space")
-
-        @stop.on_trigger
-        async def _(event: Event) -> None:
-            self._handlers.send(event, "stop")
-
-    def _curves_panel(self, gui: viser.GuiApi) -> None:
-        panel = gui.add_panel()
-        with panel.add_tab("curves"):
-            self._currents = gui.add_html("")
-            gui.add_html(scale_html(self._bench.state().current_limit_A))
-            self._plots = CurvesPanel(gui)
-        panel.dock_below(self._panel)
+        # The bar, the plots and the menus of the coils send their commands as values of these buttons.
+        self._remote = gui.add_button_group("remote", ("",), visible=False)
+        self._remote.on_click(self._on_remote)
 
     def _controls(self, gui: viser.GuiApi, choices: Choices) -> None:
         tabs = gui.add_tab_group()
         with tabs.add_tab("move"):
             self._modes_tab = ModesTab(gui, self._handlers, self._bench, choices, self._scene)
         law, twin = tabs.add_tab("law"), tabs.add_tab("twin")
-        self._settings = SettingsTab(gui, self._handlers, choices, law, twin)
+        self._settings = SettingsTab(gui, self._handlers, self._bench, choices, law, twin)
         with tabs.add_tab("faults"):
             self._faults_tab = FaultsTab(gui, self._handlers, choices)
-        with tabs.add_tab("keep"):
+        with tabs.add_tab("files"):
             self._files_tab = FilesTab(gui, self._handlers, self._bench, choices)
         gui.main_panel.dock_right()
-        gui.main_panel.set_width(RIGHT_WIDTH)
+
+    async def _on_remote(self, event: Event) -> None:
+        """Execute a command of the page's script: a command of the bench, or one of the page itself."""
+        if event.client_id is None:
+            return
+        try:
+            name, given = json.loads(event.target.value)
+            own: dict[str, Callable[..., None]] = {
+                "enter": self._modes_tab.enter,
+                "theme": self._change_theme,
+                "resized": self._resize,
+            }
+            if act := own.get(name):
+                act(event, **given)
+            else:
+                self._handlers.send(event, name, **given)
+        except (ValueError, TypeError):  # no page of the bench sends such a value
+            return
+
+    def _change_theme(self, event: Event) -> None:
+        """Change a page between dark and light."""
+        self._light ^= {event.client_id}
+        event.client.gui.configure_theme(
+            dark_mode=event.client_id not in self._light, show_logo=False, show_share_button=False
+        )
+
+    def _resize(self, event: Event, width: float, font: float) -> None:
+        """Fit the panel of a page to its window, in pixels, and to the size of its text."""
+        least, most = WIDTHS_PX
+        event.client.gui.main_panel.set_width(float(np.clip(WIDTH_EM * font, least, min(most, 0.42 * width))))
 
     def _pages(self) -> None:
-        """Register clients that connect or disconnect; add to each page its own buttons."""
+        """Register clients that connect or disconnect."""
 
         @self._server.on_client_connect
         async def _(client: viser.ClientHandle) -> None:
             self._bench.command("hello", client=client_name(client.client_id))
-            ask = client.gui.add_button(ASK, visible=False, order=-1e6)
-            on_press(ask, lambda event: self._handlers.send(event, "ask"))
-            give = client.gui.add_button("", visible=False, order=-1e6, color="orange")
-
-            def grant(event: Event) -> None:
-                for name in self._bench.state().asking[:1]:
-                    self._handlers.send(event, "grant", to=name)
-
-            on_press(give, grant)
-            self._watching[client.client_id] = (time.monotonic(), ask, give)
+            # The page's scripts read its number here.
+            client.gui.add_html(f'<span data-page="{client.client_id}"></span>')
+            self._watching[client.client_id] = time.monotonic()
 
         @self._server.on_client_disconnect
         async def _(client: viser.ClientHandle) -> None:
             self._watching.pop(client.client_id, None)
+            self._light.discard(client.client_id)
+            self._beating.discard(client.client_id)
             self._bench.command("leave", client=client_name(client.client_id))
 
+    def _on_control(self, word: str, number: int | None) -> None:
+        """Pass STOP or a heartbeat of a page to the bench."""
+        if word == "stop":
+            self._bench.command("stop")
+        elif number is not None:
+            self._beating.add(number)
+            self._bench.command("beat", client=client_name(number))
+
     def _show_status(self, state: Any) -> None:
-        _renewed(self._status, status_html(state, self._handlers.refused, self._handlers.waiting_command))
-        _renewed(self._currents, currents_html(state.current_A, state.current_limit_A, state.temperature_C))
-        if state.t_s < self._shown_s:  # another run
-            self._scene.forget()
-        if state.t_s != self._shown_s:
-            self._shown_s = state.t_s
-            self._scene.trail(np.array(state.q_rad))
-            self._plots.show(*self._bench.bounds())
-            self._plots.warm(state.t_s, state.temperature_C)
+        self._header = {
+            "remote": self._remote._impl.uuid,
+            "status": status_html(state, self._handlers.refused, self._handlers.waiting_command),
+            "mode": state.mode,
+            "stop_mode": state.stop_mode,
+            "running": state.running,
+            "speed": min(state.speed, 1e6),
+            "operator": state.operator,
+            "asking": state.asking,
+            "current_A": state.current_A,
+            "limit_A": state.current_limit_A,
+            "temperature_C": state.temperature_C,
+            "failed": state.failed_groups,
+            "capture": [state.capture, state.capture_t_s],
+        }
+        self._scene.trail(self._bench.bins(self._scene.trail_after))
         self._modes_tab.show(state)
         self._faults_tab.show(state)
         self._files_tab.show(state)
 
     def _renew(self, state: Any) -> None:
         self._settings.show()
-        for number, (came_s, ask, give) in list(self._watching.items()):
+        self._modes_tab.renew(state)
+        self._files_tab.renew()
+        for number, came_s in list(self._watching.items()):
             name = client_name(number)
-            self._bench.command("beat", client=name)
             fresh = time.monotonic() - came_s < FRESH_S
+            if number not in self._beating and time.monotonic() - came_s < LOADING_S:
+                self._bench.command("beat", client=name)
             if state.operator is None and fresh and len(self._watching) == 1:
                 self._bench.command("ask", client=name)
-            with contextlib.suppress(RuntimeError):  # the page may be closed meanwhile
-                ask.visible = state.operator != name and name not in state.asking
-                ask.label = ASK if state.operator else TAKE_OVER
-                give.visible = state.operator == name and bool(state.asking)
-                if give.visible:
-                    give.label = f"Grant control to {state.asking[0]}"
 
 
 def _desired(state: Any) -> Any:
     return None if state.mode in ("off", "manual", "fault") else np.array(state.q_ref_rad)
 
 
-def _renewed(html: Any, content: str) -> None:
-    if html.content != content:
-        html.content = content
-
-
 def _set_camera(server: viser.ViserServer) -> None:
     """Place the camera so that the shaft, all rows of coils and the ball between them are visible."""
     camera = server.initial_camera
-    camera.position, camera.look_at, camera.near = (0.15, -0.22, 0.15), (0.0, 0.0, 0.02), 0.01
+    camera.position, camera.look_at, camera.near = (0.11, -0.16, 0.12), (0.0, 0.0, 0.02), 0.01

@@ -22,6 +22,30 @@ class TicketProtocol(Protocol):
     refused: str | None
 
 
+class BinsProtocol(Protocol):
+    """Bins of rows as arrays by signal, oldest first."""
+
+    @property
+    def run(self) -> int:
+        """Number of the run."""
+
+    @property
+    def numbers(self) -> list[int]:
+        """Numbers of the bins."""
+
+    @property
+    def rows(self) -> dict[str, NDArray[np.float64]]:
+        """First row of each."""
+
+    @property
+    def low(self) -> dict[str, NDArray[np.float64]]:
+        """Least values."""
+
+    @property
+    def high(self) -> dict[str, NDArray[np.float64]]:
+        """Greatest values."""
+
+
 class BenchProtocol(Protocol):
     """The machine: no call of it waits."""
 
@@ -32,11 +56,17 @@ class BenchProtocol(Protocol):
     def command(self, name: str, /, *, client: str | None = None, **arguments: Any) -> TicketProtocol:
         """Tell it something."""
 
+    def may_command(self, client: str) -> bool:
+        """True if a client operates now."""
+
     def state(self) -> Any:
         """The latest picture."""
 
-    def bounds(self) -> tuple[dict[str, NDArray[np.float64]], dict[str, NDArray[np.float64]]]:
-        """Least and greatest values in short parts of the last seconds, by signal."""
+    def bins(self, after: int = -1) -> BinsProtocol:
+        """Rows of the last minute in bins with a number above `after`."""
+
+    def captured(self) -> dict[str, NDArray[np.float64]]:
+        """Every row of the completed capture, by signal."""
 
     def command_line(self) -> str:
         """The present settings as a command line."""
@@ -55,6 +85,8 @@ class FieldSetting:
     meaning: str
     choices: tuple[str, ...] = ()
     """Valid values, if they are a list."""
+    range: tuple[float, float] | None = None
+    """Range of a slider for each of its numbers, if they are numbers."""
 
 
 @dataclass(frozen=True)
@@ -69,7 +101,9 @@ class Choices:
         Fields of a shape of trajectory, by its name, with their defaults.
     read : callable
         Value of a text for a field, as the command line reads it.
-    scenarios, shapes, laws : sequence of str
+    scenarios, laws, runs : callable
+        Names of those of the package and of the folder; recorded runs of the folder.
+    shapes : sequence of str
         Names.
     limits : (float, float), rad/s and rad/s²
         Limits of the approach to a pose, until others are set.
@@ -80,8 +114,9 @@ class Choices:
     settings: Callable[[], list[FieldSetting]]
     shape: Callable[[str], list[FieldSetting]]
     read: Callable[[str, str], Any]
-    scenarios: Sequence[str]
+    scenarios: Callable[[], Sequence[str]]
     shapes: Sequence[str]
-    laws: Sequence[str]
+    laws: Callable[[], Sequence[str]]
+    runs: Callable[[], Sequence[str]]
     limits: tuple[float, float]
     targets: dict[str, tuple[str, ...]]

@@ -13,6 +13,7 @@ from scipy.spatial.transform import Rotation
 from spheretwin.models.actuator import Actuator
 from spheretwin.viz import theme
 from spheretwin.viz.bench.actuator import actuator_solids, quaternions_along
+from spheretwin.viz.bench.protocols import BinsProtocol
 from spheretwin.viz.scene.solids import Surface
 
 LIGHT = 1.6
@@ -71,7 +72,8 @@ GHOST_OPACITY = 0.3
 # Share of the ball's radius.
 TIP_RADIUS = 0.12
 
-TRAIL_POINTS = 80
+# Points of the path of the tip: 50 a second, as the bins of the history.
+TRAIL_POINTS = 150
 
 SMALLEST_M = 1e-9
 
@@ -92,6 +94,8 @@ class Scene:
         One instance a coil, in the order of the actuator's.
     handle : viser.IcosphereHandle
         The tip of the desired pose, to be dragged.
+    trail_after : int
+        Number of the last bin of the path of the tip.
     """
 
     def __init__(self, api: viser.SceneApi, actuator: Actuator) -> None:
@@ -139,6 +143,7 @@ class Scene:
             cast_shadow=False,
             receive_shadow=False,
         )
+        self._trail_run, self.trail_after = -1, -1
         self._trail: deque[NDArray[np.float64]] = deque(maxlen=TRAIL_POINTS)
         self._line = api.add_line_segments(
             "/trail",
@@ -179,9 +184,18 @@ class Scene:
             self._ghost.wxyz = desired.as_quat(scalar_first=True)
             self.handle.position = desired.as_matrix() @ self._actuator.shaft_tip_m
 
-    def trail(self, q_rad: NDArray[np.float64]) -> None:
-        """Extend the path of the tip."""
-        self._trail.append(_pose(q_rad).as_matrix() @ self._actuator.shaft_tip_m)
+    def trail(self, bins: BinsProtocol) -> None:
+        """Extend the path of the tip by the first rows of bins; start again with another run."""
+        if bins.run != self._trail_run:
+            self._trail_run, self.trail_after = bins.run, -1
+            self._trail.clear()
+            self._line.points = np.zeros((1, 2, 3), dtype=np.float32)
+            return  # of these bins some may be missing
+        new = _pose(bins.rows["q_rad"][-TRAIL_POINTS:]).as_matrix() @ self._actuator.shaft_tip_m
+        if not len(new):
+            return
+        self.trail_after = bins.numbers[-1]
+        self._trail.extend(new)
         points = np.array(self._trail, dtype=np.float32)
         if len(points) > 1:
             self._line.points = np.stack([points[:-1], points[1:]], axis=1)
@@ -209,16 +223,6 @@ class Scene:
         met = eye_m + (-middle - half if middle < -half else half - middle) * ahead
         x, y, z = met / max(float(np.linalg.norm(met)), SMALLEST_M)
         return [float(np.arctan2(-y, z)), float(np.arcsin(np.clip(x, -1.0, 1.0))), gamma_rad]
-
-    def group_of(self, coil: int | None) -> int | None:
-        """Return the group of a clicked coil by its place; None if there is none."""
-        groups = np.flatnonzero((self._actuator.groups == coil).any(axis=1))
-        return int(groups[0]) if len(groups) else None
-
-    def forget(self) -> None:
-        """Clear the path of the tip."""
-        self._trail.clear()
-        self._line.points = np.zeros((1, 2, 3), dtype=np.float32)
 
     def _coil_colours(self, current_A: NDArray[np.float64], limit_A: float) -> NDArray[np.uint8]:
         of_group = instance_colours(theme.current_colours(current_A, limit_A))

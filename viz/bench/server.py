@@ -3,7 +3,8 @@
 viser accepts every client and every message, and a message may open a tunnel to another host. Its server is
 therefore made with a connection guard: hosts and origins other than this machine are refused (a foreign
 page cannot reach it, nor by a name that it has turned to 127.0.0.1), so is every message that is not a page's
-in form, and the page may load nothing from other hosts.
+in form, and the page may load nothing from other hosts. Other accounts of this machine have no access: a
+browser needs the token of the printed address, and has a cookie from then on.
 """
 
 from __future__ import annotations
@@ -14,8 +15,11 @@ import http
 import io
 import logging
 import socket
+from collections import Counter
+from collections.abc import Callable, Mapping
 from functools import partial
 from typing import Any
+from urllib.parse import parse_qs, parse_qsl, urlsplit
 
 import viser
 import websockets.asyncio.server as servers
@@ -23,22 +27,22 @@ from websockets.datastructures import Headers
 from websockets.http11 import Request, Response
 
 from spheretwin.models.base.errors import InputError, without_breaks
-from spheretwin.viz.bench.viser_internals import (
-    SUBPROTOCOL,
-    ServerArguments,
-    is_page_message,
-    with_guard,
-    with_head,
-)
+from spheretwin.viz.bench.access import Access
+from spheretwin.viz.bench.connections import CONTROL, Control, PageConnection, serve_control
+from spheretwin.viz.bench.viser_internals import SUBPROTOCOL, ServerArguments, with_guard, with_head
 
 HOST = "127.0.0.1"
 
 MOST_PAGES = 64
 
-# A person sends far less; a flood waits in its own socket.
-MOST_MESSAGES_PER_S = 300.0
+CONTROL_PATH = "/control"
 
 LARGEST_MESSAGE = 16_384
+
+NO_ACCESS = (
+    "No access. Open the address with a token that the bench has printed. It works once; after that the bench"
+    " prints a new one."
+)
 
 POLICY = (
     "default-src 'self' data: blob: 'unsafe-inline' 'unsafe-eval' 'wasm-unsafe-eval'; "
@@ -70,7 +74,17 @@ def listen(port: int) -> socket.socket:
     return listening
 
 
-def serve(listening: socket.socket, title: str) -> viser.ViserServer:
+Answers = Mapping[str, Callable[[Mapping[str, str]], bytes]]
+"""Functions that answer the requests of the page's own script, by path; each takes the query."""
+
+
+def serve(
+    listening: socket.socket,
+    title: str,
+    access: Access,
+    control: Control,
+    answers: Answers | None = None,
+) -> viser.ViserServer:
     """Start the server of the page.
 
     Parameters
@@ -79,8 +93,14 @@ def serve(listening: socket.socket, title: str) -> viser.ViserServer:
         Socket from `listen`; the server owns it from now on.
     title : str
         Title of the page.
+    access : Access
+        Decides which browsers are admitted.
+    control : callable
+        Takes STOP and the heartbeats of the pages, see `serve_control`.
+    answers : Answers, optional
+        Answers to requests of the page's own script.
     """
-    guard = partial(_ConnectionGuard, listening, title)
+    guard = partial(_ConnectionGuard, listening, title, access, control, answers or {})
     with with_guard(guard), contextlib.redirect_stdout(io.StringIO()):  # viser prints its address
         server = viser.ViserServer(host=HOST, port=listening.getsockname()[1], verbose=False)
     server.get_event_loop().set_exception_handler(_ignore_exception)
@@ -93,26 +113,36 @@ def stop(server: viser.ViserServer) -> None:
         server.stop()
 
 
-def address(server: viser.ViserServer) -> str:
-    """Return the address of the page."""
-    return f"http://{HOST}:{server.get_port()}"
+def address(server: viser.ViserServer, access: Access) -> str:
+    """Return the address of the page for the next browser."""
+    return f"http://{HOST}:{server.get_port()}/?token={access.token}"
 
 
 class _ConnectionGuard(servers.serve):
     """Connection guard: the server that viser starts in place of its own."""
 
-    def __init__(self, listening: socket.socket, title: str, arguments: ServerArguments) -> None:
+    def __init__(
+        self,
+        listening: socket.socket,
+        title: str,
+        access: Access,
+        control: Control,
+        answers: Answers,
+        arguments: ServerArguments,
+    ) -> None:
         port = listening.getsockname()[1]
+        self._access, self._control = access, control
+        self._select = arguments.select_subprotocol
         self._hosts = {f"{name}:{port}" for name in (HOST, "localhost")}
-        self._title, self._serve_file = title, arguments.process_request
-        self._pages = 0
+        self._title, self._answers, self._serve_file = title, answers, arguments.process_request
+        self._sockets: Counter[str] = Counter()
         super().__init__(
             self._counted(arguments.handler),
             sock=listening,
             process_request=self._answer,
             subprotocols=arguments.subprotocols,
-            select_subprotocol=arguments.select_subprotocol,
-            create_connection=_PageConnection,
+            select_subprotocol=self._select_subprotocol,
+            create_connection=PageConnection,
             max_size=LARGEST_MESSAGE,
             compression=None,
             # A browser opens spare sockets that send nothing: they must not delay the end.
@@ -124,13 +154,19 @@ class _ConnectionGuard(servers.serve):
 
     def _counted(self, handler: Any) -> Any:
         async def counted(connection: Any) -> None:
-            self._pages += 1
+            self._sockets[connection.subprotocol] += 1
             try:
-                await handler(connection)
+                if connection.subprotocol == CONTROL:
+                    await serve_control(connection, self._control)
+                else:
+                    await handler(connection)
             finally:
-                self._pages -= 1
+                self._sockets[connection.subprotocol] -= 1
 
         return counted
+
+    def _select_subprotocol(self, connection: Any, offered: Any) -> Any:
+        return CONTROL if CONTROL in offered else self._select(connection, offered)
 
     def _answer(self, connection: Any, request: Request) -> Response | None:
         hosts = request.headers.get_all("Host")
@@ -138,6 +174,10 @@ class _ConnectionGuard(servers.serve):
             return _refusal(http.HTTPStatus.MISDIRECTED_REQUEST)
         if any(origin not in self._origins() for origin in request.headers.get_all("Origin")):
             return _refusal(http.HTTPStatus.FORBIDDEN)
+        if token := parse_qs(urlsplit(request.path).query).get("token"):
+            return self._redirection(request, token[0])
+        if not self._access.admits(request.headers.get_all("Cookie")):
+            return _refusal(http.HTTPStatus.FORBIDDEN, NO_ACCESS)
         if request.headers.get_all("Upgrade"):
             return self._admission(request)
         return self._file(connection, request, hosts[0])
@@ -145,13 +185,30 @@ class _ConnectionGuard(servers.serve):
     def _origins(self) -> set[str]:
         return {f"http://{host}" for host in self._hosts}
 
+    def _redirection(self, request: Request, token: str) -> Response:
+        """Admit a browser by the token, and show the page at an address without it."""
+        cookie = self._access.redeem(token)
+        if not cookie and not self._access.admits(request.headers.get_all("Cookie")):
+            return _refusal(http.HTTPStatus.FORBIDDEN, NO_ACCESS)
+        response = _refusal(http.HTTPStatus.SEE_OTHER)
+        response.headers["Location"], response.headers["Cache-Control"] = "/", "no-store"
+        if cookie:
+            response.headers["Set-Cookie"] = cookie
+        return response
+
     def _admission(self, request: Request) -> Response | None:
         """Return a refusal, or None if a socket is admitted: its page must have the version of the server."""
-        if request.headers.get_all("Sec-WebSocket-Protocol") != [SUBPROTOCOL]:
+        expected = CONTROL if urlsplit(request.path).path == CONTROL_PATH else SUBPROTOCOL
+        if request.headers.get_all("Sec-WebSocket-Protocol") != [expected]:
             return _refusal(http.HTTPStatus.BAD_REQUEST)
-        return _refusal(http.HTTPStatus.SERVICE_UNAVAILABLE) if self._pages >= MOST_PAGES else None
+        return (
+            _refusal(http.HTTPStatus.SERVICE_UNAVAILABLE) if self._sockets[expected] >= MOST_PAGES else None
+        )
 
     def _file(self, connection: Any, request: Request, host: str) -> Response:
+        path, _, query = request.path.partition("?")
+        if answer := self._answers.get(path):
+            return _data(answer(dict(parse_qsl(query))))
         plain = Request(request.path, Headers())
         try:
             response = self._serve_file(connection, plain)
@@ -170,25 +227,17 @@ class _ConnectionGuard(servers.serve):
         return response
 
 
-class _PageConnection(servers.ServerConnection):
-    """Socket of a page: it passes only messages of the forms of a page, at a limited rate."""
-
-    _due = 0.0
-
-    async def recv(self, decode: bool | None = None) -> Any:
-        while True:
-            raw = await super().recv(decode)
-            now = asyncio.get_running_loop().time()
-            self._due = max(self._due + 1 / MOST_MESSAGES_PER_S, now - 1.0)
-            if self._due > now:
-                await asyncio.sleep(self._due - now)
-            if isinstance(raw, bytes) and is_page_message(raw):
-                return raw
+def _data(body: bytes) -> Response:
+    headers = {"Content-Type": "application/octet-stream", "Content-Length": str(len(body))}
+    headers |= {"Cache-Control": "no-store", "X-Content-Type-Options": "nosniff", "Connection": "close"}
+    return Response(http.HTTPStatus.OK, "OK", Headers(headers), body)
 
 
-def _refusal(status: http.HTTPStatus) -> Response:
-    body = f"{status.phrase}\n".encode()
-    headers = Headers({"Content-Type": "text/plain", "Content-Length": str(len(body)), "Connection": "close"})
+def _refusal(status: http.HTTPStatus, text: str | None = None) -> Response:
+    body = f"{text or status.phrase}\n".encode()
+    headers = Headers(
+        {"Content-Type": "text/plain; charset=utf-8", "Content-Length": str(len(body)), "Connection": "close"}
+    )
     return Response(status, status.phrase, headers, body)
 
 

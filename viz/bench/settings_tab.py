@@ -10,7 +10,8 @@ import viser
 
 from spheretwin.models.base.errors import InputError
 from spheretwin.viz.bench.event_handlers import Event, EventHandlers, Note, on_press
-from spheretwin.viz.bench.protocols import Choices, FieldSetting
+from spheretwin.viz.bench.gains import GainHistory, GainSliders
+from spheretwin.viz.bench.protocols import BenchProtocol, Choices, FieldSetting
 
 ApplyFields = Callable[[Event, dict[str, str]], None]
 
@@ -121,6 +122,8 @@ class SettingsTab:
         GUI of the server.
     handlers : EventHandlers
         Handlers that send the commands.
+    bench : BenchProtocol
+        Bench whose error is compared.
     choices : Choices
         Fields and laws.
     law, twin : viser.GuiTabHandle
@@ -131,6 +134,7 @@ class SettingsTab:
         self,
         gui: viser.GuiApi,
         handlers: EventHandlers,
+        bench: BenchProtocol,
         choices: Choices,
         law: viser.GuiTabHandle,
         twin: viser.GuiTabHandle,
@@ -141,7 +145,7 @@ class SettingsTab:
         self._laws: Any
         self._gains: Form
         with law:
-            self._law(gui)
+            self._law(gui, bench)
         with twin:
             self._twin(gui)
         self.show()
@@ -153,13 +157,15 @@ class SettingsTab:
 
     def _show(self, settings: list[FieldSetting]) -> None:
         law = next(setting for setting in settings if setting.name == LAW)
-        if self._known_law != law.text:
+        laws = list(dict.fromkeys([*self._choices.laws(), law.text]))
+        if (self._known_law, list(self._laws.options)) != (law.text, laws):
             self._known_law = law.text
-            self._laws.options = list(dict.fromkeys([*self._choices.laws, law.text]))
+            self._laws.options = laws
             self._laws.value = law.text
-        self._gains.show(
-            [setting for setting in settings if _section(setting.name) == "controller" and setting != law]
-        )
+        gains = [setting for setting in settings if _section(setting.name) == "controller"]
+        self._sliders.show([setting for setting in gains if setting.range])
+        self._history.show(gains)
+        self._gains.show([setting for setting in gains if setting != law])
         self._often.show([setting for setting in settings if setting.name in OFTEN])
         section = self._sections.value
         self._fields.show(
@@ -170,15 +176,21 @@ class SettingsTab:
             ]
         )
 
-    def _law(self, gui: viser.GuiApi) -> None:
-        self._laws = gui.add_dropdown("law", self._choices.laws)
-        own = gui.add_text("user law", "", hint="FILE.py:NAME, on this machine")
-        self._handlers.on_change(own)
-        take = gui.add_button("Load user law")
+    def _law(self, gui: viser.GuiApi, bench: BenchProtocol) -> None:
+        self._laws = gui.add_dropdown("law", self._choices.laws(), hint="of the package and of the folder")
+        with gui.add_folder("load law from file", expand_by_default=False):
+            own = gui.add_text("law file", "", hint="FILE.py:NAME, on this machine")
+            self._handlers.on_change(own)
+            take = gui.add_button("Load law from file")
         note = Note(gui, take.order + 0.5)
-        self._handlers.on_change(self._laws, lambda event: self._set(event, LAW, event.target.value, note))
-        on_press(take, lambda event: self._set(event, LAW, own.value, note))
-        self._gains = self._form(gui, "Set gains")
+        self._handlers.on_change(
+            self._laws, lambda event: self._set_gain(event, LAW, event.target.value, note)
+        )
+        on_press(take, lambda event: self._set_gain(event, LAW, own.value, note))
+        self._history = GainHistory(gui, bench, self._set)
+        self._sliders = GainSliders(gui, self._handlers, self._set_gain)
+        with gui.add_folder("all fields of the controller", expand_by_default=False):
+            self._gains = self._form(gui, "Set gains")
         defaults = gui.add_button("Reset gains to defaults")
         on_press(defaults, self._reset_gains)
 
@@ -199,7 +211,7 @@ class SettingsTab:
 
         def set_all(event: Event, fields: dict[str, str]) -> None:
             for name, text in fields.items():
-                self._set(event, name, text, form.note_of(name))
+                self._set_gain(event, name, text, form.note_of(name))
 
         form.on_apply(set_all)
         return form
@@ -209,9 +221,15 @@ class SettingsTab:
             if _section(setting.name) != "controller" or setting.name == LAW:
                 continue
             if setting.default is not None and setting.text != setting.default:
-                self._set(event, setting.name, setting.default, self._gains.note_of(setting.name))
+                self._set_gain(event, setting.name, setting.default, self._gains.note_of(setting.name))
 
-    def _set(self, event: Event, name: str, text: str, note: Note) -> None:
+    def _set_gain(self, event: Event, name: str, text: str, note: Note | None = None) -> None:
+        """Set a field so that the change can be undone, if it is one of the controller."""
+        if _section(name) == "controller":
+            self._history.note(name)
+        self._set(event, name, text, note)
+
+    def _set(self, event: Event, name: str, text: str, note: Note | None = None) -> None:
         try:
             value = self._choices.read(name, text)
         except InputError as error:

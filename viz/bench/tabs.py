@@ -1,18 +1,13 @@
-"""Tabs of the bench's page for faults and files, and its curves."""
+"""Tabs of the bench's page for faults and files."""
 
 from __future__ import annotations
 
-from collections import deque
 from html import escape
 from typing import Any
 
-import numpy as np
 import viser
-from numpy.typing import NDArray
 
 from spheretwin.models.base.errors import InputError
-from spheretwin.models.telemetry.signals import ANGLES
-from spheretwin.viz import theme
 from spheretwin.viz.bench.event_handlers import Event, EventHandlers, Note, on_press
 from spheretwin.viz.bench.protocols import BenchProtocol, Choices
 
@@ -36,9 +31,9 @@ class FaultsTab:
         target = gui.add_dropdown("target", list(targets), initial_value=first)
         mode: Any = gui.add_dropdown("mode", list(targets[first]), initial_value=targets[first][0])
         value = gui.add_text("value", "", hint="if the mode has one")
-        detection = gui.add_checkbox("detection", False, hint="the controller detects the fault itself")
+        detection = gui.add_checkbox("detect", False, hint="the fault detector is on")
         reported = gui.add_checkbox(
-            "reported to controller", False, hint="the controller receives the fault and its group"
+            "report to controller", False, hint="the allocation receives the fault and its group"
         )
         add = gui.add_button("Add from now on", color="orange")
         note = Note(gui, add.order + 0.5)
@@ -100,22 +95,33 @@ class FilesTab:
     def __init__(
         self, gui: viser.GuiApi, handlers: EventHandlers, bench: BenchProtocol, choices: Choices
     ) -> None:
+        self._choices = choices
+        self._scenarios: Any
         with gui.add_folder("record"):
             recording = gui.add_text("recording", "bench.rrd", hint="for Rerun; empty for none")
             telemetry = gui.add_text("telemetry", "bench.parquet", hint="can be replayed; empty for none")
+            rate: Any = gui.add_dropdown(
+                "rate", list(RATES), hint="rows of the recording a second, and extremes and events"
+            )
             record = gui.add_button("Record from now on", color="red")
-            for line in (recording, telemetry):
+            for line in (recording, telemetry, rate):
                 handlers.on_change(line)
             note = Note(gui, record.order + 0.5)
 
             def begin(event: Event) -> None:
                 files = {"recording": recording.value.strip(), "telemetry": telemetry.value.strip()}
-                handlers.send(event, "record", note, **{kind: file for kind, file in files.items() if file})
+                given: dict[str, Any] = {kind: file for kind, file in files.items() if file}
+                rate_Hz = RATES[rate.value]
+                if rate_Hz and "recording" in given:
+                    given["rate_Hz"] = rate_Hz
+                handlers.send(event, "record", note, **given)
 
             on_press(record, begin)
             handlers.button(gui, "Stop and complete the files", "keep")
         with gui.add_folder("scenario"):
-            source = gui.add_dropdown("restart with", choices.scenarios)
+            source = self._scenarios = gui.add_dropdown(
+                "restart with", choices.scenarios(), hint="of the package and of the folder"
+            )
             load = gui.add_button("Load")
             file = gui.add_text("save as", "bench.toml")
             save = gui.add_button("Save the present settings")
@@ -145,6 +151,14 @@ class FilesTab:
 
             on_press(self._snapshots, go_back)
 
+    def renew(self) -> None:
+        """List the scenarios of the folder."""
+        scenarios = list(self._choices.scenarios())
+        if list(self._scenarios.options) != scenarios:
+            value = self._scenarios.value
+            self._scenarios.options = scenarios
+            self._scenarios.value = value if value in scenarios else scenarios[0]
+
     def show(self, state: Any) -> None:
         """List the snapshots."""
         if state.snapshots and tuple(self._snapshots.options) != state.snapshots:
@@ -153,92 +167,14 @@ class FilesTab:
             self._snapshots.visible = bool(state.snapshots)
 
 
-Array = NDArray[np.float64]
-
 # A group of buttons needs at least one button.
 NONE_YET = ("",)
 
-
-HEIGHT = 125
-
-# Points of a curve: what a narrow panel can show.
-MOST_POINTS = 150
-
-_INK, _LINES = "#adb5bd", "#343a40"
-
-
-class CurvesPanel:
-    """Curves over the last seconds.
-
-    Parameters
-    ----------
-    gui : viser.GuiApi
-        In the container they are to be in.
-    """
-
-    def __init__(self, gui: viser.GuiApi) -> None:
-        self._error = _plot(gui, "error, mrad: bounds of all ticks", ANGLES, bounds=True)
-        self._torque = _plot(gui, "command, N·m: bounds of all ticks", ANGLES, bounds=True)
-        self._temperature = _plot(gui, "warmest winding, °C", ("T",))
-        self._temperature.visible = False
-        self._warmest: deque[tuple[float, float]] = deque(maxlen=MOST_POINTS)
-
-    def warm(self, t_s: float, temperature_C: tuple[float, ...] | None) -> None:
-        """Draw the temperature of the warmest winding, if the hardware models it."""
-        if temperature_C is None:
-            self._temperature.visible = False
-            return
-        if self._warmest and t_s <= self._warmest[-1][0]:  # another run
-            self._warmest.clear()
-        self._warmest.append((t_s, max(temperature_C)))
-        if len(self._warmest) > 1:
-            self._temperature.data = tuple(np.array(self._warmest).T.copy())
-            self._temperature.visible = True
-
-    def show(self, low: dict[str, Array], high: dict[str, Array]) -> None:
-        """Draw the bounds of all ticks, as a bench has them: a band for each axis."""
-        count = len(low["t_s"]) if low else 0
-        if count < 2:
-            return
-        starts = np.arange(0, count, -(-count // MOST_POINTS))
-        for plot, name, factor in ((self._error, "error_rad", 1e3), (self._torque, "torque_command_Nm", 1.0)):
-            least = factor * np.minimum.reduceat(low[name], starts)
-            most = factor * np.maximum.reduceat(high[name], starts)
-            columns = (column for pair in zip(least.T, most.T, strict=True) for column in pair)
-            plot.data = (low["t_s"][starts], *map(np.ascontiguousarray, columns))
-
-
-def _plot(
-    gui: viser.GuiApi, title: str, names: tuple[str, ...], *, bounds: bool = False
-) -> viser.GuiUplotHandle:
-    """Return a plot with a line for each name, or with two and the band between them."""
-    nothing = np.array([0.0, 1.0])
-    colours = ["rgb({},{},{})".format(*colour) for colour in theme.AXIS_COLOURS[: len(names)]]
-    curves: Any = tuple(
-        {"label": f"{name}{end}", "stroke": colour, "width": 1.0 if end else 1.5, "points": {"show": False}}
-        for name, colour in zip(names, colours, strict=True)
-        for end in ((" min", " max") if bounds else ("",))
-    )
-    bands: Any = tuple(
-        {"series": (2 * place + 2, 2 * place + 1), "fill": "rgba({},{},{},0.5)".format(*colour)}
-        for place, colour in enumerate(theme.AXIS_COLOURS[: len(names)])
-    )
-    axis = {
-        "stroke": _INK,
-        "grid": {"stroke": _LINES, "width": 1},
-        "ticks": {"stroke": _LINES},
-        "font": "10px sans-serif",
-    }
-    axes: Any = tuple({**axis, "size": size} for size in (32, 44))
-    return gui.add_uplot(
-        data=(nothing, *(np.zeros(2) for _ in curves)),
-        series=({"label": "s"}, *curves),
-        bands=bands if bounds else None,
-        title=title,
-        scales={"x": {"time": False}},
-        axes=axes,
-        legend={"show": True, "live": False},
-        cursor={"show": False},
-        height=HEIGHT,
-        padding=(2, 8, 0, 0),
-    )
+# Rows of a recording per second, in addition to extremes and events.
+RATES: dict[str, float | None] = {
+    "all rows": None,
+    "500 Hz": 500.0,
+    "200 Hz": 200.0,
+    "60 Hz": 60.0,
+    "10 Hz": 10.0,
+}

@@ -7,8 +7,13 @@ viser has no options for what the bench needs here, and each of these may change
 - The messages of a page are compared with copies of their forms, as viser decodes any message, and some of
   them open a tunnel to another host. A message that has changed is ignored: its control has no effect.
 - The subprotocol contains the version of viser. After a change no page is admitted.
+- The handler of changed values is replaced: a page that does not operate must not change what another page
+  sends. After a change the bench does not start.
 - Title, head and class names of the page set its title, its keys and the place of notifications. After a
   change the page has the title and the keys of viser.
+- The scripts of the bench send their commands with `__viserMutable.sendMessage` of the page, and place the
+  marks of the coils by its `camera` and by the root of `__viserSceneTree`. After a change the buttons of the
+  bar have no effect, or the coils have no marks and no menus.
 
 `pyproject.toml` bounds the versions; `tests/viz/bench/test_viser_internals.py` names what has changed.
 """
@@ -23,7 +28,9 @@ from typing import Annotated, Any, NamedTuple, Union
 
 import msgspec
 import viser
+import viser._messages as messages
 import websockets.asyncio.server as servers
+from viser.infra import ClientId
 
 from spheretwin.models.base.errors import SpheretwinError
 
@@ -80,14 +87,19 @@ TITLE = b"<title>Viser</title>"
 """Title of the page, as viser serves it."""
 
 
-def with_head(page: bytes, title: str) -> bytes:
-    """Return the page with another title and with the style and the script of `page_head.html`.
+CLIENT_FILES = ("bench.css", "bar.js", "coils.js", "plots.js")
+"""Style and scripts of the bar, the marks of the coils, and the plots."""
 
-    A key that is let go over a button would press it, and the space bar is STOP wherever it is pressed.
-    viser's camera listens to keys too, at the document, after its commands: an arrow moves the twin only.
-    Notifications are at the bottom, where they hide nothing.
+
+def with_head(page: bytes, title: str) -> bytes:
+    """Return the page with another title, and with styles and scripts of the bench.
+
+    The script is the first one of the page: it sees a key before any control does. Notifications are at the
+    bottom, where they hide nothing.
     """
+    style, *scripts = (Path(__file__).with_name(name).read_text(encoding="utf-8") for name in CLIENT_FILES)
     added = Path(__file__).with_name("page_head.html").read_text(encoding="utf-8").rstrip()
+    added += f"<style>{style}</style>" + "".join(f"<script>{script}</script>" for script in scripts)
     head = f"<head><title>{title}</title>{added}".encode()
     return page.replace(TITLE, b"").replace(b"<head>", head, 1)
 
@@ -171,10 +183,50 @@ MESSAGES = (_Camera, _Update, _Command, _Submission, _Edit, _Click, _Drag)
 _PAGES: msgspec.msgpack.Decoder[Any] = msgspec.msgpack.Decoder(Union[MESSAGES])  # noqa: UP007
 
 
-def is_page_message(raw: bytes) -> bool:
-    """True if a message of a socket has the form of a page's message."""
+def moved_thing(raw: bytes) -> object | None:
+    """Return a key of what a message moves, as a slider, the camera or the tip: a later one replaces it.
+
+    A message that is no move has a key of its own. None unless it has the form of a page's message.
+    """
     try:
-        _PAGES.decode(raw)
+        message = _PAGES.decode(raw)
     except (msgspec.MsgspecError, UnicodeDecodeError, RecursionError):
-        return False
-    return True
+        return None
+    match message:
+        case _Camera():
+            return _Camera
+        case _Drag(phase="update", name=name):
+            return _Drag, name
+        case _Update(uuid=uuid, updates=_Value(value=float() | list())):
+            return _Update, uuid
+    return object()
+
+
+def guard_values(server: viser.ViserServer, accepts: Callable[[viser.GuiEvent], bool]) -> None:
+    """Let only some pages change the values of the controls; the others get the present value back.
+
+    viser changes a value, and sends it to all pages, before any callback can refuse it, also for a socket
+    that never becomes a page.
+
+    Parameters
+    ----------
+    server : viser.ViserServer
+    accepts : callable
+        Takes the event of a change.
+    """
+    gui, interface = server.gui, server.gui._websock_interface
+
+    async def handle(number: ClientId, message: messages.GuiUpdateMessage) -> None:
+        control = gui._gui_input_handle_from_uuid.get(message.uuid)
+        client = server.get_clients().get(number)
+        if control is None or client is None:
+            return
+        if control._impl.is_button or accepts(viser.GuiEvent(client, number, control)):
+            await gui._handle_gui_updates(number, message)
+        else:
+            client.gui._websock_interface.queue_message(
+                messages.GuiUpdateMessage(message.uuid, {"value": control._impl.value})
+            )
+
+    interface.unregister_handler(messages.GuiUpdateMessage, gui._handle_gui_updates)
+    interface.register_handler(messages.GuiUpdateMessage, handle)

@@ -62,7 +62,7 @@ def test_a_value_is_refused_in_the_words_of_the_command_line(common, name, value
 
 
 @pytest.mark.parametrize(
-    ("name", "arguments", "told"),
+    ("name", "arguments", "message"),
     [
         ("steer", {}, "bench: expected one of start, "),
         ("stpo", {}, "did you mean stop?"),
@@ -93,15 +93,15 @@ def test_a_value_is_refused_in_the_words_of_the_command_line(common, name, value
         ("record", {"telemetry": "/no/such/folder/run.parquet"}, "expected a writable path"),
         ("keep", {}, "expected a recording to keep"),
         ("replay", {"file": "/no/such/run.parquet"}, "/no/such/run.parquet"),
-        ("load", {"source": "nowhere"}, "expected hold, nutation"),
+        ("load", {"source": "nowhere"}, "expected bench, hold, nutation"),
         ("save", {"file": "/no/such/folder/s.toml"}, "expected a writable path"),
     ],
 )
-def test_a_command_that_cannot_be_done_is_refused_in_one_line(common, name, arguments, told):
+def test_a_command_that_cannot_be_done_is_refused_in_one_line(common, name, arguments, message):
     before = common.state()
     ticket = common.command(name, **arguments)
     common.advance(0)
-    assert told in ticket.refused
+    assert message in ticket.refused
     assert "\n" not in ticket.refused
     after = common.state()
     assert (after.mode, after.journal, after.tick) == (before.mode, before.journal, before.tick)
@@ -208,7 +208,7 @@ def test_faults_come_and_go():
 
 
 def test_a_run_that_ends_leaves_a_bench_that_a_reset_brings_back():
-    with begun() as made:
+    with begun(plant__end_stops__on=False) as made:
         done(made, "set", name="disturbance.load", value=3.0)
         done(made, "off")
         made.advance(4000)
@@ -230,7 +230,7 @@ def test_a_run_that_ends_leaves_a_bench_that_a_reset_brings_back():
 
 @pytest.mark.parametrize("reset", [False, True])
 def test_a_snapshot_brings_back_a_run_that_has_ended_and_one_before_a_reset(reset):
-    with begun() as made:
+    with begun(plant__end_stops__on=False) as made:
         made.advance(50)
         done(made, "point", **MODES["point"])
         made.advance(50)
@@ -329,8 +329,8 @@ def test_the_number_of_snapshots_is_bounded_and_a_name_can_be_used_again():
     with bench() as made:
         for place in range(16):
             done(made, "snapshot", name=f"{place}")
-        told = "bench: expected at most 16 snapshots, received one more"
-        assert said(made, "snapshot", name="16") == told
+        message = "bench: expected at most 16 snapshots, received one more"
+        assert said(made, "snapshot", name="16") == message
         done(made, "snapshot", name="15")
         assert made.state().snapshots == tuple(f"{place}" for place in range(16))
 

@@ -106,8 +106,8 @@ def test_a_changed_field_of_the_trajectory_keeps_its_phase():
 def test_a_pose_out_of_range_is_refused_and_nothing_changes():
     with begun() as bench:
         before = bench.state()
-        told = said(bench, "point", pose_rad=[0.0, 1.39, 0.0])
-        assert told == "bench: expected β from -1.34626 to 1.34626 rad, received 1.39"
+        refusal = said(bench, "point", pose_rad=[0.0, 1.39, 0.0])
+        assert refusal == "bench: expected β from -1.34626 to 1.34626 rad, received 1.39"
         assert (bench.state().mode, bench.state().journal) == (before.mode, before.journal)
 
 

@@ -60,9 +60,9 @@ def test_a_closed_bench_has_completed_its_files_and_holds_none_of_them(tmp_path)
 
 
 def test_a_file_that_begins_during_a_run_can_be_reviewed(files):
-    told = run_summary.figures(reviewed.read(files[1]))
-    assert told["rows"] == 500
-    assert told["status"] == "completed"
+    summary = run_summary.figures(reviewed.read(files[1]))
+    assert summary["rows"] == 500
+    assert summary["status"] == "completed"
 
 
 def test_no_file_is_left_of_a_recording_that_is_refused(tmp_path):
@@ -105,7 +105,7 @@ def test_a_replay_pauses_the_twin(files, place):
             for name in ("q_rad", "q_ref_rad", "error_rad", "torque_Nm", "current_A"):
                 assert getattr(state, name) == tuple(rows[name][shown - 1])
             assert state.t_s == rows["t_s"][shown - 1]
-        np.testing.assert_array_equal(made.history()["q_rad"], rows["q_rad"][:300:20])
+        np.testing.assert_array_equal(made.bins().rows["q_rad"], rows["q_rad"][:300:20])
         assert made.advance(1000) == 200
         assert not made.state().running
         # Back at the twin, which did not move.
@@ -136,10 +136,10 @@ SETTINGS = [
 
 
 def test_the_settings_are_written_down_and_read_again_are_the_same(tmp_path):
-    path = tmp_path / "mine.toml"
     with begun() as made:
         made.advance(30)
         for name, value in SETTINGS:
+            path = tmp_path / f"{name}.toml"
             done(made, "set", name=name, value=value)
             done(made, "jog", rates_rad_s=[0.0, 0.1, 0.0])
             made.advance(3)

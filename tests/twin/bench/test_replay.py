@@ -117,7 +117,7 @@ def ran(tmp_path, name, *, chunk, looked=False, refused=False):
             while left:
                 left -= made.advance(min(chunk, left))
                 if looked:
-                    made.state(), made.history(), made.fields(), made.command_line(), made.scenario_toml()
+                    made.state(), made.bins(), made.fields(), made.command_line(), made.scenario_toml()
                 if refused:
                     assert said(made, "set", name="disturbance.load", value="heavy")
                     assert said(made, "set", name="no.such.field", value=1)
@@ -147,7 +147,7 @@ def test_a_twin_in_a_thread_runs_what_is_commanded_as_one_without(tmp_path):
             ("pause", {}),
             ("keep", {}),
         ]:
-            assert made.command(name, **arguments).wait(60) is None
+            assert made.command(name, **arguments).wait(60) == "done"
     assert len(kept_rows(path)) > 0
     assert same_when_replayed(path)
 

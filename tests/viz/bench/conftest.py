@@ -12,5 +12,5 @@ def bench():
 
 @pytest.fixture
 def page(bench):
-    with fake.shown(bench) as found:
-        yield found
+    with fake.shown(bench) as result:
+        yield result

@@ -6,6 +6,7 @@ from types import SimpleNamespace
 
 import numpy as np
 
+from spheretwin.bench.history import Bins
 from spheretwin.models import actuator as actuators
 from spheretwin.models.base.errors import InputError
 from spheretwin.viz.bench import server
@@ -18,6 +19,7 @@ STATE = {
     "mode": "hold",
     "running": True,
     "stopped": False,
+    "stop_mode": "off",
     "scenario": "hold",
     "law": "afsm",
     "shape": "hold",
@@ -30,6 +32,7 @@ STATE = {
     "q_ref_rad": (0.1, -0.1, 0.3),
     "error_mrad": 100.0,
     "error_deg": 5.7296,
+    "current_command_A": (0.0,) * GROUPS,
     "current_A": tuple(np.linspace(-2.0, 2.0, GROUPS)),
     "current_limit_A": 8.0,
     "temperature_C": None,
@@ -38,7 +41,19 @@ STATE = {
     "rank_lost": False,
     "status": "running",
     "reason": None,
+    "chatter_A_s": 12.3,
     "faults": (),
+    "active_faults": (),
+    "failed_groups": (),
+    "limits": (2.0, 20.0),
+    "pose_rad": None,
+    "jog_rates_rad_s": (0.0, 0.0, 0.0),
+    "manual_currents_A": None,
+    "replay_file": None,
+    "replay_range_s": None,
+    "capture": "off",
+    "capture_t_s": None,
+    "allocation": "projected",
     "pending": (),
     "snapshots": (),
     "recording": (),
@@ -58,6 +73,7 @@ class Bench:
     def __init__(self, refused=(), **state):
         self.told, self.refused = [], dict(refused)
         self.now = SimpleNamespace(**STATE | state)
+        self.run, self.capture = 1, {}
         self._lock = threading.Lock()
 
     def command(self, name, /, *, client=None, **arguments):
@@ -72,6 +88,9 @@ class Bench:
                 self.now.operator = None
         return SimpleNamespace(done=True, refused=self.refused.get(name))
 
+    def may_command(self, client):
+        return client == self.now.operator
+
     def commands(self):
         """Names and arguments of what it was told, but for who is there."""
         return [(name, given) for name, _, given in self.told if name not in ("hello", "leave")]
@@ -79,11 +98,24 @@ class Bench:
     def state(self):
         return self.now
 
-    def bounds(self):
-        t_s = np.linspace(0.0, 1.0, 50)
+    def bins(self, after=-1):
+        numbers = [number for number in range(50) if number > after]
+        t_s = 0.02 * np.array(numbers, dtype=float)
         angles = np.stack([np.sin(t_s), np.cos(t_s), t_s], axis=1)
-        low = {"t_s": t_s, "error_rad": 1e-3 * angles, "torque_command_Nm": angles}
-        return low, {name: values + 0.5 for name, values in low.items()}
+        rows = {
+            "t_s": t_s[:, None],
+            "q_rad": angles,
+            "q_ref_rad": angles + 0.01,
+            "error_rad": 1e-3 * angles,
+            "torque_command_Nm": angles,
+            "current_A": t_s[:, None] * np.arange(GROUPS),
+            "coil_temperature_degC": np.full((len(numbers), GROUPS), np.nan),
+        }
+        high = {name: values + (0.5 if name != "t_s" else 0.0) for name, values in rows.items()}
+        return Bins(self.run, numbers, rows, rows, high)
+
+    def captured(self):
+        return self.capture
 
     def command_line(self):
         return "spheretwin simulate hold"
@@ -91,7 +123,7 @@ class Bench:
 
 SETTINGS = [
     FieldSetting("controller.law", "afsm", "afsm", "law", ("pd", "afsm")),
-    FieldSetting("controller.stiffness", "4 4 4", "1 1 1", "stiffness, N·m/rad"),
+    FieldSetting("controller.stiffness", "4 4 4", "1 1 1", "stiffness, N·m/rad", range=(0.0, 8.0)),
     FieldSetting("controller.known", "true", "false", "whether"),
     FieldSetting("disturbance.load", "0", "0", "load"),
     FieldSetting("plant.step_s", "0.0005", "0.0005", "physics step, s"),
@@ -108,9 +140,10 @@ CHOICES = Choices(
     settings=lambda: SETTINGS,
     shape=lambda name: [FieldSetting("amplitude", "0.2", "0.2", "rad")] if name == "sinusoid" else [],
     read=read,
-    scenarios=("hold", "nutation"),
+    scenarios=lambda: ("hold", "nutation"),
     shapes=("hold", "sinusoid"),
-    laws=("pd", "afsm"),
+    laws=lambda: ("pd", "afsm"),
+    runs=lambda: ("run.parquet",),
     limits=(2.0, 20.0),
     targets={"coil.00": ("open", "short"), "supply": ("off",)},
 )

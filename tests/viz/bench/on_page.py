@@ -12,7 +12,7 @@ _LINE = "[...document.querySelectorAll('label')].find(each => each.innerText == 
 def opened(browser, page, size=None):
     """A page of the bench that is served, once it shows its state."""
     tab = browser.open(page.address, size)
-    tab.wait_for(f"{STATUS} !== null")
+    tab.wait_for(f"{STATUS}?.innerText && bench.page() !== undefined")
     return tab
 
 
@@ -43,17 +43,27 @@ def on_screen(page, tab, point_m):
     right, down, ahead = R_SC.T @ (np.array(point_m) - camera.position)
     left, top, width, height = tab.evaluate(
         "(box => [box.x, box.y, box.width, box.height])"
-        "(document.querySelector('canvas').getBoundingClientRect())"
+        "(document.querySelector('canvas[data-engine]').getBoundingClientRect())"
     )
     focal = height / 2 / np.tan(camera.fov / 2)
     return left + width / 2 + focal * right / ahead, top + height / 2 + focal * down / ahead
+
+
+def show_tab(tab, name):
+    """Show a tab of the panel; other parts of the page may have the same text."""
+    named = f"[...document.querySelectorAll('[role=tab]')].find((each) => each.innerText == '{name}')"
+    tab.evaluate(f"{named}.id = 'tab {name}'")
+    tab.click(f"[id='tab {name}']")
+    tab.wait_for(f"{named}.getAttribute('aria-selected') == 'true'")
 
 
 def write(tab, label, text):
     """Write into the line of a label in place of what is there."""
     line = f"{_LINE % label}.parentElement.parentElement.parentElement.querySelector('input')"
     tab.wait_for(f"{_LINE % label} !== undefined")
-    tab.evaluate(f"{line}.focus(), {line}.select()")
+    # A line in a folder that is opening cannot have the focus yet.
+    tab.wait_for(f"({line}.focus(), document.activeElement === {line})")
+    tab.evaluate(f"{line}.select()")
     if text:
         tab.write(text)
     else:

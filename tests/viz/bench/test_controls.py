@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from spheretwin.viz.bench.modes_tab import FASTEST_JOG_DEG_S
-from spheretwin.viz.bench.page import SPEEDS
 from tests.viz.bench import fake
 from tests.waiting import wait_for
 
@@ -14,10 +13,10 @@ AXES = "αβγ"
 @pytest.fixture
 def controls(page):
     """Controls by their labels; of several with one label the first."""
-    found = {}
+    results = {}
     for handle in page._server.gui._gui_input_handle_from_uuid.values():
-        found.setdefault(handle.label, handle)
-    return found
+        results.setdefault(handle.label, handle)
+    return results
 
 
 def test_sliders_have_the_limits_of_their_quantities(controls, bench):
@@ -45,10 +44,9 @@ def test_sliders_of_angles_show_the_desired_pose(controls, bench):
 
 def test_lists_have_the_choices_and_the_active_one(controls):
     for label, options, value in (
-        ("speed", tuple(SPEEDS), "1×"),
         ("shape", fake.CHOICES.shapes, "hold"),
-        ("restart with", fake.CHOICES.scenarios, fake.CHOICES.scenarios[0]),
-        ("law", fake.CHOICES.laws, "afsm"),
+        ("restart with", fake.CHOICES.scenarios(), fake.CHOICES.scenarios()[0]),
+        ("law", fake.CHOICES.laws(), "afsm"),
         ("target", tuple(fake.CHOICES.targets), "coil.00"),
         ("section", ("plant",), "plant"),
     ):
@@ -64,11 +62,6 @@ def test_lists_have_the_choices_and_the_active_one(controls):
         ("step_s", "0.0005"),
     ):
         assert controls[label].value == value, label
-
-
-def test_speeds_are_the_factors_of_their_names():
-    for name, factor in SPEEDS.items():
-        assert factor == (1e6 if name == "as fast as possible" else float(name.removesuffix("×")))
 
 
 def test_faults_are_listed_as_text_from_0_on(page, bench):
@@ -91,18 +84,27 @@ def test_snapshots_can_be_chosen_when_there_are_some(page, bench, controls):
     wait_for(lambda: not buttons.visible)
 
 
-def test_curves_and_currents_are_those_of_the_bench(page, bench):
-    wait_for(lambda: "at most 2.00 A" in page._currents.content)
-    low, high = bench.bounds()
-    wait_for(lambda: len(page._plots._error.data[0]) == len(low["t_s"]))
-    t_s, *bounds = page._plots._error.data
-    np.testing.assert_allclose(t_s, low["t_s"])
-    for axis in range(3):
-        np.testing.assert_allclose(bounds[2 * axis], 1e3 * low["error_rad"][:, axis])
-        np.testing.assert_allclose(bounds[2 * axis + 1], 1e3 * high["error_rad"][:, axis])
-    assert not page._plots._temperature.visible
-    for t_s, temperature_C in ((2.0, 41.0), (3.0, 43.0)):
-        bench.now.temperature_C, bench.now.t_s = (20.0, temperature_C), t_s
-        wait_for(lambda t_s=t_s: page._shown_s == t_s)
-    wait_for(lambda: page._plots._temperature.visible)
-    assert [column.tolist() for column in page._plots._temperature.data] == [[2.0, 3.0], [41.0, 43.0]]
+def test_controls_follow_commands_from_elsewhere(controls, bench):
+    bench.now.limits = (0.7, 9.0)
+    bench.now.mode, bench.now.jog_rates_rad_s = "jog", (0.0, np.radians(12.0), 0.0)
+    wait_for(lambda: controls["rate, rad/s"].value == 0.7)
+    wait_for(lambda: controls["acceleration, rad/s²"].value == 9.0)
+    wait_for(lambda: controls["β, °/s"].value == 12.0)
+    bench.now.mode, bench.now.pose_rad = "point", (0.2, -0.3, 0.5)  # of a script
+    wait_for(lambda: controls["β, °"].value == round(np.degrees(-0.3), 1))
+    bench.now.pose_rad = None
+    bench.now.mode, bench.now.manual_currents_A = "manual", (0.0,) * 3 + (1.25,) + (0.0,) * 14
+    wait_for(lambda: (controls["03, A"].value, controls["β, °/s"].value) == (1.25, 0.0))
+    bench.now.mode = "replay"
+    bench.now.replay_file, bench.now.replay_range_s, bench.now.t_s = "/other/run.rrd", (1.0, 7.0), 3.5
+    scrubber = controls["time, s"]
+    wait_for(lambda: scrubber.visible)
+    wait_for(lambda: (scrubber.min, scrubber.max, scrubber.value) == (1.0, 7.0, 3.5))
+    wait_for(lambda: controls["file"].value == "/other/run.rrd")
+    wait_for(lambda: controls["03, A"].value == 0.0)  # a mode ended
+
+
+def test_the_pose_as_numbers_follows_the_desired_pose(page, bench):
+    for axis, angle in zip(AXES, bench.now.q_ref_rad, strict=True):
+        line = page._modes_tab._pose._lines[f"pose.exact {axis}, °"]
+        wait_for(lambda line=line, angle=angle: line.value == f"{np.degrees(angle):.2f}")

@@ -7,9 +7,11 @@ from spheretwin.models.kinematics import rotation
 from spheretwin.viz import theme
 from spheretwin.viz.bench import scene as colours
 from spheretwin.viz.bench import server as front
+from spheretwin.viz.bench.access import Access
 from spheretwin.viz.bench.actuator import CUT, RING_SECTIONS, actuator_solids, quaternions_along
 from spheretwin.viz.bench.scene import Scene
 from spheretwin.viz.scene import solids
+from tests.viz.bench import fake
 
 # Coordinates are single precision: 1e-7 of a length, and of a volume three times that.
 SINGLE = 1e-6
@@ -30,10 +32,10 @@ def is_closed(solid):
     corners = place.reshape(-1)[solid.triangles]
     edges = np.concatenate([corners[:, [0, 1]], corners[:, [1, 2]], corners[:, [2, 0]]])
     edges = edges[edges[:, 0] != edges[:, 1]]  # at the axis
-    found = {}
+    results = {}
     for start, end in edges.tolist():
-        found[start, end] = found.get((start, end), 0) + 1
-    return all(found.get((end, start)) == count for (start, end), count in found.items())
+        results[start, end] = results.get((start, end), 0) + 1
+    return all(results.get((end, start)) == count for (start, end), count in results.items())
 
 
 def polygon(sections):
@@ -123,7 +125,8 @@ def test_quaternions_turn_z_to_each_axis(actuator):
 
 @pytest.fixture
 def scene(actuator):
-    server = front.serve(front.listen(0), "scene")
+    listening = front.listen(0)
+    server = front.serve(listening, "scene", Access(listening.getsockname()[1]), lambda *_: None)
     yield Scene(server.scene, actuator)
     front.stop(server)
 
@@ -172,9 +175,6 @@ def test_both_coils_of_a_group_have_its_colour(scene, actuator):
     colours = np.array(scene.coils.batched_colors)
     (red,) = np.unique(colours[actuator.groups[5]], axis=0)
     assert (colours == red).all(axis=1).sum() == 2
-    assert [scene.group_of(coil) for coil in actuator.groups[5].tolist()] == [5, 5]
-    assert scene.group_of(None) is None
-    assert scene.group_of(99) is None
 
 
 def test_the_stator_has_a_hoop_behind_the_coils_of_each_latitude(actuator):
@@ -186,3 +186,22 @@ def test_the_stator_has_a_hoop_behind_the_coils_of_each_latitude(actuator):
         radius = np.hypot(at[:, 0], at[:, 1])
         angles = np.arctan2(at[:, 1], at[:, 0])[radius < 1.001 * np.sqrt(behind**2 - height**2)]
         assert len(np.unique(angles.round(3))) >= RING_SECTIONS
+
+
+def test_the_path_of_the_tip_is_that_of_the_rows_and_restarts_with_a_run(scene, actuator):
+    """Chunks of any size give the same path: its points are rows of the run, not frames of the page."""
+    bench = fake.Bench()
+    scene.trail(bench.bins(scene.trail_after))
+    for count in (10, 11, 37, 50):
+        bins = bench.bins(scene.trail_after)
+        new = {name: values[: max(0, count - 1 - scene.trail_after)] for name, values in bins.rows.items()}
+        scene.trail(bins._replace(numbers=bins.numbers[: len(new["q_rad"])], rows=new))
+    tips = np.array([rotation(q) @ actuator.shaft_tip_m for q in bench.bins().rows["q_rad"]])
+    drawn = np.array(scene._line.points)
+    assert drawn[:, 0] == pytest.approx(tips[:-1], abs=1e-7)  # single precision, of tenths of a metre
+    assert drawn[:, 1] == pytest.approx(tips[1:], abs=1e-7)
+    bench.run = 2
+    scene.trail(bench.bins(scene.trail_after))
+    assert (np.array(scene._line.points) == 0.0).all()
+    scene.trail(bench.bins(scene.trail_after))
+    assert len(scene._line.points) == len(tips) - 1

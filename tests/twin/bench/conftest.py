@@ -1,0 +1,11 @@
+"""Preparations of a busy machine: a loop may be compiled for longer than a person would wait."""
+
+import pytest
+
+from spheretwin.bench import preparation
+from tests.waiting import PATIENCE_S
+
+
+@pytest.fixture(autouse=True)
+def _patience(monkeypatch):
+    monkeypatch.setattr(preparation, "LIMIT_s", PATIENCE_S)

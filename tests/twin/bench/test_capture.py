@@ -1,0 +1,113 @@
+"""Triggered capture: exactly the rows around an event, for any chunks; its triggers and what is refused."""
+
+import numpy as np
+import pytest
+
+from spheretwin.bench.capture import Capture, Trigger
+from spheretwin.models.base.errors import InputError
+from spheretwin.models.telemetry.signals import Signal, common_signals, width
+from spheretwin.models.telemetry.table import Table
+from tests.twin.bench.cases import begun, done, said
+
+GROUPS = 18
+FAULT = Signal("fault", "1", 2, "failure mode", ("coil.00", "coil.01"))
+
+
+def table(first, last, more=()):
+    signals = (*common_signals(GROUPS), *more)
+    rows = Table(signals, np.zeros((last - first, width(signals))))
+    rows["t_s"][:] = 1e-3 * np.arange(first, last)
+    rows["allocation_scale"][:] = 1.0
+    return rows
+
+
+def captured(trigger, rows, chunk):
+    capture = Capture(trigger, GROUPS, 1e-3)
+    for first in range(0, len(rows), chunk):
+        capture.write(rows.rows(first, min(len(rows), first + chunk)))
+    return capture
+
+
+@pytest.mark.parametrize("chunk", [1, 20, 37, 1000])
+@pytest.mark.parametrize(("edge", "event"), [("rising", 412), ("falling", 460)])
+def test_a_level_captures_the_rows_around_its_crossing(chunk, edge, event):
+    """Above the level from the first row on: only the second time is a crossing."""
+    rows = table(0, 1000)
+    rows["error_rad"][:30, 1] = rows["error_rad"][412:460, 1] = 0.3
+    rows["error_rad"][700:, 1] = 0.4
+    level = 0.2 if edge == "rising" else 0.1
+    trigger = Trigger("level", "error_rad", 1, level, edge, 0.1, 0.25)
+    if edge == "falling":
+        rows["error_rad"][:30, 1] = 0.0
+        rows["error_rad"][30:412, 1] = 0.3
+    capture = captured(trigger, rows, chunk)
+    assert (capture.state, capture.t_s) == ("complete", pytest.approx(1e-3 * event))
+    np.testing.assert_allclose(capture.read()["t_s"].reshape(-1), 1e-3 * np.arange(event - 100, event + 150))
+    np.testing.assert_array_equal(capture.read()["error_rad"], rows["error_rad"][event - 100 : event + 150])
+
+
+@pytest.mark.parametrize("chunk", [1, 20, 1000])
+def test_an_early_event_has_fewer_rows_before_it(chunk):
+    rows = table(0, 500)
+    rows["allocation_scale"][40:60] = 0.7
+    capture = captured(Trigger("saturation", before_s=0.1, length_s=0.2), rows, chunk)
+    np.testing.assert_allclose(capture.read()["t_s"].reshape(-1), 1e-3 * np.arange(0, 140))
+
+
+def test_lost_rank_is_no_saturation():
+    rows = table(0, 100)
+    rows["allocation_scale"][40:60] = 0.0
+    assert captured(Trigger("saturation"), rows, 10).state == "armed"
+
+
+def test_a_fault_that_begins_triggers_also_when_its_columns_are_new():
+    trigger = Trigger("fault", before_s=0.01, length_s=0.03)
+    capture = Capture(trigger, GROUPS, 1e-3)
+    capture.write(table(0, 20))
+    failing = table(20, 60, (FAULT,))
+    failing["fault"][7:, 1] = 2.0
+    capture.write(failing)
+    assert (capture.state, capture.t_s) == ("complete", pytest.approx(0.027))
+    present = Capture(trigger, GROUPS, 1e-3)
+    failing["fault"][:] = 2.0
+    present.write(failing)  # it has begun before
+    assert present.state == "armed"
+
+
+def test_a_capture_without_rows_before():
+    rows = table(0, 100)
+    rows["allocation_scale"][40:] = 0.7
+    capture = captured(Trigger("saturation", before_s=0.0, length_s=0.02), rows, 7)
+    np.testing.assert_allclose(capture.read()["t_s"].reshape(-1), 1e-3 * np.arange(40, 60))
+
+
+@pytest.mark.parametrize(
+    ("trigger", "message"),
+    [
+        (Trigger("level", "eror_rad"), "did you mean error_rad"),
+        (Trigger("level", "error_rad", 3), "expected an entry of error_rad from 0 to 2, received 3"),
+        (Trigger("fault", before_s=2.0, length_s=2.0), "expected before_s from 0 to below length_s"),
+        (Trigger("fault", length_s=1e3), "length_s of at most 50 s"),
+    ],
+)
+def test_a_trigger_that_cannot_act_is_refused(trigger, message):
+    with pytest.raises(InputError, match=message):
+        Capture(trigger, GROUPS, 1e-3)
+
+
+def test_a_bench_captures_every_row_and_arms_again_after_reset():
+    with begun() as made:
+        done(
+            made, "capture", on="level", signal="q_ref_rad", entry=1, level=0.05, before_s=0.02, length_s=0.1
+        )
+        made.advance(400)
+        assert made.state().capture == "complete"
+        rows = made.captured()
+        np.testing.assert_allclose(np.diff(rows["t_s"].reshape(-1)), 1e-3, rtol=1e-9)
+        assert len(rows["t_s"]) == 100
+        np.testing.assert_array_equal(rows["q_ref_rad"][:, 1] > 0.05, np.arange(100) >= 20)
+        assert "expected one of t_s" in said(made, "capture", on="level", signal="height")
+        done(made, "reset")
+        assert (made.state().capture, made.state().capture_t_s, made.captured()) == ("armed", None, {})
+        done(made, "capture", on="off")
+        assert made.state().capture == "off"

@@ -1,0 +1,146 @@
+"""Files and code of the user: outside the threads that serve pages and the loop, and with a time limit."""
+
+import os
+import threading
+import time
+
+import pytest
+
+from spheretwin import scenario as scenarios
+from spheretwin.bench import Bench, preparation
+from spheretwin.bench.folder import Folder
+from spheretwin.bench.preparation import Preparation
+from spheretwin.cli.bench import read, settings_of
+from spheretwin.models.base.errors import InputError
+from tests.twin.bench.cases import QUIET, begun, done, said
+from tests.waiting import PATIENCE_S, wait_for
+
+LAW = """
+import threading
+from spheretwin.control.law import Law
+from spheretwin.control.law_components.parameters import LawParameters
+
+RUN_IN = [threading.current_thread().name]
+
+class Mine(LawParameters):
+    gain: float = 1.0
+
+    def build(self, known):
+        RUN_IN.append(threading.current_thread().name)
+        def step(t, reference, measurement, parameters, state, torque):
+            torque[0] = torque[1] = torque[2] = 0.0 * parameters[0]
+        return Law("mine", step, [self.gain], [])
+"""
+
+
+def test_code_of_the_user_runs_only_in_threads_of_preparations(tmp_path):
+    (file := tmp_path / "law.py").write_text(LAW)
+    scenario = scenarios.load("sinusoid", QUIET)
+    with Bench(scenario, folder=Folder(tmp_path, scenario)) as bench:
+        bench.begin()
+        for name, arguments in (
+            ("set", {"name": "controller.law", "value": read("controller.law", "law.py:Mine")}),
+            ("set", {"name": "controller.gain", "value": 2.0}),
+            ("start", {}),
+            ("set", {"name": "controller.gain", "value": 3.0}),
+            ("off", {}),
+            ("hold", {}),
+            ("reset", {}),
+        ):
+            assert bench.command(name, **arguments).wait(PATIENCE_S) == "done"
+        assert settings_of(bench.fields())  # what the page reads
+        assert bench.state().law == f"{file}:Mine"
+        module = bench._bench_state.driver.session.law.step.__globals__
+        names = module["RUN_IN"]
+    assert len(names) >= 4
+    assert set(names) <= {"prepare set", "prepare reset"}
+
+
+def test_a_file_that_has_changed_meanwhile_is_not_read_in_the_loop(tmp_path, monkeypatch):
+    """The preparation has read it; a pipe in its place would block the loop for ever."""
+    (file := tmp_path / "law.py").write_text(LAW)
+    with begun() as bench:
+        ticket = bench.command("set", name="controller.law", value=f"{file}:Mine")
+        with monkeypatch.context() as patch:
+            patch.setattr(Preparation, "done", False)  # however fast it is, the loop has not used it yet
+            bench._processor.process(waits=False)
+        bench._processor._preparing[1]._thread.join()
+        file.unlink()
+        bench.advance(1)
+        assert ticket.refused is None
+        assert bench.state().law == f"{file}:Mine"
+
+
+class Held:
+    """Work that waits until it is let go, and returns something that is closed."""
+
+    def __init__(self):
+        self.go, self.closed = threading.Event(), threading.Event()
+
+    def __call__(self):
+        self.go.wait()
+        return self
+
+    def close(self):
+        self.closed.set()
+
+
+def test_a_preparation_that_is_too_late_is_refused_and_its_result_closed():
+    work = Held()
+    prepared = Preparation("load", work, limit_s=0.05)
+    with pytest.raises(InputError, match=r"expected load to be prepared within 0\.05 s, received nothing"):
+        prepared.result()
+    assert prepared.done
+    assert not work.closed.is_set()
+    work.go.set()
+    assert work.closed.wait(PATIENCE_S)
+
+
+def test_a_preparation_in_time_gives_its_result_or_its_error():
+    work = Held()
+    work.go.set()
+    assert Preparation("load", work).result() is work
+    assert not work.closed.is_set()
+    with pytest.raises(ZeroDivisionError):
+        Preparation("load", lambda: 1 / 0).result()
+    with pytest.raises(InputError, match="expected load to be prepared, received SystemExit"):
+        Preparation("load", exit).result()
+
+
+def test_stop_does_not_wait_for_a_law_that_never_loads(tmp_path, monkeypatch):
+    (tmp_path / "law.py").write_text("import time\nwhile True:\n    time.sleep(0.01)\n")
+    monkeypatch.setattr(preparation, "LIMIT_s", 0.5)
+    monkeypatch.setattr(preparation, "END_s", 0.0)
+    with begun() as bench:
+        bench.begin()
+        late = bench.command("set", name="controller.law", value=f"{tmp_path / 'law.py'}:Mine")
+        wait_for(lambda: bench._processor._preparing)
+        begun_s = time.monotonic()
+        assert bench.command("stop").wait(PATIENCE_S) == "done"
+        assert not late.done or time.monotonic() - begun_s >= 0.5
+        assert bench.state().stopped
+        assert late.wait(PATIENCE_S) == "refused"
+        assert "within 0.5 s" in late.refused
+        assert bench.command("reset").wait(PATIENCE_S) == "done"  # others follow it
+
+
+def test_a_pipe_is_refused_at_once(tmp_path):
+    os.mkfifo(tmp_path / "pipe")
+    pipe = str(tmp_path / "pipe")
+    with begun() as bench:
+        for name, arguments in (
+            ("replay", {"file": pipe}),
+            ("set", {"name": "plant.mjcf", "value": pipe}),
+            ("set", {"name": "plant.torque_curve", "value": pipe}),
+            ("trajectory", {"fields": {"shape": "waypoints", "file": pipe}}),
+            ("set", {"name": "trajectory", "value": {"shape": "waypoints", "file": pipe}}),
+            ("load", {"source": "hold", "overrides": {"plant.mjcf": pipe}}),
+            ("record", {"telemetry": pipe}),
+            ("save", {"file": pipe}),
+        ):
+            assert "expected a regular file" in said(bench, name, **arguments), name
+        os.rename(pipe, tmp_path / "pipe.py")
+        os.mkfifo(tmp_path / "pipe.toml")
+        assert "regular" in said(bench, "set", name="controller.law", value=f"{pipe}.py:Mine")
+        assert "regular" in said(bench, "load", source=f"{pipe}.toml")
+        done(bench, "start")

@@ -1,0 +1,118 @@
+"""STOP and a free rotor: at rest at the end stops, with currents off at once or after a hold."""
+
+import numpy as np
+import pytest
+
+from spheretwin import scenario as scenarios
+from spheretwin.bench import Bench
+from spheretwin.bench.driver import HELD_s
+from tests.twin.bench.cases import begun, done, kept_rows, said, same_when_replayed
+
+# Enough to tip the rotor over from any pose, and some friction, so that it comes to rest.
+TIPPING = {"disturbance__load": 0.05, "plant__payload_kg": 0.05, "plant__viscous_Nm_s": [2e-3, 2e-3, 2e-3]}
+
+
+@pytest.mark.parametrize("command", ["off", "manual", "stop"])
+def test_a_rotor_that_is_let_go_comes_to_rest_at_its_limit(command):
+    arguments = {"group": 3, "current_A": 1.0} if command == "manual" else {}
+    with begun("hold", **TIPPING) as bench:
+        bench.advance(50)
+        done(bench, command, **arguments)
+        bench.advance(20_000)
+        state = bench.state()
+        assert (state.status, state.reason, state.tick) == ("running", None, 20_050)
+        assert np.abs(state.qdot_rad_s[:2]).max() < 1e-3
+        assert np.all(np.abs(state.q_rad[:2]) < np.radians(80))
+        # Usable: the law brings it back.
+        if command == "stop":
+            done(bench, "reset")
+            done(bench, "start")
+        done(bench, "point", pose_rad=[0.2, 0.1, 0.0])
+        bench.advance(6000)
+        assert bench.state().error_mrad < 50
+
+
+def test_the_bench_that_starts_without_arguments_can_be_left_without_currents():
+    """No constant load may accelerate the axis without an end until the watchdog ends the run."""
+    with Bench(scenarios.load("bench", {"plant.engine": "lagrangian"})) as bench:
+        done(bench, "start")
+        bench.advance(1000)
+        done(bench, "off")
+        bench.advance(15_000)
+        assert (bench.state().mode, bench.state().status) == ("off", "running")
+        done(bench, "hold")
+
+
+def test_end_stops_are_on_unless_the_scenario_says_otherwise():
+    for given, expected in ((None, True), (False, False), (True, True)):
+        changes = {} if given is None else {"plant__end_stops__on": given}
+        with begun(**changes) as bench:
+            assert ("plant.end_stops.on", expected) in [field[:2] for field in bench.fields()]
+    with begun() as bench:
+        done(bench, "load", source="tilt", overrides={"plant.engine": "lagrangian"})
+        assert ("plant.end_stops.on", True) in [field[:2] for field in bench.fields()]
+        assert "--plant.end-stops.on true" in bench.command_line()
+
+
+def test_a_stop_that_holds_brings_the_rotor_to_rest_and_then_switches_off(tmp_path):
+    path = tmp_path / "run.parquet"
+    with begun() as bench:
+        done(bench, "record", telemetry=str(path))
+        done(bench, "stop_mode", mode="hold")
+        done(bench, "jog", rates_rad_s=[0.0, 0.0, 1.0])
+        bench.advance(3000)
+        done(bench, "stop")
+        state = bench.state()
+        assert (state.mode, state.stopped, state.stop_mode) == ("hold", True, "hold")
+        assert state.note == "STOP: holds, then zero currents until reset"
+        for name, arguments in (("point", {"pose_rad": [0, 0, 0]}), ("off", {}), ("manual", {"group": 1})):
+            assert "expected reset after STOP" in said(bench, name, **arguments)
+        while bench.state().mode == "hold":
+            bench.advance(20)
+        tick = bench.state().tick
+        assert bench.state().mode == "off"
+        bench.advance(100)
+    rows = kept_rows(path)
+    # It was at rest for the stated time, and the currents are off from one tick on.
+    at_rest = np.flatnonzero(np.abs(rows["qdot_ref_rad_s"]).max(axis=1) > 1e-12)[-1]
+    assert tick - at_rest == pytest.approx(HELD_s / 1e-3, abs=45)  # two chunks of 20 ticks, and the profile
+    assert np.abs(rows["qdot_rad_s"][tick - 20]).max() < 1e-2
+    assert np.any(rows["current_command_A"][tick - 21])
+    assert not np.any(rows["current_command_A"][tick:])
+    assert same_when_replayed(path)
+
+
+def test_a_second_stop_switches_off_at_once_and_stops_do_not_fill_the_journal():
+    with begun() as bench:
+        done(bench, "stop_mode", mode="hold")
+        done(bench, "stop")
+        assert bench.state().mode == "hold"
+        done(bench, "stop")
+        assert bench.state().mode == "off"
+        journal = bench.state().journal
+        for _ in range(1000):
+            bench.command("stop")
+        bench.advance(1)
+        assert bench.state().journal == journal
+        assert not np.any(bench.state().current_command_A)
+
+
+def test_a_stop_that_holds_leaves_a_free_rotor_free():
+    with begun() as bench:
+        done(bench, "stop_mode", mode="hold")
+        done(bench, "off")
+        bench.advance(10)
+        done(bench, "stop")
+        assert bench.state().mode == "off"
+
+
+def test_a_reset_releases_a_stop_that_holds():
+    with begun() as bench:
+        done(bench, "stop_mode", mode="hold")
+        done(bench, "stop")
+        done(bench, "reset")
+        done(bench, "start")
+        bench.advance(3000)
+        state = bench.state()
+        assert (state.mode, state.stopped) == ("trajectory", False)
+        assert state.stop_mode == "hold"  # it is a choice of the person, not of the run

@@ -1,0 +1,214 @@
+"""End stops: exact bounce, rest under a load, energy, order, both engines, and no trace of them when off."""
+
+import numpy as np
+import pytest
+from hypothesis import example, given
+from hypothesis import strategies as st
+from scipy.optimize import brentq
+
+from spheretwin import scenario as scenarios
+from spheretwin.models.base.errors import InputError
+from spheretwin.models.lagrangian import inertia_matrix
+from spheretwin.plant.bristle_friction import (
+    StictionSection,
+    apply_bristles,
+    begin_bristles,
+    bristle_friction,
+)
+from spheretwin.plant.cable import CableSection
+from spheretwin.plant.end_stops import EndStopsSection, end_stops
+from spheretwin.plant.lagrangian_rotor import LagrangianRotor
+from spheretwin.session import Session
+from tests.twin.plant.test_bristle_friction import STEP_s, motion, order, three
+
+ON = EndStopsSection(on=True)
+# Hinge γ has no end in the shipped model; upright and alone it has the inertia J3, and exact solutions.
+RANGE_rad = np.array([[-1.4, 1.4], [-1.4, 1.4], [-0.5, 0.5]])
+CONTACT_rad = 0.5 - ON.travel_rad
+
+
+def stopped(actuator, section=ON, step_s=STEP_s):
+    stops = end_stops(section, RANGE_rad, actuator.inertia, step_s)
+    nothing = StictionSection(), (0.0, 0.0, 0.0), CableSection()
+    return bristle_friction(*nothing, actuator.inertia, step_s, stops=stops)
+
+
+def spin(actuator, duration_s, rate, start=0.0, load=0.0, section=ON, step_s=STEP_s):
+    """Angle and rate of hinge γ before each step."""
+    torque = np.tile([0.0, 0.0, load], (round(duration_s / step_s), 1))
+    q, qdot, _ = motion(
+        LagrangianRotor(actuator, step_s),
+        stopped(actuator, section, step_s),
+        torque,
+        np.array([0.0, 0.0, start]),
+        np.array([0.0, 0.0, rate]),
+    )
+    assert not np.any(q[:, :2])
+    return q[:, 2], qdot[:, 2]
+
+
+def bounce(actuator, rate, section=ON):
+    """Time of the contact, largest penetration and rate after it: the damped oscillation up to no torque."""
+    natural = np.sqrt(section.stiffness_Nm_rad / actuator.inertia[2])
+    damped, decay = natural * np.sqrt(1 - section.damping_ratio**2), section.damping_ratio * natural
+
+    def penetration(t):
+        return rate / damped * np.exp(-decay * t) * np.sin(damped * t)
+
+    def speed(t):
+        return rate * np.exp(-decay * t) * (np.cos(damped * t) - decay / damped * np.sin(damped * t))
+
+    end = brentq(
+        lambda t: natural**2 * penetration(t) + 2 * decay * speed(t), np.pi / 2 / damped, np.pi / damped
+    )
+    turn = np.arctan2(damped, decay) / damped
+    return end, penetration(turn), speed(end)
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_a_bounce_is_the_exact_one_of_a_damped_spring(actuator, side):
+    rate, steps, errors = 10.0, np.array([5e-4, 2.5e-4, 1.25e-4, 6.25e-5]), []
+    _, depth, after = bounce(actuator, rate)
+    for h in steps:
+        q, qdot = spin(actuator, 0.06, side * rate, section=ON, step_s=h)
+        errors.append(abs(side * qdot[-1] - after))
+        assert np.all(np.abs(q) < 0.5)
+        # The sample nearest to the turning point is half a step away from it: v h / 2 at no rate, h² a / 8.
+        assert CONTACT_rad + depth - np.abs(q).max() < 2e-3 * depth * (h / 5e-4) + 1e-4
+    # Each step has the exact momentum of the damper; the spring has (natural h)² / 12, and the end of the
+    # contact falls within a step.
+    natural = np.sqrt(ON.stiffness_Nm_rad / actuator.inertia[2])
+    assert np.all(errors < (natural * steps) ** 2 * rate / 6), errors
+    assert errors[-1] < 0.1 * errors[0], errors
+
+
+def test_without_damping_a_bounce_returns_the_rate(actuator):
+    """The discrete gradient conserves energy: what is lost is rounding."""
+    q, qdot = spin(actuator, 0.2, 8.0, section=ON.model_copy(update={"damping_ratio": 0.0}))
+    assert np.abs(q).max() > CONTACT_rad + 5e-3
+    assert abs(qdot[-1]) == pytest.approx(8.0, rel=1e-10)
+
+
+def test_a_loaded_rotor_comes_to_rest_at_the_limit(actuator):
+    load = 0.05
+    q, qdot = spin(actuator, 20.0, 0.0, load=load)
+    rest = CONTACT_rad + load / ON.stiffness_Nm_rad
+    # Bounces end after the sum of a geometric series; then the oscillation decays with 1 / (0.3 · 850 rad/s).
+    assert np.abs(q[-1000:] - rest).max() < 1e-12
+    assert np.abs(qdot[-1000:]).max() < 1e-10
+
+
+pose = st.floats(-1.45, 1.45)
+
+
+@given(
+    st.tuples(pose, pose, st.floats(-0.55, 0.55)).map(np.array),
+    three,
+    st.floats(-3, 2),
+    st.floats(0, 6),
+    st.floats(0, 10),
+    st.floats(-6, -2),
+    st.booleans(),
+)
+@example(np.array([1.38, 1.39, 0.48]), np.array([1.0, -1.0, 1.0]), 2.0, 6.0, 0.3, -3.3, True)
+def test_a_contact_never_adds_energy_and_never_pulls(
+    actuator, q, direction, speed, stiffness, ratio, step, sticks
+):
+    """One step of any length; at β = 1.4 rad the inertia about α is 30 times less."""
+    h, qdot = 10**step, 10**speed * direction
+    section = ON.model_copy(update={"stiffness_Nm_rad": 10**stiffness, "damping_ratio": ratio})
+    stops = end_stops(section, RANGE_rad, actuator.inertia, h)
+    stiction = StictionSection(on=sticks)
+    bristles = bristle_friction(
+        stiction, (2e-3, 2e-3, 2e-3), CableSection(), actuator.inertia, h, stops=stops
+    )
+    after_q, after = q + h * qdot, qdot.copy()  # of a rotor without torque, and with constant inertia
+    begin_bristles(bristles, q, q, qdot, np.zeros(3))
+    apply_bristles(bristles, q, qdot, qdot, after_q, after)
+    M = inertia_matrix(q, actuator.inertia)
+
+    def energy(rates, angles):
+        beyond = np.maximum(angles - stops.contact_rad[:, 1], 0) + np.maximum(
+            stops.contact_rad[:, 0] - angles, 0
+        )
+        return 0.5 * rates @ M @ rates + 0.5 * section.stiffness_Nm_rad * np.sum(beyond**2)
+
+    springs = 0.5 * np.sum(bristles.stiffness_Nm_rad * bristles.deflection_rad**2)
+    # The iteration ends at 1e-13 of the largest rate; the condition of the matrix is up to 140, and stiff
+    # springs multiply an angle's rounding.
+    rounding = 1e-9 * energy(qdot, q) + 1e-9 * section.stiffness_Nm_rad * (h * np.abs(qdot).max()) ** 2
+    assert energy(after, after_q) + springs <= energy(qdot, q) + rounding + 1e-300
+    # Inwards, or nothing.
+    assert np.all(stops.torque_q * np.sign(q + after_q) <= 0)
+    momentum = M @ (after - qdot) - h * (stops.torque_q - bristles.torque_q.sum(axis=0))
+    impedance = h * section.stiffness_Nm_rad * h + stops.damping_Nm_s.max()
+    scale = np.abs(M) @ (np.abs(after) + np.abs(qdot)) + h * np.abs(stops.torque_q)
+    assert np.all(np.abs(momentum) <= 1e-9 * scale + 1e-11 * impedance * np.abs([after, qdot]).max() + 1e-300)
+
+
+FREE = {
+    "plant.engine": "lagrangian",
+    "trajectory.shape": "hold",
+    "manual.currents_A": [0.0] * 18,
+    "disturbance.load": 0.0,
+    "disturbance.random_bound_Nm": 0.0,
+    "plant.modelling_torque_Nm": [0.0, 0.0, 0.0],
+}
+THROWN = {"plant.initial_rad": [0.4, -0.3, 0.2], "plant.initial_rad_s": [6.0, -5.0, 2.0]}
+
+
+def run(ticks, **changes):
+    given = FREE | {name.replace("__", "."): value for name, value in changes.items()}
+    with Session(scenarios.load("tilt", given)) as session:
+        return session.advance(ticks), session
+
+
+def test_a_thrown_rotor_stays_within_its_range_on_both_engines():
+    """Without end stops the run ends at the end of the range."""
+    on = THROWN | {"plant.end_stops.on": True, "plant.viscous_Nm_s": [2e-3, 2e-3, 2e-3]}
+    tables = {}
+    for engine in ("lagrangian", "mujoco"):
+        table, session = run(3000, **on, plant__engine=engine)
+        assert str(session.status) == "running"
+        assert np.all(np.abs(table["q_rad"][:, :2]) < np.radians(80))
+        assert np.any(table["end_stop_Nm"][:, 0]) or np.any(table["end_stop_Nm"][:, 1])
+        tables[engine] = table["q_rad"]
+    # Both are of fourth order; contacts amplify differences of 1e-13 by the mass ratio, 30, a bounce.
+    np.testing.assert_allclose(tables["mujoco"], tables["lagrangian"], rtol=0, atol=1e-6)
+    table, session = run(3000, **THROWN)
+    assert str(session.status) == "left_workspace"
+    assert "end_stop_Nm" not in [signal.name for signal in table.signals]
+
+
+def test_stops_that_are_not_touched_leave_the_motion():
+    rates = {"plant.initial_rad_s": [0.4, -0.3, 0.5]}
+    free, _ = run(300, **rates)
+    with_stops, _ = run(300, **rates, plant__end_stops__on=True)
+    # The correction of a step adds and subtracts the pose: one rounding of the angle a step.
+    np.testing.assert_allclose(with_stops["q_rad"], free["q_rad"], rtol=0, atol=1e-12)
+    assert not with_stops["end_stop_Nm"].any()
+
+
+def test_there_are_no_stops_unless_they_are_on(actuator):
+    assert end_stops(EndStopsSection(), RANGE_rad, actuator.inertia, STEP_s) is None
+    assert end_stops(EndStopsSection(on=False), RANGE_rad, actuator.inertia, STEP_s) is None
+    assert scenarios.load("hold").plant.end_stops.on is None
+    with pytest.raises(InputError, match="expected a travel_rad below half of each hinge's range"):
+        end_stops(ON.model_copy(update={"travel_rad": 0.6}), RANGE_rad, actuator.inertia, STEP_s)
+
+
+def test_a_bounce_converges(actuator):
+    """Rate after an impact on two hinges that are coupled, against a fine step."""
+
+    def final(h):
+        rotor, bristles = LagrangianRotor(actuator, h), stopped(actuator, step_s=h)
+        q, qdot, _ = motion(
+            rotor, bristles, np.zeros((round(0.05 / h), 3)), np.array([1.2, -0.9, 0.0]), np.array([8.0, 3, 0])
+        )
+        assert q[:, 0].max() > 1.35
+        return qdot[-1]
+
+    steps = np.array([5e-4, 2.5e-4, 1.25e-4])
+    reference = final(5e-4 / 64)
+    errors = [np.abs(final(h) - reference).max() for h in steps]
+    assert order(steps, errors) > 1.5, errors

@@ -1,0 +1,131 @@
+"""End stops: both engines against an adaptive integration of the same model.
+
+The reference knows neither the step nor the implicit method of `plant.end_stops`: DOP853 integrates the
+Lagrangian with the torque of the buffers as it is written down.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spheretwin.crosscheck.coil_driven import drive_plant
+from spheretwin.crosscheck.trajectories import ENGINES, solve
+from spheretwin.models.actuator import Actuator
+from spheretwin.models.base.checks import Check
+from spheretwin.models.lagrangian import acceleration
+from spheretwin.plant.end_stops import EndStopsSection
+
+Array = NDArray[np.float64]
+
+STEP_s = 1e-4
+DURATION_s, SAMPLE_s = 0.2, 1e-3
+BEFORE_rad = 0.2962634015954635  # distance of the start from the upper end of α: 1.1 rad of 80°
+START_rad_s = (6.0, -3.0, 2.0)
+STOPS = EndStopsSection(on=True)
+
+# A contact lasts 4 ms: it is not stepped over.
+TIGHT: dict[str, Any] = {"rtol": 1e-11, "atol": 1e-13, "max_step": 2e-4}
+
+
+class Contacts(NamedTuple):
+    """Checks of the end stops."""
+
+    checks: list[Check]
+
+
+def compare(mjcf: Path, actuator: Actuator) -> Contacts:
+    """Compare both engines with the reference.
+
+    Parameters
+    ----------
+    mjcf : Path
+        Model file that the engines read.
+    actuator : Actuator
+        Its inertia and hinge ranges are those of the reference.
+    """
+    expected, contacts = Reference(actuator, STOPS).integrate()
+    # A contact turns a rate v with (natural h)²/12 of it, as the trapezoid of a spring does.
+    natural_s = STOPS.stiffness_Nm_rad / float(min(actuator.inertia))
+    fastest = float(np.abs(expected[:, 3:]).max())
+    bound = contacts * fastest * natural_s * STEP_s**2
+    return Contacts(
+        [
+            _motion(name, np.abs(by_plant(mjcf, actuator, engine) - expected), bound)
+            for name, engine in ENGINES.items()
+        ]
+    )
+
+
+class Reference:
+    """Integration of the Lagrangian with end stops; its steps shrink where a contact begins or ends.
+
+    Parameters
+    ----------
+    actuator : Actuator
+    section : EndStopsSection
+    """
+
+    def __init__(self, actuator: Actuator, section: EndStopsSection) -> None:
+        self._actuator, self._inertia, self._stiffness = actuator, actuator.inertia, section.stiffness_Nm_rad
+        self._damping = 2 * section.damping_ratio * np.sqrt(section.stiffness_Nm_rad * actuator.inertia)
+        self._low, self._high = (actuator.hinge_range_rad + section.travel_rad * np.array([1.0, -1.0])).T
+
+    def integrate(self) -> tuple[Array, int]:
+        """Return the states (n + 1, 6) at the samples, and the number of contacts.
+
+        Raises
+        ------
+        EngineError
+            The integrator could not hold its tolerance.
+        """
+        t_s = SAMPLE_s * np.arange(round(DURATION_s / SAMPLE_s) + 1)
+        start = np.array([*start_rad(self._actuator), *START_rad_s])
+        states = solve("end stop reference", self._flow, (0.0, t_s[-1]), start, t_eval=t_s, **TIGHT).y.T
+        touches = (states[:, :3] > self._high) | (states[:, :3] < self._low)
+        return states, int(np.count_nonzero(np.diff(touches.astype(int), axis=0) > 0))
+
+    def _flow(self, t: float, state: Array) -> Array:
+        q, qdot = state[:3].copy(), state[3:].copy()
+        above, below = q - self._high, self._low - q
+        upper = np.where(above > 0, np.maximum(self._stiffness * above + self._damping * qdot, 0), 0.0)
+        lower = np.where(below > 0, np.maximum(self._stiffness * below - self._damping * qdot, 0), 0.0)
+        return np.concatenate([qdot, acceleration(q, qdot, lower - upper, self._inertia, 0.0)])
+
+
+def start_rad(actuator: Actuator) -> tuple[float, float, float]:
+    """Return the first pose: α before its upper buffer, β and γ on either side of 0."""
+    alpha, beta, gamma = actuator.hinge_range_rad
+    return float(alpha[1] - BEFORE_rad), float(max(-0.5, 0.7 * beta[0])), float(min(0.3, 0.7 * gamma[1]))
+
+
+def by_plant(mjcf: Path, actuator: Actuator, engine: str) -> Array:
+    """Return the states (n + 1, 6) at the samples by the plant without currents."""
+    count = round(DURATION_s / STEP_s)
+    fields: dict[str, Any] = {
+        "plant.engine": engine,
+        "plant.step_s": STEP_s,
+        "plant.initial_rad": start_rad(actuator),
+        "plant.initial_rad_s": START_rad_s,
+        "controller.period_s": STEP_s,
+        **{f"plant.end_stops.{name}": value for name, value in STOPS.model_dump().items()},
+    }
+    every = round(SAMPLE_s / STEP_s)
+    return drive_plant(mjcf, fields, lambda groups: np.zeros((count, groups)), np.zeros((count, 3)), every)
+
+
+def _motion(name: str, difference: Array, bound: float) -> Check:
+    return Check(
+        name=f"end stops: motion, {name}",
+        compares=f"hinge alpha that bounces while the others turn, for {DURATION_s:g} s: rates,"
+        " with DOP853 on the same equations",
+        states=len(difference),
+        value=float(difference[:, 3:].max()),
+        bound=bound,
+        why="a contact turns a rate with an error of (natural frequency times step)² of the rate",
+        unit="rad/s",
+        detail={"largest difference of an angle, rad": float(difference[:, :3].max())},
+    )
