@@ -158,13 +158,13 @@ def sampled(actuator):
 
 def test_least_norm_torque_by_tilt(sampled, actuator):
     workspace, on_grid = sampled
-    found = worst_by_tilt(workspace, on_grid, FIGURES["least_norm"], actuator)
-    worst = found.capability.least_norm_Nm
+    result = worst_by_tilt(workspace, on_grid, FIGURES["least_norm"], actuator)
+    worst = result.capability.least_norm_Nm
     assert np.all(worst <= on_grid.least_norm_Nm.min(axis=(1, 2)))
     # Searched by another program: 0.8745 at 0, 0.4183 at 20, 0.3780 at 30.
     assert_allclose(worst[[0, 2, 3]], [0.8745, 0.4183, 0.3780], rtol=1e-3)
     # Tilts are kept, and the shaft's azimuth at 0 degrees is free.
-    assert_allclose(found.tilt_azimuth_spin_rad[:, 0], workspace.tilt_rad)
+    assert_allclose(result.tilt_azimuth_spin_rad[:, 0], workspace.tilt_rad)
 
 
 def test_weakest_poses_come_first_and_once(sampled, actuator):

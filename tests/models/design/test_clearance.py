@@ -54,19 +54,19 @@ def test_shipped_parts_fit(actuator):
 def test_coils_of_neighbouring_layers_overlap_first(actuator):
     # The closest coils are neighbours of the upper layer, 26.4 degrees apart: 12 pairs, and 12 below.
     wide = replace(actuator, coil=replace(actuator.coil, outer_radius_m=0.0120))
-    found = overlaps(wide)
-    assert len(found) == 24
-    assert {overlap.part for overlap in found} == {"coil"}
-    for overlap in found:
+    result = overlaps(wide)
+    assert len(result) == 24
+    assert {overlap.part for overlap in result} == {"coil"}
+    for overlap in result:
         assert wide.coil_axes[overlap.first, 2] == pytest.approx(wide.coil_axes[overlap.second, 2])
         assert overlap.first < overlap.second
         assert 0 < overlap.depth_m < 1e-3
 
 
 def test_poles_overlap_deepest_first(actuator):
-    found = overlaps(replace(actuator, magnet=replace(actuator.magnet, radius_m=0.018)))
-    assert {overlap.part for overlap in found} == {"pole"}
-    depths = [overlap.depth_m for overlap in found]
+    result = overlaps(replace(actuator, magnet=replace(actuator.magnet, radius_m=0.018)))
+    assert {overlap.part for overlap in result} == {"pole"}
+    depths = [overlap.depth_m for overlap in result]
     assert np.all(np.diff(depths) < 1e-8)  # equal ones by their indices
 
 

@@ -44,17 +44,17 @@ def test_lookup_of_the_shipped_curve(actuator):
 
 
 def test_lookup_of_a_coarse_curve_is_worse(actuator):
-    kept = actuator.torque_curve
-    coarse = TorqueCurve(kept.phi_rad[::8], kept.torque_Nm_per_A[::8])
+    curve = actuator.torque_curve
+    coarse = TorqueCurve(curve.phi_rad[::8], curve.torque_Nm_per_A[::8])
     assert curve_check.largest_lookup_error(coarse) < 1e-4
 
 
 def test_difference_knows_a_scaled_curve(actuator):
-    kept = actuator.torque_curve
+    curve = actuator.torque_curve
     rows = np.r_[0:120:4, 120:721:40]
-    data = TorqueCurve(kept.phi_rad[rows], 0.9 * kept.torque_Nm_per_A[rows])
-    found = curve_check.difference(data, actuator.magnet, actuator.coil, Mesh(12, 64, 6, 12))
-    assert found.scale == pytest.approx(0.9, abs=1e-4)
-    assert found.as_given.worst == pytest.approx(0.1, rel=0.02)
-    assert found.as_given.worst_deg == pytest.approx(10.5, abs=1.0)
-    assert found.scaled.worst < 1e-3
+    data = TorqueCurve(curve.phi_rad[rows], 0.9 * curve.torque_Nm_per_A[rows])
+    result = curve_check.difference(data, actuator.magnet, actuator.coil, Mesh(12, 64, 6, 12))
+    assert result.scale == pytest.approx(0.9, abs=1e-4)
+    assert result.as_given.worst == pytest.approx(0.1, rel=0.02)
+    assert result.as_given.worst_deg == pytest.approx(10.5, abs=1.0)
+    assert result.scaled.worst < 1e-3

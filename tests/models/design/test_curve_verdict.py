@@ -9,8 +9,9 @@ from spheretwin.models import actuator as actuators
 from spheretwin.models import torque_curve
 from spheretwin.models.base.checks import broken
 from spheretwin.models.base.errors import InputError
-from spheretwin.models.design import curve_check, pole_torque
+from spheretwin.models.design import curve_check
 from spheretwin.models.torque_curve import TorqueCurve
+from tests.models.design.quadrature import sample_coarsely
 
 TEXT = actuators.MJCF_PATH.read_text(encoding="utf-8")
 
@@ -18,20 +19,19 @@ TEXT = actuators.MJCF_PATH.read_text(encoding="utf-8")
 @pytest.fixture
 def few_samples(monkeypatch):
     """A twentieth of the samples, 5 degrees apart: the checks, not the figures."""
-    full = pole_torque.sample_angles
-    monkeypatch.setattr(pole_torque, "sample_angles", lambda: full()[::20])
+    sample_coarsely(monkeypatch)
 
 
 def test_a_weaker_magnet_is_a_factor_and_no_difference_in_shape(actuator):
-    kept = actuator.torque_curve
+    curve = actuator.torque_curve
     rows = np.r_[0:120:4, 120:721:20]
-    judged = curve_check.judge(TorqueCurve(kept.phi_rad[rows], 0.93 * kept.torque_Nm_per_A[rows]))
+    judged = curve_check.judge(TorqueCurve(curve.phi_rad[rows], 0.93 * curve.torque_Nm_per_A[rows]))
     assert judged.rows == 61
     # The shipped samples are rounded to 12 decimals, 5e-11 of the peak.
     assert judged.geometry.scale == pytest.approx(0.93, abs=1e-6)
     assert judged.geometry.scaled.worst < 1e-6
     assert judged.geometry.as_given.worst == pytest.approx(0.07, rel=0.01)
-    assert judged.peak.peak_Nm_per_A == pytest.approx(0.93 * kept.peak_Nm_per_A, rel=0.01)
+    assert judged.peak.peak_Nm_per_A == pytest.approx(0.93 * curve.peak_Nm_per_A, rel=0.01)
     assert 0 < judged.leave_one_out.rms < 0.01
     assert 0 < judged.lookup_error < 1e-4
     assert judged.warnings == []
@@ -41,8 +41,7 @@ def test_a_weaker_magnet_is_a_factor_and_no_difference_in_shape(actuator):
 def computed():
     """Curve of the shipped model from a twentieth of the samples."""
     with pytest.MonkeyPatch.context() as patch:
-        full = pole_torque.sample_angles
-        patch.setattr(pole_torque, "sample_angles", lambda: full()[::20])
+        sample_coarsely(patch)
         return curve_check.compute()
 
 

@@ -26,7 +26,7 @@ def compared(actuator):
 
 def torque_on_coils(actuator, pole, axes, rule):
     magnet = direct_summation.pole_magnet(actuator.magnet, pole, 1.0, rule.stacked)
-    return direct_summation._torque_on_coils(magnet, axes, np.zeros(len(axes)), actuator.coil, rule)
+    return direct_summation.torque_on_coils(magnet, axes, np.zeros(len(axes)), actuator.coil, rule)
 
 
 def flat(actuator):
@@ -48,7 +48,7 @@ def pair_errors(actuator, rule, degrees=(2.0, 7.0, 10.5, 18.0)):
 @pytest.mark.parametrize("stacked", [1, 5, 24])
 def test_a_stack_has_the_volume_of_the_ground_pole(actuator, stacked):
     magnet = actuator.magnet
-    pieces = direct_summation._cylinders(magnet, stacked)
+    pieces = direct_summation.cylinders(magnet, stacked)
     assert len(pieces) == stacked
     volume = sum(np.pi * radius**2 * (top - bottom) for radius, bottom, top in pieces)
     assert volume == pytest.approx(magnet.volume_m3, rel=1e-12)
@@ -59,7 +59,7 @@ def test_a_stack_has_the_volume_of_the_ground_pole(actuator, stacked):
 
 def test_a_flat_pole_is_one_cylinder(actuator):
     magnet = flat(actuator).magnet
-    assert direct_summation._cylinders(magnet, 24) == [(magnet.radius_m, magnet.back_m, magnet.front_m)]
+    assert direct_summation.cylinders(magnet, 24) == [(magnet.radius_m, magnet.back_m, magnet.front_m)]
 
 
 def drawn_body(magnet, sections, steps):
@@ -163,7 +163,7 @@ def test_wrong_polarity_is_found(compared, actuator):
 
 def test_wrong_curve_is_found(compared, actuator):
     curve = actuator.torque_curve
-    wrong = replace(actuator, torque_curve=TorqueCurve(curve.phi_rad, 1.02 * curve.torque_Nm_per_A))
+    wrong = replace(actuator, torque_data=TorqueCurve(curve.phi_rad, 1.02 * curve.torque_Nm_per_A))
     model = np.array([torque_matrix(q, wrong) for q in compared.q])
     assert error_share(compared._replace(model=model), actuator) > 0.01
 

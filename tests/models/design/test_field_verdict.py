@@ -9,16 +9,17 @@ from spheretwin.models.base.checks import broken
 from spheretwin.models.design import direct_summation
 from spheretwin.models.design import field_check as field_verdict
 from spheretwin.models.torque_curve import TorqueCurve
-from tests.models.design.quadrature import COARSE
+from tests.models.design.quadrature import sum_coarsely
 
 
 @pytest.fixture
 def coarse(monkeypatch):
     """Fewer points in the windings."""
-    monkeypatch.setattr(direct_summation, "STANDARD", COARSE)
+    sum_coarsely(monkeypatch)
 
 
-def test_the_shipped_actuator_passes_and_is_told_by_tilt(actuator):
+def test_the_shipped_actuator_passes_and_is_told_by_tilt(actuator, monkeypatch):
+    monkeypatch.setattr(field_verdict, "SCATTER_POSES", 1)
     verdict = field_verdict.judge(actuator, poses=2)
     assert [band.tilt_deg for band in verdict.by_tilt] == [(0, 12), (12, 24)]
     assert sum(band.poses for band in verdict.by_tilt) == 2
@@ -55,7 +56,7 @@ def test_a_wrong_matrix_is_not_attributed_to_the_curve(actuator, monkeypatch):
 @pytest.mark.usefixtures("coarse")
 def test_a_wrong_curve_is_found_and_named(actuator):
     curve = actuator.torque_curve
-    stronger = replace(actuator, torque_curve=TorqueCurve(curve.phi_rad, 1.03 * curve.torque_Nm_per_A))
+    stronger = replace(actuator, torque_data=TorqueCurve(curve.phi_rad, 1.03 * curve.torque_Nm_per_A))
     verdict = field_verdict.judge(stronger, poses=1)
     assert broken(verdict.checks) == ["torque"]
     assert verdict.checks[0].value == pytest.approx(0.03, abs=2e-3)  # the coarse sum's own error

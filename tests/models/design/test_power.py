@@ -62,7 +62,7 @@ def turned_to(axis):
 def flux_linkage(R_SR, group, actuator):
     """Flux of the 16 magnets through the turns of one group, Wb."""
     poles = zip(actuator.pole_axes @ R_SR.T, actuator.pole_polarity, strict=True)
-    pieces = direct_summation._cylinders(actuator.magnet, STACKED)
+    pieces = direct_summation.cylinders(actuator.magnet, STACKED)
     magnets = magpylib.Collection(
         [
             magpylib.magnet.Cylinder(

@@ -36,10 +36,10 @@ def test_every_experiment_has_rows_and_a_page(name, tmp_path):
     plan = make_plan(EXPERIMENTS[name], seeds=1, limit=2)
     outcomes = run_plan(plan)
     assert unexpected_ends(plan, outcomes) == []
-    told = rows(plan, outcomes)
-    json.dumps(told, allow_nan=False)
-    assert len(told) == min(2, len(EXPERIMENTS[name].cases()))
-    assert all(set(row) >= FACE for row in told)
+    entries = rows(plan, outcomes)
+    json.dumps(entries, allow_nan=False)
+    assert len(entries) == min(2, len(EXPERIMENTS[name].cases()))
+    assert all(set(row) >= FACE for row in entries)
     sections = plan.experiment.sections(outcomes)
     assert all(
         len(row) == len(table.head) for section in sections for table in section.tables for row in table.rows

@@ -50,13 +50,13 @@ EXPERIMENT = fault_study.EXPERIMENT._replace(cases=lambda: STUDY)
 
 
 @pytest.fixture(scope="module")
-def found():
+def study():
     plan = make_plan(EXPERIMENT, seeds=2)
     return plan, run_plan(plan, threads=2)
 
 
-def row(found, case):
-    return next(each for each in rows(*found) if each["case"] == case.name)
+def row(study, case):
+    return next(each for each in rows(*study) if each["case"] == case.name)
 
 
 def outcome(ratio, status=Status.COMPLETED, **more_of_it):
@@ -78,13 +78,13 @@ def outcome(ratio, status=Status.COMPLETED, **more_of_it):
     return Outcome(status, {"max_abs_error_rad": [0.0] * 3}, np.zeros(3), data)
 
 
-def test_rows_are_the_same_whatever_the_threads(found):
+def test_rows_are_the_same_whatever_the_threads(study):
     plan = make_plan(EXPERIMENT, seeds=2)
-    assert json.dumps(rows(plan, run_plan(plan, threads=1))) == json.dumps(rows(*found))
+    assert json.dumps(rows(plan, run_plan(plan, threads=1))) == json.dumps(rows(*study))
 
 
-def test_every_run_ends_with_a_status_and_numbers(found):
-    plan, outcomes = found
+def test_every_run_ends_with_a_status_and_numbers(study):
+    plan, outcomes = study
     assert unexpected_ends(plan, outcomes) == []
     assert all(run.data.is_finite for each in outcomes.values() for run in each)
     assert (
@@ -100,19 +100,19 @@ def test_the_error_without_a_failure_is_the_median_of_its_seeds():
     assert f"{np.degrees(0.09):.2f}°" not in text
 
 
-def test_single_group_and_pair_track_where_told_or_found_and_else_not(found):
+def test_single_group_and_pair_track_where_told_or_found_and_else_not(study):
     for groups in ((0,), PAIR):
         for way in (REPORTED, DETECTING, BOUNDED):
-            told = row(found, of_groups(groups, way))
-            assert (told["tracks"], told["reason"], told["rank"]) == (2, None, 3)
-            assert 0.9 < told["error_ratio_range"][0] <= told["error_ratio_range"][1] < 1.15
-        untold = row(found, of_groups(groups, UNREPORTED))
+            entry = row(study, of_groups(groups, way))
+            assert (entry["tracks"], entry["reason"], entry["rank"]) == (2, None, 3)
+            assert 0.9 < entry["error_ratio_range"][0] <= entry["error_ratio_range"][1] < 1.15
+        untold = row(study, of_groups(groups, UNREPORTED))
         assert untold["tracks"] == 0
         assert "of the commanded torque is delivered" in untold["reason"]
 
 
-def test_errors_are_those_of_the_healthy_run_with_the_same_seed(found):
-    _, outcomes = found
+def test_errors_are_those_of_the_healthy_run_with_the_same_seed(study):
+    _, outcomes = study
     case = of_groups(PAIR, UNREPORTED)
     for seed, run in enumerate(outcomes[case.name]):
         errors = [
@@ -128,8 +128,8 @@ def test_errors_are_those_of_the_healthy_run_with_the_same_seed(found):
         assert (run.data.ratio, run.data.start_s) == (1.0, 0.0)
 
 
-def test_the_reference_has_the_allocation_and_the_window_of_the_faulty_run(found):
-    _, outcomes = found
+def test_the_reference_has_the_allocation_and_the_window_of_the_faulty_run(study):
+    _, outcomes = study
     bounded = scenario_of(of_groups(PAIR, BOUNDED), None, 1)
     run = outcomes[of_groups(PAIR, BOUNDED).name][1]
     error = np.abs(simulate(bounded.model_copy(update={"fault": ()})).telemetry["error_rad"])
@@ -143,11 +143,11 @@ def test_the_reference_has_the_allocation_and_the_window_of_the_faulty_run(found
     assert run.data.healthy_rad == np.abs(healthy[window]).max()
 
 
-def test_the_detector_s_times_are_told(found):
-    told = row(found, of_groups(PAIR, DETECTING))
-    assert [len(times) for times in told["time_to_detection_s"]] == [2, 2]
-    assert told["wrongly_found"] == 0
-    assert row(found, of_groups(PAIR, REPORTED))["time_to_detection_s"] == [[None, None]] * 2
+def test_the_detector_s_times_are_told(study):
+    entry = row(study, of_groups(PAIR, DETECTING))
+    assert [len(times) for times in entry["time_to_detection_s"]] == [2, 2]
+    assert entry["wrongly_found"] == 0
+    assert row(study, of_groups(PAIR, REPORTED))["time_to_detection_s"] == [[None, None]] * 2
 
 
 def opened(group, start_s, end_s=5.0, **changes):
@@ -187,9 +187,9 @@ def test_latency_is_a_distribution_in_which_the_undetected_count():
         outcome(1.0, latencies_s=(time_s,), driven_ticks=(5 if time_s else 1,), remaining=None)
         for time_s in [4e-3] * 80 + [5e-3] * 12 + [0.2] * 5 + [None] * 3
     ]
-    told = outcome(0.9)
+    undetected = outcome(0.9)
     names = [of_groups((0,), way).name for way in (DETECTING, REPORTED)]
-    section = fault_latency.section(Outcomes({names[0]: runs, names[1]: [told] * len(runs)}))
+    section = fault_latency.section(Outcomes({names[0]: runs, names[1]: [undetected] * len(runs)}))
     (row,) = section.tables[0].rows
     assert row == (
         "one open", "100", "4", "5", "200", "not detected", "200", "3 (3.0 %)", "5", "5", "1",
@@ -203,30 +203,30 @@ def test_latency_is_a_distribution_in_which_the_undetected_count():
     assert set(by_latency["all"][2:6]) == {"1.000"}
 
 
-def test_cost_is_what_the_delay_adds_with_the_same_seed_and_start(found):
-    _, outcomes = found
-    detecting, told = (outcomes[of_groups(PAIR, way).name] for way in (DETECTING, REPORTED))
-    for one, other in zip(detecting, told, strict=True):
+def test_cost_is_what_the_delay_adds_with_the_same_seed_and_start(study):
+    _, outcomes = study
+    detecting, reported = (outcomes[of_groups(PAIR, way).name] for way in (DETECTING, REPORTED))
+    for one, other in zip(detecting, reported, strict=True):
         assert one.data.start_s == other.data.start_s
         assert fault_latency.cost_rad(one, other) == one.data.after_rad - other.data.after_rad
 
 
-def test_too_little_torque_is_the_reason(found):
-    told = row(found, of_groups(MANY, REPORTED))
-    assert told["tracks"] == 0
-    assert told["torque_left_over_needed"] < 0.5
-    assert told["least_norm_torque_over_needed"] <= told["torque_left_over_needed"]
-    assert told["reason"].endswith("by least norm")
+def test_too_little_torque_is_the_reason(study):
+    entry = row(study, of_groups(MANY, REPORTED))
+    assert entry["tracks"] == 0
+    assert entry["torque_left_over_needed"] < 0.5
+    assert entry["least_norm_torque_over_needed"] <= entry["torque_left_over_needed"]
+    assert entry["reason"].endswith("by least norm")
 
 
-def test_the_watchdog_s_reason_is_told(found):
-    assert row(found, of_part(DROPOUT, RELEASE))["reason"] == "no fresh measurement"
-    assert row(found, of_part(DROPOUT, RELEASE))["status"] == "failsafe"
-    assert row(found, of_part(DROPOUT, ALONE))["status"] == "left_workspace"
+def test_the_watchdog_s_reason_is_told(study):
+    assert row(study, of_part(DROPOUT, RELEASE))["reason"] == "no fresh measurement"
+    assert row(study, of_part(DROPOUT, RELEASE))["status"] == "failsafe"
+    assert row(study, of_part(DROPOUT, ALONE))["status"] == "left_workspace"
 
 
-def test_the_other_engine_agrees(found):
-    _, outcomes = found
+def test_the_other_engine_agrees(study):
+    _, outcomes = study
     ((one, other),) = fault_study.engine_pairs(outcomes, REPORTED)
     assert fault_study.agree(one, other)
     assert fault_study.difference_rad(one, other) < 1e-12  # 10,000 steps that round otherwise
@@ -234,8 +234,8 @@ def test_the_other_engine_agrees(found):
     assert not fault_study.agree(one, apart)
 
 
-def test_page_shows_every_figure_and_row(found):
-    _, outcomes = found
+def test_page_shows_every_figure_and_row(study):
+    _, outcomes = study
     groups, delays, reasons, parts, other = fault_study.sections(outcomes)
     assert [row[0] for row in delays.tables[0].rows] == [
         "one open", "two open", "three to nine open", "one shorted",
@@ -255,11 +255,11 @@ def test_page_shows_every_figure_and_row(found):
     ]  # fmt: skip
 
 
-def test_map_of_pairs_has_pairs_below_and_single_groups_on_the_diagonal(found):
-    ratios = fault_sections.ratios(found[1], UNREPORTED)
+def test_map_of_pairs_has_pairs_below_and_single_groups_on_the_diagonal(study):
+    ratios = fault_sections.ratios(study[1], UNREPORTED)
     there = np.argwhere(np.isfinite(ratios)).tolist()
     assert there == [[0, 0], [1, 0]]
-    assert ratios[1, 0] == row(found, of_groups(PAIR, UNREPORTED))["error_ratio"]
+    assert ratios[1, 0] == row(study, of_groups(PAIR, UNREPORTED))["error_ratio"]
 
 
 def test_tracking_is_to_complete_and_to_stay_within_twice():
@@ -269,8 +269,8 @@ def test_tracking_is_to_complete_and_to_stay_within_twice():
     assert not tracks(outcome(float("nan"), Status.LEFT_WORKSPACE))  # it ended before the fault
 
 
-def test_a_lost_direction_is_the_first_reason(found):
-    left = found[1][of_groups(PAIR, REPORTED).name][0].data.remaining
+def test_a_lost_direction_is_the_first_reason(study):
+    left = study[1][of_groups(PAIR, REPORTED).name][0].data.remaining
     assert reason(outcome(3.0, remaining=left._replace(rank=2))) == "rank 2"
     assert reason(outcome(1.5, remaining=left._replace(rank=2))) is None
 

@@ -23,14 +23,14 @@ def cache(monkeypatch):
 @pytest.fixture
 def ran(monkeypatch):
     """Scenarios that were really run."""
-    real, found = runner.simulate, []
+    real, results = runner.simulate, []
 
     def simulate(scenario):
-        found.append(scenario)
+        results.append(scenario)
         return real(scenario)
 
     monkeypatch.setattr(runner, "simulate", simulate)
-    return found
+    return results
 
 
 def remembering(plan):
@@ -55,11 +55,11 @@ def test_rows_that_were_run_are_not_run_again_and_are_the_same(ran):
 
 def test_what_was_run_before_an_interruption_is_kept(ran, monkeypatch):
     plan = make_plan(experiment(NOISY), seeds=4)
-    told = []
+    messages = []
 
     def done(name):
-        told.append(name)
-        if len(told) == 2:
+        messages.append(name)
+        if len(messages) == 2:
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):

@@ -21,32 +21,32 @@ def path(poses, seed=0):
 
 
 def test_all_groups_by_hand():
-    found = remaining_torque(BY_HAND, ALONG_Z, LIMIT_A, ())
-    assert found.torque == pytest.approx(1.5 * LIMIT_A / 2)
+    result = remaining_torque(BY_HAND, ALONG_Z, LIMIT_A, ())
+    assert result.torque == pytest.approx(1.5 * LIMIT_A / 2)
     # Least norm asks the stronger for twice the current: 1 to 0.5, and 1.25 of torque at the limit.
-    assert found.least_norm == pytest.approx(1.25 * LIMIT_A / 2)
-    assert found.least_share == pytest.approx(1.0)
-    assert found.singular_value_Nm_per_A == pytest.approx(1.0)
-    assert found.rank == 3
+    assert result.least_norm == pytest.approx(1.25 * LIMIT_A / 2)
+    assert result.least_share == pytest.approx(1.0)
+    assert result.singular_value_Nm_per_A == pytest.approx(1.0)
+    assert result.rank == 3
 
 
 def test_the_weaker_group_alone_by_hand():
-    found = remaining_torque(BY_HAND, ALONG_Z, LIMIT_A, (2,))
-    assert found.torque == found.least_norm == pytest.approx(0.5 * LIMIT_A / 2)
-    assert found.least_share == pytest.approx(0.25 / 1.25)
-    assert found.singular_value_Nm_per_A == pytest.approx(0.5)
+    result = remaining_torque(BY_HAND, ALONG_Z, LIMIT_A, (2,))
+    assert result.torque == result.least_norm == pytest.approx(0.5 * LIMIT_A / 2)
+    assert result.least_share == pytest.approx(0.25 / 1.25)
+    assert result.singular_value_Nm_per_A == pytest.approx(0.5)
 
 
 @pytest.mark.parametrize(("opened", "rank"), [((2, 3), 2), ((0, 2, 3), 1)])
 def test_a_lost_direction_leaves_no_torque(opened, rank):
-    found = remaining_torque(BY_HAND, ALONG_Z, LIMIT_A, opened)
-    assert (found.torque, found.least_norm, found.least_share, found.rank) == (0.0, 0.0, 0.0, rank)
+    result = remaining_torque(BY_HAND, ALONG_Z, LIMIT_A, opened)
+    assert (result.torque, result.least_norm, result.least_share, result.rank) == (0.0, 0.0, 0.0, rank)
 
 
 def test_three_open_groups_of_five_leave_a_plane():
     G = np.random.default_rng(4).normal(size=(6, 3, 5))
-    found = remaining_torque(G, np.ones((6, 3)), LIMIT_A, (0, 2, 4))
-    assert (found.rank, found.torque) == (2, 0.0)
+    result = remaining_torque(G, np.ones((6, 3)), LIMIT_A, (0, 2, 4))
+    assert (result.rank, result.torque) == (2, 0.0)
 
 
 def test_the_least_of_a_path_is_that_of_its_worst_pose():
@@ -63,31 +63,31 @@ def test_torque_is_that_of_a_linear_programme(opened):
     G, torque_S = path(8, seed=1)
     others = [group for group in range(18) if group not in opened]
     for pose in range(len(G)):
-        found = remaining_torque(G[pose : pose + 1], torque_S[pose : pose + 1], LIMIT_A, opened)
+        result = remaining_torque(G[pose : pose + 1], torque_S[pose : pose + 1], LIMIT_A, opened)
         equal = np.column_stack([G[pose][:, others], -torque_S[pose]])
         bounds = [(-LIMIT_A, LIMIT_A)] * len(others) + [(0, None)]
         solved = linprog([0.0] * len(others) + [-1.0], A_eq=equal, b_eq=np.zeros(3), bounds=bounds)
         # The solver's own tolerance, 1e-7 of its equations.
-        assert found.torque == pytest.approx(min(solved.x[-1], MOST), rel=1e-6)
-        assert found.least_norm <= found.torque * (1 + 1e-9)
+        assert result.torque == pytest.approx(min(solved.x[-1], MOST), rel=1e-6)
+        assert result.least_norm <= result.torque * (1 + 1e-9)
 
 
 @pytest.mark.parametrize("opened", [(0,), (3, 9, 14)])
 def test_what_comes_is_what_currents_for_all_groups_give(opened):
     """Tried out: least-norm currents of all groups, those of the open ones gone, in many directions."""
     G, torque_S = path(1, seed=2)
-    found = remaining_torque(G, torque_S, LIMIT_A, opened)
-    kept = G[0].copy()
-    kept[:, list(opened)] = 0.0
-    gives = kept @ np.linalg.pinv(G[0])  # torque given of a torque asked for
+    result = remaining_torque(G, torque_S, LIMIT_A, opened)
+    remaining = G[0].copy()
+    remaining[:, list(opened)] = 0.0
+    gives = remaining @ np.linalg.pinv(G[0])  # torque given of a torque asked for
     # In the norm of the currents that are asked for, |u| with torque = C u.
     C = np.linalg.cholesky(G[0] @ G[0].T)
     u = np.random.default_rng(3).normal(size=(3, 20_000))
     u /= np.linalg.norm(u, axis=0)
     shares = np.sum(u * np.linalg.solve(C, gives @ C @ u), axis=0)
-    assert shares.min() >= found.least_share - 1e-12
+    assert shares.min() >= result.least_share - 1e-12
     # 20,000 directions come within 0.03 rad of the worst one, whose share is the least to second order.
-    assert shares.min() == pytest.approx(found.least_share, abs=1e-3)
+    assert shares.min() == pytest.approx(result.least_share, abs=1e-3)
 
 
 def test_nothing_wanted_is_nothing_lacking():

@@ -42,8 +42,8 @@ def test_every_law_is_searched_with_all_of_its_gains_and_the_same_budget(hardwar
     assert study.common_seeds
     searched = Rows(study)
     for law in study.law:
-        found = tuning_gains.gains_of(study, law, searched)
-        fields = set(tuning_gains.values(found, tuning_gains.middle(found)))
+        result = tuning_gains.gains_of(study, law, searched)
+        fields = set(tuning_gains.values(result, tuning_gains.middle(result)))
         named = {field.split(".")[1] for field in fields}
         base = set(LAWS["pd"].model_fields) - {"stiffness", "damping"}
         own = set(LAWS[law["law"]].model_fields) - base - {"preset", "coupled"}
@@ -63,14 +63,14 @@ def test_frozen_gains_are_within_their_ranges_and_limits(hardware):
     study = load(hardware.study)
     ranges = {(gain.law, gain.called): gain for gain in study.optimise.gain}
     assert set(frozen(hardware)) == set(LAWS)
-    for law, found in frozen(hardware).items():
-        for each in found:
+    for law, result in frozen(hardware).items():
+        for each in result:
             assert each["limit"] in hardware.limits_A_s
             assert list(each["values"].values())[1] <= each["limit"]
             for name, value in each["gains"].items():
                 gain = ranges.get((law, name)) or ranges["", name]
                 assert (value is None and gain.optional) or gain.low <= value <= gain.high
-        errors = [next(iter(each["values"].values())) for each in found]
+        errors = [next(iter(each["values"].values())) for each in result]
         assert errors == sorted(errors, reverse=True)
 
 
@@ -294,7 +294,7 @@ def test_a_figure_has_a_line_a_law_and_the_floors(short):
     _, outcomes = short
     axes = rivals.figure(IDEAL, outcomes).figure.axes[0]
     lines = [np.asarray(line.get_xydata()) for line in axes.lines]
-    found = [each for each in results(IDEAL, IDEAL.conditions[0], outcomes) if each.limit_A_s is not None]
+    entries = [each for each in results(IDEAL, IDEAL.conditions[0], outcomes) if each.limit_A_s is not None]
     for law in ("afsm_eso", "pid"):
-        points = sorted((each.variation_A_s, 1e3 * each.largest_rad) for each in found if each.law == law)
+        points = sorted((each.variation_A_s, 1e3 * each.largest_rad) for each in entries if each.law == law)
         assert any(np.shape(line) == np.shape(points) and np.allclose(line, points) for line in lines)

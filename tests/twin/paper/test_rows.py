@@ -23,22 +23,22 @@ def row(outcomes, case=NOISY):
 
 
 def test_row_has_the_public_face():
-    told = row(THREE)
-    assert (told["figure"], told["case"], told["controller"], told["hardware"]) == (
+    entry = row(THREE)
+    assert (entry["figure"], entry["case"], entry["controller"], entry["hardware"]) == (
         "short", "noisy", "afsm", "electronics",
     )  # fmt: skip
-    assert (told["m"], told["L"], told["seeds"]) == (0.0, 0.0, 3)
-    assert told["paper"] == [0.01, None, None]
-    assert told["status"] == "completed"
-    assert told["statuses"] == {"completed": 3}
+    assert (entry["m"], entry["L"], entry["seeds"]) == (0.0, 0.0, 3)
+    assert entry["paper"] == [0.01, None, None]
+    assert entry["status"] == "completed"
+    assert entry["statuses"] == {"completed": 3}
 
 
 def test_errors_are_medians_and_ranges():
-    told = row(THREE)
-    assert told["max_abs_error_rad"] == pytest.approx([0.2, 0.4, 0.6])
-    assert told["max_abs_error_range_rad"][2] == pytest.approx([0.3, 0.9])
-    assert told["measured_max_abs_error_rad"] == pytest.approx([2.0] * 3)
-    assert told["tail_rms_error_rad"] == pytest.approx([0.1] * 3)
+    entry = row(THREE)
+    assert entry["max_abs_error_rad"] == pytest.approx([0.2, 0.4, 0.6])
+    assert entry["max_abs_error_range_rad"][2] == pytest.approx([0.3, 0.9])
+    assert entry["measured_max_abs_error_rad"] == pytest.approx([2.0] * 3)
+    assert entry["tail_rms_error_rad"] == pytest.approx([0.1] * 3)
 
 
 def test_status_is_what_should_not_have_been():

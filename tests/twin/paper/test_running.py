@@ -16,17 +16,17 @@ from tests.twin.paper.cases import IDEAL, LOST, NOISY, allowed, experiment
 
 def test_rows_are_the_same_bytes_whatever_the_threads():
     plan = make_plan(experiment(NOISY, IDEAL, NOISY._replace(name="again")), seeds=5)
-    told = [json.dumps(rows(plan, run_plan(plan, threads=workers))) for workers in (1, 2, 7)]
-    assert told[0] == told[1] == told[2]
-    noisy, ideal, again = json.loads(told[0])
+    messages = [json.dumps(rows(plan, run_plan(plan, threads=workers))) for workers in (1, 2, 7)]
+    assert messages[0] == messages[1] == messages[2]
+    noisy, ideal, again = json.loads(messages[0])
     assert (noisy["seeds"], ideal["seeds"]) == (5, 1)
     assert {**again, "case": "noisy"} == noisy
 
 
 def test_an_outcome_is_that_of_its_case_and_seed():
     plan = make_plan(experiment(NOISY), seeds=3)
-    found = run_plan(plan)["noisy"]
-    for seed, outcome in enumerate(found):
+    result = run_plan(plan)["noisy"]
+    for seed, outcome in enumerate(result):
         run = simulate(scenarios.load("tilt", {**NOISY.fields, "seed": seed}))
         table = run.telemetry
         np.testing.assert_array_equal(outcome.max_abs_error, np.abs(table["error_rad"]).max(axis=0))
@@ -41,11 +41,11 @@ def test_ideal_sensors_measure_the_true_error():
 
 
 def test_every_run_is_told_of_once():
-    told = []
+    messages = []
     plan = make_plan(experiment(NOISY, IDEAL), seeds=3)
-    run_plan(plan, told.append)
-    assert sorted(told) == ["ideal", "noisy", "noisy", "noisy"]
-    assert len(told) == len(plan.jobs)
+    run_plan(plan, messages.append)
+    assert sorted(messages) == ["ideal", "noisy", "noisy", "noisy"]
+    assert len(messages) == len(plan.jobs)
 
 
 def test_a_limit_leaves_the_first_cases():

@@ -8,6 +8,8 @@ import pytest
 from spheretwin import scenario as scenarios
 from spheretwin.models.telemetry.status import Status
 from spheretwin.paper import stability
+from spheretwin.paper.experiment import Outcomes
+from spheretwin.paper.frequency_response import LINES_Hz, linear_loop
 from spheretwin.paper.lyapunov import consequents, descent, regressor
 from spheretwin.paper.runner import make_plan, scenario_of
 from spheretwin.paper.stability import REACHED_rad_s, reduce
@@ -96,3 +98,17 @@ def test_margins_begin_at_what_is_healthy_and_are_compared_with_no_other_plant()
     jobs = make_plan(stability.EXPERIMENT, seeds=1).sample
     assert {job.case.fields["controller.law"] for job in jobs} == {law.law for law in stability.LAWS}
     assert all(job.case.comparable for job in jobs)
+
+
+def test_frequency_responses_are_a_section_with_margins_and_a_figure():
+    law = stability.LOOPS[0]
+    case = stability.frequency_response(law)
+    response = linear_loop(scenarios.load("hold", case.fields)).response(LINES_Hz)
+    data = stability.StabilityMeasures(None, None, None, None, None, response)
+    outcomes = Outcomes({case.name: [outcome(0.0)._replace(data=data)]})
+    section = stability.sections(outcomes)[-1]
+    measured, linear = section.tables[0].rows
+    assert measured[:2] == (law.label, "measured")
+    assert measured[2:] == linear[2:]  # as the response is that of the linear loop
+    assert "–" not in "".join(measured)
+    assert [len(axes.lines) for axes in section.drawings[0]().figure.axes] == [3, 3]

@@ -18,7 +18,7 @@ from spheretwin.viz.theme import LAW_COLOURS, LAW_MARKS
 
 
 @pytest.fixture(scope="module")
-def found():
+def study():
     """All cases with one seed, by the faster engine, which agrees."""
     cases = [
         case._replace(fields={**case.fields, "plant.engine": "lagrangian"})
@@ -39,18 +39,18 @@ def test_laws_are_the_paper_s_a_tuned_pid_and_ours():
         assert scenario.controller == type(scenario.controller)(**preset)  # printed gains are the defaults
 
 
-def test_json_has_the_paper_s_figures_in_rad(found):
-    told = {
+def test_json_has_the_paper_s_figures_in_rad(study):
+    fields = {
         row["controller"]: row
-        for row in rows(*found)
+        for row in rows(*study)
         if row["condition"] in ("printed gains", BY_LAW["pid"].gains)
     }
-    degrees = {law: np.degrees([each or 0 for each in row["paper"] or []]) for law, row in told.items()}
+    degrees = {law: np.degrees([each or 0 for each in row["paper"] or []]) for law, row in fields.items()}
     np.testing.assert_allclose(degrees["pd"], [0.55, 0.55, 0])
     np.testing.assert_allclose(degrees["adaptive_fuzzy"], [0.25, 0, 0])
     np.testing.assert_allclose(degrees["afsm"], [0.12, 0, 0])
-    assert told["pid"]["paper"] is None
-    assert (told["pd"]["paper_relation"], told["afsm"]["paper_relation"]) == (">", "≈")
+    assert fields["pid"]["paper"] is None
+    assert (fields["pd"]["paper_relation"], fields["afsm"]["paper_relation"]) == (">", "≈")
 
 
 def differences(one, other, path=()):
@@ -76,8 +76,8 @@ def test_a_change_is_of_one_thing_alone(change):
         assert len(differences(changed, unchanged)) == 1
 
 
-def test_order_of_the_paper_is_kept_and_the_tuned_laws_are_ahead(found):
-    _, outcomes = found
+def test_order_of_the_paper_is_kept_and_the_tuned_laws_are_ahead(study):
+    _, outcomes = study
     errors = [[run.measured_max_abs_error[0] for run in outcomes[printed(law).name]] for law in TILT_LAWS]
     assert np.all(np.diff(errors[:3], axis=0) < 0)
     assert np.all(np.max(errors[3:], axis=0) < errors[2])
@@ -86,16 +86,16 @@ def test_order_of_the_paper_is_kept_and_the_tuned_laws_are_ahead(found):
     assert [row[0] for row in section.tables[0].rows] == [law.label for law in TILT_LAWS]
 
 
-def test_ideal_sensors_leave_afsm_what_the_corners_cost(found):
-    _, outcomes = found
+def test_ideal_sensors_leave_afsm_what_the_corners_cost(study):
+    _, outcomes = study
     (ideal,) = outcomes["afsm: ideal hardware"]
     assert np.degrees(ideal.max_abs_error[0]) == pytest.approx(0.239, abs=5e-4)  # as README prints it
     (rounded,) = outcomes["afsm: ideal hardware, corners at 0.2 rad/s²"]
     assert rounded.max_abs_error[0] < 0.55 * ideal.max_abs_error[0]
 
 
-def test_one_change_brings_each_law_to_the_paper(found):
-    section = tilt.change_section(found[1])
+def test_one_change_brings_each_law_to_the_paper(study):
+    section = tilt.change_section(study[1])
     said = {(law, what): reached for law, what, reached, *_ in section.tables[0].rows}
     for law in ("PD", "adaptive fuzzy", "AFSM"):
         assert any(

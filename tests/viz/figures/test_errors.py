@@ -74,16 +74,16 @@ def test_heat_writes_what_is_a_number():
     assert written == ["0.100", "9.00", "0.300"]
 
 
-@pytest.mark.parametrize(("columns", "beside"), [(5, True), (6, False)])
-def test_panels_of_many_columns_are_one_below_the_other(columns, beside):
+@pytest.mark.parametrize(("columns", "side_by_side"), [(5, True), (6, False)])
+def test_panels_of_many_columns_are_one_below_the_other(columns, side_by_side):
     panel, names = (
         maps.HeatPanel(np.zeros((2, columns)), np.zeros((2, columns))),
         [str(i) for i in range(columns)],
     )
     figure = maps.heat({"α": panel, "β": panel}, ROWS[:2], names, "heat", "change, degrees")
     first, second = (axes.get_subplotspec() for axes in figure.axes[:2])
-    assert (first.rowspan == second.rowspan) == beside
-    assert (first.colspan == second.colspan) != beside
+    assert (first.rowspan == second.rowspan) == side_by_side
+    assert (first.colspan == second.colspan) != side_by_side
 
 
 def test_laws_have_colours_of_their_own_or_share_the_last():

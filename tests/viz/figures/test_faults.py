@@ -83,8 +83,10 @@ def test_panels_without_a_point_or_a_square_are_drawn_too(tmp_path):
 
 def test_a_panel_without_a_finite_point_is_empty():
     panels = {"told": [(0.5, 3.0, 9)], "detecting": [(0.5, np.inf, 9), (np.nan, 1.0, 9)]}
-    told, detecting, _ = faults.clouds(panels, ("torque", "error", "groups"), (1.0, 2.0), "clouds").axes
-    assert len(told.collections[0].get_offsets()) == 1
+    reported_panel, detecting, _ = faults.clouds(
+        panels, ("torque", "error", "groups"), (1.0, 2.0), "clouds"
+    ).axes
+    assert len(reported_panel.collections[0].get_offsets()) == 1
     assert len(detecting.collections[0].get_offsets()) == 0
 
 

@@ -74,10 +74,10 @@ def test_a_line_of_an_early_end_has_a_cross():
 
 def test_paths_are_on_the_same_scales():
     turn = np.linspace(0, 6, 50)
-    around = np.stack([90 * np.cos(turn), 20 * np.sin(turn), 100 + turn], axis=1)
+    path = np.stack([90 * np.cos(turn), 20 * np.sin(turn), 100 + turn], axis=1)
     by_label = {
-        "AFSM": over_time.TipPath("afsm", around, around, True),
-        "PD": over_time.TipPath("pd", around[:9], around, False),
+        "AFSM": over_time.TipPath("afsm", path, path, True),
+        "PD": over_time.TipPath("pd", path[:9], path, False),
     }
     figure = over_time.paths(by_label, "title")
     spaces, plans = figure.axes[::2], figure.axes[1::2]
@@ -91,14 +91,14 @@ def test_paths_are_on_the_same_scales():
 
 @pytest.mark.parametrize("suffix", ["png", "svg"])
 def test_the_same_figure_gives_the_same_bytes(tmp_path, suffix):
-    found = []
+    results = []
     for folder in ("one", "other"):
         (tmp_path / folder).mkdir()
         path = tmp_path / folder / f"errors.{suffix}"
         style.save(drawn(), path)
-        found.append(path.read_bytes())
-    assert found[0] == found[1]
-    assert (b"<svg" in found[0]) == (suffix == "svg")
+        results.append(path.read_bytes())
+    assert results[0] == results[1]
+    assert (b"<svg" in results[0]) == (suffix == "svg")
 
 
 def test_errors_over_time_are_medians_and_ranges_in_mrad():

@@ -1,0 +1,134 @@
+"""Torque field of magnets: a dipole exactly, boxes against forces, images, the shipped poles, refusals."""
+
+import re
+import sys
+
+import mujoco
+import numpy as np
+import pytest
+
+from spheretwin import cli
+from spheretwin.models import actuator as actuators
+from spheretwin.models import torque_field
+from spheretwin.models.base.errors import InputError
+from spheretwin.models.design import rotor_field
+from spheretwin.models.torque_field import TorqueField, directions
+from spheretwin.scenario.reading import FOLDER
+
+SECOND = (FOLDER / "ventusff" / "actuator.xml").read_text()
+POLES = re.compile(
+    r"(?s)            <frame euler=\"0 0 0\">\n              <frame euler=\"0 -46.4.*"
+    r"(?=            <site name=\"shaft_tip)"
+)
+POLE = '<site name="pole_0" class="north" {}/>\n'
+
+
+def written(tmp_path, *poles):
+    """The second actuator's coils, with other magnets."""
+    assert POLES.search(SECOND)
+    text = POLES.sub(
+        "".join(POLE.format(pole).replace("pole_0", f"pole_{i}") for i, pole in enumerate(poles)), SECOND
+    )
+    (path := tmp_path / "mine.xml").write_text(text)
+    return path
+
+
+def test_a_sphere_at_the_centre_is_a_dipole(tmp_path):
+    radius = 0.02
+    path = written(tmp_path, f'type="sphere" size="{radius}" pos="0 0 0"')
+    computed = rotor_field.compute(path, 6.0, 6)
+    coil = actuators.read_coil(mujoco.MjModel.from_xml_path(str(path)))
+    moment = 1.2 / (4e-7 * np.pi) * 4 / 3 * np.pi * radius**3
+    rho, weight_rho = np.polynomial.legendre.leggauss(40)
+    rho = coil.inner_radius_m + (coil.outer_radius_m - coil.inner_radius_m) * (rho + 1) / 2
+    z, weight_z = np.polynomial.legendre.leggauss(40)
+    z = coil.distance_m + coil.length_m * z / 2
+    # A turn of radius rho at height z links µ0 m rho² / 2 r³ of a dipole along its axis.
+    turn = 4e-7 * np.pi * moment * rho[:, None] ** 2 / (2 * np.hypot(rho[:, None], z) ** 3)
+    linked = coil.turns * np.sum(np.outer(weight_rho, weight_z) / 4 * turn)
+    axes = directions(31, 60)
+    expected = -linked * np.cross(axes, [0.0, 0.0, 1.0])  # -n x grad(linked n.z)
+    np.testing.assert_allclose(computed.field.torque_Nm_per_A, expected, rtol=0, atol=1e-9 * linked)
+
+
+def test_magnets_of_any_shape_and_pose_agree_with_their_forces(tmp_path):
+    path = written(
+        tmp_path,
+        'type="box" size="0.006 0.004 0.003" pos="0.015 0.004 -0.003" euler="20 50 10"',
+        'type="sphere" size="0.005" pos="-0.012 0.005 0.01" euler="70 0 30"',
+        'type="cylinder" size="0.006 0.004" pos="0 -0.016 0.004" euler="80 10 0"',
+    )
+    (check,) = rotor_field.compute(path, 3.0, 60).checks
+    assert 0 < check.value < check.bound == 1e-3
+
+
+def test_the_mirror_image_makes_each_magnet_twice_as_long(tmp_path):
+    half = written(tmp_path, 'size="0.006 0.004" pos="0.02 0 0" zaxis="1 0 0"')
+    imaged = rotor_field.compute(half, 6.0, 40, on_iron=True)
+    double = written(tmp_path, 'size="0.006 0.008" pos="0.016 0 0" zaxis="1 0 0"')
+    expected = rotor_field.compute(double, 6.0, 40).field
+    difference = imaged.field.torque_Nm_per_A - expected.torque_Nm_per_A
+    assert np.abs(difference).max() < 1e-9 * expected.peak_Nm_per_A  # the same field, summed otherwise
+
+
+def test_the_shipped_poles_have_the_torque_of_their_curve(actuator):
+    field = rotor_field.compute(actuators.MJCF_PATH, 6.0, 90).field
+    axes = directions(31, 60)
+    expected = np.zeros_like(axes)
+    for r, polarity in zip(actuator.pole_axes, actuator.pole_polarity, strict=True):
+        expected += polarity * actuator.torque_curve.over_sine(axes @ r)[..., None] * np.cross(r, axes)
+    error = np.abs(field.torque_Nm_per_A - expected).max()
+    # The stack of 24 cylinders that stands for a ground pole is within 2e-4; degrees above 90 give the rest.
+    assert error < 1e-3 * actuator.torque_curve.peak_Nm_per_A
+
+
+def test_what_the_verb_writes_is_read_back_and_runs(tmp_path, capsys):
+    path, out = (
+        written(tmp_path, 'size="0.006 0.004" pos="0.02 0 0" zaxis="1 0 0"'),
+        tmp_path / "torque_field.csv",
+    )
+    flags = ["--mjcf", str(path), "--degree", "40", "--step", "3"]
+    assert cli.main(["magnetics", "field", *flags, "--out", str(out)]) == 0
+    field = torque_field.read(out)
+    assert isinstance(field, TorqueField)
+    assert field.computed_for["coil turns"] == 400
+    assert actuators.load(path).torque_data.peak_Nm_per_A == field.peak_Nm_per_A
+    assert "Remake: spheretwin magnetics field --step 3 --degree 40\n" in out.read_text()
+    capsys.readouterr()
+    assert cli.main(["magnetics", "field", *flags]) == 0
+    assert capsys.readouterr().out == out.read_text()
+
+
+@pytest.mark.parametrize(
+    ("pole", "complaint"),
+    [
+        (
+            'size="0.006 0.004" pos="0.028 0 0" zaxis="1 0 0"',
+            "expected magnets within the faces of the coils at 0.031 m",
+        ),
+        (
+            'type="ellipsoid" size="0.006 0.004 0.004" pos="0.02 0 0"',
+            "expected pole_0 as a cylinder, box or sphere",
+        ),
+    ],
+)
+def test_magnets_that_do_not_fit_are_reported_in_one_line(tmp_path, pole, complaint):
+    with pytest.raises(InputError, match=complaint) as caught:
+        rotor_field.compute(written(tmp_path, pole))
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("flags", [["--step", "7"], ["--step", "0"], ["--degree", "2"], ["--degree", "x"]])
+def test_bad_flags_are_reported_in_one_line(flags, capsys):
+    assert cli.main(["magnetics", "field", *flags]) == 2
+    error = capsys.readouterr().err
+    assert error.startswith("spheretwin: command line: argument")
+    assert error.count("\n") == 1
+
+
+def test_without_magpylib_the_extra_is_named(monkeypatch, tmp_path):
+    monkeypatch.setitem(sys.modules, "magpylib", None)
+    with pytest.raises(
+        InputError, match="expected magpylib to compute fields, which the extra magnetics installs"
+    ):
+        rotor_field.compute(written(tmp_path, 'type="sphere" size="0.02" pos="0 0 0"'))

@@ -1,0 +1,321 @@
+"""Torque fields: the shipped actuator in both forms, the spline against SciPy, files and groups of coils."""
+
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.interpolate import CubicSpline
+
+from spheretwin.export.plant_code import magnetic_tables
+from spheretwin.models import actuator as actuators
+from spheretwin.models import torque_field
+from spheretwin.models.base.errors import InputError
+from spheretwin.models.inductance import mutual_inductance
+from spheretwin.models.kinematics import rate_jacobian, rotation
+from spheretwin.models.magnetics import (
+    disagreements,
+    fill_torque_matrix,
+    scaled,
+    scratch_of,
+    torque_matrix,
+    torque_model,
+)
+from spheretwin.models.mjcf import contents_digest
+from spheretwin.models.scatter import no_scatter, scattered_model, summed_torque_matrix
+from spheretwin.models.torque_curve import TorqueCurve
+from spheretwin.models.torque_field import TorqueField, directions
+from spheretwin.scenario.reading import FOLDER
+
+SECOND = FOLDER / "ventusff" / "actuator.xml"
+
+
+def field_of_curve(actuator, latitudes, meridians):
+    """The torque of all poles on one coil, (12) to (14), as a field."""
+    axes = directions(latitudes, meridians).reshape(-1, 3)
+    torque = np.zeros_like(axes)
+    for r, polarity in zip(actuator.pole_axes, actuator.pole_polarity, strict=True):
+        torque += polarity * actuator.torque_curve.over_sine(axes @ r)[:, None] * np.cross(r, axes)
+    return TorqueField(torque.reshape(latitudes, meridians, 3))
+
+
+def harmonics(n):
+    """The coefficients of the second actuator's firmware: n x grad of two spherical harmonics, N·m/A."""
+    x, y, z = np.moveaxis(n, -1, 0)
+    u = 0.01396139 * z + 0.00688961 * (3 * z**3 - z)
+    slope = 0.01396139 + 0.00688961 * (9 * z**2 - 1)
+    gradient = np.stack([2 * x * u, -2 * y * u, (x**2 - y**2) * slope], axis=-1)
+    return np.cross(n, gradient)
+
+
+def random_axes(count, seed=0):
+    axes = np.random.default_rng(seed).normal(size=(count, 3))
+    return axes / np.linalg.norm(axes, axis=1, keepdims=True)
+
+
+def random_poses(count, seed=0):
+    return np.random.default_rng(seed).uniform([-1, -1, -np.pi], [1, 1, np.pi], (count, 3))
+
+
+@pytest.fixture(scope="module")
+def second():
+    return actuators.load(SECOND)
+
+
+def test_the_shipped_actuator_is_the_same_as_a_curve_and_as_a_field(actuator):
+    as_field = replace(actuator, torque_data=field_of_curve(actuator, 181, 360))
+    for q in random_poses(100):
+        difference = torque_matrix(q, as_field) - torque_matrix(q, actuator)
+        assert np.abs(difference).max() < 1e-4 * actuator.torque_curve.peak_Nm_per_A
+
+
+def test_the_compiled_matrix_is_the_sum_of_the_spline_over_the_coils(second):
+    for q in random_poses(100):
+        # The same polynomials, summed in another order: rounding of torques of 0.02 N·m/A.
+        np.testing.assert_allclose(
+            torque_matrix(q, second), summed_torque_matrix(q, second), rtol=0, atol=1e-16 * 32
+        )
+
+
+def test_the_spline_is_the_product_of_periodic_cubic_splines(second):
+    samples = second.torque_data.torque_Nm_per_A
+    beyond = np.roll(samples[-2::-1], samples.shape[1] // 2, axis=1)  # down the opposite meridian
+    torus = np.concatenate([samples, beyond])
+    torus = np.concatenate([torus, torus[:, :1]], axis=1)
+    along_theta = CubicSpline(np.linspace(0, 2 * np.pi, len(torus)), torus, bc_type="periodic")
+    phi = np.linspace(0, 2 * np.pi, torus.shape[1])
+    for axis in random_axes(50):
+        theta, azimuth = np.arccos(axis[2]), np.arctan2(axis[1], axis[0]) % (2 * np.pi)
+        expected = CubicSpline(phi, along_theta(theta), bc_type="periodic")(azimuth)
+        np.testing.assert_allclose(second.torque_data.torque(axis[None])[0], expected, rtol=0, atol=1e-15)
+
+
+def test_the_error_of_the_spline_falls_with_the_fourth_power_of_the_step():
+    axes, errors = random_axes(2000), []
+    for latitudes in (16, 31, 61):
+        field = TorqueField(harmonics(directions(latitudes, 2 * (latitudes - 1))))
+        errors.append(np.abs(field.torque(axes) - harmonics(axes)).max())
+    orders = np.log2(np.array(errors[:-1]) / errors[1:])
+    np.testing.assert_allclose(orders, 4, atol=0.3)  # the next power at steps of 12 degrees
+
+
+def test_the_second_actuator_has_the_harmonics_of_its_firmware(second):
+    samples = second.torque_data.torque_Nm_per_A
+    expected = harmonics(directions(*samples.shape[:2]))
+    np.testing.assert_allclose(samples, expected, rtol=0, atol=1e-9)  # decimals of the file
+    assert second.torque_data.peak_Nm_per_A == pytest.approx(0.0197, abs=5e-5)
+    axes = random_axes(2000)
+    error = np.abs(second.torque_data.torque(axes) - harmonics(axes)).max()
+    assert error < 5e-5 * second.torque_data.peak_Nm_per_A  # as the head of the file says
+
+
+def test_a_curve_about_a_pole_cannot_give_the_second_actuator(second):
+    """About neither a pole nor the shaft is the magnitude of its torque a function of the angle alone."""
+    field = second.torque_data
+    for pole in (*second.pole_axes, np.array([0.0, 0.0, 1.0])):
+        frame = np.linalg.svd(pole[None])[2]
+        azimuth = 2 * np.pi * np.arange(36) / 36
+        ring = (
+            pole * np.cos(0.4) + np.sin(0.4) * np.column_stack([np.cos(azimuth), np.sin(azimuth)]) @ frame[1:]
+        )
+        magnitude = np.linalg.norm(field.torque(ring / np.linalg.norm(ring, axis=1, keepdims=True)), axis=1)
+        assert np.ptp(magnitude) > 0.1 * field.peak_Nm_per_A
+
+
+def test_poles_of_the_sphere_are_no_seam(second):
+    for z in (1.0, -1.0):
+        ring = np.array([[1e-9 * np.cos(a), 1e-9 * np.sin(a), z] for a in np.linspace(0, 2 * np.pi, 13)])
+        values = second.torque_data.torque(ring)
+        # Slopes of some 0.1 N·m/A per radian, over 1e-9.
+        np.testing.assert_allclose(values, np.broadcast_to(values[0], values.shape), rtol=0, atol=1e-9)
+    axes = np.array([[-1.0, 1e-17, 0.0], [-1.0, -1e-17, 0.0], [1.0, 0.0, 0.0], [1.0, -1e-17, 0.0]])
+    first, last, start, end = second.torque_data.torque(axes)
+    np.testing.assert_allclose([first, start], [last, end], rtol=0, atol=1e-15)
+
+
+def test_constant_currents_do_no_work_around_a_closed_path(second):
+    current = np.random.default_rng(2).normal(size=8)
+    work, power = 0.0, 0.0
+    for a in np.linspace(0, 2 * np.pi, 400, endpoint=False):
+        q = np.array([0.3 * np.cos(a), 0.2 * np.sin(a), 0.5 * np.cos(a)])
+        qdot = np.array([-0.3 * np.sin(a), 0.2 * np.cos(a), -0.5 * np.sin(a)])
+        share = (torque_matrix(q, second) @ current) @ (rate_jacobian(q) @ qdot) / 400
+        work, power = work + share, power + abs(share)
+    assert abs(work) < 1e-4 * power  # the spline is within 4e-5 of a field with a potential
+
+
+def test_a_positive_current_attracts_a_north_pole(second):
+    """The polarities that the model file draws agree with the sign of the field."""
+    field = second.torque_data
+    for pole, polarity in zip(second.pole_axes, second.pole_polarity, strict=True):
+        for side in np.linalg.svd(pole[None])[2][1:]:
+            coil = (pole + 0.1 * side) / np.hypot(1, 0.1)
+            torque = field.torque(coil[None])[0]
+            assert polarity * (torque @ np.cross(pole, coil)) > 0
+
+
+def test_groups_and_directions_are_those_of_the_model_file(second):
+    assert second.groups.tolist() == [[0, 4], [1, 5], [2, 6], [3, 7], [8, 9], [10, 11], [12, 13], [14, 15]]
+    assert second.coil_direction.tolist() == [1] * 4 + [-1] * 4 + [1] * 8
+    q = np.array([0.1, -0.2, 0.4])
+    of_coils = second.torque_data.torque(second.coil_axes @ rotation(q)) @ rotation(q).T
+    np.testing.assert_allclose(torque_matrix(q, second)[:, 1], of_coils[1] - of_coils[5], rtol=0, atol=1e-16)
+    np.testing.assert_allclose(torque_matrix(q, second)[:, 4], of_coils[8] + of_coils[9], rtol=0, atol=1e-16)
+
+
+def test_inductances_follow_the_directions_of_the_currents(second):
+    reversed_group = second.coil_direction.copy()
+    reversed_group[[1, 5]] *= -1
+    M, turned = (mutual_inductance(each) for each in (second, replace(second, coil_direction=reversed_group)))
+    sign = np.ones(8)
+    sign[1] = -1
+    np.testing.assert_allclose(turned, M * np.outer(sign, sign), rtol=1e-12)
+    np.testing.assert_allclose(M, M.T, rtol=1e-9)
+    assert np.abs(M).max() > 0
+
+
+def test_a_scaled_model_has_scaled_torques(second):
+    model, q, G = scaled(torque_model(second), 1.2), np.array([0.1, 0.2, 0.3]), np.empty((3, 8))
+    fill_torque_matrix(q, model, G, scratch_of(model))
+    np.testing.assert_allclose(G, 1.2 * torque_matrix(q, second), rtol=0, atol=1e-16)  # rounding
+
+
+def test_scatter_of_coils_is_exact_and_of_poles_is_refused(second):
+    rng, errors = np.random.default_rng(4), no_scatter(second)
+    coils = errors.coils._replace(
+        gain=rng.uniform(-0.1, 0.1, 16), angle_rad=rng.uniform(-0.02, 0.02, (16, 2))
+    )
+    scatter, G = errors._replace(coils=coils), np.empty((3, 8))
+    model = scattered_model(second, scatter)
+    for q in random_poses(5):
+        fill_torque_matrix(q, model, G, scratch_of(model))
+        np.testing.assert_allclose(G, summed_torque_matrix(q, second, scatter), rtol=0, atol=1e-15)
+        assert np.abs(G - torque_matrix(q, second)).max() > 1e-4
+    poles = errors.poles._replace(gain=np.full(8, 0.01))
+    for wrong in (
+        errors._replace(poles=poles),
+        errors._replace(coils=coils._replace(distance_m=np.ones(16))),
+    ):
+        with pytest.raises(InputError, match="errors of the coils' gain and angle alone"):
+            scattered_model(second, wrong)
+
+
+def test_a_file_is_read_back_in_any_order(tmp_path, second):
+    field = second.torque_data
+    lines = torque_field.to_csv(field, ["Where from"]).splitlines()
+    rows = np.random.default_rng(0).permutation(lines[2:]).tolist()
+    (path := tmp_path / "field.csv").write_text("\n".join([*lines[:2], *rows]))
+    again = torque_field.read(path)
+    assert isinstance(again, TorqueField)
+    np.testing.assert_array_equal(again.torque_Nm_per_A, field.torque_Nm_per_A)
+    assert again.name == "torque field field.csv"
+    assert isinstance(torque_field.read(actuators.TORQUE_CURVE_PATH), TorqueCurve)
+
+
+def test_the_coil_of_a_computed_field_is_compared_with_the_model(tmp_path, second):
+    field = replace(second.torque_data, computed_for={"coil turns": 300.0, "coil distance_m": 0.037})
+    assert disagreements(replace(second, torque_data=field)) == [
+        "torque field torque_field.csv was computed for coil turns 300, the model has 400"
+    ]
+    assert disagreements(second) == []
+
+
+HEAD = "theta_deg,phi_deg,x_Nm_per_A,y_Nm_per_A,z_Nm_per_A"
+ROWS = [f"{t},{p},{0.01 * (t % 180 != 0)},0,0.01" for t in range(0, 181, 30) for p in range(0, 360, 45)]
+
+
+@pytest.mark.parametrize(
+    ("lines", "complaint"),
+    [
+        ([HEAD.replace("z_Nm", "z_mNm"), *ROWS], "expected the columns theta_deg, phi_deg, x_Nm_per_A,"),
+        ([HEAD], "expected at least 7 values of theta_deg and an even number of at least 8 of phi_deg"),
+        ([HEAD, *ROWS[:16]], "received 2 and 8"),
+        ([HEAD, *(row for row in ROWS if ",315," not in row)], "received 7 and 7"),
+        ([HEAD, *ROWS[:-1]], "once, received other angles in 55 rows"),
+        ([HEAD, *ROWS[:-1], "180,314,0,0,0.01"], "an even number of at least 8 of phi_deg, received 7 and 9"),
+        (
+            [HEAD, *(row.replace("30,", "31,") for row in ROWS)],
+            "expected every pair of equal steps of theta_deg",
+        ),
+        ([HEAD, *ROWS, ROWS[-1]], "once, received other angles in 57 rows"),
+        ([HEAD, *ROWS[:-1], "180,315,0,0,nan"], "expected finite numbers, received NaN or infinity"),
+        ([HEAD, *ROWS[:-1], "180,315,0,0,north"], "expected numbers only, received 'north'"),
+        ([HEAD, *ROWS[:-1], "180,315,0,0"], "expected numbers only"),
+        ([HEAD, *ROWS[:-1], "180,315,0,0,0.02"], "expected one torque at theta_deg 0 and one at 180"),
+        ([HEAD, *(re.sub(",0.01,0,0.01|,0.0,0,0.01", ",0,0,0", row) for row in ROWS)], "received 0"),
+        (
+            [HEAD, *(row.replace("0.01", "1e9") for row in ROWS)],
+            "expected a peak between 1e-12 and 1e+06 N·m/A",
+        ),
+    ],
+)
+def test_a_bad_file_is_reported_in_one_line(tmp_path, lines, complaint):
+    (path := tmp_path / "field.csv").write_text("\n".join(lines) + "\n")
+    with pytest.raises(InputError, match=re.escape(complaint)) as caught:
+        torque_field.read(path)
+    assert str(caught.value).startswith(f"torque field {path}: ")
+    assert "\n" not in str(caught.value)
+
+
+def written(tmp_path, *replacements):
+    text = SECOND.read_text()
+    for old, new in replacements:
+        assert old in text
+        text = text.replace(old, new)
+    (tmp_path / "torque_field.csv").write_bytes((FOLDER / "ventusff" / "torque_field.csv").read_bytes())
+    (path := tmp_path / "mine.xml").write_text(text)
+    return path
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "complaint"),
+    [
+        ('user="-4"', 'user="4.5"', "the number of its group, from 1 on, with a sign"),
+        ('user="-4"', 'user="0"', "received 1, 2, 3, 4, -1, -2, -3, 0, 5"),
+        ('user="-4"', 'user="3"', "equally many coils in each group"),
+        ('user="-4"', 'user="900"', "from 1 on"),
+        ('"torque_field.csv"', '"elsewhere.csv"', "elsewhere.csv: expected a readable text file"),
+    ],
+)
+def test_bad_groups_are_reported_in_one_line(tmp_path, old, new, complaint):
+    with pytest.raises(InputError, match=re.escape(complaint)) as caught:
+        actuators.load(written(tmp_path, (old, new)))
+    assert "\n" not in str(caught.value)
+
+
+def test_a_group_may_have_one_coil(tmp_path):
+    numbers = [
+        re.search(rf'name="coil_{coil:02}".*?user="(.*?)"', SECOND.read_text())[0] for coil in range(1, 17)
+    ]
+    alone = [(part, re.sub('user=".*"', f'user="{coil}"', part)) for coil, part in enumerate(numbers, 1)]
+    actuator = actuators.load(written(tmp_path, *alone))
+    assert actuator.groups.shape == (16, 1)
+    q = np.array([0.1, -0.2, 0.4])
+    of_coils = actuator.torque_data.torque(actuator.coil_axes @ rotation(q)) @ rotation(q).T
+    np.testing.assert_allclose(torque_matrix(q, actuator), of_coils.T, rtol=0, atol=1e-16)
+
+
+def test_a_torque_curve_needs_opposite_coils(tmp_path, second):
+    path = written(tmp_path)
+    with pytest.raises(InputError, match="expected groups of two opposite coils for a torque curve"):
+        actuators.load(path, actuators.TORQUE_CURVE_PATH)
+    with pytest.raises(
+        InputError, match=r"expected a torque curve here, received the torque field torque_field\.csv"
+    ):
+        _ = second.torque_curve
+
+
+def test_the_torque_file_is_part_of_the_model_file(tmp_path):
+    path = written(tmp_path)
+    before, first = contents_digest(path), actuators.load(path)
+    file = tmp_path / "torque_field.csv"
+    file.write_text(file.read_text().replace("0.01", "0.02"))
+    assert contents_digest(path) != before
+    assert actuators.load(path) is not first
+
+
+def test_an_export_names_the_kind_of_torque_that_it_needs(second):
+    with pytest.raises(
+        InputError, match="expected an actuator with a torque curve, received one with a torque field"
+    ):
+        magnetic_tables(torque_model(second))

@@ -1,0 +1,107 @@
+"""Generated C, compiled with all warnings as errors, called by ctypes."""
+
+import ctypes
+import subprocess
+
+import numpy as np
+import pytest
+
+from spheretwin.export.c_library import write_c
+from spheretwin.export.compiler import host_compiler
+from spheretwin.export.controller_code import controller_code
+from spheretwin.export.plant_code import plant_code
+
+COMPILER = host_compiler()
+needs_compiler = pytest.mark.skipif(COMPILER is None, reason="there is no C compiler")
+WARNINGS = ["-std=c99", "-pedantic", "-Wall", "-Wextra", "-Wconversion", "-Wshadow", "-Werror"]
+SANITIZERS = ["-g", "-O1", "-fsanitize=address,undefined", "-fno-sanitize-recover=all"]
+
+
+def compiled(folder, sources, name, *flags):
+    """Path of a library or a program; no warning is accepted."""
+    made = folder / name
+    command = [*COMPILER, *WARNINGS, *flags, "-o", made, *(folder / source for source in sources), "-lm"]
+    done = subprocess.run(list(map(str, command)), capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    return made
+
+
+def address(array):
+    assert array.flags.c_contiguous
+    return array.ctypes.data_as(ctypes.c_void_p)
+
+
+class CPlant:
+    """Plant as a C library."""
+
+    def __init__(self, folder, scenario, changes, inputs="currents"):
+        self.model = plant_code(scenario, changes, inputs)
+        write_c(folder, self.model, None)
+        library = compiled(folder, ["st_plant.c"], "plant.so", "-O2", "-ffp-contract=off", "-fPIC", "-shared")
+        self._c = ctypes.CDLL(str(library))
+        for name in ("st_plant_step", "st_plant_advance"):
+            getattr(self._c, name).argtypes = [ctypes.c_void_p] * 3 + [ctypes.c_double]
+        self._c.st_plant_advance.argtypes += [ctypes.c_void_p]
+        groups = self.model.groups
+        self.names = [name for quantity in self.model.parameters for name in quantity.names]
+        self.parameters, self.x_start = np.empty(len(self.names)), np.empty(8 + 2 * groups)
+        self._c.st_plant_defaults(address(self.parameters), address(self.x_start))
+        self._plant = np.zeros(len(self.x_start) + 3 + groups + 1)
+        self.start(self.x_start)
+
+    @property
+    def x(self):
+        return self._plant[: len(self.x_start)]
+
+    def set(self, name, value):
+        self.parameters[self.names.index(name)] = value
+
+    def start(self, x):
+        self._c.st_plant_start(address(self._plant), address(x))
+
+    def step(self, u, h):
+        return self._c.st_plant_step(address(self.parameters), address(u), address(self._plant), h)
+
+    def advance(self, u, duration_s):
+        reached = np.zeros(1)
+        verdict = self._c.st_plant_advance(
+            address(self.parameters), address(u), address(self._plant), duration_s, address(reached)
+        )
+        return verdict, reached[0]
+
+    def derivatives(self, u, x):
+        result = np.empty(len(x))
+        self._c.st_plant_derivatives(address(self.parameters), address(u), address(x), address(result))
+        return result
+
+    def directional(self, u, x, du, dx):
+        result = np.empty(len(x))
+        arrays = (self.parameters, u, x, du, dx, result)
+        self._c.st_plant_directional(*map(address, arrays))
+        return result
+
+
+class CController:
+    """Control tick as a C library, in double or single precision."""
+
+    def __init__(self, folder, scenario, changes, single=False):
+        self.model = controller_code(scenario, changes)
+        write_c(folder, None, self.model)
+        flags = ["-DST_SINGLE", "-Wdouble-promotion"] if single else []
+        name = "single.so" if single else "double.so"
+        shared = ["-O2", "-ffp-contract=off", "-fPIC", "-shared"]
+        self._c = ctypes.CDLL(str(compiled(folder, ["st_controller.c"], name, *shared, *flags)))
+        self._type = np.float32 if single else np.float64
+        self._c.st_controller_tick.restype = ctypes.c_float if single else ctypes.c_double
+        self._memory = np.zeros(20_000)  # more than any controller has
+        self.start()
+
+    def start(self):
+        self._c.st_controller_start(address(self._memory))
+
+    def tick(self, reference, angle, rate):
+        """Share and commands."""
+        command = np.zeros(self.model.groups, self._type)
+        given = [np.array(values, self._type, order="C") for values in (reference, angle, rate)]
+        share = self._c.st_controller_tick(address(self._memory), *map(address, given), address(command))
+        return share, command

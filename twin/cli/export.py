@@ -1,0 +1,127 @@
+"""``spheretwin export fmu|c SCENARIO``: plant and control tick for other tools and for firmware."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from spheretwin.cli.common import print_json, print_message
+from spheretwin.cli.log_options import changes_of
+from spheretwin.cli.options import Parser
+from spheretwin.models.base.errors import InputError
+from spheretwin.models.base.files import check_writable
+from spheretwin.viz.terminal import runs
+
+BOTH = ("plant", "controller")
+
+
+def declare(parser: Parser) -> None:
+    """Declare the arguments of the verb."""
+    parts = parser.add_subparsers(metavar="PART", required=True)
+    fmu = _part(
+        parts,
+        "fmu",
+        "write the plant as a functional mock-up unit",
+        "Write the plant of a scenario as an FMU: C99 without Python, with its sources, and with a binary for"
+        " this machine if it has a C compiler.",
+    )
+    fmu.add_argument(
+        "--fmi", type=int, choices=(2, 3), default=2, help="version of the interface (default: 2)"
+    )
+    fmu.add_argument(
+        "--kind",
+        choices=("co-simulation", "model-exchange"),
+        default="co-simulation",
+        help="with the fixed-step method of the twin, or for the solver of the tool (default: co-simulation)",
+    )
+    fmu.add_argument(
+        "--target",
+        action="append",
+        default=[],
+        metavar="PLATFORM",
+        help="also for other platforms, such as x86_64-windows, by the extra cross; repeatable",
+    )
+    fmu.add_argument("--out", metavar="FILE.fmu", help="(default: the name of the scenario)")
+    fmu.set_run(run_fmu, has_fields=True)
+    code = _part(
+        parts,
+        "c",
+        "write plant and control tick as C files",
+        "Write the plant of a scenario as a C99 library, and one control tick of its controller (estimator,"
+        " law, allocation) for a microcontroller.",
+    )
+    code.add_argument("--part", choices=BOTH, help="only this one (default: both)")
+    code.add_argument("--out", metavar="DIR", help="(default: the name of the scenario, and _c)")
+    code.set_run(run_c, has_fields=True)
+
+
+def _part(parts: argparse._SubParsersAction[Parser], name: str, summary: str, description: str) -> Parser:
+    parser = parts.add_parser(name, help=summary, description=description, conflict_handler="resolve")
+    parser.add_argument("scenario", help="name or file")
+    parser.add_argument(
+        "--inputs",
+        choices=("currents", "voltages"),
+        default="currents",
+        help="inputs of the plant: commanded currents, or voltages at the groups (default: currents)",
+    )
+    parser.add_argument("--twin", type=Path, metavar="TWIN.toml", help="use the fields of an identified twin")
+    parser.add_argument("--json", help="print what was written as JSON, alone on stdout")
+    return parser
+
+
+def run_fmu(options: argparse.Namespace) -> bool:
+    """Write an FMU; return True."""
+    from spheretwin.export.fmu import write_fmu
+    from spheretwin.export.plant_code import plant_code
+
+    _check_scenario(options)
+    path = options.out or Path(f"{Path(options.scenario).stem}.fmu")
+    if path.suffix != ".fmu":
+        raise InputError(f"export: expected --out FILE.fmu, received {path}")
+    check_writable(path)
+    model = plant_code(options.scenario, changes_of(options), options.inputs)
+    written = write_fmu(path, model, options.fmi, options.kind, options.target)
+    if not written.binaries:
+        print_message("export: no binary: no C compiler for this machine; the sources are inside")
+    if options.json:
+        print_json(
+            {
+                "fmu": str(path),
+                "fmi": options.fmi,
+                "kind": options.kind,
+                "inputs": options.inputs,
+                "identifier": written.identifier,
+                "binaries": written.binaries,
+                "parameters": [name for quantity in model.parameters for name in quantity.names],
+            }
+        )
+    else:
+        runs.print_written([path])
+    return True
+
+
+def run_c(options: argparse.Namespace) -> bool:
+    """Write C files; return True."""
+    from spheretwin.export.c_library import write_c
+    from spheretwin.export.controller_code import controller_code
+    from spheretwin.export.plant_code import plant_code
+
+    _check_scenario(options)
+    chosen, changes = [options.part] if options.part else BOTH, changes_of(options)
+    plant = plant_code(options.scenario, changes, options.inputs) if "plant" in chosen else None
+    controller = controller_code(options.scenario, changes) if "controller" in chosen else None
+    folder = options.out or Path(f"{Path(options.scenario).stem}_c")
+    paths = write_c(folder, plant, controller)
+    if options.json:
+        tick = controller._asdict() if controller else {}
+        tick.pop("files", None)
+        names = [path.name for path in paths]
+        print_json({"folder": str(folder), "files": names, "controller": tick or None})
+    else:
+        runs.print_written([folder])
+    return True
+
+
+def _check_scenario(options: argparse.Namespace) -> None:
+    if not options.scenario:
+        raise InputError("command line: expected SCENARIO, received none")

@@ -1,0 +1,1 @@
+"""Export of the plant and of the control tick as C99, and of the plant as a functional mock-up unit (FMU)."""

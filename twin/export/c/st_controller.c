@@ -1,0 +1,173 @@
+/* SPDX-License-Identifier: MIT */
+/* Control tick: estimator, governor, law, feed-forward, allocation, estimate of the applied torque. */
+#include "st_controller.h"
+
+#include "st_numbers.h"
+
+#define ST_NUMBER st_real
+#include "st_controller_tables.h" /* generated */
+
+#define ST_GENERAL_JOINT 0
+#define T st_real
+#define NAME(x) st_##x
+#define RE(x) (x)
+#define SINE st_sin
+#define COSINE st_cos
+#define FLOOR st_floor
+#include "st_equations.h"
+
+#include ST_ESTIMATOR
+#include ST_LAW
+#include ST_ALLOCATION
+#if ST_GOVERNOR
+#include "st_governor.h"
+#endif
+#if ST_FEED_FORWARD
+#include "st_feed_forward.h"
+#endif
+
+void st_controller_start(st_controller *controller)
+{
+    int i;
+#if ST_APPLIED_TORQUE || ST_FEED_FORWARD || ST_GOVERNOR
+    int j;
+#endif
+    for (i = 0; i < ST_LAW_STATE; i++) {
+        controller->law[i] = ST_LAW_START[i];
+    }
+    for (i = 0; i < ST_ESTIMATOR_STATE; i++) {
+        controller->estimator[i] = 0;
+    }
+    for (i = 0; i < 3; i++) {
+        controller->applied_torque[i] = 0;
+    }
+#if ST_APPLIED_TORQUE
+    for (j = 0; j < ST_GROUPS; j++) {
+        controller->current[j] = 0;
+        for (i = 0; i < ST_COMMANDS; i++) {
+            controller->commands[i][j] = 0;
+        }
+    }
+#endif
+#if ST_GOVERNOR
+    controller->governed_started = 0;
+    for (i = 0; i < 3; i++) {
+        for (j = 0; j < 3; j++) {
+            controller->governed[i][j] = 0;
+        }
+    }
+#endif
+#if ST_FEED_FORWARD
+    for (i = 0; i < ST_FED_FORWARD; i++) {
+        for (j = 0; j < 3; j++) {
+            controller->fed_forward[i][j] = 0;
+        }
+    }
+#endif
+}
+
+/* Torque on the rotor in frame S of a torque on the hinges: E^-T torque_q. */
+static void st_cartesian_torque(const st_real q[3], const st_real torque_q[3], st_real torque_S[3])
+{
+    const st_turns at = st_turns_of(q);
+    const st_real in_plane = (torque_q[2] - at.sb * torque_q[0]) / at.cb;
+    torque_S[0] = torque_q[0];
+    torque_S[1] = at.ca * torque_q[1] - at.sa * in_plane;
+    torque_S[2] = at.sa * torque_q[1] + at.ca * in_plane;
+}
+
+#if ST_APPLIED_TORQUE
+/* Advance the estimate of currents and torque by a period, from the commands after the nominal delay. */
+static void st_estimate_torque(
+    st_controller *controller, const st_real q[3], st_real G[3][ST_GROUPS], const st_real command[ST_GROUPS])
+{
+    const st_real f = ST_FRACTION;
+    st_real torque_S[3] = {0, 0, 0};
+    int i, j;
+    for (j = 0; j < ST_GROUPS; j++) {
+        st_real older, newer, distance, first, mean;
+        for (i = ST_COMMANDS - 1; i > 0; i--) {
+            controller->commands[i][j] = controller->commands[i - 1][j];
+        }
+        controller->commands[0][j] = command[j];
+        older = controller->commands[ST_COMMANDS - 1][j];
+        newer = controller->commands[ST_COMMANDS - 2][j];
+        distance = controller->current[j] - older;
+        first = older + ST_OLDER_MEAN * distance;
+        distance = older + ST_OLDER_DECAY * distance - newer;
+        mean = f * first + (1 - f) * (newer + ST_NEWER_MEAN * distance);
+        controller->current[j] = newer + ST_NEWER_DECAY * distance;
+        for (i = 0; i < 3; i++) {
+            torque_S[i] += G[i][j] * mean;
+        }
+    }
+    st_generalised_torque(q, torque_S, controller->applied_torque);
+}
+#endif
+
+/* Torque of the law with its compensators; returns 1 if it is finite. */
+static int st_call_law(st_controller *controller, st_real reference[3][3], st_real measurement[3][3],
+    st_real torque[3])
+{
+#if ST_FEED_FORWARD
+    st_real fed[3];
+#endif
+    int i;
+#if ST_GOVERNOR
+    if (!st_govern(controller, measurement, reference)) {
+        return 0;
+    }
+#endif
+#if ST_FEED_FORWARD
+    st_feed_forward(controller, reference, measurement[2], fed);
+#endif
+    st_law((const st_real(*)[3])reference, (const st_real(*)[3])measurement, controller->law, torque);
+    for (i = 0; i < 3; i++) {
+#if ST_FEED_FORWARD
+        torque[i] += fed[i];
+#endif
+        if (!(st_fabs(torque[i]) < ST_LARGEST)) {
+            return 0;
+        }
+    }
+    for (i = 0; i < ST_LAW_SIGNALS; i++) {
+        if (!st_finite(controller->law[i])) {
+            return 0;
+        }
+    }
+    return 1;
+}
+
+st_real st_controller_tick(st_controller *controller, const st_real reference[3][3], const st_real angle[3],
+    const st_real rate[3], st_real command[ST_GROUPS])
+{
+    st_real desired[3][3], measurement[3][3], pose[3], torque[3], torque_S[3], G[3][ST_GROUPS], share = -1;
+    int i, j, succeeded = 1;
+    for (i = 0; i < 3; i++) {
+        measurement[0][i] = angle[i];
+        for (j = 0; j < 3; j++) {
+            desired[i][j] = reference[i][j];
+        }
+    }
+    st_estimate_rates(measurement[0], rate, controller->estimator, measurement[1]);
+    for (i = 0; i < 3; i++) {
+        pose[i] = measurement[0][i];
+        measurement[2][i] = controller->applied_torque[i];
+        succeeded = succeeded && st_fabs(pose[i]) < ST_LARGEST;
+    }
+    for (j = 0; j < ST_GROUPS; j++) {
+        command[j] = 0;
+    }
+    if (!succeeded) {
+        return share;
+    }
+    st_torque_matrix(pose, G);
+    if (st_call_law(controller, desired, measurement, torque)) {
+        st_cartesian_torque(pose, torque, torque_S);
+        share = st_allocate(G, torque_S, ST_CURRENT_LIMIT_A, command);
+    }
+#if ST_APPLIED_TORQUE
+    st_estimate_torque(controller, pose, G, command);
+#endif
+    return share;
+}

@@ -1,0 +1,295 @@
+"""Model of the plant for generated code: tunable parameters, initial states, sizes and tables."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any, Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spheretwin import scenario as scenarios
+from spheretwin.active_config import initial_config
+from spheretwin.export.c_text import constant, definitions, header
+from spheretwin.models import magnetics
+from spheretwin.models.base.errors import InputError
+from spheretwin.models.magnetics import TorqueModel
+from spheretwin.models.mjcf_reader import HINGES
+from spheretwin.plant.magnet_heat import initial_degC, remanence
+from spheretwin.plant.plant_step import Parameters
+from spheretwin.plant_model import parameters
+from spheretwin.scenario.sections import ResolvedScenario
+
+Array = NDArray[np.float64]
+Inputs = Literal["currents", "voltages"]
+
+
+class Variable(NamedTuple):
+    """Parameter, state or input of the generated plant: one number or one for each of its parts."""
+
+    name: str
+    values: tuple[float, ...]
+    unit: str
+    description: str
+    parts: tuple[str, ...] = ()
+    """Names of the numbers; empty for a single one."""
+    least: float | None = None
+    largest: float | None = None
+    fixed: bool = False
+    """True for a parameter that cannot change during a simulation."""
+
+    @property
+    def names(self) -> list[str]:
+        """Names of all numbers, such as ``q_rad.alpha`` and ``current_A[3]``."""
+        return [self.name + part for part in self.parts] or [self.name]
+
+
+class PlantCode(NamedTuple):
+    """Plant of a scenario for generated code."""
+
+    name: str
+    inputs: Inputs
+    thermal: bool
+    groups: int
+    parameters: list[Variable]
+    states: list[Variable]
+    commands: list[Variable]
+    """Inputs."""
+    step: Parameters
+    """Parameters of the plant step."""
+    hinge_range_rad: Array
+
+    def model_header(self) -> str:
+        """Return the header of sizes and of the structure of the parameters."""
+        fields = [
+            f"    double {one.name}{f'[{len(one.values)}]' if one.parts else ''}; "
+            f"/* {one.unit}: {one.description} */"
+            for one in self.parameters
+        ]
+        flags = {
+            "ST_GROUPS": self.groups,
+            "ST_VOLTAGES": self.inputs == "voltages",
+            "ST_THERMAL": self.thermal,
+        }
+        return header([*definitions(flags), "", "typedef struct {", *fields, "} st_parameters;"])
+
+    def table_header(self) -> str:
+        """Return the header of tables and default values."""
+        joint = self.step.joint
+        lines = [
+            NUMBERS,
+            *magnetic_tables(self.step.magnetics),
+            *definitions({"ST_GENERAL_JOINT": joint is not None}),
+            constant("ST_HINGE_RANGE", self.hinge_range_rad, "double"),
+            constant("ST_INITIAL", [value for one in self.states for value in one.values], "double"),
+            "static const st_parameters ST_DEFAULTS = {",
+            *(f"    {_initialiser(one)}, /* {one.name} */" for one in self.parameters),
+            "};",
+        ]
+        if joint is not None:
+            lines += [
+                constant("ST_HINGE_AXES", joint.axes, "double"),
+                constant("ST_HINGE_POINTS", joint.points, "double"),
+                constant("ST_MASSES", joint.masses, "double"),
+                constant("ST_GRAVITY", joint.gravity, "double"),
+            ]
+        return header(lines)
+
+
+NUMBERS = "#define ST_C(number) ((ST_NUMBER)(number))"
+"""First line of a header of tables."""
+
+
+def magnetic_tables(model: TorqueModel) -> list[str]:
+    """Return the tables of the torque matrix.
+
+    Raises
+    ------
+    InputError
+        The field is not that of pole lines and a torque curve.
+    """
+    if model.coils.size:
+        raise InputError("export: expected an actuator with a torque curve, received one with a torque field")
+    lines, groups = model.line_axes.shape[0], model.group_axes.shape[1]
+    scatter = model.pair_gain.shape[1] > 0
+    place = {
+        "ST_LINES": lines,
+        "ST_SCATTER": scatter,
+        "ST_KNEE": f"ST_C({magnetics.KNEE!r})",
+        "ST_CENTRE": f"ST_C({magnetics.CENTRE!r})",
+        "ST_WIDE": magnetics.WIDE_PER_UNIT,
+        "ST_NARROW": magnetics.NARROW_PER_UNIT,
+    }
+    tables = {
+        "ST_LINE_AXES": model.line_axes,
+        "ST_LINE_WEIGHTS": model.line_weights,
+        "ST_GROUP_AXES": model.group_axes,
+        "ST_TABLE": model.table,
+    }
+    if scatter:
+        tables["ST_PAIR_GAIN"] = model.pair_gain.reshape(2, lines, groups)
+        tables["ST_PAIR_STRETCH"] = model.pair_stretch.reshape(2, lines, groups)
+    return [*definitions(place), *(constant(name, table) for name, table in tables.items())]
+
+
+def plant_code(
+    scenario: str, changes: Mapping[str, Any] | None = None, inputs: Inputs = "currents"
+) -> PlantCode:
+    """Return the plant of a scenario for generated code.
+
+    Parameters
+    ----------
+    scenario : str
+        Name or file.
+    changes : mapping, optional
+        Fields by dotted name, such as those of an identified twin.
+    inputs : str
+        ``currents``, which the amplifiers follow with a lag up to their limit, or ``voltages`` at the groups.
+
+    Raises
+    ------
+    InputError
+        A field is invalid, or the plant has a state that the generated code does not have: static friction,
+        hysteresis of a cable; with voltages, mutual inductance.
+    """
+    loaded = scenarios.load(scenario, changes)
+    step, config = parameters(loaded), initial_config(loaded, None, None)
+    resolved, actuator = config.scenario, config.files.actuator
+    if inputs == "voltages" and resolved.drive.coil_coupling:
+        raise InputError(
+            "export: expected drive.coil_coupling 0 with voltages as inputs,"
+            f" received {resolved.drive.coil_coupling:g}"
+        )
+    groups = len(actuator.groups)
+    return PlantCode(
+        name=resolved.name,
+        inputs=inputs,
+        thermal=resolved.plant.thermal.on,
+        groups=groups,
+        parameters=_parameters(resolved, step, inputs, groups),
+        states=_states(resolved, groups),
+        commands=_inputs(resolved, inputs, groups),
+        step=step,
+        hinge_range_rad=actuator.hinge_range_rad,
+    )
+
+
+AXES = tuple(f".{angle}" for angle in HINGES)
+
+
+def _per_group(groups: int) -> tuple[str, ...]:
+    return tuple(f"[{group}]" for group in range(groups))
+
+
+def _parameters(scenario: ResolvedScenario, step: Parameters, inputs: Inputs, groups: int) -> list[Variable]:
+    drive, thermal, plant = scenario.drive, scenario.plant.thermal, scenario.plant
+    gain = step.torque_gain / remanence(thermal, drive.ambient_degC)
+
+    def each_hinge(name: str, values: Array, unit: str, text: str, least: float | None = None) -> Variable:
+        return Variable(name, _numbers(values), unit, text, AXES, least)
+
+    def single(name: str, value: float, unit: str, text: str, least: float = 1e-12, **more: Any) -> Variable:
+        return Variable(name, (float(value),), unit, text, (), least, **more)
+
+    rows = []
+    if step.joint is None:
+        rows += [
+            each_hinge(
+                "inertia_kg_m2", step.inertia_kg_m2, "kg.m2", "principal moments, with the payload", 1e-12
+            ),
+            single("weight_moment_Nm", step.weight_moment_Nm, "N.m", "weight of the payload times height", 0),
+        ]
+    rows += [
+        each_hinge("coulomb_Nm", step.coulomb_Nm, "N.m", "Coulomb friction of each hinge", 0),
+        each_hinge("viscous_Nm_s", step.viscous_Nm_s, "N.m.s", "viscous friction of each hinge", 0),
+        single(
+            "friction_smoothing_rad_s",
+            step.friction_smoothing_rad_s,
+            "rad/s",
+            "rate over which Coulomb friction changes sign",
+        ),
+        each_hinge("constant_torque_Nm", step.constant_torque_Nm, "N.m", "constant torque, subtracted"),
+        each_hinge("spring_Nm_rad", step.spring_Nm_rad, "N.m/rad", "stiffness about each hinge", 0),
+        Variable(
+            "torque_gain",
+            _numbers(gain),
+            "1",
+            "torque of each group over nominal, at 20 degC",
+            _per_group(groups),
+        ),
+    ]
+    if inputs == "currents":
+        rows += [
+            single("current_limit_A", drive.current_limit_A, "A", "largest current of the amplifiers", 0),
+            single("lag_s", drive.lag_s, "s", "time constant of the currents", 0),
+        ]
+    rows += [
+        single("resistance_ohm", drive.resistance_ohm, "Ohm", "resistance of a group at 20 degC"),
+    ]
+    if inputs == "voltages":
+        rows.append(single("inductance_H", drive.inductance_H, "H", "inductance of a group"))
+    rows += [
+        single("resistance_per_K", drive.resistance_per_K, "1/K", "relative rise of the resistance", 0),
+        single("heat_capacity_J_K", drive.heat_capacity_J_K, "J/K", "heat capacity of a winding"),
+        single(
+            "thermal_resistance_K_W", drive.thermal_resistance_K_W, "K/W", "from a winding to the stator", 0
+        ),
+    ]
+    if thermal.on:
+        rows += [
+            single("ambient_degC", drive.ambient_degC, "degC", "temperature of the surroundings", -273.15),
+            Variable(
+                "remanence_per_K", (thermal.remanence_per_K,), "1/K", "relative change of the remanence"
+            ),
+            single("stator_heat_capacity_J_K", thermal.stator_heat_capacity_J_K, "J/K", "of the stator"),
+            single("rotor_heat_capacity_J_K", thermal.rotor_heat_capacity_J_K, "J/K", "of the rotor"),
+            single(
+                "stator_to_ambient_K_W", thermal.stator_to_ambient_K_W, "K/W", "from stator to surroundings"
+            ),
+            single("air_gap_K_W", thermal.air_gap_K_W, "K/W", "from stator to rotor"),
+            single("rotor_to_ambient_K_W", thermal.rotor_to_ambient_K_W, "K/W", "from rotor to surroundings"),
+        ]
+    return [
+        *rows,
+        single("step_s", plant.step_s, "s", "longest step of the fixed-step method", fixed=True),
+        single(
+            "thermal_period_s",
+            scenario.controller.period_s,
+            "s",
+            "time between updates of the temperatures by the fixed-step method",
+            fixed=True,
+        ),
+    ]
+
+
+def _states(scenario: ResolvedScenario, groups: int) -> list[Variable]:
+    plant, ambient_degC = scenario.plant, scenario.drive.ambient_degC
+    rotor_degC = initial_degC(plant.thermal, ambient_degC) if plant.thermal.on else ambient_degC
+    each = _per_group(groups)
+    return [
+        Variable("q_rad", _numbers(plant.initial_rad), "rad", "angle of each hinge", AXES),
+        Variable("qdot_rad_s", _numbers(plant.initial_rad_s), "rad/s", "rate of each hinge", AXES),
+        Variable("current_A", (0.0,) * groups, "A", "current of each group", each),
+        Variable("winding_degC", (ambient_degC,) * groups, "degC", "temperature of each winding", each),
+        Variable("stator_degC", (ambient_degC,), "degC", "temperature of the stator"),
+        Variable("rotor_degC", (rotor_degC,), "degC", "temperature of the rotor"),
+    ]
+
+
+def _inputs(scenario: ResolvedScenario, inputs: Inputs, groups: int) -> list[Variable]:
+    each, zeros = _per_group(groups), (0.0,) * groups
+    commands = {
+        "currents": Variable("current_command_A", zeros, "A", "commanded current of each group", each),
+        "voltages": Variable("voltage_V", zeros, "V", "voltage at each group", each),
+    }
+    disturbance = "generalised disturbance torque on each hinge, subtracted"
+    return [commands[inputs], Variable("disturbance_Nm", (0.0,) * 3, "N.m", disturbance, AXES)]
+
+
+def _numbers(values: Sequence[float] | Array | None) -> tuple[float, ...]:
+    return tuple(float(value) for value in np.asarray(values, np.float64))
+
+
+def _initialiser(one: Variable) -> str:
+    text = ", ".join(map(repr, one.values))
+    return f"{{{text}}}" if one.parts else text

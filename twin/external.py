@@ -1,0 +1,167 @@
+"""Controller or plant outside of the process of a session: another program, or a machine."""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Callable
+from typing import Any, NamedTuple, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spheretwin.control.controller import Controller
+from spheretwin.control.manual_currents import Manual
+from spheretwin.control.supervision.watchdog import Reason, trip
+from spheretwin.electronics.drive_chain import DriveChain
+from spheretwin.loop import INTERRUPTED, NO_EXTERNAL, External, Scratch
+from spheretwin.models.base.compiled import uncompiled
+from spheretwin.plant.plant_tick import GOING, Plant
+
+Array = NDArray[np.float64]
+
+_CALLBACK = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_double)
+
+
+class Measurement(NamedTuple):
+    """Values that the sensors of a machine report at one time."""
+
+    angle_rad: Array
+    """(3,)"""
+    rate_rad_s: Array | None = None
+    """(3,); None if the machine does not measure rates."""
+    current_A: Array | None = None
+    """(n,); None if the machine does not measure currents."""
+    temperature_degC: float | None = None
+    """Of the hottest coil; None if the machine does not report it."""
+
+
+class ExternalController(Protocol):
+    """Controller that replaces that of the scenario.
+
+    Attributes
+    ----------
+    name : str
+        Entry of the journal.
+    """
+
+    name: str
+
+    def command(self, t_s: float, measurement: Measurement) -> Array | None:
+        """Return the group currents (n,), A, for the measurement of a tick; None ends the run."""
+
+
+class ExternalPlant(Protocol):
+    """Machine that replaces the plant of the scenario.
+
+    Attributes
+    ----------
+    name : str
+        Entry of the journal.
+    authority : float
+        Share of the commands that is sent at the next tick, from 0 to 1: soft start.
+    """
+
+    name: str
+    authority: float
+
+    def advance(self, t_s: float, current_A: Array) -> tuple[Measurement, Reason] | None:
+        """Send the currents (n,) of a tick; return the next measurement, and a reason to remove the currents.
+
+        `Reason.NONE` goes on; None ends the run.
+        """
+
+
+class Connection:
+    """Connection of the loop to an external part.
+
+    Parameters
+    ----------
+    part : ExternalController or ExternalPlant, optional
+    controller : Controller
+    plant : Plant
+    scratch : Scratch
+        Buffers of the loop.
+    compiled : bool
+        True if the loop is compiled: it calls the part by its address.
+
+    Attributes
+    ----------
+    external : External
+        Argument of the loop. It has only addresses: this object keeps the functions alive.
+    """
+
+    def __init__(
+        self, part: Any, controller: Controller, plant: Plant, scratch: Scratch, compiled: bool
+    ) -> None:
+        self._part, self._controller, self._plant = part, controller, plant
+        self._measured = scratch.measurement
+        self._error: BaseException | None = None
+        self.external = NO_EXTERNAL
+        if part is None:
+            return
+        is_plant = hasattr(part, "advance")
+        function = self._guarded(self._advance if is_plant else self._command)
+        self._callback = _CALLBACK(function)
+        entry = ctypes.cast(self._callback, ctypes.c_void_p).value if compiled else function
+        groups = len(plant.current)
+        self.external = External(
+            0 if is_plant else entry, entry if is_plant else 0, np.zeros(groups), np.zeros(3)
+        )
+        if is_plant:
+            controller.authority[0] = part.authority
+
+    def raise_error(self) -> None:
+        """Raise the exception of the part, if there was one: it cannot pass the compiled loop."""
+        error, self._error = self._error, None
+        if error is not None:
+            raise error
+
+    def _guarded(self, function: Callable[[float], int]) -> Callable[[float], int]:
+        def call(t_s: float) -> int:
+            try:
+                return function(t_s)
+            except BaseException as error:
+                self._error = error
+                return INTERRUPTED
+
+        return call
+
+    def _command(self, t_s: float) -> int:
+        plant, controller = self._plant, self._controller
+        sensors, drive = plant.current_sensors, plant.drive
+        measurement = Measurement(
+            self._measured[0],
+            None if controller.estimator_state.on else self._measured[1],
+            sensors.measured_A if sensors.on else plant.current,
+            drive.coil.temperature_degC.max() if isinstance(drive, DriveChain) else None,
+        )
+        command = self._part.command(t_s, measurement)
+        if command is None:
+            return INTERRUPTED
+        controller.manual.currents_A[0] = command
+        return GOING
+
+    def _advance(self, t_s: float) -> int:
+        controller, plant, external = self._controller, self._plant, self.external
+        # Nominal torque of the currents: the true one is not known.
+        np.dot(controller.cached_matrix.G, external.command, out=external.torque_S)
+        result = self._part.advance(t_s, external.command)
+        if result is None:
+            return INTERRUPTED
+        measurement, reason = result
+        plant.rotor.q[:] = measurement.angle_rad
+        if measurement.rate_rad_s is not None:
+            plant.rotor.qdot[:] = measurement.rate_rad_s
+        plant.current[:] = external.command if measurement.current_A is None else measurement.current_A
+        if reason:
+            _trip(controller.supervision.watchdog, int(reason))
+        controller.authority[0] = self._part.authority
+        return GOING
+
+
+_trip = uncompiled(trip)
+
+
+def external_currents(groups: int) -> Manual:
+    """Return the manual currents that an external controller writes."""
+    return Manual(True, False, np.zeros(1), np.zeros((1, groups)))
