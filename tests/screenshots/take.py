@@ -1,4 +1,4 @@
-"""Take the pictures of the READMEs: ``python -m tests.screenshots.take [--out DIR] [NAME ...]``.
+"""Take the pictures and clips of the pages: ``python -m tests.screenshots.take [--out DIR] [NAME ...]``.
 
 ``--inspect DIR`` takes these and more at five sizes instead, in both themes of the viewer, each also as a
 reader with deuteranopia sees it.
@@ -26,7 +26,8 @@ from spheretwin.session import Session
 from spheretwin.simulation import follow
 from spheretwin.viz.recording.live import RECORDING
 from tests.browser import CHROMIUM
-from tests.screenshots.bench import drawn
+from tests.screenshots import clips
+from tests.screenshots.bench import screenshot
 from tests.screenshots.viewer import DARK, THEMES, HeadlessViewer
 
 PICTURES = Path(__file__).parents[2] / "viz" / "pictures"
@@ -97,10 +98,15 @@ MORE: dict[str, Recorded | Driven] = {
 }
 """Pictures for an inspection only."""
 
+NOT_TAKEN = "{}: not taken: no Chromium on this machine"
+
+CLIPS = {"nutation_clip": TABLE["overview"], "bench_clip": TABLE["bench"]}
+"""Run and drags of each clip."""
+
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    known = TABLE | MORE
+    known = TABLE | MORE | CLIPS
     parser.add_argument("names", nargs="*", metavar="NAME", help=f"of {', '.join(known)}")
     parser.add_argument("--out", type=Path, default=PICTURES, metavar="DIR")
     parser.add_argument("--size", default=f"{WIDTH}x{HEIGHT}", metavar="WIDTHxHEIGHT")
@@ -113,11 +119,14 @@ def main() -> None:
             parser.error(f"expected one of {', '.join(known)}, received {name}")
     if not options.inspect:
         size = tuple(map(int, options.size.split("x")))
-        for name in options.names or TABLE:
+        for name in options.names or [*TABLE, *CLIPS]:
+            if name in CLIPS:
+                save_clip(name, CLIPS[name], options.out)
+                continue
             for _, _, picture in pictures_of(name, known[name], [size], [DARK]):
                 save(picture, options.out / f"{name}.png")
         return
-    for name in options.names or known:
+    for name in options.names or TABLE | MORE:
         for (width, height), theme, picture in pictures_of(name, known[name], SIZES, THEMES):
             folder = options.inspect / f"{width}x{height}"
             save(picture, folder / f"{name}_{theme}.png")
@@ -138,10 +147,25 @@ def pictures_of(
                 for theme in themes:
                     yield size, theme, viewer_picture(name, recording, row.t_s, size, theme)
         elif CHROMIUM:
-            for size in sizes:  # a bench has one theme
-                yield size, DARK, drawn(row.run.split(), row.poses_deg, size, Path(work))
+            for size in sizes:
+                for theme in themes:
+                    light = theme != DARK
+                    yield size, theme, screenshot(row.run.split(), row.poses_deg, size, Path(work), light)
         else:
-            print(f"{name}: not taken: no Chromium on this machine", file=sys.stderr)
+            print(NOT_TAKEN.format(name), file=sys.stderr)
+
+
+def save_clip(name: str, row: Recorded | Driven, out: Path) -> None:
+    """Write a clip, unless this machine cannot take it."""
+    with tempfile.TemporaryDirectory() as work:
+        if isinstance(row, Recorded):
+            frames = clips.nutation(recorded(row, Path(work)))
+        elif CHROMIUM:
+            frames = clips.bench(row.run.split(), row.poses_deg, Path(work))
+        else:
+            print(NOT_TAKEN.format(name), file=sys.stderr)
+            return
+    clips.save(frames, out / f"{name}.webp")
 
 
 def save(picture: Image.Image, path: Path) -> None:

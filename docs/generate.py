@@ -1,0 +1,368 @@
+"""Reference pages that follow from the sources: fields, columns, commands, statuses, figures, faults.
+
+``python docs/generate.py`` writes them into ``docs/reference/generated``; the build of the site does so too.
+"""
+
+from __future__ import annotations
+
+import argparse
+import importlib
+import inspect
+import os
+import re
+from collections.abc import Iterable, Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+from pydantic import BaseModel
+
+from spheretwin import cli
+from spheretwin.channels import CHANNELS
+from spheretwin.cli.options import Parser
+from spheretwin.control.law import NominalModel
+from spheretwin.control.laws import LAWS
+from spheretwin.faults.targets import TARGETS
+from spheretwin.metrics import METRICS
+from spheretwin.models import actuator as actuators
+from spheretwin.models.telemetry.signals import Signal, common_signals
+from spheretwin.models.telemetry.status import Status
+from spheretwin.scenario.fields import Kind, kind_of, unit_of
+from spheretwin.scenario.hardware import HARDWARE, ORIGINS
+from spheretwin.scenario.reading import value_text
+from spheretwin.scenario.sections import Scenario
+
+ROOT = Path(__file__).parents[1]
+GROUPS = 18
+
+READMES = {
+    "models/README.md": "actuator",
+    "twin/electronics/README.md": "electronics",
+    "twin/envs/README.md": "environments",
+    "twin/faults/README.md": "faults",
+    "twin/machine/README.md": "machine",
+    "twin/machine/link/README.md": "link",
+    "twin/paper/README.md": "paper",
+    "twin/study/README.md": "studies",
+    "viz/README.md": "recordings",
+    "viz/bench/README.md": "bench",
+}
+"""Pages that stand next to the code, and their names on the site."""
+
+DOCSTRINGS = {
+    "afsm_eso": ("AFSM-ESO: law and proof", "spheretwin.control.laws.afsm_eso"),
+    "extended_state_observer": (
+        "Extended state observer: gains and error bounds",
+        "spheretwin.control.law_components.extended_state_observer",
+    ),
+    "bounded_allocation": ("Bounded allocation", "spheretwin.control.allocation.bounded"),
+    "generalised_maxwell_slip": ("Static friction", "spheretwin.plant.bristle_friction"),
+    "reference_governor": ("Reference governor", "spheretwin.control.compensators.reference_governor"),
+    "delay_prediction": ("Prediction over the delay", "spheretwin.control.compensators.prediction"),
+    "fault_detector": ("Fault detector", "spheretwin.control.supervision.fault_detector"),
+}
+"""Derivations that stand in the docstrings of modules: title and module of the page."""
+
+TOP_LEVEL = "run"
+"""Heading of the fields outside any section."""
+
+HELP_WIDTH = "96"
+
+
+def write_pages(folder: Path) -> None:
+    """Write every page; a page whose text is unchanged keeps its time."""
+    folder.mkdir(parents=True, exist_ok=True)
+    pages = {
+        "scenario_fields": scenario_fields(),
+        "laws": laws(),
+        "hardware": hardware(),
+        "telemetry_columns": telemetry_columns(),
+        "commands": commands(),
+        "statuses": statuses(),
+        "metrics": metrics(),
+        "fault_modes": fault_modes(),
+        **{name: readme(path) for path, name in READMES.items()},
+        **{name: docstring(*page) for name, page in DOCSTRINGS.items()},
+    }
+    for name, text in pages.items():
+        path = folder / f"{name}.md"
+        if not path.exists() or path.read_text(encoding="utf-8") != text:
+            path.write_text(text, encoding="utf-8")
+
+
+def scenario_fields() -> str:
+    """Return the page of all fields of a scenario, by section."""
+    sections: dict[str, list[Sequence[str]]] = {TOP_LEVEL: []}
+    for dotted, field in _fields(Scenario):
+        section = dotted.partition(".")[0] if "." in dotted else TOP_LEVEL
+        sections.setdefault(section, []).append(
+            (f"`{dotted}`", unit_of(dotted), _default(field), _cell(field.description or ""))
+        )
+    lines = [
+        "# Scenario fields",
+        "",
+        "Generated from the models. Each field is a line of a TOML file and a flag:"
+        " `plant.coulomb_Nm` is `--plant.coulomb-Nm`. `#` stands for the number of an entry of a list."
+        " `spheretwin explain FIELD` prints value, unit, distribution and origin.",
+    ]
+    for section, rows in sections.items():
+        lines += ["", f"## {section}", "", *_table(("field", "unit", "default", "meaning"), rows)]
+    return _page(lines)
+
+
+def _fields(section: type[BaseModel], prefix: str = "") -> Iterator[tuple[str, Any]]:
+    """Yield dotted name and description of every plain field; parameters of laws have a page of their own."""
+    for name, field in section.model_fields.items():
+        kind = kind_of(field)
+        if kind is None:
+            yield prefix + name, field
+            continue
+        below = f"{prefix}{name}.#." if kind.is_list else f"{prefix}{name}."
+        yield from _unique(field for member in _members(name, kind) for field in _fields(member, below))
+
+
+def _members(name: str, kind: Kind) -> Iterable[type[BaseModel]]:
+    return [next(iter(kind.members.values()))] if name == "controller" else kind.members.values()
+
+
+def _unique(fields: Iterable[tuple[str, Any]]) -> Iterator[tuple[str, Any]]:
+    """Yield the first field of each name: members of a family share fields."""
+    seen: set[str] = set()
+    for dotted, field in fields:
+        if dotted not in seen:
+            seen.add(dotted)
+            yield dotted, field
+
+
+def _default(field: Any) -> str:
+    if field.is_required():
+        return "required"
+    default = field.get_default(call_default_factory=True)
+    if default is None:
+        return ""
+    return f"`{text}`" if (text := value_text(default)) else ""
+
+
+def laws() -> str:
+    """Return the page of the shipped laws with their parameters."""
+    common = set.intersection(*(set(kind.model_fields) for kind in LAWS.values()))
+    lines = [
+        "# Control laws",
+        "",
+        "Generated from the models: `controller.law` selects a law; its parameters are fields of"
+        " `controller`. A gain is one number for all axes, or three.",
+    ]
+    for name, kind in LAWS.items():
+        rows = [
+            (f"`{parameter}`", unit_of(parameter), _default(field), _cell(field.description or ""))
+            for parameter, field in kind.model_fields.items()
+            if parameter not in common
+        ]
+        lines += ["", f"## {name}", "", _summary(kind), ""]
+        lines += _table(("parameter", "unit", "default", "meaning"), rows)
+    return _page(lines)
+
+
+def hardware() -> str:
+    """Return the page of the hardware sets."""
+    lines = ["# Hardware sets", "", "Generated: the fields that `hardware` sets unless a scenario sets them."]
+    for name, values in HARDWARE.items():
+        rows = [
+            (f"`{dotted}`", f"`{value_text(value)}`", unit_of(dotted), _cell(ORIGINS[name][dotted]))
+            for dotted, value in values.items()
+        ]
+        lines += ["", f"## {name}", ""]
+        lines += _table(("field", "value", "unit", "origin"), rows) if rows else ["It sets no field."]
+    return _page(lines)
+
+
+def telemetry_columns() -> str:
+    """Return the page of the telemetry columns."""
+    conditional = [signal for channel in CHANNELS for signal in channel.signals(GROUPS)]
+    known = NominalModel(period_s=1e-3, delay_s=0.0, inertia=actuators.load().inertia)
+    own = {signal.name: signal for kind in LAWS.values() for signal in kind().build(known).signals}
+    lines = [
+        "# Telemetry columns",
+        "",
+        f"Generated from the channels, for the shipped actuator with {GROUPS} groups."
+        " A vector is a list of fixed length, with a number for each label.",
+        *("", "## Every run", "", *_signals(common_signals(GROUPS))),
+        *("", "## With a stage that is on", "", *_signals(conditional)),
+        *("", "## Of the laws that have them", "", *_signals(own.values())),
+    ]
+    return _page(lines)
+
+
+def _signals(signals: Iterable[Signal]) -> list[str]:
+    rows = [
+        (
+            f"`{signal.name}`",
+            signal.unit,
+            f"{signal.size}",
+            _cell(signal.meaning + (f" ({', '.join(signal.states)})" if signal.states else "")),
+        )
+        for signal in signals
+    ]
+    return _table(("column", "unit", "numbers", "meaning"), rows)
+
+
+def commands() -> str:
+    """Return the page of the commands, with the help of each verb."""
+    os.environ["COLUMNS"] = HELP_WIDTH
+    lines = [
+        "# Commands",
+        "",
+        "Generated from the parsers. `spheretwin VERB --help` prints the same. Exit codes are listed under"
+        " [statuses and exit codes](statuses.md).",
+        "",
+        *_table(("verb", "purpose"), [(f"[`{verb}`](#{verb})", text) for verb, text in cli.VERBS.items()]),
+    ]
+    for verb, text in cli.VERBS.items():
+        lines += ["", f"## {verb}", "", f"{text[0].upper()}{text[1:]}.", ""]
+        for title, parser in _parsers(verb):
+            lines += ["", f"### {title}", ""] if title != verb else []
+            lines += ["```text", parser.format_help().rstrip(), "```"]
+    return _page(lines)
+
+
+def _parsers(verb: str) -> Iterator[tuple[str, argparse.ArgumentParser]]:
+    """Yield the parser of a verb, and those of the verbs below it."""
+    parser = Parser(prog=f"spheretwin {verb}", conflict_handler="resolve")
+    importlib.import_module(f"spheretwin.cli.{verb}").declare(parser)
+    yield verb, parser
+    for action in parser._actions:
+        if isinstance(action, argparse._SubParsersAction):
+            for name, below in action.choices.items():
+                yield f"{verb} {name}", below
+
+
+def statuses() -> str:
+    """Return the page of statuses and exit codes."""
+    endings = [(f"`{status}`", _cell(status.text)) for status in Status]
+    codes = [
+        ("0", "done: a run completed, every check is within its bound"),
+        ("1", "a run ended early (its files are complete up to there), or a check or a file failed"),
+        ("2", "bad input, or a damaged file: one line on stderr says what was expected and received"),
+        ("130, 143", "a second Ctrl-C or SIGTERM ended the process at once"),
+    ]
+    return _page(
+        [
+            "# Statuses and exit codes",
+            "",
+            "A run has one of these statuses, in telemetry, JSON, studies and `Run.status`.",
+            "",
+            *_table(("status", "meaning"), endings),
+            "",
+            "## Exit codes",
+            "",
+            *_table(("code", "meaning"), codes),
+        ]
+    )
+
+
+def metrics() -> str:
+    """Return the page of the figures of a run."""
+    rows = [
+        (f"`{name}`", unit_of(name), ", ".join(kind.labels), _cell(_summary(kind)))
+        for name, kind in METRICS.items()
+    ]
+    return _page(
+        [
+            "# Figures of a run",
+            "",
+            "Generated: keys of `simulate --json` and of `Run.figures`, columns of a study.",
+            "",
+            *_table(("figure", "unit", "entries", "meaning"), rows),
+        ]
+    )
+
+
+def fault_modes() -> str:
+    """Return the page of the parts that can fail."""
+    lines = ["# Fault targets and modes", "", "Generated: `target` and `mode` of a `[[fault]]`."]
+    for target in TARGETS.values():
+        names = target.names(GROUPS)
+        shown = f"`{names[0]}` to `{names[-1]}`" if len(names) > 2 else " and ".join(f"`{n}`" for n in names)
+        rows = [
+            (f"`{mode}`", _cell(kind.value.meaning if kind.value else "no value"), _value_default(kind.value))
+            for mode, kind in target.modes.items()
+        ]
+        note = " It needs `drive.supply_V`." if target.needs_supply else ""
+        lines += ["", f"## {target.name}", "", f"Targets: {shown}.{note}", ""]
+        lines += _table(("mode", "value", "default"), rows)
+    return _page(lines)
+
+
+def _value_default(value: Any) -> str:
+    if value is None:
+        return ""
+    return "required" if value.default is None else f"`{value.default:g}`"
+
+
+def docstring(title: str, module: str) -> str:
+    """Return the docstring of a module as a page: it is plain text with indented formulas, as in Markdown."""
+    text = inspect.cleandoc(importlib.import_module(module).__doc__ or "")
+    path = f"`{module}`"
+    return _page([f"# {title}", "", f"The documentation of the module {path}.", "", text])
+
+
+_LINK = re.compile(r"(?P<image>!?)\[(?P<text>[^\]]*)\]\((?P<target>[^)\s]+)\)")
+
+
+def readme(path: str) -> str:
+    """Return the README of a folder as a page: its links lead to pages of the site, or name a file."""
+    folder = Path(path).parent
+
+    def replaced(match: re.Match[str]) -> str:
+        target, _, anchor = match["target"].partition("#")
+        if not target or "://" in target:
+            return match[0]
+        file = os.path.normpath(folder / target).replace(os.sep, "/")
+        if not (ROOT / file).exists():
+            raise FileNotFoundError(f"{path}: a link leads to {file}, which does not exist")
+        if file in READMES:
+            return f"[{match['text']}]({READMES[file]}.md{f'#{anchor}' if anchor else ''})"
+        if match["image"]:
+            return f"![{match['text']}](../../../{file})"
+        if file.startswith("docs/"):
+            return f"[{match['text']}](../../{file.removeprefix('docs/')})"
+        return match["text"] if file in match["text"] else f"{match['text']} (`{file}`)"
+
+    text = _LINK.sub(replaced, (ROOT / path).read_text(encoding="utf-8"))
+    return _one_title(text)
+
+
+def _one_title(text: str) -> str:
+    """Return a page with one title: later headings of the first level move down with all that follow."""
+    lines, is_code, is_first, shift = [], False, True, False
+    for line in text.splitlines():
+        is_code ^= line.startswith("```")
+        if line.startswith("#") and not is_code:
+            shift = shift or (line.startswith("# ") and not is_first)
+            is_first = False
+            line = f"#{line}" if shift else line
+        lines.append(line)
+    return _page(lines)
+
+
+def _summary(kind: type) -> str:
+    return (kind.__doc__ or "").strip().split("\n\n")[0].replace("\n    ", " ")
+
+
+def _table(headings: Sequence[str], rows: Iterable[Sequence[str]]) -> list[str]:
+    lines = [f"| {' | '.join(headings)} |", f"|{'---|' * len(headings)}"]
+    return [*lines, *(f"| {' | '.join(row)} |" for row in rows)]
+
+
+def _cell(text: str) -> str:
+    """Return a text that is safe in a cell of a table."""
+    return (
+        " ".join(text.split()).replace("``", "`").replace("|", "\\|").replace("<", "&lt;").replace("*", "\\*")
+    )
+
+
+def _page(lines: Iterable[str]) -> str:
+    return "\n".join(lines) + "\n"
+
+
+if __name__ == "__main__":
+    write_pages(ROOT / "docs" / "reference" / "generated")
