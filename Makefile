@@ -7,16 +7,17 @@ BIN := .venv/bin
 WHEEL := .venv-wheel/bin
 SYNC = $(UV) sync --quiet --frozen --no-default-groups --python $(PYTHON)
 
-.PHONY: demo test check format benchmark peers reproduce tune-rivals screenshots setup clean
+.PHONY: demo test check format benchmark peers reproduce tune-rivals screenshots docs docs-snippets results extras dist setup clean
 
 demo: .venv/demo ## run the nutation under AFSM and leave a recording and its telemetry
 	$(BIN)/spheretwin simulate nutation --record nutation.rrd --telemetry nutation.parquet
 	@echo "here:      $(BIN)/rerun nutation.rrd"
 
 # Tests of one file stay together: they share results. The order of the files is that of tests/conftest.py.
-# Bytecode is written: hundreds of processes would compile the sources again.
+# Bytecode is written: hundreds of processes would compile the sources again. The processes share the cores: threads
+# of a linear algebra library would wait for each other, and take twice the processor time.
 test: setup ## run the tests in parallel
-	PYTHONDONTWRITEBYTECODE= $(BIN)/pytest -rs --numprocesses auto --maxprocesses 4 --dist loadfile --no-loadscope-reorder
+	PYTHONDONTWRITEBYTECODE= OPENBLAS_NUM_THREADS=1 $(BIN)/pytest -rs --numprocesses auto --maxprocesses 4 --dist loadfile --no-loadscope-reorder
 
 check: .venv-wheel/installed ## format, lint, types, import layers
 	$(WHEEL)/ruff format --check .
@@ -44,8 +45,35 @@ tune-rivals: setup ## search the gains of the compared laws again, and freeze th
 		$(BIN)/spheretwin sweep $$study --optimise && cp $${study}_study/gains.json twin/paper/$$study.json || exit 1; \
 	done
 
-screenshots: setup ## take the READMEs' pictures; with INSPECT=DIR these and more, at five sizes, in both themes, and as a colour-blind reader sees them
+screenshots: setup ## take the pictures and clips of the pages; with INSPECT=DIR these and more, at five sizes, in both themes, and as a colour-blind reader sees them
 	$(BIN)/python -m tests.screenshots.take $(if $(INSPECT),--inspect $(INSPECT))
+
+docs: .venv/docs ## build the site without a network, with warnings as errors, in build/docs
+	$(BIN)/sphinx-build --fail-on-warning --keep-going --quiet --jobs 2 docs build/docs
+	@echo "here:      build/docs/index.html"
+
+docs-snippets: setup ## also run the snippets of the documentation that take minutes
+	SPHERETWIN_LONG_SNIPPETS=1 $(BIN)/pytest tests/docs -rs
+
+results: setup ## remake the pages of the results in build/results; conditions.txt there has date, versions and machine
+	mkdir -p build/results
+	{ date -u +%FT%TZ; git describe --always --dirty; $(BIN)/spheretwin doctor; } > build/results/conditions.txt
+	$(BIN)/spheretwin reproduce all --out build/results/paper
+	$(BIN)/spheretwin crosscheck --out build/results/crosscheck
+	$(BIN)/spheretwin magnetics check --out build/results/magnetics_check
+	$(BIN)/spheretwin magnetics map --out build/results/magnetics_map
+	@echo "here:      build/results (make peers prints the comparison with other programs)"
+
+dist: $(TOOLS)/uv ## build wheel and source distribution, check them, and run a scenario from a clean environment
+	rm -rf dist build/clean
+	$(UV) build --quiet --out-dir dist .
+	$(UV) tool run --quiet twine check --strict dist/*
+	$(UV) venv --quiet --python $(PYTHON) build/clean
+	$(UV) pip install --quiet --python build/clean dist/*.whl
+	cd build/clean && bin/spheretwin doctor && bin/spheretwin simulate hold --duration 0.5 --controller.law pid --json
+
+extras: .venv/demo ## add optional packages: EXTRAS="bench plots", or all of them
+	$(SYNC) --inexact --compile-bytecode $(if $(EXTRAS),$(EXTRAS:%=--extra %),--all-extras)
 
 format: .venv-wheel/installed
 	$(WHEEL)/ruff format .
@@ -63,6 +91,11 @@ setup: .venv/installed
 	$(SYNC) --compile-bytecode --group test
 	@touch $@ .venv/demo
 
+# What the site needs beyond the tests: its API pages import the package.
+.venv/docs: .venv/installed
+	$(SYNC) --inexact --compile-bytecode --group docs
+	@touch $@
+
 # Some peers are as large as all the rest: they stay out of the way.
 .venv-peers/installed: uv.lock pyproject.toml $(TOOLS)/uv
 	UV_PROJECT_ENVIRONMENT=.venv-peers $(SYNC) --compile-bytecode --group peers
@@ -70,7 +103,7 @@ setup: .venv/installed
 
 # Type checkers and import-linter do not see folders that are mapped by an editable install.
 .venv-wheel/installed: uv.lock pyproject.toml $(TOOLS)/uv $(shell find models control viz twin -name '*.py')
-	rm -rf build
+	rm -rf build/lib build/bdist*
 	UV_PROJECT_ENVIRONMENT=.venv-wheel $(SYNC) --no-editable --reinstall-package spheretwin --all-extras --group dev
 	@touch $@
 

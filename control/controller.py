@@ -70,6 +70,7 @@ class Controller(NamedTuple):
     compensators: Compensators
     supervision: Supervision
     manual: Manual
+    authority: NDArray[np.float64]  # (1,) share of the commands that is sent: 1, or less in a soft start
 
 
 def controller(
@@ -127,6 +128,7 @@ def controller(
         compensators=compensators,
         supervision=supervision,
         manual=manual,
+        authority=np.ones(1),
     )
 
 
@@ -194,6 +196,9 @@ def control_tick(
         _command_zero(controller, command)
         if watchdog.halt[0] == GO:
             share = command_manual_currents(controller.manual, t, controller.current_limit_A, command)
+    if controller.authority[0] != 1.0:
+        for j in range(command.shape[0]):
+            command[j] *= controller.authority[0]
     if controller.applied_torque.on:
         estimate_applied_torque(controller.applied_torque, pose, controller.cached_matrix.G, command)
     return share

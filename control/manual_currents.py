@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, PrivateAttr, model_validator
 
 from spheretwin.models.base.compiled import allocation_free
+from spheretwin.models.base.reuse import reused
 from spheretwin.models.telemetry.csv_series import TIME, TimeSeries, reached, read
 
 Array = NDArray[np.float64]
@@ -91,6 +92,7 @@ class Manual(NamedTuple):
     currents_A: Array  # (m, n)
 
 
+@reused
 def manual(section: ManualSection, groups: int) -> Manual:
     """Return the manual currents of a section whose number of groups has been checked."""
     series = section.series or TimeSeries(np.zeros(1), np.zeros((1, groups)))

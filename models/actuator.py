@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sized
 from dataclasses import dataclass, replace
 from functools import cache, lru_cache
 from math import hypot, pi, sqrt
@@ -11,7 +12,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from spheretwin.models import torque_curve
+from spheretwin.models import torque_curve, torque_field
 from spheretwin.models.base.errors import InputError, distinct_texts
 from spheretwin.models.mjcf import Mjcf, read
 from spheretwin.models.mjcf_reader import (
@@ -26,11 +27,13 @@ from spheretwin.models.mjcf_reader import (
     sites,
 )
 from spheretwin.models.torque_curve import TorqueCurve
+from spheretwin.models.torque_field import TorqueData
 
 FOLDER = Path(__file__).resolve().parent
 MJCF_PATH = FOLDER / "actuator.xml"
 TORQUE_CURVE_PATH = FOLDER / "torque_curve.csv"
 
+TORQUE_FILE = "torque_file"
 FRONT_RADIUS = "pole_front_radius_m"
 
 # Axes of one group are exact opposites in the MJCF; rotations from degrees have errors of 1e-15.
@@ -117,7 +120,7 @@ class CoilGeometry:
 
 @dataclass(frozen=True)
 class CoilGroup:
-    """Two collinear coils in series, and the amplifier that drives them."""
+    """Coils in series, and the amplifier that drives them."""
 
     resistance_ohm: float
     inductance_H: float
@@ -137,24 +140,27 @@ class Actuator:
         Unit vectors, rotor frame, pointing outward.
     pole_polarity : (p,) array
         +1 where the north pole points outward, -1 where the south pole does.
-    coil_axes : (2n, 3) array
+    coil_axes : (c, 3) array
         Unit vectors, stator frame, pointing outward.
-    groups : (n, 2) int array
-        The two coils of each group, as indices into the coils.
+    coil_direction : (c,) array
+        +1 where a positive current of the group runs counterclockwise about the outward axis, else -1.
+    groups : (n, c/n) int array
+        The coils of each group, as indices into the coils.
     hinge_range_rad : (3, 2) array, rad
         Least and greatest angle of each hinge; infinite for a free hinge.
     shaft_tip_m, payload_mount_m : (3,) array, m
         In the rotor frame.
     magnet, coil, group
         Data shared by all of a kind.
-    torque_curve
-        Torque of one coil on one pole per ampere.
+    torque_data
+        Torque of one coil per ampere: on one pole, or on the rotor.
     """
 
     inertia: NDArray[np.float64]
     pole_axes: NDArray[np.float64]
     pole_polarity: NDArray[np.float64]
     coil_axes: NDArray[np.float64]
+    coil_direction: NDArray[np.float64]
     groups: NDArray[np.int64]
     hinge_range_rad: NDArray[np.float64]
     shaft_tip_m: NDArray[np.float64]
@@ -162,47 +168,77 @@ class Actuator:
     magnet: Magnet
     coil: CoilGeometry
     group: CoilGroup
-    torque_curve: TorqueCurve
+    torque_data: TorqueData
 
     @property
     def group_axes(self) -> NDArray[np.float64]:
         """(n, 3) array: axis of the first coil of each group, stator frame."""
         return self.coil_axes[self.groups[:, 0]]
 
+    @property
+    def torque_curve(self) -> TorqueCurve:
+        """Torque curve.
 
-def load(mjcf: Path = MJCF_PATH, curve: Path = TORQUE_CURVE_PATH) -> Actuator:
-    """Read the actuator from its MJCF and its torque curve.
+        Raises
+        ------
+        InputError
+            The actuator has a torque field instead.
+        """
+        if not isinstance(self.torque_data, TorqueCurve):
+            raise InputError(f"model: expected a torque curve here, received the {self.torque_data.name}")
+        return self.torque_data
+
+    def of_groups(self, of_coils: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the torque matrix, (3, n), of the torques of the coils, (c, 3)."""
+        return np.asarray((self.coil_direction[:, None] * of_coils)[self.groups].sum(axis=1).T)
+
+
+def load(mjcf: Path = MJCF_PATH, curve: Path | None = None) -> Actuator:
+    """Read the actuator from its MJCF and its torque curve or field.
 
     Parameters
     ----------
     mjcf : Path
         Model file; the shipped one unless given.
     curve : Path
-        Torque curve as CSV; the shipped one unless given.
+        Torque curve or torque field as CSV. Unless given, the file next to the model file that its custom
+        text `torque_file` names, or the shipped curve if it names none.
 
     Raises
     ------
     InputError
         A file cannot be read, or the model lacks a part of the actuator.
     """
-    if (mjcf, curve) == (MJCF_PATH, TORQUE_CURVE_PATH):
+    if mjcf == MJCF_PATH and curve in (None, TORQUE_CURVE_PATH):
         return _shipped()  # read once; other files, and their includes, may change during the process
-    return _cached(read(mjcf), curve, torque_curve.read_bytes(curve))
+    model = read(mjcf)
+    path = curve or torque_path(mjcf, model.described)
+    return _cached(model, path, torque_curve.read_bytes(path))
+
+
+def torque_path(mjcf: Path, model: mujoco.MjModel) -> Path:
+    """Return the torque curve or field that a model file names, or the shipped curve."""
+    text = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_TEXT, TORQUE_FILE)
+    if text < 0:
+        return TORQUE_CURVE_PATH
+    first = int(model.text_adr[text])
+    return mjcf.parent / model.text_data[first:].split(b"\0", 1)[0].decode()
 
 
 @lru_cache(maxsize=8)
 def _cached(mjcf: Mjcf, curve: Path, content: bytes) -> Actuator:
     """Return one object for unchanged files: caches depend on the identity of the actuator."""
-    return from_model(mjcf.described, torque_curve.parse(curve, content))
+    return from_model(mjcf.described, torque_field.parse(curve, content))
 
 
-def from_model(model: mujoco.MjModel, curve: TorqueCurve) -> Actuator:
+def from_model(model: mujoco.MjModel, torque_data: TorqueData) -> Actuator:
     """Read the actuator from a compiled model.
 
     Raises
     ------
     InputError
-        The model is not a rotor on three hinges about x, y, z amid paired coils.
+        The model is not a rotor on three hinges about x, y, z amid groups of coils, or has a torque curve and
+        groups that are not two opposite coils.
     """
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
@@ -212,19 +248,21 @@ def from_model(model: mujoco.MjModel, curve: TorqueCurve) -> Actuator:
     coils = sites(model, "coil_")
     R_SR = data.body(body(model, "rotor")).xmat.reshape(3, 3)
     coil_axes = _frozen(_outward_axes(data, coils))
+    groups, direction = groups_of(model, coils, coil_axes, torque_data)
     return Actuator(
         inertia=_frozen(_inertia(model, body(model, "rotor"))),
         pole_axes=_frozen(_outward_axes(data, poles) @ R_SR),
-        pole_polarity=_frozen(_polarity(model, poles)),
+        pole_polarity=_frozen(polarities(model, poles)),
         coil_axes=coil_axes,
-        groups=_frozen(_collinear_pairs(model, coils, coil_axes)),
+        coil_direction=_frozen(direction),
+        groups=_frozen(groups),
         hinge_range_rad=_frozen(hinge_range(model)),
         shaft_tip_m=_frozen(model.site_pos[site(model, "shaft_tip")]),
         payload_mount_m=_frozen(model.body_pos[body(model, "payload")]),
         magnet=_magnet(model, poles),
-        coil=_coil(model, coils),
+        coil=read_coil(model),
         group=_group(model),
-        torque_curve=curve,
+        torque_data=torque_data,
     )
 
 
@@ -238,7 +276,7 @@ def read_magnet_and_coil(mjcf: Path) -> tuple[Magnet, CoilGeometry]:
     """
     model = read(mjcf).described
     check_bounded(model)
-    return _magnet(model, sites(model, "pole_")), _coil(model, sites(model, "coil_"))
+    return _magnet(model, sites(model, "pole_")), read_coil(model)
 
 
 @cache
@@ -264,7 +302,8 @@ def _outward_axes(data: mujoco.MjData, sites: list[int]) -> NDArray[np.float64]:
     return data.site_xmat[sites].reshape(-1, 3, 3)[:, :, 2]
 
 
-def _polarity(model: mujoco.MjModel, poles: list[int]) -> NDArray[np.float64]:
+def polarities(model: mujoco.MjModel, poles: list[int]) -> NDArray[np.float64]:
+    """Return the polarity of the sites of poles, +1 or -1: their user values."""
     polarity = model.site_user[poles, 0] if model.nuser_site else np.zeros(len(poles))
     for pole, value in zip(poles, polarity, strict=True):
         if value not in (-1.0, 1.0):
@@ -276,6 +315,65 @@ def _polarity(model: mujoco.MjModel, poles: list[int]) -> NDArray[np.float64]:
     return polarity
 
 
+def groups_of(
+    model: mujoco.MjModel, coils: list[int], axes: NDArray[np.float64], torque_data: TorqueData
+) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    """Return the coils (sites) of each group, (n, k), and the direction of the current in each coil.
+
+    Raises
+    ------
+    InputError
+        The groups are invalid, or not two opposite coils with a torque curve.
+    """
+    groups, direction = _groups(model, coils, axes)
+    if isinstance(torque_data, TorqueCurve):
+        _check_opposite(groups, direction, axes)
+    return groups, direction
+
+
+def _groups(
+    model: mujoco.MjModel, coils: list[int], axes: NDArray[np.float64]
+) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    """Return the coils of each group, and the direction of the current in each coil.
+
+    The user value of a coil is the number of its group from 1 on, negative for the opposite direction of the
+    current. Without user values a group is two opposite coils.
+    """
+    number = model.site_user[coils, 0] if model.nuser_site else np.zeros(len(coils))
+    if not np.any(number):
+        return _collinear_pairs(model, coils, axes), np.ones(len(coils))
+    of_coil = np.abs(number)
+    count = int(min(of_coil.max(), len(coils)))
+    groups = [np.flatnonzero(of_coil == group + 1) for group in range(count)]
+    sizes = {len(group) for group in groups}
+    if sum(map(len, groups)) != len(coils) or len(sizes) > 1:
+        raise InputError(
+            "model: expected as user value of each coil the number of its group, from 1 on, with a sign, and"
+            f" equally many coils in each group, received {', '.join(f'{value:g}' for value in number)}"
+        )
+    _check_count(groups)
+    return np.array(groups), np.sign(number)
+
+
+def _check_count(groups: Sized) -> None:
+    if len(groups) < LEAST_GROUPS:
+        raise InputError(f"model: expected at least {LEAST_GROUPS} groups of coils, received {len(groups)}")
+
+
+def _check_opposite(
+    groups: NDArray[np.int64], direction: NDArray[np.float64], axes: NDArray[np.float64]
+) -> None:
+    """Check that each group is two opposite coils with currents of one direction: a torque curve needs it."""
+    pairs = groups.shape[1] == 2 and bool(np.all(direction == 1))
+    if not pairs or np.any(
+        np.sum(axes[groups[:, 0]] * axes[groups[:, 1]], axis=1) > -1 + COLLINEAR_TOLERANCE
+    ):
+        raise InputError(
+            "model: expected groups of two opposite coils for a torque curve, received other groups; a torque"
+            " field admits any"
+        )
+
+
 def _collinear_pairs(model: mujoco.MjModel, coils: list[int], axes: NDArray[np.float64]) -> NDArray[np.int64]:
     """Return the groups: two coils in series whose axes are exact opposites."""
     opposite = axes @ axes.T < -1 + COLLINEAR_TOLERANCE
@@ -285,10 +383,7 @@ def _collinear_pairs(model: mujoco.MjModel, coils: list[int], axes: NDArray[np.f
             raise InputError(f"model: expected one coil opposite {name}, received {count}")
     partner = np.argmax(opposite, axis=1)
     groups = np.array([[i, j] for i, j in enumerate(partner) if i < j])
-    if len(groups) < LEAST_GROUPS:
-        raise InputError(
-            f"model: expected at least {LEAST_GROUPS} groups of two coils, received {len(groups)}"
-        )
+    _check_count(groups)
     return groups
 
 
@@ -299,16 +394,16 @@ def _magnet(model: mujoco.MjModel, poles: list[int]) -> Magnet:
         length_m=2 * shared(model.site_size[poles, 1], "length of the poles"),
         distance_m=shared(np.linalg.norm(model.site_pos[poles], axis=1), "distance of the poles"),
     )
-    return replace(blank, front_radius_m=_front_radius(model, blank))
+    return replace(blank, front_radius_m=front_radius(model, blank.radius_m, blank.length_m))
 
 
-def _front_radius(model: mujoco.MjModel, blank: Magnet) -> float:
+def front_radius(model: mujoco.MjModel, radius_m: float, length_m: float) -> float:
     """Return the radius of the ground fronts of the poles; 0 (flat) if the model does not give it."""
     if mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_NUMERIC, FRONT_RADIUS) < 0:
         return 0.0
     value = float(model.numeric(FRONT_RADIUS).data[0])
-    depth = min(blank.radius_m, blank.length_m)  # of the deepest possible cap
-    smallest = (blank.radius_m**2 + depth**2) / (2 * depth)
+    depth = min(radius_m, length_m)  # of the deepest possible cap
+    smallest = (radius_m**2 + depth**2) / (2 * depth)
     if value != 0.0 and not smallest <= value <= LARGEST_LENGTH_M:
         low, high, received = distinct_texts(smallest, LARGEST_LENGTH_M, value)
         raise InputError(
@@ -318,7 +413,9 @@ def _front_radius(model: mujoco.MjModel, blank: Magnet) -> float:
     return value
 
 
-def _coil(model: mujoco.MjModel, coils: list[int]) -> CoilGeometry:
+def read_coil(model: mujoco.MjModel) -> CoilGeometry:
+    """Return the common geometry of the coils of a compiled model."""
+    coils = sites(model, "coil_")
     coil = CoilGeometry(
         inner_radius_m=number(model, "coil_inner_radius_m"),
         outer_radius_m=shared(model.site_size[coils, 0], "radius of the coils"),

@@ -32,7 +32,7 @@ SAME_COSINE = 9
 def mutual_inductance(actuator: Actuator) -> Array:
     """Return the mutual inductance of all groups, (n, n) in H, with zeros on the diagonal.
 
-    A positive current in a group runs counterclockwise about the outward axis in both of its coils. The
+    A positive current in a group runs about the outward axis of each coil as `coil_direction` states. The
     result is cached in memory and in the cache folder, under the geometry that it was computed from.
     """
     coil, groups = actuator.coil, actuator.groups
@@ -44,20 +44,23 @@ def mutual_inductance(actuator: Actuator) -> Array:
         coil.turns,
     )
     key = (
-        b"mutual inductance" + np.array(geometry).tobytes() + actuator.coil_axes.tobytes() + groups.tobytes()
+        b"mutual inductance"
+        + np.array(geometry).tobytes()
+        + b"".join(part.tobytes() for part in (actuator.coil_axes, actuator.coil_direction, groups))
     )
     return cached_array(key, lambda: _all_groups(actuator))
 
 
 def _all_groups(actuator: Actuator) -> Array:
-    """Return the mutual inductance of all groups: the sum over the four pairs of their coils."""
+    """Return the mutual inductance of all groups: the sum over the pairs of their coils."""
     cosines = np.clip(np.round(actuator.coil_axes @ actuator.coil_axes.T, SAME_COSINE), -1, 1)
     different, places = np.unique(cosines, return_inverse=True)
     values = [coil_pair(actuator.coil, np.arccos(c)) if c < 1 else 0.0 for c in different]
     of_coils = np.array(values)[places].reshape(cosines.shape)
-    first, second = actuator.groups.T
-    of_groups = sum(of_coils[np.ix_(a, b)] for a in (first, second) for b in (first, second))
-    return np.asarray(of_groups * (1 - np.eye(len(first))))
+    of_coils *= np.outer(actuator.coil_direction, actuator.coil_direction)
+    members = actuator.groups.T
+    of_groups = sum(of_coils[np.ix_(a, b)] for a in members for b in members)
+    return np.asarray(of_groups * (1 - np.eye(len(actuator.groups))))
 
 
 def coil_pair(coil: CoilGeometry, angle_rad: float) -> float:

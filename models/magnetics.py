@@ -2,7 +2,7 @@
 
 from dataclasses import asdict
 from functools import lru_cache
-from math import copysign
+from math import atan2, copysign, pi, sqrt
 from typing import NamedTuple
 
 import numpy as np
@@ -10,10 +10,11 @@ from numpy.typing import NDArray
 
 from spheretwin.models.actuator import Actuator, CoilGeometry, Magnet
 from spheretwin.models.base.cache import cached_array
-from spheretwin.models.base.compiled import allocation_free, part_of_its_caller
+from spheretwin.models.base.compiled import allocation_free, inlined, part_of_its_caller
 from spheretwin.models.base.errors import InputError, distinct_texts, one_line
 from spheretwin.models.kinematics import rotation_rows
 from spheretwin.models.torque_curve import TorqueCurve
+from spheretwin.models.torque_field import TorqueField
 
 # The look-up's intervals: wide where |cos phi| is below the knee, narrow above it, where f_t rises and falls
 # (phi below 18 degrees). 780 intervals (25 kB) hold the spline to 2e-7 of its peak; equal intervals would
@@ -44,6 +45,9 @@ class TorqueModel(NamedTuple):
 
     A machine with scatter (`models.scatter`) has a gain and a stretch for each pair of line and group: row 0
     plus row 1 if the angle between line and group axis is acute, row 0 minus row 1 if it is obtuse.
+
+    An actuator with a torque field has no pole lines, but the axes of its coils, group by group; with a
+    torque curve these are empty. Which of both it has is data: the compiled code is the same.
     """
 
     line_axes: NDArray[np.float64]  # (n_lines, 3), rotor frame
@@ -52,6 +56,8 @@ class TorqueModel(NamedTuple):
     table: NDArray[np.float64]  # (781, 4), cubic coefficients of h, N·m/A
     pair_gain: NDArray[np.float64]  # (2, lines × n) factor of h; (2, 0) without scatter
     pair_stretch: NDArray[np.float64]  # (2, lines × n) share of 1 - |c| that is added to |c|
+    coils: NDArray[np.float64]  # (4, c) axis, stator frame, and torque over that of the field
+    field: NDArray[np.float64]  # (t + 2, p + 3, 3) spline coefficients of the torque field, N·m/A
 
 
 def torque_matrix(q: NDArray[np.float64], actuator: Actuator) -> NDArray[np.float64]:
@@ -62,7 +68,7 @@ def torque_matrix(q: NDArray[np.float64], actuator: Actuator) -> NDArray[np.floa
     q : (3,) array, rad
         Pose.
     actuator : Actuator
-        Poles, coils, groups and torque curve.
+        Poles, coils, groups and torque curve or field.
 
     Returns
     -------
@@ -85,16 +91,46 @@ def torque_matrix(q: NDArray[np.float64], actuator: Actuator) -> NDArray[np.floa
 @lru_cache(maxsize=8)
 def torque_model(actuator: Actuator) -> TorqueModel:
     """Return the data of an actuator for compiled code, cached for the actuators used last."""
+    group_axes = np.ascontiguousarray(actuator.group_axes.T)
+    if isinstance(actuator.torque_data, TorqueField):
+        return TorqueModel(
+            line_axes=np.empty((0, 3)),
+            line_weights=np.empty(0),
+            group_axes=group_axes,
+            table=np.empty((0, 4)),
+            pair_gain=np.empty((2, 0)),
+            pair_stretch=np.empty((2, 0)),
+            coils=coils_by_group(actuator, actuator.coil_axes, np.ones(len(actuator.coil_axes))),
+            field=actuator.torque_data.coefficients,
+        )
     lines = pole_lines(actuator.pole_axes)
     opposite = np.where(lines[:, 1] < 0, 0.0, actuator.pole_polarity[lines[:, 1]])
     return TorqueModel(
         line_axes=np.ascontiguousarray(actuator.pole_axes[lines[:, 0]]),
         line_weights=actuator.pole_polarity[lines[:, 0]] + opposite,
-        group_axes=np.ascontiguousarray(actuator.group_axes.T),
+        group_axes=group_axes,
         table=_cached_table(actuator.torque_curve),
         pair_gain=np.empty((2, 0)),
         pair_stretch=np.empty((2, 0)),
+        coils=np.empty((4, 0)),
+        field=np.empty((0, 0, 3)),
     )
+
+
+def coils_by_group(
+    actuator: Actuator, axes: NDArray[np.float64], gain: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Return the coils of a torque field as `TorqueModel` has them, from axes (c, 3) and gains (c,)."""
+    of_coils = np.column_stack([axes, actuator.coil_direction * gain])
+    return np.ascontiguousarray(of_coils[actuator.groups.ravel()].T)
+
+
+def scaled(model: TorqueModel, scale: float) -> TorqueModel:
+    """Return a model of which all torques are those of another one times a factor."""
+    if scale == 1:
+        return model
+    weights = np.array([[1.0], [1.0], [1.0], [scale]])
+    return model._replace(line_weights=scale * model.line_weights, coils=weights * model.coils)
 
 
 def pole_lines(axes: NDArray[np.float64]) -> NDArray[np.int64]:
@@ -172,6 +208,9 @@ def fill_torque_matrix(
     `TorqueModel`), in a separate loop: the compiler vectorises the arithmetic before and after the
     scattered reads of the table over several groups.
     """
+    if model.coils.shape[1] > 0:
+        _fill_from_field(q, model, G)
+        return
     R_x, R_y, R_z = rotation_rows(q)
     table, row, cosine, h = model.table, scratch[0], scratch[1], scratch[1]
     pull_x, pull_y, pull_z = scratch[2], scratch[3], scratch[4]
@@ -214,6 +253,50 @@ def fill_torque_matrix(
         G_x[j] = y * s_z[j] - z * s_y[j]
         G_y[j] = z * s_x[j] - x * s_z[j]
         G_z[j] = x * s_y[j] - y * s_x[j]
+
+
+@allocation_free
+def _fill_from_field(q: NDArray[np.float64], model: TorqueModel, G: NDArray[np.float64]) -> None:
+    """Write the torque matrix of a torque field into `G`, as `TorqueField.torque` computes it."""
+    R_x, R_y, R_z = rotation_rows(q)
+    field, coils, groups = model.field, model.coils, G.shape[1]
+    size, rows, columns = coils.shape[1] // groups, field.shape[0] - 3, field.shape[1] - 3
+    for j in range(groups):
+        x = y = z = 0.0  # torque, rotor frame
+        for coil in range(j * size, (j + 1) * size):
+            s_x, s_y, s_z, weight = coils[0, coil], coils[1, coil], coils[2, coil], coils[3, coil]
+            n_x = R_x[0] * s_x + R_y[0] * s_y + R_z[0] * s_z
+            n_y = R_x[1] * s_x + R_y[1] * s_y + R_z[1] * s_z
+            n_z = R_x[2] * s_x + R_y[2] * s_y + R_z[2] * s_z
+            row = atan2(sqrt(n_x * n_x + n_y * n_y), n_z) * (rows / pi)
+            column = atan2(n_y, n_x) * (columns / (2 * pi))
+            column += columns if column < 0 else 0.0
+            i = min(max(int(row), 0), rows - 1)  # an angle may round to its end, or be NaN
+            k = min(max(int(column), 0), columns - 1)
+            row_weights, column_weights = _spline_weights(row - i), _spline_weights(column - k)
+            for a in range(4):
+                along_x = along_y = along_z = 0.0
+                for b in range(4):
+                    along_x += column_weights[b] * field[i + a, k + b, 0]
+                    along_y += column_weights[b] * field[i + a, k + b, 1]
+                    along_z += column_weights[b] * field[i + a, k + b, 2]
+                share = weight * row_weights[a]
+                x, y, z = x + share * along_x, y + share * along_y, z + share * along_z
+        G[0, j] = R_x[0] * x + R_x[1] * y + R_x[2] * z
+        G[1, j] = R_y[0] * x + R_y[1] * y + R_y[2] * z
+        G[2, j] = R_z[0] * x + R_z[1] * y + R_z[2] * z
+
+
+@inlined
+def _spline_weights(t: float) -> tuple[float, float, float, float]:
+    """Return the values of the four cubic B-splines at a fraction of a step."""
+    u = 1 - t
+    return (
+        u * u * u / 6,
+        (t * t * (3 * t - 6) + 4) / 6,
+        (u * u * (3 * u - 6) + 4) / 6,
+        t * t * t / 6,
+    )
 
 
 class CachedMatrix(NamedTuple):
@@ -279,13 +362,18 @@ def computed_from(magnet: Magnet, coil: CoilGeometry) -> dict[str, float]:
     return {f"{part} {name}": value for part, data in parts.items() for name, value in data.items()}
 
 
+def of_coil(coil: CoilGeometry) -> dict[str, float]:
+    """Return every number of a coil that a torque field depends on, as `computed_from` does."""
+    return {f"coil {name}": value for name, value in asdict(coil).items()}
+
+
 def disagreements(actuator: Actuator) -> list[str]:
     """Return the differences between an actuator and the geometry of its torque curve, one line per number.
 
     Parameters
     ----------
     actuator : Actuator
-        The actuator, with its torque curve.
+        The actuator, with its torque curve or field.
 
     Returns
     -------
@@ -293,8 +381,9 @@ def disagreements(actuator: Actuator) -> list[str]:
         Empty if both agree, and for a curve without the numbers of its geometry: measured, or from another
         program. A curve with these numbers, but without the front radius, was computed for flat poles.
     """
-    curve = actuator.torque_curve
-    computed_for = UNSAID | dict(curve.computed_for) if curve.computed_for else {}
+    curve = actuator.torque_data
+    unsaid = UNSAID if isinstance(curve, TorqueCurve) else {}  # a field is of any arrangement of magnets
+    computed_for = unsaid | dict(curve.computed_for) if curve.computed_for else {}
     lines = []
     for name, has in computed_from(actuator.magnet, actuator.coil).items():
         had = computed_for.get(name, has)

@@ -212,7 +212,19 @@ def _read(path: Path) -> Mjcf:
         compiled = _compiled(path)
     for model in compiled:
         _turn_principal_axes_back(model)
+    if lost := missing_meshes(mujoco.MjSpec.from_file(str(path)), path):
+        lines.append(f"recordings do not draw {', '.join(lost)}: no such files below {path.parent.resolve()}")
     return Mjcf(*compiled, tuple(f"model {path}: {line}" for line in lines))
+
+
+def missing_meshes(spec: mujoco.MjSpec, path: Path) -> dict[str, str]:
+    """Return the meshes whose file is missing: file, and name. No run needs one that is only drawn."""
+    folder = path.parent / spec.meshdir
+    return {
+        mesh.file: mesh.name or Path(mesh.file).stem
+        for mesh in spec.meshes
+        if mesh.file and not any((folder / name).is_file() for name in (mesh.file, Path(mesh.file).name))
+    }
 
 
 def _compiled(path: Path) -> tuple[mujoco.MjModel, mujoco.MjModel, mujoco.MjModel]:
@@ -271,7 +283,7 @@ def _turn_principal_axes_back(model: mujoco.MjModel) -> None:
         model.body_iquat[rotor] = 1, 0, 0, 0
 
 
-_NAMED_FILE = re.compile(rb"""\bfile\s*=\s*["']([^"']+)["']""")
+_NAMED_FILE = re.compile(rb"""\bfile\s*=\s*["']([^"']+)["']|"torque_file"\s+data\s*=\s*"([^"]+)\"""")
 _FOLDERS = re.compile(rb"""\b(?:meshdir|texturedir|assetdir)\s*=\s*["']([^"']+)["']""")
 _OTHER_KINDS = (".obj", ".stl", ".msh", ".png", ".ktx", ".skn")
 
@@ -310,7 +322,8 @@ def _texts_and_named(path: Path) -> tuple[dict[Path, bytes], set[Path]]:
 
 def _named(path: Path, texts: Mapping[Path, bytes]) -> set[Path]:
     """Return the files that the texts of a model name, in all folders that the engine may search."""
-    names = {_decoded(name) for text in texts.values() for name in _NAMED_FILE.findall(text)}
+    references = (name for text in texts.values() for names in _NAMED_FILE.findall(text) for name in names)
+    names = {_decoded(name) for name in references if name}
     names |= {os.path.basename(name) for name in names}  # strippath
     folders = {path.parent.resolve(), *(source.parent for source in texts)}
     below = {_decoded(name) for text in texts.values() for name in _FOLDERS.findall(text)}

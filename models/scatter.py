@@ -20,7 +20,8 @@ from numpy.typing import NDArray
 from spheretwin.models.actuator import Actuator
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.kinematics import frame_of_axis, rotation
-from spheretwin.models.magnetics import TorqueModel, pole_lines, torque_model
+from spheretwin.models.magnetics import TorqueModel, coils_by_group, pole_lines, torque_model
+from spheretwin.models.torque_field import TorqueField
 
 Array = NDArray[np.float64]
 
@@ -61,7 +62,7 @@ def no_scatter(actuator: Actuator) -> Scatter:
 
 
 def summed_torque_matrix(q: Array, actuator: Actuator, scatter: Scatter | None = None) -> Array:
-    """Return the torque matrix G_t(q) as a sum over every pole and every coil, with the torque curve itself.
+    """Return the torque matrix G_t(q) as a sum over all coils, with the torque curve or field itself.
 
     Parameters
     ----------
@@ -78,6 +79,10 @@ def summed_torque_matrix(q: Array, actuator: Actuator, scatter: Scatter | None =
         Column j is the stator-frame torque of one ampere in group j.
     """
     poles, coils = scatter = scatter or no_scatter(actuator)
+    if isinstance(actuator.torque_data, TorqueField):
+        _check_representable(actuator.torque_data, scatter)
+        torque = actuator.torque_data.torque(coils.axes(actuator.coil_axes) @ rotation(q)) @ rotation(q).T
+        return actuator.of_groups((1 + coils.gain[:, None]) * torque)
     pole_axes = poles.axes(actuator.pole_axes) @ rotation(q).T  # (p, 3)
     coil_axes = coils.axes(actuator.coil_axes)  # (c, 3)
     pole_change, coil_change = _distance_changes(actuator, scatter)
@@ -86,7 +91,7 @@ def summed_torque_matrix(q: Array, actuator: Actuator, scatter: Scatter | None =
     pull = (1 + gain) * actuator.torque_curve.over_sine(cosine + stretch * (np.sign(cosine) - cosine))
     pull *= np.outer(actuator.pole_polarity * (1 + poles.gain), 1 + coils.gain)
     torque = np.einsum("pc,pck->ck", pull, np.cross(pole_axes[:, None], coil_axes))  # (c, 3)
-    return np.asarray(torque[actuator.groups].sum(axis=1).T)
+    return actuator.of_groups(torque)
 
 
 def scattered_model(actuator: Actuator, scatter: Scatter) -> TorqueModel:
@@ -102,9 +107,14 @@ def scattered_model(actuator: Actuator, scatter: Scatter) -> TorqueModel:
     Raises
     ------
     InputError
-        A distance has an error, and the torque curve lacks its sensitivities to distance.
+        A distance has an error, and the torque curve lacks its sensitivities to distance; or poles or
+        distances have errors, and the actuator has a torque field.
     """
     poles, coils = scatter
+    if isinstance(actuator.torque_data, TorqueField):
+        _check_representable(actuator.torque_data, scatter)
+        of_coils = coils_by_group(actuator, coils.axes(actuator.coil_axes), 1 + coils.gain)
+        return torque_model(actuator)._replace(coils=of_coils)
     pole_axes, coil_axes = poles.axes(actuator.pole_axes), coils.axes(actuator.coil_axes)
     lines, pairs = pole_lines(actuator.pole_axes), actuator.groups
     strength = actuator.pole_polarity * (1 + poles.gain)
@@ -126,6 +136,15 @@ def scattered_model(actuator: Actuator, scatter: Scatter) -> TorqueModel:
         pair_gain=_mean_and_step(gain.reshape(2, -1)),
         pair_stretch=_mean_and_step(stretch.reshape(2, -1)),
     )
+
+
+def _check_representable(field: TorqueField, scatter: Scatter) -> None:
+    """Check that a torque field, which has all poles in one, can represent a scatter."""
+    if any(map(np.any, scatter.poles)) or np.any(scatter.coils.distance_m):
+        raise InputError(
+            f"{field.name}: expected errors of the coils' gain and angle alone, which a torque field can"
+            " represent, received errors of poles or of distances"
+        )
 
 
 def _mean_and_step(pairs: Array) -> Array:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -74,6 +74,11 @@ class TorqueCurve:
         """Largest sample, N·m/A."""
         return float(np.max(np.abs(self.torque_Nm_per_A)))
 
+    @property
+    def content(self) -> tuple[NDArray[np.float64], ...]:
+        """Arrays that define the curve."""
+        return self.phi_rad, self.torque_Nm_per_A
+
     def over_sine(self, cosine: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return g(cos phi) = f_t(phi) / sin phi, finite at 0 and at pi.
 
@@ -128,45 +133,66 @@ def read_bytes(path: Path) -> bytes:
 
 def parse(path: Path, content: bytes) -> TorqueCurve:
     """Return the torque curve of the content of a file; see `read`. The path is for messages only."""
-    try:
-        text = content.decode("utf-8-sig")  # spreadsheets write a byte-order mark
-    except UnicodeDecodeError as error:
-        raise InputError(
-            f"torque curve {path}: expected a readable text file, {without_breaks(error)}"
-        ) from None
-    lines = [line for line in text.splitlines() if line.strip() and not line.startswith("#")]
-    rows = csv.DictReader(lines, skipinitialspace=True)
-    try:
-        header = [name or "" for name in rows.fieldnames or ()]
-        missing = [name for name in COLUMNS if name not in header]
-        records = list(rows)
-    except csv.Error as error:
-        raise InputError(f"torque curve {path}: expected numbers only, received {error}") from None
-    if missing:
-        raise InputError(
-            f"torque curve {path}: expected the columns {', '.join(COLUMNS)},"
-            f" received {', '.join(header) or 'none'}"
-        )
-    samples = np.array([[_number(path, row[name]) for name in COLUMNS] for row in records])
-    uneven = next((i for i, row in enumerate(records) if None in row or None in row.values()), None)
-    if uneven is not None or len(set(header)) < len(header):
-        where = "a column twice" if uneven is None else f"another number of them in row {uneven + 1}"
-        raise InputError(f"torque curve {path}: expected each column once in every row, received {where}")
+    label = f"torque curve {path}"
+    text = decoded(label, content)
+    samples = read_columns(label, text, COLUMNS)
     _check(path, samples)
     return TorqueCurve(
         np.radians(samples[:, 0]),
         samples[:, 1],
-        _named_numbers(path, text, COMPUTED_FOR),
-        _named_numbers(path, text, SENSITIVITY),
+        named_numbers(label, text, COMPUTED_FOR),
+        named_numbers(label, text, SENSITIVITY),
         f"torque curve {path.name}",
     )
 
 
-def _number(path: Path, text: Any) -> float:
+def decoded(label: str, content: bytes) -> str:
+    """Return the text of a file; `label` names it in messages.
+
+    Raises
+    ------
+    InputError
+        It is not UTF-8.
+    """
+    try:
+        return content.decode("utf-8-sig")  # spreadsheets write a byte-order mark
+    except UnicodeDecodeError as error:
+        raise InputError(f"{label}: expected a readable text file, {without_breaks(error)}") from None
+
+
+def read_columns(label: str, text: str, columns: Sequence[str]) -> NDArray[np.float64]:
+    """Return the named columns of a CSV text without its comments, (rows, columns).
+
+    Raises
+    ------
+    InputError
+        A column is missing or twice, a row has another number of columns, or a value is no number.
+    """
+    lines = [line for line in text.splitlines() if line.strip() and not line.startswith("#")]
+    rows = csv.DictReader(lines, skipinitialspace=True)
+    try:
+        header = [name or "" for name in rows.fieldnames or ()]
+        missing = [name for name in columns if name not in header]
+        records = list(rows)
+    except csv.Error as error:
+        raise InputError(f"{label}: expected numbers only, received {error}") from None
+    if missing:
+        raise InputError(
+            f"{label}: expected the columns {', '.join(columns)}, received {', '.join(header) or 'none'}"
+        )
+    samples = np.array([[_number(label, row[name]) for name in columns] for row in records])
+    uneven = next((i for i, row in enumerate(records) if None in row or None in row.values()), None)
+    if uneven is not None or len(set(header)) < len(header):
+        where = "a column twice" if uneven is None else f"another number of them in row {uneven + 1}"
+        raise InputError(f"{label}: expected each column once in every row, received {where}")
+    return samples.reshape(-1, len(columns))
+
+
+def _number(label: str, text: Any) -> float:
     try:
         return float(text)
     except (TypeError, ValueError):  # a row that is too short has None
-        raise InputError(f"torque curve {path}: expected numbers only, received {shown(text)}") from None
+        raise InputError(f"{label}: expected numbers only, received {shown(text)}") from None
 
 
 def head(computed_for: Mapping[str, float], sensitivity: Mapping[str, float]) -> list[str]:
@@ -188,7 +214,7 @@ def to_csv(curve: TorqueCurve, provenance: list[str]) -> str:
     return text.getvalue()
 
 
-def _named_numbers(path: Path, text: str, start: str) -> dict[str, float] | None:
+def named_numbers(label: str, text: str, start: str) -> dict[str, float] | None:
     """Return the numbers in the lines written by `head` that begin with `start`."""
     numbers = {}
     for name, number in re.findall(HEAD_LINE.format(start=start), text, re.MULTILINE):
@@ -198,8 +224,7 @@ def _named_numbers(path: Path, text: str, start: str) -> dict[str, float] | None
             numbers[name] = np.nan
         if not np.isfinite(numbers[name]):
             raise InputError(
-                f"torque curve {path}: expected a finite number after {start} {name}:,"
-                f" received {number or 'none'}"
+                f"{label}: expected a finite number after {start} {name}:, received {number or 'none'}"
             )
     return numbers or None
 

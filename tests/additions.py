@@ -154,20 +154,30 @@ UNCOUPLED = EngineKind("uncoupled", Uncoupled, Integrators, step)
     "metric": Addition(
         "",
         '''
+class Load(NamedTuple):
+    total: Array
+
+
+@rounding_each
+def _add_load(rows, first, columns, state):
+    for i in range(rows.shape[0]):
+        for j in range(3):
+            state.total[j] += rows[i, columns[0] + j]
+
+
 class MeanLoad(Metric):
     """Mean disturbance on each axis, N·m."""
 
+    reads = ("disturbance_Nm",)
+    add = staticmethod(_add_load)
+
     def __init__(self, planned):
         super().__init__(planned)
-        self.total = np.zeros(3)
-
-    def add(self, rows):
-        """Add the rows of one chunk."""
-        add_rows(np.ascontiguousarray(rows["disturbance_Nm"]), self.total)
+        self.state = Load(np.zeros(3))
 
     def value(self):
         """[3] in N·m; None without a row."""
-        return (self.total / self._rows).tolist() if self._rows else None
+        return (self.state.total / self._rows).tolist() if self._rows else None
 ''',
         "twin/metrics.py",
         (

@@ -27,6 +27,7 @@ import pytest
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import connect
 
+from tests import page_scripts
 from tests.waiting import PATIENCE_S
 
 CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
@@ -66,11 +67,18 @@ _KEYS = {
     "Tab": ("Tab", 9),
     "Backspace": ("Backspace", 8),
 }
+# A page answers within milliseconds once its process is there; this is for a busy machine.
+_ANSWER_S = 20.0
+
 _ARROWS = {"ArrowLeft": 37, "ArrowUp": 38, "ArrowRight": 39, "ArrowDown": 40}
 
 
 class BrowserError(AssertionError):
     """The browser refused a command, or a page did not become what was waited for."""
+
+
+class NoAnswerError(BrowserError):
+    """The browser has ended, or has not answered a command in time."""
 
 
 class Browser:
@@ -82,10 +90,14 @@ class Browser:
         Width and height of its pages, pixels.
     flags : str
         More of Chromium's own flags.
+    frame_s : float
+        Time between two frames of a page: a picture is computed without a graphics processor, and as often as
+        it can be it takes all cores. Zero does not slow it down.
     """
 
-    def __init__(self, size=(1280, 800), flags=()):
+    def __init__(self, size=(1280, 800), flags=(), frame_s=0.1):
         self.size = size
+        self._frame_s = frame_s
         self._flags = flags
         self._answers, self._pages = {}, {}
         self._ids = itertools.count(1)
@@ -129,19 +141,22 @@ class Browser:
         self._pages[session] = page
         for domain in ("Page", "Runtime", "Network", "Log"):
             page.command(f"{domain}.enable")
+        if self._frame_s:
+            source = page_scripts.SLOW % (1000 * self._frame_s)
+            page.command("Page.addScriptToEvaluateOnNewDocument", source=source)
         page.command("Target.setAutoAttach", autoAttach=True, waitForDebuggerOnStart=True, flatten=True)
         page.resize(*(size or self.size))
         page.go(url)
         return page
 
-    def command(self, method, session=None, **parameters):
+    def command(self, method, session=None, *, within_s=PATIENCE_S, **parameters):
         """Send one command of the protocol and return its result."""
         number = self._post(method, session, parameters)
         with self._arrived:
-            self._arrived.wait_for(lambda: number in self._answers or self._ended, PATIENCE_S)
+            self._arrived.wait_for(lambda: number in self._answers or self._ended, within_s)
             answer = self._answers.pop(number, None)
         if answer is None:
-            raise BrowserError(f"{method}: no answer")
+            raise NoAnswerError(f"{method}: no answer")
         if "error" in answer:
             raise BrowserError(f"{method}: {answer['error']['message']}")
         return answer["result"]
@@ -234,7 +249,13 @@ class Page:
         answer = self.command("Page.navigate", url=url)
         if "errorText" in answer:
             raise BrowserError(f"{url}: {answer['errorText']}")
-        self.wait_for("document.readyState == 'complete'")
+        # An answer has been lost here, presumably while Chromium changed the process of the page.
+        for _ in range(int(PATIENCE_S / _ANSWER_S)):
+            try:
+                return self.wait_for("document.readyState == 'complete'", within_s=_ANSWER_S)
+            except NoAnswerError:
+                continue
+        raise BrowserError(f"{url}: no answer in {PATIENCE_S:g} s")
 
     def front(self):
         """Bring it before the others: what is hidden is hardly drawn."""
@@ -254,20 +275,25 @@ class Page:
             mobile=False,
         )
 
-    def evaluate(self, javascript):
+    def evaluate(self, javascript, within_s=PATIENCE_S):
         """Value of an expression, as JSON holds it; a promise is waited for."""
         answer = self.command(
-            "Runtime.evaluate", expression=javascript, returnByValue=True, awaitPromise=True, userGesture=True
+            "Runtime.evaluate",
+            within_s=within_s,
+            expression=javascript,
+            returnByValue=True,
+            awaitPromise=True,
+            userGesture=True,
         )
         if "exceptionDetails" in answer:
-            told = answer["exceptionDetails"]
-            raise BrowserError(told.get("exception", {}).get("description", told["text"]))
+            details = answer["exceptionDetails"]
+            raise BrowserError(details.get("exception", {}).get("description", details["text"]))
         return answer["result"].get("value")
 
-    def wait_for(self, javascript, patience_s=PATIENCE_S):
-        """Wait until an expression is true, and return its value."""
+    def wait_for(self, javascript, patience_s=PATIENCE_S, within_s=PATIENCE_S):
+        """Wait until an expression is true, and return its value; each answer comes within a time."""
         until = time.monotonic() + patience_s
-        while not (value := self.evaluate(javascript)):
+        while not (value := self.evaluate(javascript, within_s)):
             if time.monotonic() > until:
                 raise BrowserError(f"not within {patience_s:g} s: {javascript}")
             time.sleep(0.05)
@@ -288,10 +314,10 @@ class Page:
         while True:
             x, y = self._place(place)
             if isinstance(place, str):
-                self.evaluate(_GUARD)
+                self.evaluate(page_scripts.GUARD)
             for kind in ("mouseMoved", "mousePressed", "mouseReleased"):
                 self._mouse(kind, x, y, clickCount=0 if kind == "mouseMoved" else 1)
-            if not isinstance(place, str) or self.evaluate(_END_GUARD):
+            if not isinstance(place, str) or self.evaluate(page_scripts.END_GUARD):
                 return
             if time.monotonic() > until:
                 raise BrowserError(f"no click reached {place}")
@@ -330,11 +356,11 @@ class Page:
     def draw(self, frames):
         """Wait until it has drawn some frames more."""
         self.front()
-        self.evaluate(_DRAWN % frames)
+        self.evaluate(page_scripts.DRAWN % frames)
 
     def frames_per_second(self, seconds=2.0):
         """How often it draws, over some seconds."""
-        return self.evaluate(_FRAMES % (1000 * seconds))
+        return self.evaluate(page_scripts.FRAMES % (1000 * seconds))
 
     def heard(self, method, parameters):
         """Keep one event of the browser's."""
@@ -344,8 +370,9 @@ class Page:
             case "Network.webSocketCreated":
                 self._asked(parameters["url"])
             case "Runtime.exceptionThrown":
-                told = parameters["exceptionDetails"]
-                self.console.append(f"error: {told.get('exception', {}).get('description', told['text'])}")
+                details = parameters["exceptionDetails"]
+                text = details.get("exception", {}).get("description", details["text"])
+                self.console.append(f"error: {text}")
             case "Runtime.consoleAPICalled" if parameters["type"] in ("error", "warning", "assert"):
                 words = [str(each.get("value", each.get("description"))) for each in parameters["args"]]
                 self.console.append(f"{parameters['type']}: {' '.join(words)}")
@@ -361,75 +388,8 @@ class Page:
         """Middle of an element, pixels, once it rests and can be pressed; x and y stay as they are."""
         if not isinstance(place, str):
             return place
-        return self.wait_for(_MIDDLE % json.dumps(place))
+        return self.wait_for(page_scripts.MIDDLE % json.dumps(place))
 
     def _mouse(self, kind, x, y, **more):
         button = "none" if kind == "mouseMoved" and "buttons" not in more else "left"
         self.command("Input.dispatchMouseEvent", type=kind, x=x, y=y, button=button, **more)
-
-
-# Middle of an element whose box is the same in two frames and whose middle nothing else covers. The last
-# element that was looked for stays known to the page.
-_MIDDLE = """(async () => {
-  const place = %s;
-  const find = () => {
-    if (!place.startsWith("text=")) return document.querySelector(place);
-    const words = place.slice(5);
-    const all = [...document.querySelectorAll("body *")].filter(
-      (each) => each.innerText?.trim() === words && each.getClientRects().length);
-    return all[all.length - 1];
-  };
-  const frame = () => new Promise(requestAnimationFrame);
-  const box = (element) => {
-    const {x, y, width, height} = element.getBoundingClientRect();
-    return [x, y, width, height];
-  };
-  const element = window.pressed = find();
-  if (!element) return null;
-  element.scrollIntoView({block: "nearest"});
-  await frame();
-  const before = box(element);
-  await frame();
-  const [x, y, width, height] = box(element);
-  const same = element.isConnected && width && height && before.join() === [x, y, width, height].join();
-  const middle = [x + width / 2, y + height / 2];
-  return same && element.contains(document.elementFromPoint(...middle)) ? middle : null;
-})()"""
-
-# Between these two, events of the mouse reach only the element that was looked for.
-_GUARD = """(() => {
-  const {pressed} = window;
-  const kinds = ["pointerdown", "mousedown", "pointerup", "mouseup", "click"];
-  let clicked = false;
-  const guard = (event) => {
-    if (!pressed.contains(event.target)) {
-      event.stopImmediatePropagation();
-      event.preventDefault();
-    } else {
-      clicked ||= event.type === "click";
-    }
-  };
-  for (const kind of kinds) window.addEventListener(kind, guard, true);
-  window.endGuard = () => {
-    for (const kind of kinds) window.removeEventListener(kind, guard, true);
-    return clicked;
-  };
-  return true;
-})()"""
-_END_GUARD = "endGuard()"
-
-_DRAWN = """new Promise((done) => {
-  const draw = (left) => left ? requestAnimationFrame(() => draw(left - 1)) : done(true);
-  draw(%d);
-})"""
-
-_FRAMES = """new Promise((done) => {
-  const began = performance.now();
-  let frames = 0;
-  const draw = () => {
-    const passed = performance.now() - began;
-    if (passed > %f) done(frames / passed * 1000);
-    else { frames += 1; requestAnimationFrame(draw); }
-  };
-  requestAnimationFrame(draw);
-})"""

@@ -223,8 +223,8 @@ def grown(folder):
     """What the copy says of its new members."""
     done = python(folder, SCRIPT, folder, compiles=True)
     assert done.returncode == 0, done.stderr
-    figures, told = done.stdout.split("RESULT")
-    return {"summary": json.loads(figures.splitlines()[0]), **json.loads(told)}
+    figures, output = done.stdout.split("RESULT")
+    return {"summary": json.loads(figures.splitlines()[0]), **json.loads(output)}
 
 
 def test_a_law(grown):
@@ -359,7 +359,7 @@ def test_the_families_tests_run_the_new_members_and_pass(folder, grown):
 
 
 def test_contributing_names_the_file_and_the_row_of_each():
-    text = (ROOT / "CONTRIBUTING.md").read_text()
+    text = (ROOT / "docs" / "project" / "contributing.md").read_text()
     for family, addition in ADDITIONS.items():
         name = family.split("'s ")[-1]  # a fault of a stage stands in the row of faults
         start = re.compile(rf"\| {name}( of [^|]*)? \|")

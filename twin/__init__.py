@@ -2,7 +2,9 @@
 
 >>> import spheretwin as st
 >>> run = st.simulate("nutation", {"controller.law": "afsm"})
->>> run.save("nutation.rrd")
+>>> print(run.status)
+completed
+>>> path = run.save("nutation.rrd")
 """
 
 from importlib import import_module

@@ -20,7 +20,8 @@ from spheretwin.electronics.sensor_chain import SensorsSection, sensor_sheet
 from spheretwin.faults.fault import Fault
 from spheretwin.models import mjcf
 from spheretwin.models.actuator import Actuator, CoilGroup
-from spheretwin.models.base.errors import InputError, distinct_texts
+from spheretwin.models.base.errors import InputError, distinct_texts, shown
+from spheretwin.models.base.reuse import reused
 from spheretwin.models.base.user_code import is_reference
 from spheretwin.models.inductance import mutual_inductance
 from spheretwin.models.lagrangian import loaded_inertia
@@ -32,7 +33,7 @@ from spheretwin.models.telemetry.signals import Signal, with_more
 from spheretwin.plant.mujoco_rotor import integrator_name
 from spheretwin.scenario.changes import first_tick, scheduled_changes, with_change
 from spheretwin.scenario.files import Files, files_of, nominal_curve, reload_files
-from spheretwin.scenario.plant_sections import PlantSection, ResolvedNominal, ResolvedPlant
+from spheretwin.scenario.plant_sections import NominalSection, PlantSection, ResolvedNominal, ResolvedPlant
 from spheretwin.scenario.reading import as_plain
 from spheretwin.scenario.sections import ResolvedScenario, Scenario, UserController, UserPath
 from spheretwin.trajectories import SHAPES
@@ -69,6 +70,7 @@ def fill_defaults(
         initial_rad=section.initial_rad or _first_pose(trajectory or scenario.trajectory),
         gravity_m_s2=_gravity(section, files.model),
         group_gain=section.group_gain or (1.0,) * len(actuator.groups),
+        end_stops=section.end_stops.model_copy(update={"on": bool(section.end_stops.on)}),
     )
     resolved = _with(
         ResolvedScenario, scenario, drive=drive, plant=plant, nominal=_nominal(scenario, drive, actuator)
@@ -116,8 +118,12 @@ def _nominal(scenario: Scenario, drive: ResolvedDrive, actuator: Actuator) -> Re
     """Return the data sheet of the controller; default of a value: the model file, or the true value."""
     section = scenario.nominal
     sheet = true_sheet(scenario, drive, actuator) if section.equals_truth else _model_sheet(actuator)
-    sheet["torque_curve"] = nominal_curve(scenario)
-    return _with(ResolvedNominal, section, **_given_or(section, sheet))
+    return _nominal_of(section, sheet, nominal_curve(scenario))
+
+
+@reused
+def _nominal_of(section: NominalSection, sheet: dict[str, Any], curve: str) -> ResolvedNominal:
+    return _with(ResolvedNominal, section, **_given_or(section, {**sheet, "torque_curve": curve}))
 
 
 def _given_or(section: BaseModel, sheet: Mapping[str, Any]) -> dict[str, Any]:
@@ -126,6 +132,7 @@ def _given_or(section: BaseModel, sheet: Mapping[str, Any]) -> dict[str, Any]:
     return {name: sheet[name] if value is None else value for name, value in given.items()}
 
 
+@reused
 def _model_sheet(actuator: Actuator) -> dict[str, Any]:
     """Return the nominal values of a model file: ideal sensors, amplifiers and bearings, and the coil lag."""
     group, ideal = actuator.group, (0.0, 0.0, 0.0)
@@ -259,7 +266,7 @@ class ActiveConfig(NamedTuple):
 
     @property
     def law(self) -> Law:
-        """Law of the configuration; a law that the scenario names is built at each call."""
+        """Law of the configuration; a user law that the scenario names is built at each call."""
         return self.user_law or assembly.law_of(self.scenario)
 
     @property
@@ -301,6 +308,8 @@ class ActiveConfig(NamedTuple):
         InputError
             A change is not possible with this law, this trajectory or these files.
         """
+        if not changes:
+            return
         config, logged = self, with_more({}, self.signals)
         for change in changes:
             try:
@@ -319,8 +328,10 @@ def initial_config(
     Raises
     ------
     InputError
-        The model file, the torque curve, the trajectory or a value of the scenario cannot be used.
+        The scenario or the law is another object, or the model file, the torque curve, the trajectory or a
+        value of the scenario cannot be used.
     """
+    _check_kinds(scenario, law)
     user_trajectory = None if trajectory is None else checked(trajectory)
     return _config_of(scenario, files or files_of(scenario), law, user_trajectory)
 
@@ -329,3 +340,15 @@ def _config_of(
     scenario: Scenario, files: Files, law: Law | None, trajectory: UserTrajectory | None
 ) -> ActiveConfig:
     return ActiveConfig(fill_defaults(scenario, files, law, trajectory), files, law, trajectory)
+
+
+def _check_kinds(scenario: object, law: object) -> None:
+    if not isinstance(scenario, Scenario):
+        raise InputError(
+            f"scenario: expected a scenario, as spheretwin.load returns it, received {shown(scenario)}"
+        )
+    if not (law is None or isinstance(law, Law)):
+        raise InputError(
+            f"law: expected a Law, received {shown(law)}; a law of a file is a value of the field"
+            ' controller.law, such as "mine.py:Mine"'
+        )

@@ -16,6 +16,7 @@ from spheretwin.control.compensators.reference_governor import governor
 from spheretwin.control.controller import Controller, Supervision, controller
 from spheretwin.control.estimators.estimator import Estimator, Sampling
 from spheretwin.control.law import Law, NominalModel
+from spheretwin.control.laws import LAWS
 from spheretwin.control.manual_currents import manual
 from spheretwin.electronics.drive import DriveModel
 from spheretwin.electronics.drive_chain import DriveChain
@@ -24,12 +25,14 @@ from spheretwin.faults.schedule import part_names
 from spheretwin.loop import ColumnOffsets
 from spheretwin.models.actuator import Actuator
 from spheretwin.models.base.errors import InputError, SpheretwinError, exception_text, shown
+from spheretwin.models.base.reuse import reused
 from spheretwin.models.joint_chain import JointChain
 from spheretwin.models.lagrangian import loaded_inertia
-from spheretwin.models.magnetics import TorqueModel, scratch_of, torque_model
+from spheretwin.models.magnetics import TorqueModel, scaled, scratch_of, torque_model
 from spheretwin.models.scatter import scattered_model
 from spheretwin.models.telemetry.signals import Signal, common_signals, offsets, width
 from spheretwin.plant.bristle_friction import bristle_friction
+from spheretwin.plant.end_stops import end_stops
 from spheretwin.plant.friction import Friction, friction
 from spheretwin.plant.magnet_heat import MagnetHeat, magnet_heat
 from spheretwin.plant.mass_properties import mass_errors
@@ -37,7 +40,7 @@ from spheretwin.plant.part_scatter import scatter_of
 from spheretwin.plant.plant_tick import ENGINES, Plant
 from spheretwin.plant.rotor import Rotor, RotorSettings
 from spheretwin.scenario.files import Files
-from spheretwin.scenario.plant_sections import ResolvedPlant
+from spheretwin.scenario.plant_sections import ResolvedNominal, ResolvedPlant
 from spheretwin.scenario.sections import ResolvedScenario
 from spheretwin.shared_buffers import SharedBuffers, drive_of
 
@@ -52,9 +55,13 @@ def law_of(scenario: ResolvedScenario) -> Law:
     InputError
         A user law that returns no `Law`, or one for another control period.
     """
-    section = scenario.controller
+    section, nominal = scenario.controller, scenario.nominal
+    return (_shipped_law if section.law in LAWS else _built_law)(section, nominal)
+
+
+def _built_law(section: Any, nominal: ResolvedNominal) -> Law:
     try:
-        law = section.build(_known(scenario))
+        law = section.build(_known_to(section, nominal))
     except (SpheretwinError, KeyboardInterrupt):
         raise
     except BaseException as error:  # the user's code may raise anything
@@ -67,6 +74,10 @@ def law_of(scenario: ResolvedScenario) -> Law:
     return law
 
 
+_shipped_law = reused(_built_law)
+"""A law of this package holds no state: runs copy its memory."""
+
+
 def same_nominal_model(scenario: ResolvedScenario, other: ResolvedScenario) -> bool:
     """True if the laws of both scenarios receive the same nominal model."""
     first, second = _known(scenario), _known(other)
@@ -75,9 +86,13 @@ def same_nominal_model(scenario: ResolvedScenario, other: ResolvedScenario) -> b
 
 
 def _known(scenario: ResolvedScenario) -> NominalModel:
-    nominal, period_s = scenario.nominal, scenario.controller.period_s
-    delay_s, inertia = nominal.delay_s, np.array(nominal.inertia_kg_m2)
-    if scenario.controller.prediction.on:
+    return _known_to(scenario.controller, scenario.nominal)
+
+
+@reused
+def _known_to(section: Any, nominal: ResolvedNominal) -> NominalModel:
+    period_s, delay_s, inertia = section.period_s, nominal.delay_s, np.array(nominal.inertia_kg_m2)
+    if section.prediction.on:
         return NominalModel(period_s, 0.0, inertia, ahead_s=delay_s)
     return NominalModel(period_s, delay_s, inertia)
 
@@ -110,8 +125,7 @@ def column_offsets(signals: tuple[Signal, ...], law: Law) -> ColumnOffsets:
 
 def nominal_magnetics(scenario: ResolvedScenario, files: Files) -> TorqueModel:
     """Return the magnetics of the data sheet of the controller."""
-    model, scale = torque_model(files.nominal), scenario.nominal.torque_scale
-    return model if scale == 1 else model._replace(line_weights=scale * model.line_weights)
+    return scaled(torque_model(files.nominal), scenario.nominal.torque_scale)
 
 
 def estimator_of(scenario: ResolvedScenario) -> Estimator | None:
@@ -122,9 +136,14 @@ def estimator_of(scenario: ResolvedScenario) -> Estimator | None:
     InputError
         The parameters do not fit the control period or the sensors.
     """
-    nominal = scenario.nominal
+    return _estimator_of(scenario.estimator, scenario.nominal, scenario.controller)
+
+
+@reused
+def _estimator_of(section: Any, nominal: ResolvedNominal, controller: Any) -> Estimator | None:
     noise_rad, quantum_rad = np.array(nominal.angle_noise_rad), np.array(nominal.angle_resolution_rad)
-    return scenario.estimator.build(Sampling(scenario.controller.period_s, noise_rad, quantum_rad))
+    estimator: Estimator | None = section.build(Sampling(controller.period_s, noise_rad, quantum_rad))
+    return estimator
 
 
 def controller_of(
@@ -199,6 +218,7 @@ def plant_of(scenario: ResolvedScenario, files: Files, rotor: Any, buffers: Shar
             section.step_s,
             chain,
             seed=scenario.seed,
+            stops=end_stops(section.end_stops, actuator.hinge_range_rad, inertia, section.step_s),
         ),
         heat=heat,
         group_gain=group_gain,

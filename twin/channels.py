@@ -16,7 +16,7 @@ from spheretwin.faults.fault import MODES
 from spheretwin.faults.schedule import part_names
 from spheretwin.models.base.compiled import part_of_its_caller
 from spheretwin.models.telemetry.signals import ANGLES, Signal
-from spheretwin.plant.bristle_friction import log_cable, log_presliding
+from spheretwin.plant.bristle_friction import log_cable, log_end_stops, log_presliding
 from spheretwin.plant.cable import acts
 from spheretwin.plant.magnet_heat import log_heat
 from spheretwin.scenario.sections import Scenario
@@ -187,6 +187,24 @@ def write_cable(row: NDArray, controller: Any, sensors: Any, plant: Any) -> None
 CABLE = Channel(lambda groups: CABLE_SIGNALS, lambda scenario: acts(scenario.plant.cable), write_cable)
 
 
+END_STOP_SIGNALS = (
+    Signal(
+        "end_stop_Nm", "N·m", 3, "end stops on the hinges, in the last physics step of the period", ANGLES
+    ),
+)
+
+
+@part_of_its_caller
+def write_end_stops(row: NDArray, controller: Any, sensors: Any, plant: Any) -> None:
+    """Write the columns of one tick."""
+    log_end_stops(plant.bristles, row)
+
+
+END_STOPS = Channel(
+    lambda groups: END_STOP_SIGNALS, lambda scenario: bool(scenario.plant.end_stops.on), write_end_stops
+)
+
+
 HEAT_SIGNALS = (
     Signal("stator_temperature_degC", "°C", 1, "at the end of the control period"),
     Signal("rotor_temperature_degC", "°C", 1, "of the magnets, at the end of the control period"),
@@ -325,6 +343,7 @@ CHANNELS: tuple[Channel, ...] = (
     FRICTION,
     PRESLIDING,
     CABLE,
+    END_STOPS,
     HEAT,
     DRIVE,
     FAULTS,

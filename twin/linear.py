@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from spheretwin.active_config import initial_config
 from spheretwin.models.actuator import Actuator
+from spheretwin.models.base import extras
 from spheretwin.models.base.errors import InputError, distinct_texts, shown
 from spheretwin.models.kinematics import rate_jacobian
 from spheretwin.models.lagrangian import gravity_stiffness, gravity_torque, inertia_matrix
@@ -263,7 +264,7 @@ def linearise(
     _check_choice("inputs", inputs, ("torque", "currents"))
     _check_choice("kind", kind, ("scipy", "control"))
     # Before the computation, so that a missing library is reported at once.
-    library = _python_control() if kind == "control" else importlib.import_module("scipy.signal")
+    library = python_control() if kind == "control" else importlib.import_module("scipy.signal")
     config = initial_config(scenario, None, None)
     actuator = config.files.actuator
     pose = _pose(config.scenario.plant.initial_rad if pose_rad is None else pose_rad, actuator)
@@ -364,16 +365,14 @@ def _check_choice(name: str, received: str, valid: tuple[str, ...]) -> None:
         )
 
 
-def _python_control() -> Any:
+def python_control() -> Any:
+    """Return the package control; raise `InputError` if it is not installed."""
     try:
         library: Any = importlib.import_module("control")
     except ImportError:
         library = None
     if not hasattr(library, "StateSpace"):  # it may be a folder of that name in the working folder
-        raise InputError(
-            "linear model: expected an installed python-control for kind control, received none;"
-            " pip install control"
-        )
+        raise extras.missing("linear model", "python-control", "control", "for kind control")
     return library
 
 

@@ -1,4 +1,7 @@
-"""Closed loop: in each tick measure, control, advance the plant, log a row. Compiled, or in Python."""
+"""Closed loop: in each tick measure, control, advance the plant, log a row. Compiled, or in Python.
+
+The controller or the plant can be outside of this process: the loop then calls a function in its place.
+"""
 
 from __future__ import annotations
 
@@ -7,6 +10,7 @@ from math import isfinite
 from typing import Any, NamedTuple
 
 import numpy as np
+from numba import types
 from numpy.typing import NDArray
 
 from spheretwin.channels import write_channels
@@ -28,7 +32,7 @@ from spheretwin.models.base.compiled import (
     uncompiled,
 )
 from spheretwin.models.base.errors import InputError
-from spheretwin.models.base.numba_internals import Dispatcher
+from spheretwin.models.base.numba_internals import Dispatcher, function_at
 from spheretwin.models.telemetry.signals import MOTION_SIGNALS, offsets, width
 from spheretwin.plant.plant_tick import (
     DIVERGED,
@@ -47,6 +51,7 @@ TIME, ANGLE, RATE = _OFFSETS["t_s"], _OFFSETS["q_rad"], _OFFSETS["qdot_rad_s"]
 ANGLE_REF, RATE_REF, ERROR = _OFFSETS["q_ref_rad"], _OFFSETS["qdot_ref_rad_s"], _OFFSETS["error_rad"]
 TORQUE_COMMAND, TORQUE = _OFFSETS["torque_command_Nm"], _OFFSETS["torque_Nm"]
 _TEMPERATURE = int(Reason.TEMPERATURE)
+INTERRUPTED = 4
 DISTURBANCE, CURRENT_COMMAND = _OFFSETS["disturbance_Nm"], width(MOTION_SIGNALS)
 
 
@@ -67,6 +72,27 @@ class ColumnOffsets(NamedTuple):
     law_signals: int
 
 
+EXTERNAL_SIGNATURE = types.int64(types.float64)
+"""Time of the tick, s; returns the code of a status, `GOING` as a rule."""
+
+external_at = function_at(EXTERNAL_SIGNATURE)
+
+
+class External(NamedTuple):
+    """Functions of `EXTERNAL_SIGNATURE` for parts outside of this process; 0 for a simulated part.
+
+    In compiled code they are addresses.
+    """
+
+    controller: Any  # reads the measurement, writes the manual currents
+    plant: Any  # reads `command`, writes the next pose and currents of the plant, and `torque_S`
+    command: NDArray[np.float64]  # (n,) A, of this tick, for the plant
+    torque_S: NDArray[np.float64]  # (3,) N·m of these currents
+
+
+NO_EXTERNAL = External(0, 0, np.zeros(0), np.zeros(3))
+
+
 class Scratch(NamedTuple):
     """Buffers for intermediate values."""
 
@@ -85,6 +111,7 @@ def loop(
     plant: Plant,
     column_offsets: ColumnOffsets,
     scratch: Scratch,
+    external: External,
     log: Array,
 ) -> tuple[int, int]:
     """Run one control tick for each row of `log`.
@@ -103,13 +130,15 @@ def loop(
     column_offsets : ColumnOffsets
     scratch : Scratch
         The content is irrelevant.
+    external : External
+        Parts outside of this process.
     log : (ticks, width) array
         Telemetry; each tick writes its row.
 
     Returns
     -------
     tuple of int
-        Rows written, and `GOING`, `LEFT_WORKSPACE`, `DIVERGED` or `FAILSAFE`.
+        Rows written, and `GOING`, `LEFT_WORKSPACE`, `DIVERGED`, `FAILSAFE` or `INTERRUPTED`.
     """
     reference, measurement = scratch.reference, scratch.measurement
     watchdog, detector = controller.supervision.watchdog, controller.supervision.detector
@@ -129,6 +158,10 @@ def loop(
             sense_currents(plant.current_sensors, plant.current, plant.draws)
             if detector.on:
                 copy_into(detector.measured_A, 0, plant.current_sensors.measured_A, groups)
+        if external.controller != 0:
+            code = external_at(external.controller)(t)
+            if code != GOING:
+                return tick, code
         command = row[CURRENT_COMMAND:first_current]
         share = control_tick(controller, law, allocate, estimate, t, reference, measurement, command)
         if share == NO_TORQUE:
@@ -139,7 +172,14 @@ def loop(
         delivered = PlantOutput(
             row[first_current:first_mean], row[first_mean:scale], row[TORQUE : TORQUE + 3]
         )
-        status = plant_tick(plant, command, disturbance, delivered)
+        if external.plant == 0:
+            status = plant_tick(plant, command, disturbance, delivered)
+        else:
+            copy_into(external.command, 0, command, groups)
+            status = external_at(external.plant)(t)
+            copy_into(delivered.current, 0, command, groups)
+            copy_into(delivered.mean_current, 0, command, groups)
+            copy_into(delivered.torque_S, 0, external.torque_S, 3)
         if status == FAILSAFE and watchdog.reason[0] == 0:
             trip(watchdog, _TEMPERATURE)
         write_channels(row, column_offsets.channels, controller, sensors, plant)

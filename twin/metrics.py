@@ -1,88 +1,49 @@
-"""Metrics: reducers that process a run chunk by chunk without storing its rows."""
+"""Metrics of a run: compiled reducers of its rows, and the list of their names."""
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
-from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from spheretwin.electronics.coil import current_lag
-from spheretwin.models.actuator import Actuator
 from spheretwin.models.base.compiled import rounding_each
 from spheretwin.models.telemetry.signals import ANGLES
-from spheretwin.models.telemetry.table import Table, rank_lost, saturated
-from spheretwin.scenario.sections import ResolvedScenario
-
-
-@dataclass(frozen=True)
-class PlannedRun:
-    """Facts about a run that a metric knows before the first row.
-
-    Attributes
-    ----------
-    scenario : ResolvedScenario
-        Scenario at the start.
-    actuator : Actuator
-        Simulated actuator.
-    ticks : int
-        Planned control ticks; the run may end earlier.
-    """
-
-    scenario: ResolvedScenario
-    actuator: Actuator
-    ticks: int
-
-    @property
-    def period_s(self) -> float:
-        """Control period, s."""
-        return self.scenario.controller.period_s
-
-
-class Metric(ABC):
-    """Metric of a run; the result is bit-identical for any chunks.
-
-    Parameters
-    ----------
-    planned : PlannedRun
-        Facts about the run.
-    """
-
-    labels: ClassVar[tuple[str, ...]] = ()
-    """Names of the entries, if the value is a list."""
-
-    def __init__(self, planned: PlannedRun) -> None:
-        self.planned, self._rows = planned, 0
-
-    def write(self, rows: Table) -> None:
-        """Process the rows of one chunk, at least one."""
-        self.add(rows)
-        self._rows += len(rows)
-
-    @abstractmethod
-    def add(self, rows: Table) -> None:
-        """Process the rows of one chunk; `_rows` is the number of rows before it."""
-
-    @abstractmethod
-    def value(self) -> Any:
-        """Return the value of the metric in JSON types; None if there are too few rows."""
-
-    def warnings(self) -> list[str]:
-        """Return warnings that concern the validity of the figures, one line each."""
-        return []
-
+from spheretwin.reduction import Metric, PlannedRun
 
 Array = NDArray[np.float64]
 
 
+class CopperState(NamedTuple):
+    """State of `CopperLoss`."""
+
+    first_step: float  # mean remaining share of the distance to the command over the first physics step
+    tick: float  # the same over the tick
+    tick_squared: float  # of its square, which decays twice as fast, over the tick
+    limit_A: float
+    follows: bool  # true if the currents relax towards the commands
+    squares: Array  # (n,) A²
+    logged_W: Array  # (n,)
+
+
 @rounding_each
-def add_rows(rows: Array, total: Array) -> None:
-    """Add rows (n, k) to a total (k,), one after the other: the sum does not depend on the chunks."""
+def _add_copper_loss(rows: Array, first: int, columns: tuple[int, ...], state: CopperState) -> None:
+    logged, current, command = columns
     for i in range(rows.shape[0]):
-        for j in range(rows.shape[1]):
-            total[j] += rows[i, j]
+        for j in range(state.squares.shape[0]):
+            if logged >= 0:
+                state.logged_W[j] += rows[i, logged + j]
+            elif not state.follows:
+                state.squares[j] += rows[i, current + j] * rows[i, current + j]
+            else:
+                target = min(max(rows[i, command + j], -state.limit_A), state.limit_A)
+                distance = 0.0  # at the start of the tick; 0 without a lag
+                if state.first_step > 0.0:
+                    distance = (rows[i, current + j] - target) / state.first_step
+                crossed = 2.0 * state.tick * target * distance
+                decayed = state.tick_squared * (distance * distance)
+                state.squares[j] += target * target + crossed + decayed
 
 
 class CopperLoss(Metric):
@@ -97,45 +58,50 @@ class CopperLoss(Metric):
     counts completely.
     """
 
+    state: CopperState
+    reads = ("copper_loss_W", "current_A", "current_command_A")
+    add = staticmethod(_add_copper_loss)
+
     def __init__(self, planned: PlannedRun) -> None:
         super().__init__(planned)
-        section = planned.scenario.drive
-        lag_s, self._limit_A = section.lag_s, section.current_limit_A
-        # Mean remaining shares of the distance to the command: over the first step, over the tick, and of its
-        # square over the tick, which decays twice as fast.
-        self._first_step, self._tick, self._tick_squared = (
-            current_lag(time_constant_s, span_s, self._limit_A).mean_share
+        section, groups = planned.scenario.drive, len(planned.actuator.groups)
+        lag_s, limit_A = section.lag_s, section.current_limit_A
+        step, tick, tick_squared = (
+            float(current_lag(time_constant_s, span_s, limit_A).mean_share)
             for time_constant_s, span_s in (
                 (lag_s, planned.scenario.plant.step_s),
                 (lag_s, planned.period_s),
                 (0.5 * lag_s, planned.period_s),
             )
         )
-        self._follows = not section.converts
-        self._resistance_ohm = section.resistance_ohm
-        self._squares = np.zeros(len(planned.actuator.groups))
-        self._logged_W = np.zeros(len(planned.actuator.groups))
-
-    def add(self, rows: Table) -> None:
-        """Process the rows of one chunk."""
-        if any(signal.name == "copper_loss_W" for signal in rows.signals):
-            add_rows(np.ascontiguousarray(rows["copper_loss_W"]), self._logged_W)
-        elif not self._follows:
-            add_rows(rows["current_A"] ** 2, self._squares)
-        else:
-            target = np.clip(rows["current_command_A"], -self._limit_A, self._limit_A)
-            distance = np.zeros_like(target)  # at the start of the tick; 0 without a lag
-            if self._first_step > 0:
-                distance = (rows["current_A"] - target) / self._first_step
-            crossed = 2.0 * self._tick * target * distance
-            add_rows(target**2 + crossed + self._tick_squared * distance**2, self._squares)
+        squares, logged_W = np.zeros((2, groups))
+        follows = not section.converts
+        self.state = CopperState(step, tick, tick_squared, float(limit_A), follows, squares, logged_W)
 
     def value(self) -> float | None:
         """Return the loss in J; None without a row."""
         if not self._rows:
             return None
-        heat_W = np.sum(self._resistance_ohm * self._squares) + np.sum(self._logged_W)
+        resistance_ohm = self.planned.scenario.drive.resistance_ohm
+        heat_W = np.sum(resistance_ohm * self.state.squares) + np.sum(self.state.logged_W)
         return float(heat_W * self.planned.period_s)
+
+
+class VariationState(NamedTuple):
+    """State of `CurrentVariation`."""
+
+    variation: Array  # (n,) A
+    last: Array  # (n,) A, of the last tick
+
+
+@rounding_each
+def _add_variation(rows: Array, first: int, columns: tuple[int, ...], state: VariationState) -> None:
+    (command,) = columns
+    for i in range(rows.shape[0]):
+        for j in range(state.last.shape[0]):
+            if first + i > 0:
+                state.variation[j] += abs(rows[i, command + j] - state.last[j])
+            state.last[j] = rows[i, command + j]
 
 
 class CurrentVariation(Metric):
@@ -146,41 +112,64 @@ class CurrentVariation(Metric):
     complete variation, and the lag of the coils does not smooth it.
     """
 
+    state: VariationState
+    reads = ("current_command_A",)
+    add = staticmethod(_add_variation)
+
     def __init__(self, planned: PlannedRun) -> None:
         super().__init__(planned)
         groups = len(planned.actuator.groups)
-        self._variation = np.zeros(groups)
-        self._last = np.zeros(groups)
-
-    def add(self, rows: Table) -> None:
-        """Process the rows of one chunk."""
-        command = rows["current_command_A"]
-        if not self._rows:
-            self._last = command[0].copy()
-        add_rows(np.abs(np.diff(command, axis=0, prepend=self._last[None])), self._variation)
-        self._last = command[-1].copy()
+        self.state = VariationState(np.zeros(groups), np.zeros(groups))
 
     def value(self) -> float | None:
         """Return the variation in A/s; None with fewer than two rows."""
         if self._rows < 2:
             return None
-        return float(self._variation.mean() / ((self._rows - 1) * self.planned.period_s))
+        return float(self.state.variation.mean() / ((self._rows - 1) * self.planned.period_s))
+
+
+class Largest(NamedTuple):
+    """Largest values so far; minus infinity before the first row."""
+
+    values: Array
+
+
+@rounding_each
+def _add_currents(rows: Array, first: int, columns: tuple[int, ...], state: Largest) -> None:
+    (current,) = columns
+    for i in range(rows.shape[0]):
+        for j in range(state.values.shape[0]):
+            state.values[j] = max(state.values[j], abs(rows[i, current + j]))
 
 
 class MaxAbsCurrent(Metric):
     """Largest ``|current_A|`` of any group, A: of means over the physics step that begins at each tick."""
 
+    state: Largest
+    reads = ("current_A",)
+    add = staticmethod(_add_currents)
+
     def __init__(self, planned: PlannedRun) -> None:
         super().__init__(planned)
-        self._largest = -np.inf
-
-    def add(self, rows: Table) -> None:
-        """Process the rows of one chunk."""
-        self._largest = max(self._largest, float(np.abs(rows["current_A"]).max()))
+        self.state = Largest(np.full(len(planned.actuator.groups), -np.inf))
 
     def value(self) -> float | None:
         """Return the current in A; None without a row."""
-        return self._largest if self._largest >= 0 else None
+        return float(self.state.values.max()) if self._rows else None
+
+
+class SumOfSquares(NamedTuple):
+    """Sum of the squares of three columns."""
+
+    values: Array  # (3,)
+
+
+@rounding_each
+def _add_torque(rows: Array, first: int, columns: tuple[int, ...], state: SumOfSquares) -> None:
+    (torque,) = columns
+    for i in range(rows.shape[0]):
+        for j in range(3):
+            state.values[j] += rows[i, torque + j] * rows[i, torque + j]
 
 
 class RmsTorque(Metric):
@@ -190,46 +179,59 @@ class RmsTorque(Metric):
     at each tick.
     """
 
+    state: SumOfSquares
+    reads = ("torque_Nm",)
+    add = staticmethod(_add_torque)
+
     def __init__(self, planned: PlannedRun) -> None:
         super().__init__(planned)
-        self._squares = np.zeros(3)
-
-    def add(self, rows: Table) -> None:
-        """Process the rows of one chunk."""
-        add_rows(rows["torque_Nm"] ** 2, self._squares)
+        self.state = SumOfSquares(np.zeros(3))
 
     def value(self) -> float | None:
         """Return the torque in N·m; None without a row."""
-        return float(np.sqrt(self._squares.sum() / self._rows)) if self._rows else None
+        return float(np.sqrt(self.state.values.sum() / self._rows)) if self._rows else None
 
 
 # Above this share of ticks at the current limit a run has a warning.
 SATURATED_SHARE = 0.05
 
 
+class Shares(NamedTuple):
+    """State of `SaturatedFraction`."""
+
+    ticks: NDArray[np.int64]  # (2,) with reduced torque, with a torque matrix of less than rank 3
+
+
+@rounding_each
+def _add_shares(rows: Array, first: int, columns: tuple[int, ...], state: Shares) -> None:
+    (scale,) = columns
+    for i in range(rows.shape[0]):
+        state.ticks[0] += 0.0 < rows[i, scale] < 1.0
+        state.ticks[1] += rows[i, scale] == 0.0
+
+
 class SaturatedFraction(Metric):
     """Share of the ticks at which the current limit reduced the commanded torque, 0 to 1."""
 
+    state: Shares
+    reads = ("allocation_scale",)
+    add = staticmethod(_add_shares)
+
     def __init__(self, planned: PlannedRun) -> None:
         super().__init__(planned)
-        self._saturated = self._rank_lost = 0
-
-    def add(self, rows: Table) -> None:
-        """Process the rows of one chunk."""
-        self._saturated += int(np.count_nonzero(saturated(rows)))
-        self._rank_lost += int(np.count_nonzero(rank_lost(rows)))
+        self.state = Shares(np.zeros(2, dtype=np.int64))
 
     def value(self) -> float | None:
         """Return the share, 0 to 1; None without a row."""
-        return self._saturated / self._rows if self._rows else None
+        return int(self.state.ticks[0]) / self._rows if self._rows else None
 
     def warnings(self) -> list[str]:
         """Return warnings if the limit, or a torque matrix without full rank, determines the figures."""
         warnings = []
-        if self._rank_lost:
+        if rank_lost := int(self.state.ticks[1]):
             warnings.append(
                 "the torque matrix of the groups in use has less than rank 3 at"
-                f" {self._rank_lost} of {self._rows} ticks: no currents are commanded there"
+                f" {rank_lost} of {self._rows} ticks: no currents are commanded there"
             )
         share = self.value() or 0.0
         if share > SATURATED_SHARE:
@@ -240,90 +242,105 @@ class SaturatedFraction(Metric):
         return warnings
 
 
+@rounding_each
+def _add_error(rows: Array, first: int, columns: tuple[int, ...], state: Largest) -> None:
+    (error,) = columns
+    for i in range(rows.shape[0]):
+        for j in range(3):
+            state.values[j] = max(state.values[j], abs(rows[i, error + j]))
+
+
 class MaxAbsError(Metric):
     """Largest ``|error_rad|`` of each hinge over the whole run, its start included, [3] in rad."""
 
     labels = ANGLES
+    state: Largest
+    reads = ("error_rad",)
+    add = staticmethod(_add_error)
 
     def __init__(self, planned: PlannedRun) -> None:
         super().__init__(planned)
-        self._largest = np.full(3, -np.inf)
-
-    def add(self, rows: Table) -> None:
-        """Process the rows of one chunk."""
-        self._largest = np.maximum(self._largest, np.abs(rows["error_rad"]).max(axis=0))
+        self.state = Largest(np.full(3, -np.inf))
 
     def value(self) -> list[float] | None:
         """Return [3] in rad; None without a row."""
-        return self._largest.tolist() if self._largest[0] >= 0 else None
+        return self.state.values.tolist() if self._rows else None
 
 
 PIECE_TICKS = 256
+
+
+class Pieces(NamedTuple):
+    """Sums of squares over pieces of 256 ticks, one of which begins at half of the planned ticks.
+
+    They give the value of the second half without the rows, and grow by a kilobyte for 10,000 ticks.
+    """
+
+    offset: int  # ticks of the first piece, which may be shorter
+    sums: Array  # (pieces, 3) rad²
+
+
+@rounding_each
+def _add_pieces(rows: Array, first: int, columns: tuple[int, ...], state: Pieces) -> None:
+    (error,) = columns
+    for i in range(rows.shape[0]):
+        piece = (first + i - state.offset) // PIECE_TICKS + 1
+        for j in range(3):
+            state.sums[piece, j] += rows[i, error + j] * rows[i, error + j]
 
 
 class RmsError(Metric):
     """Root mean square of ``error_rad`` of each hinge over the whole run, [3] in rad."""
 
     labels = ANGLES
+    state: Pieces
+    reads = ("error_rad",)
+    add = staticmethod(_add_pieces)
 
     def __init__(self, planned: PlannedRun) -> None:
         super().__init__(planned)
-        self._squares = SquaresByPiece(planned.ticks)
+        self.state = Pieces(planned.ticks // 2 % PIECE_TICKS, np.zeros((1, 3)))
 
-    def add(self, rows: Table) -> None:
-        """Process the rows of one chunk."""
-        self._squares.add(rows["error_rad"])
+    def begin(self, rows: int) -> int:
+        """Prepare the state for a chunk of some rows; return the tick of its first row."""
+        first = super().begin(rows)
+        if (missing := self._piece(self._rows - 1) + 1 - len(self.state.sums)) > 0:
+            self.state = self.state._replace(sums=np.concatenate([self.state.sums, np.zeros((missing, 3))]))
+        return first
 
     def value(self) -> list[float] | None:
         """Return [3] in rad; None without a row."""
-        return self._squares.rms(0)
+        return self._rms(0)
 
-
-class SquaresByPiece:
-    """Sums of squares over pieces of 256 ticks, one of which begins at half of the planned ticks.
-
-    They give the value of the second half without the rows, and grow by a kilobyte for 10,000 ticks.
-
-    Parameters
-    ----------
-    planned : int
-        Planned ticks of the run.
-    """
-
-    def __init__(self, planned: int) -> None:
-        self._offset = planned // 2 % PIECE_TICKS
-        self._sums = np.zeros((1, 3))
-        self.rows = 0
-
-    def add(self, values: NDArray[np.float64]) -> None:
-        """Add the next rows (n, 3)."""
-        first, squares = self.rows, values**2
-        self.rows += len(values)
-        last_piece = self.piece(self.rows - 1)
-        missing = max(0, last_piece + 1 - len(self._sums))
-        self._sums = np.concatenate([self._sums, np.zeros((missing, 3))])
-        for piece in range(self.piece(first), last_piece + 1):
-            begins = self._first_tick(piece) - first
-            add_rows(squares[max(begins, 0) : max(begins + PIECE_TICKS, 0)], self._sums[piece])
-
-    def rms(self, first: int) -> list[float] | None:
+    def _rms(self, piece: int) -> list[float] | None:
         """Return the root mean square from the first tick of a piece on; None without a row."""
-        if not self.rows:
+        if not self._rows:
             return None
-        begins = max(0, self._first_tick(first))
-        return np.sqrt(self._sums[first:].sum(axis=0) / (self.rows - begins)).tolist()
+        begins = max(0, (piece - 1) * PIECE_TICKS + self.state.offset)
+        return np.sqrt(self.state.sums[piece:].sum(axis=0) / (self._rows - begins)).tolist()
 
-    def _first_tick(self, piece: int) -> int:
-        """Return the first tick of a piece; below 0 for the first piece, which is shorter."""
-        return (piece - 1) * PIECE_TICKS + self._offset
-
-    def piece(self, tick: int) -> int:
+    def _piece(self, tick: int) -> int:
         """Return the piece that contains a tick."""
-        return (tick - self._offset) // PIECE_TICKS + 1
+        return (tick - self.state.offset) // PIECE_TICKS + 1
 
 
 BAND_rad = 0.01
 """Settling band of every hinge: the usual 5 % of 0.2 rad, the amplitude of the shipped motions."""
+
+
+class LastOutside(NamedTuple):
+    """State of `SettlingTime`."""
+
+    tick: NDArray[np.int64]  # (3,) last one outside the band; -1 for none
+
+
+@rounding_each
+def _add_outside(rows: Array, first: int, columns: tuple[int, ...], state: LastOutside) -> None:
+    (error,) = columns
+    for i in range(rows.shape[0]):
+        for j in range(3):
+            if abs(rows[i, error + j]) > BAND_rad:
+                state.tick[j] = first + i
 
 
 class SettlingTime(Metric):
@@ -334,23 +351,38 @@ class SettlingTime(Metric):
     """
 
     labels = ANGLES
+    state: LastOutside
+    reads = ("error_rad",)
+    add = staticmethod(_add_outside)
 
     def __init__(self, planned: PlannedRun) -> None:
         super().__init__(planned)
-        self._last_outside = np.full(3, -1)
-
-    def add(self, rows: Table) -> None:
-        """Process the rows of one chunk."""
-        outside = np.abs(rows["error_rad"]) > BAND_rad
-        last = self._rows + len(rows) - 1 - np.argmax(outside[::-1], axis=0)
-        self._last_outside = np.where(outside.any(axis=0), last, self._last_outside)
+        self.state = LastOutside(np.full(3, -1))
 
     def value(self) -> list[float | None] | None:
         """Return [3] in s; None without a row."""
         if not self._rows:
             return None
-        settled = (self._last_outside + 1).tolist()
+        settled = (self.state.tick + 1).tolist()
         return [tick * self.planned.period_s if tick < self._rows else None for tick in settled]
+
+
+class Crossing(NamedTuple):
+    """State of `Overshoot`."""
+
+    start: Array  # (3,) rad, error at the first tick
+    largest: Array  # (3,) rad
+
+
+@rounding_each
+def _add_crossing(rows: Array, first: int, columns: tuple[int, ...], state: Crossing) -> None:
+    (error,) = columns
+    for i in range(rows.shape[0]):
+        for j in range(3):
+            if first + i == 0:
+                state.start[j] = rows[i, error + j]
+            beyond = -rows[i, error + j] if state.start[j] > 0.0 else rows[i, error + j]
+            state.largest[j] = max(state.largest[j], beyond)
 
 
 class Overshoot(Metric):
@@ -361,24 +393,22 @@ class Overshoot(Metric):
     """
 
     labels = ANGLES
+    state: Crossing
+    reads = ("error_rad",)
+    add = staticmethod(_add_crossing)
 
     def __init__(self, planned: PlannedRun) -> None:
         super().__init__(planned)
-        self._start, self._largest = np.zeros(3), np.zeros(3)
-
-    def add(self, rows: Table) -> None:
-        """Process the rows of one chunk."""
-        error = rows["error_rad"]
-        if not self._rows:
-            self._start = error[0].copy()
-        self._largest = np.maximum(self._largest, (-np.sign(self._start) * error).max(axis=0))
+        self.state = Crossing(np.zeros(3), np.zeros(3))
 
     def value(self) -> list[float | None] | None:
         """Return [3] in rad; None without a row."""
         if not self._rows:
             return None
-        steps = np.abs(self._start) > BAND_rad
-        return [float(largest) if step else None for largest, step in zip(self._largest, steps, strict=True)]
+        steps = np.abs(self.state.start) > BAND_rad
+        return [
+            float(largest) if step else None for largest, step in zip(self.state.largest, steps, strict=True)
+        ]
 
 
 class TailRmsError(RmsError):
@@ -390,32 +420,40 @@ class TailRmsError(RmsError):
 
     def value(self) -> list[float] | None:
         """Return [3] in rad; None without a row."""
-        return self._squares.rms(self._squares.piece(self._squares.rows // 2))
+        return self._rms(self._piece(self._rows // 2))
+
+
+@rounding_each
+def _add_temperature(rows: Array, first: int, columns: tuple[int, ...], state: Largest) -> None:
+    (temperature,) = columns
+    if temperature >= 0:
+        for i in range(rows.shape[0]):
+            state.values[0] = max(state.values[0], rows[i, temperature])
 
 
 class RotorTemperature(Metric):
     """Largest temperature of the magnets, °C, which only decides about a warning."""
 
+    state: Largest
+    reads = ("rotor_temperature_degC",)
+    add = staticmethod(_add_temperature)
+
     def __init__(self, planned: PlannedRun) -> None:
         super().__init__(planned)
-        self._section, self._largest = planned.scenario.plant.thermal, -np.inf
-
-    def add(self, rows: Table) -> None:
-        """Process the rows of one chunk."""
-        if any(signal.name == "rotor_temperature_degC" for signal in rows.signals):
-            self._largest = max(self._largest, float(rows["rotor_temperature_degC"].max()))
+        self.state = Largest(np.full(1, -np.inf))
 
     def value(self) -> float | None:
         """Return the temperature in °C; None without one."""
-        return self._largest if self._largest > -np.inf else None
+        return float(self.state.values[0]) if self.state.values[0] > -np.inf else None
 
     def warnings(self) -> list[str]:
         """Return a warning if magnets may have been demagnetised, which the model does not contain."""
-        if not self._largest > self._section.knee_degC:
+        largest, knee_degC = self.state.values[0], self.planned.scenario.plant.thermal.knee_degC
+        if not largest > knee_degC:
             return []
         return [
-            f"the magnets reached {self._largest:.1f} °C, above plant.thermal.knee_degC"
-            f" {self._section.knee_degC:g} °C: a lasting loss of remanence is possible and not simulated"
+            f"the magnets reached {largest:.1f} °C, above plant.thermal.knee_degC"
+            f" {knee_degC:g} °C: a lasting loss of remanence is possible and not simulated"
         ]
 
 

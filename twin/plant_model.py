@@ -38,7 +38,7 @@ def parameters(scenario: Scenario | str, changes: Mapping[str, Any] | None = Non
     ------
     InputError
         A field is unknown or out of range, changes of a built scenario, static friction, hysteresis of a
-        cable, or a model with physics that the equations of motion do not have.
+        cable, end stops, or a model with physics that the equations of motion do not have.
     """
     if isinstance(scenario, str):
         scenario = scenarios.load(scenario, changes)
@@ -46,16 +46,16 @@ def parameters(scenario: Scenario | str, changes: Mapping[str, Any] | None = Non
         raise InputError("plant parameters: expected changes with the name or file of a scenario alone")
     config = initial_config(scenario, None, None)
     section = config.scenario.plant
-    if section.stiction.on or any(section.cable.hysteresis_Nm):
+    if section.stiction.on or any(section.cable.hysteresis_Nm) or section.end_stops.on:
         raise InputError(
-            "plant parameters: expected smoothed friction and no hysteresis of a cable, whose elements have"
-            " states that the step does not, received plant.stiction or plant.cable.hysteresis_Nm"
+            "plant parameters: expected smoothed friction, no hysteresis of a cable and no end stops, which"
+            " the step does not have, received plant.stiction, plant.cable.hysteresis_Nm or plant.end_stops"
         )
     return parameters_of(config.scenario, config.files)
 
 
 def parameters_of(scenario: ResolvedScenario, files: Files) -> Parameters:
-    """Return the parameters of a resolved scenario; static friction and hysteresis are left out.
+    """Return the parameters of a resolved scenario; static friction, hysteresis and end stops are left out.
 
     Raises
     ------

@@ -16,6 +16,7 @@ from spheretwin.models.base.user_code import file_of, is_reference
 from spheretwin.models.telemetry.run_record import Change, RunRecord
 from spheretwin.models.telemetry.table import read_parquet
 from spheretwin.scenario import reading
+from spheretwin.scenario.changes import EXTERNAL
 from spheretwin.scenario.sections import Scenario
 
 
@@ -77,6 +78,10 @@ def _with_moved_files(record: RunRecord, folder: Path) -> RunRecord:
 def _plan(record: RunRecord, source: str) -> RunPlan:
     scenario = scenarios.from_record(record.scenario, source)
     for change in record.journal:
+        if change.name == EXTERNAL:
+            raise InputError(
+                f"replay {source}: expected a run of the twin alone, received one with {change.value}"
+            )
         if change.name == "controller.law" and change.value not in LAWS and not is_reference(change.value):
             raise InputError(
                 f"replay {source}: expected changes to {', '.join(LAWS)}, received one to {change.value}"

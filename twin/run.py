@@ -15,15 +15,17 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from spheretwin.faults.fault_injector import FaultMessages
-from spheretwin.metrics import CHECKS, METRICS, PlannedRun
+from spheretwin.metrics import CHECKS, METRICS
 from spheretwin.models.actuator import Actuator
 from spheretwin.models.base.errors import InputError, LawError, exception_text, shown
+from spheretwin.models.base.extras import missing
 from spheretwin.models.base.user_code import load_function
 from spheretwin.models.telemetry.run_record import RunRecord, versions
 from spheretwin.models.telemetry.signals import ANGLES
 from spheretwin.models.telemetry.status import Status
 from spheretwin.models.telemetry.table import Table
 from spheretwin.provenance import change_text, facts_of
+from spheretwin.reduction import PlannedRun, write_all
 from spheretwin.scenario.changes import scheduled_changes
 from spheretwin.scenario.sections import ResolvedScenario
 from spheretwin.session import Session
@@ -241,9 +243,7 @@ def _imported(package: str) -> Any:
     try:
         return import_module(package)
     except ModuleNotFoundError:
-        raise InputError(
-            f"run: expected {package} to be installed (pip install {package}), received none"
-        ) from None
+        raise missing("run", package, "tables") from None
 
 
 UserMetric = Callable[[Run], Any]
@@ -275,14 +275,15 @@ class Figures:
     """
 
     def __init__(self, planned: PlannedRun, names: Iterable[str] = METRICS) -> None:
-        self._metrics = {name: METRICS[name](planned) for name in names}
-        self._all = [*self._metrics.values(), *(check(planned) for check in CHECKS)]
+        every = {name: kind(planned) for name, kind in METRICS.items()}
+        self._metrics = {name: every[name] for name in names}
+        # All of them, whatever the names: one reducer is compiled for all runs.
+        self._all = [*every.values(), *(check(planned) for check in CHECKS)]
 
     def write(self, rows: Table) -> None:
         """Process the rows of one chunk."""
         if len(rows):
-            for metric in self._all:
-                metric.write(rows)
+            write_all(self._all, rows)
 
     def note(self, t_s: float, text: str) -> None:
         """Ignore a message: it changes no figure."""

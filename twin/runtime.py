@@ -16,10 +16,11 @@ from spheretwin.control.law import Law
 from spheretwin.control.supervision.watchdog import REASONS, Reason, transfer_trip
 from spheretwin.electronics.drive import transfer_drive
 from spheretwin.electronics.sensors import measure_again
+from spheretwin.external import Connection, ExternalController, ExternalPlant, external_currents
 from spheretwin.loop import dispatch, is_user_law
 from spheretwin.models.base.compiled import for_types_of
 from spheretwin.models.base.errors import LawError
-from spheretwin.models.base.numba_internals import callback_errors
+from spheretwin.models.base.numba_internals import Dispatcher, callback_errors
 from spheretwin.models.base.state import check_length, restore_state, save_state, transfer_state
 from spheretwin.models.telemetry.signals import width
 from spheretwin.plant.rotor import Rotor
@@ -75,6 +76,8 @@ class Runtime:
         Active law.
     rotor : StartedRotor, optional
         Default: a rotor that starts at the initial pose and rates of the scenario.
+    external : ExternalController or ExternalPlant, optional
+        Replaces the controller or the plant of the scenario.
 
     Attributes
     ----------
@@ -94,9 +97,14 @@ class Runtime:
     """
 
     def __init__(
-        self, scenario: ResolvedScenario, files: Files, law: Law, rotor: StartedRotor | None = None
+        self,
+        scenario: ResolvedScenario,
+        files: Files,
+        law: Law,
+        rotor: StartedRotor | None = None,
+        external: ExternalController | ExternalPlant | None = None,
     ) -> None:
-        self._scenario = scenario
+        self._scenario, self._external = scenario, external
         self._rotor = rotor or _start_rotor(scenario, files)
         self._last = LastTick(np.empty(0), np.empty(0), np.zeros(len(files.actuator.groups)))
         self.law = law
@@ -108,6 +116,9 @@ class Runtime:
         buffers = shared_buffers(scenario, len(files.actuator.groups))
         supervision = supervision_of(scenario, files.nominal, buffers)
         self._controller = assembly.controller_of(scenario, self.law, magnetics, estimator, supervision)
+        if hasattr(external, "command"):
+            manual = external_currents(len(files.actuator.groups))
+            self._controller = self._controller._replace(manual=manual)
         self._plant = assembly.plant_of(scenario, files, self._rotor.data, buffers)
         self._sensors = sensors_of(scenario, buffers)
         self._faults = faults_of(scenario, self._plant, self._sensors, supervision.groups)
@@ -119,6 +130,11 @@ class Runtime:
             check_bounds=scenario.controller.check_bounds,
         )
         self._may_raise = is_user_law(law) or scenario.controller.check_bounds
+        scratch = loops.Scratch(
+            np.empty((3, 3)), np.empty((6 if scenario.controller.prediction.on else 3, 3))
+        )
+        is_compiled = isinstance(self._functions.loop, Dispatcher)
+        self._connection = Connection(external, self._controller, self._plant, scratch, is_compiled)
         self._parts = (
             self._functions.law,
             self._functions.allocate,
@@ -127,7 +143,8 @@ class Runtime:
             self._sensors,
             self._plant,
             assembly.column_offsets(self.signals, self.law),
-            loops.Scratch(np.empty((3, 3)), np.empty((6 if scenario.controller.prediction.on else 3, 3))),
+            scratch,
+            self._connection.external,
         )
 
     @property
@@ -166,7 +183,9 @@ class Runtime:
     def _run(self, inputs: loops.Inputs, log: NDArray[np.float64]) -> tuple[int, int]:
         """Run the loop and store the first exception of a compiled law."""
         if not self._may_raise:
-            return self.loop(inputs, *self._parts, log)
+            done = self.loop(inputs, *self._parts, log)
+            self._connection.raise_error()
+            return done
         raised: list[BaseException] = []
 
         def receive(error: BaseException) -> None:
@@ -175,23 +194,32 @@ class Runtime:
 
         with callback_errors(receive):
             ticks, code = self.loop(inputs, *self._parts, log)
+        self._connection.raise_error()
         if raised and self.law_error is None:
             # With a watchdog the loop goes on after the exception, while the currents decay.
             t_s = inputs.t[ticks - int(self._controller.supervision.watchdog.ticks_since_trip[0])]
             self.law_error = LawError.of(self.law.name, t_s, raised[0])
         return ticks, code
 
-    def transfer_to(self, scenario: ResolvedScenario, files: Files, user_law: Law | None) -> Runtime:
+    def transfer_to(
+        self,
+        scenario: ResolvedScenario,
+        files: Files,
+        user_law: Law | None,
+        trial: Runtime | None = None,
+    ) -> Runtime:
         """Return a runtime of another scenario that continues from the state of this one.
 
         An unchanged law keeps its memory and its parameters, which it may have modified. A law with other
         gains or another nominal model keeps its memory if the size is still the same. After manual currents
-        the law and its compensators start again.
+        the law and its compensators start again. The law of `trial`, an unused runtime, is taken if it is the
+        law of the scenario.
         """
         same = scenario.plant == self._scenario.plant
         rotor = self._rotor if same else _transfer_rotor(self._rotor, scenario, files)
-        law = user_law or self._law_for(scenario)
-        other = Runtime(scenario, files, law, rotor)
+        law = user_law or self._law_for(scenario) or (trial and trial._law_for(scenario))
+        law = law or assembly.law_of(scenario)
+        other = Runtime(scenario, files, law, rotor, self._external)
         other._last = self._last
         measure_again(other._sensors, scenario.sensors, self._last.q, self._last.noise)
         before, after = self.parts, other.parts
@@ -217,12 +245,12 @@ class Runtime:
             parts.add(ESTIMATOR_MEMORY)
         return parts
 
-    def _law_for(self, scenario: ResolvedScenario) -> Law:
-        """Return the law of a scenario: the active law if nothing that it is built from has changed."""
+    def _law_for(self, scenario: ResolvedScenario) -> Law | None:
+        """Return the active law if nothing that it is built from differs in a scenario."""
         before = self._scenario
         same = before.controller.without_compensators() == scenario.controller.without_compensators()
         same = same and assembly.same_nominal_model(before, scenario)
-        return self.law if same else assembly.law_of(scenario)
+        return self.law if same else None
 
     def set_state(self, change: StateChange) -> None:
         """Set the given parts of the state of the plant."""

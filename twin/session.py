@@ -19,6 +19,7 @@ from spheretwin.active_config import initial_config
 from spheretwin.control.law import Law
 from spheretwin.control.supervision.watchdog import Reason
 from spheretwin.control.user_law import reference_of
+from spheretwin.external import ExternalController, ExternalPlant
 from spheretwin.inputs import InputGenerator
 from spheretwin.models.actuator import Actuator
 from spheretwin.models.base.errors import InputError, LawError, SpheretwinError, shown
@@ -28,7 +29,7 @@ from spheretwin.models.telemetry.status import BY_CODE, Status
 from spheretwin.models.telemetry.table import Table, allocated, check_rows
 from spheretwin.runtime import Runtime
 from spheretwin.scenario import files as scenario_files
-from spheretwin.scenario.changes import STATE, StateChange, from_now_on, is_fixed, scheduled_changes
+from spheretwin.scenario.changes import EXTERNAL, STATE, StateChange, from_now_on, is_fixed, scheduled_changes
 from spheretwin.scenario.fields import explain
 from spheretwin.scenario.files import Files
 from spheretwin.scenario.reading import is_dotted
@@ -50,6 +51,9 @@ class Session:
         Replaces the trajectory of the scenario, to the end.
     files : Files, optional
         Content of the files of this scenario, from `scenario.files.files_of`; default: read now.
+    external : ExternalController or ExternalPlant, optional
+        Part outside of this process, which replaces the controller or the plant of the scenario. The run
+        cannot be replayed.
 
     Attributes
     ----------
@@ -85,20 +89,23 @@ class Session:
         trajectory: Sampled | None = None,
         *,
         files: Files | None = None,
+        external: ExternalController | ExternalPlant | None = None,
     ) -> None:
         self._busy = threading.Lock()
         self._closed = False
-        self._own_laws = UserLaws().with_law(law)
         self.tick, self.loop_s = 0, 0.0
-        self.journal: tuple[Change, ...] = ()
+        self._external = external
+        start = [Change(0, EXTERNAL, external.name)] if external else []
+        self.journal: tuple[Change, ...] = tuple(start)
         self.events: tuple[Change, ...] = ()
         self._status = Status.RUNNING
         self._config = initial_config(scenario, law, trajectory, files)
+        self._own_laws = UserLaws().with_law(law)
         self.initial_scenario = self.scenario
         self.law_reference = reference_of(law)
         self._planned = scheduled_changes(self.initial_scenario)
         self._inputs = self._input_generator()
-        self._runtime = Runtime(self.scenario, self._config.files, self._config.law)
+        self._runtime = Runtime(self.scenario, self._config.files, self._config.law, None, external)
         self._logged = with_more({}, self.signals)
         self._config.check_changes(self._planned)
         self._apply_events()
@@ -206,7 +213,7 @@ class Session:
         next_event = [change.tick for change in self._pending()[:1]]
         self._inputs.check_horizon(max(min([ticks, *next_event]) - 1, self.tick))
 
-    def set(self, name: str, value: Any) -> None:
+    def set(self, name: str, value: Any, trial: Session | None = None) -> None:
         """Change a field of the scenario, or the law, from the next tick on.
 
         Defaults were filled in at the start and do not follow the change: the current limit of the allocation
@@ -220,6 +227,9 @@ class Session:
         value : any
             Checked like a scenario; for ``controller.law`` also a `Law`. The same law with other gains keeps
             its memory if the size of the memory is the same.
+        trial : Session, optional
+            New session with the same change, which is not used otherwise: its law is taken, if it is that of
+            the change, so that no code of the user runs now.
 
         Raises
         ------
@@ -230,7 +240,7 @@ class Session:
             if name == STATE:
                 self._set_state(value)
             else:
-                self._set_field(name, value)
+                self._set_field(name, value, trial)
 
     def set_state(
         self,
@@ -397,7 +407,7 @@ class Session:
         self._status = BY_CODE[code]
         return ticks
 
-    def _set_field(self, name: str, value: Any) -> None:
+    def _set_field(self, name: str, value: Any, trial: Session | None) -> None:
         if not is_dotted(name):
             raise InputError(f"session: expected a field such as disturbance.load, received {shown(name)}")
         if is_fixed(name):
@@ -406,7 +416,7 @@ class Session:
             raise InputError(f"session: expected a law for controller.law, received one for {name}")
         value = from_now_on(name, value, self.t_s)
         with self._all_or_nothing():
-            self._change(name, value)
+            self._change(name, value, trial)
         self.journal += (Change(self.tick, name, active_config.recorded_value(value)),)
 
     def _set_state(self, value: Any) -> None:
@@ -424,14 +434,16 @@ class Session:
         self._runtime.set_state(change)
         self.journal += (Change(self.tick, STATE, change.model_dump(mode="json", exclude_none=True)),)
 
-    def _change(self, name: str, value: Any) -> None:
+    def _change(self, name: str, value: Any, trial: Session | None = None) -> None:
         before, self._config = self._config, self._config.with_change(name, value)
         scenario, user_law = self.scenario, self._config.user_law
         # Trajectory and disturbance are inputs: the runtime does not depend on them.
         inputs = {"trajectory": scenario.trajectory, "disturbance": scenario.disturbance}
         built = before._replace(scenario=before.scenario.model_copy(update=inputs))
         if built != self._config or user_law not in (None, self.law):
-            self._runtime = self._runtime.transfer_to(scenario, self._config.files, user_law)
+            self._runtime = self._runtime.transfer_to(
+                scenario, self._config.files, user_law, trial._runtime if trial else None
+            )
             self._logged = with_more(self._logged, self.signals)
         self._own_laws = self._own_laws.with_law(user_law)
         self._inputs.scenario = scenario  # last, because it is altered: a failure above changes nothing
@@ -440,7 +452,7 @@ class Session:
         files = scenario_files.reload_files(self._config.files, self.scenario, snapshot.scenario)
         snapshot.check_fits(files)
         self._config = self._config._replace(scenario=snapshot.scenario, files=files, user_law=user_law)
-        self._runtime = Runtime(self.scenario, files, self._config.law)
+        self._runtime = Runtime(self.scenario, files, self._config.law, None, self._external)
         self._runtime.restore(snapshot.runtime)
         self._logged = with_more(self._logged, self.signals)
         self.initial_scenario = snapshot.initial_scenario

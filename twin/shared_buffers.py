@@ -125,6 +125,6 @@ def faults_of(
     period_s, count = scenario.controller.period_s, len(plant.current)
     schedule = FaultSchedule(scenario.fault, count, period_s, scenario.seed)
     effects = None
-    if isinstance(plant.drive, DriveChain) and isinstance(sensors, SensorChain):
+    if scenario.fault and isinstance(plant.drive, DriveChain) and isinstance(sensors, SensorChain):
         effects = Effects(plant.drive, sensors, plant.group_gain, period_s, scenario.plant.step_s)
     return FaultInjector(schedule, effects, groups, plant.fault_modes, plant.fault_start_s)

@@ -159,7 +159,7 @@ def follow(
                 sink.note(t_s, text)
         reported = _report_events(session, reported, sinks)
         if live:
-            _sleep_until(started + session.t_s - first)
+            sleep_until(started + session.t_s - first)
     _apply_due(session, ticks, pending, sinks)  # the journal also contains changes after the last tick
     status = session.status
     if status == Status.RUNNING:
@@ -207,5 +207,6 @@ def _chunk_ticks(scenario: Scenario, live: bool) -> int:
     return max(1, CHUNK_STEPS // scenario.substeps)
 
 
-def _sleep_until(moment: float) -> None:
+def sleep_until(moment: float) -> None:
+    """Sleep until a time of `time.perf_counter`."""
     time.sleep(max(0.0, moment - time.perf_counter()))

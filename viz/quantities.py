@@ -307,11 +307,11 @@ def _desired(axis: int) -> Values:
 # Titles are short: next to two others, a plot has the width of a sixth of a screen.
 COMPARED_QUANTITIES: tuple[Quantity, ...] = (
     ERROR_ANGLE._replace(title="error as one angle", group="whole"),
-    *(Quantity(f"error_{axis}_mrad", "mrad", f"error of {axis}", _entry(ERROR.values, i), ERROR.floor,
+    *(Quantity(f"error_{axis}_mrad", "mrad", f"{axis} error", _entry(ERROR.values, i), ERROR.floor,
                group="error") for i, axis in enumerate(ANGLES)),
-    *(Quantity(f"angle_{axis}_rad", "rad", f"angle {axis}", _entry(_signal("q_rad"), i), 0.01,
+    *(Quantity(f"angle_{axis}_rad", "rad", f"{axis} angle", _entry(_signal("q_rad"), i), 0.01,
                group="angle", desired=_desired(i)) for i, axis in enumerate(ANGLES)),
-    *(Quantity(f"sliding_{axis}_rad_s", "rad/s", f"sliding of {axis}", _entry(_signal("sliding_s"), i), 0.01,
+    *(Quantity(f"sliding_{axis}_rad_s", "rad/s", f"{axis} sliding", _entry(_signal("sliding_s"), i), 0.01,
                needs=("sliding_s",), group="sliding") for i, axis in enumerate(ANGLES)),
     Quantity("torque_command_norm_Nm", "N·m", "command", _norm(_signal("torque_command_Nm")),
              DELIVERED.floor, group="effort"),

@@ -46,6 +46,8 @@ class Reason(IntEnum):
     TEMPERATURE = 5, "a coil is too hot"
     SPEED = 6, "the rotor is too fast"
     EDGE = 7, "the rotor is at the edge of its workspace"
+    CURRENT = 8, "a measured current is above its limit"
+    MACHINE = 9, "the machine has switched off its currents"
 
 
 REASONS = {int(reason): reason for reason in Reason}

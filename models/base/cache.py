@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 from spheretwin.models.base.errors import SpheretwinError
 from spheretwin.models.base.files import whole_file
 
-WITHOUT_COMPILED_CODE = ("analysis", "bench", "cli", "study", "viz")
+WITHOUT_COMPILED_CODE = ("analysis", "bench", "cli", "machine", "study", "viz")
 """Folders of the package whose sources no compiled function depends on."""
 
 

@@ -9,7 +9,8 @@ from typing import Any, TypeVar, cast
 
 import numba
 import numpy as np
-from numba.extending import overload, register_jitable
+from llvmlite import ir
+from numba.extending import intrinsic, overload
 from numpy.typing import NDArray
 
 from spheretwin.models.base.numba_internals import (
@@ -18,6 +19,7 @@ from spheretwin.models.base.numba_internals import (
     TupleCompiler,
     c_callback,
     cached,
+    inline_overload,
 )
 
 F = TypeVar("F", bound=Callable[..., Any])
@@ -85,7 +87,7 @@ def for_types_of(function: Any, *arguments: Any) -> Callable[..., Any]:
     """
     if not isinstance(function, Dispatcher):
         return uncompiled(function)
-    key = function, *map(_kind_of, arguments)
+    key = function, *_kinds_of(arguments)
     if key not in _ENTRIES:
         _ENTRIES[key] = function.compile(tuple(map(numba.typeof, arguments)))
     return _ENTRIES[key]
@@ -99,13 +101,19 @@ _ENTRIES: dict[tuple[Any, ...], Callable[..., Any]] = {}
 _TYPE_FLAGS = 0x0001 | 0x0002 | 0x0100 | 0x0400
 
 
-def _kind_of(value: Any) -> Any:
-    """Return a key of numba's type of a value."""
-    if isinstance(value, np.ndarray):
-        return value.dtype, value.ndim, value.flags.num & _TYPE_FLAGS
-    if isinstance(value, tuple):
-        return type(value), *map(_kind_of, value)
-    return type(value)
+def _kinds_of(values: tuple[Any, ...]) -> list[Any]:
+    """Return a key of numba's types of values: types, each with what its numba type depends on."""
+    kinds: list[Any] = []
+    rest = list(values)
+    while rest:  # no recursion: a session has 350 values in nested tuples
+        value = rest.pop()
+        kinds.append(type(value))
+        if isinstance(value, np.ndarray):
+            kinds += (value.dtype, value.ndim, value.flags.num & _TYPE_FLAGS)
+        elif isinstance(value, tuple):
+            kinds.append(len(value))
+            rest += value
+    return kinds
 
 
 def uncompiled(function: Callable[..., Any]) -> Callable[..., Any]:
@@ -172,7 +180,14 @@ def _line_of(error: Exception, function: Callable[..., Any]) -> int | None:
 
 def implements(function: Callable[..., Any], *, inline: bool = False) -> Callable[[F], F]:
     """Decorate the function that returns the implementation of `function` for given types, or None."""
-    return cast("Callable[[F], F]", overload(function, inline="always" if inline else "never"))
+    if not inline:
+        return cast("Callable[[F], F]", overload(function))
+
+    def decorate(implementation: F) -> F:
+        inline_overload(function, implementation)
+        return implementation
+
+    return decorate
 
 
 def compilable(function: F) -> F:
@@ -180,7 +195,8 @@ def compilable(function: F) -> F:
 
     For functions that call user functions: in the uncompiled loop these are plain Python.
     """
-    return cast("F", register_jitable(**NO_ALLOCATION, inline="always", **_OPTIONS)(function))
+    inline_overload(function, lambda *_: function, **NO_ALLOCATION, **_OPTIONS)
+    return function
 
 
 def _compiled(function: F, **more: Any) -> F:
@@ -190,6 +206,31 @@ def _compiled(function: F, **more: Any) -> F:
         "F",
         cached(numba.njit(nogil=True, **{**_OPTIONS, **more})(function), function),
     )
+
+
+def high_product(a: np.uint64, b: np.uint64) -> np.uint64:
+    """Return the upper 64 bits of the product of two numbers of 64 bits."""
+    return np.uint64(int(a) * int(b) >> 64)
+
+
+def _build_high_product(typing: Any, a: Any, b: Any) -> tuple[Any, Callable[..., Any]]:
+    def build(context: Any, builder: Any, signature: Any, numbers: Any) -> Any:
+        wide = ir.IntType(128)
+        product = builder.mul(*(builder.zext(number, wide) for number in numbers))
+        return builder.trunc(builder.lshr(product, ir.Constant(wide, 64)), ir.IntType(64))
+
+    return numba.uint64(numba.uint64, numba.uint64), build
+
+
+_high_product: Any = intrinsic(_build_high_product)
+
+
+@implements(high_product)
+def _compiled_high_product(a: Any, b: Any) -> Callable[..., Any]:
+    def call(a: Any, b: Any) -> Any:
+        return _high_product(a, b)
+
+    return call
 
 
 @allocation_free

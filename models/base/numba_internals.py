@@ -4,8 +4,15 @@
 `_cache`). Reason: numba's cache tracks one file of sources, and a damaged entry is an error at every call.
 Consequence of a change: a function is compiled in every process, or an exception at its first call.
 
+*Inlined implementations without machine code* (`make_overload_template`, `_get_jit_decorator`,
+`_can_compile`). Reason: numba compiles an implementation completely, then inlines it and drops the code, a
+tenth of the compile time of a loop. Consequence: the loop does not compile, or takes longer.
+
 *Functions by address* (`cgutils`, `FunctionType`). Reason: the loop is compiled once for all laws.
 Consequence: the loop does not compile.
+
+*Values in memory* (`get_data_type`, `get_abi_sizeof`). Reason: C code passes an address to compiled code,
+which reads a tuple of arrays there. Consequence: a plugin reads invalid memory.
 
 *No reference counting* (`_nrt`). Reason: it takes a third of the loop's own time. Consequence: the option is
 refused, or the loop is slower.
@@ -36,8 +43,9 @@ from types import CellType, FunctionType
 from typing import Any
 
 import llvmlite.binding
+import numpy as np
 from llvmlite import ir
-from numba import types
+from numba import njit, typeof, types
 from numba.core import cgutils
 from numba.core import ir as numba_ir
 from numba.core.analysis import compute_cfg_from_blocks, compute_use_defs, must_use_alloca
@@ -48,14 +56,17 @@ from numba.core.compiler_machinery import PassManager, register_pass
 from numba.core.dispatcher import Dispatcher as Dispatcher  # the class of compiled functions
 from numba.core.errors import NumbaWarning
 from numba.core.lowering import Lower
+from numba.core.registry import cpu_target
 from numba.core.runtime import rtsys
 from numba.core.serialize import dumps
 from numba.core.typed_passes import NativeLowering
+from numba.core.typing.templates import infer, infer_global, make_overload_template
 from numba.cpython import hashing
 from numba.experimental import function_type
 from numba.extending import intrinsic, overload
+from numpy.typing import NDArray
 
-from spheretwin.models.base import cache
+from spheretwin.models.base import cache, compilation
 
 # Loaded machine code needs the symbols of hashes and the type of a callback, in addition to the math and
 # run-time libraries. These imports register them.
@@ -96,8 +107,13 @@ class MachineCode(NullCache):
         # run.
         rtsys.initialize(target_context)
         content = cache.load_entry(self._entry(sig, target_context.codegen()))
-        if content is None:
-            return None
+        result = self._rebuilt(content, sig, target_context) if content else None
+        if result is None:
+            compilation.report(self._name)
+        return result
+
+    @staticmethod
+    def _rebuilt(content: bytes, sig: Any, target_context: Any) -> CompileResult | None:
         try:
             signature, parts = pickle.loads(content)
             if signature != sig:  # a different signature with the same text
@@ -198,6 +214,36 @@ class TupleCompiler(CompilerBase):
         return [passes]
 
 
+def inline_overload(function: Callable[..., Any], implementation: Callable[..., Any], **options: Any) -> None:
+    """Inline what `implementation` returns for the argument types into compiled callers.
+
+    As ``numba.extending.overload(function, inline="always")``, without machine code of the implementation.
+
+    Parameters
+    ----------
+    function : callable
+        Plain function.
+    implementation : callable
+        Returns a plain function for types of arguments, or None.
+    **options
+        Of `numba.jit`.
+    """
+    jit_options = {"no_cpython_wrapper": True, **options}
+    complete: Any = make_overload_template(function, implementation, jit_options, False, "always")
+
+    class Typed(complete):
+        def _get_jit_decorator(self) -> Callable[..., Any]:
+            def decorator(function: Callable[..., Any]) -> Any:
+                dispatcher = njit(**jit_options)(function)
+                dispatcher._can_compile = False  # the inliner infers the types by itself
+                return dispatcher
+
+            return lambda **_: decorator
+
+    infer(Typed)
+    infer_global(function, types.Function(Typed))
+
+
 def c_callback(
     signature: Any, function: Callable[..., Any], options: dict[str, Any], check_bounds: bool
 ) -> Any:
@@ -265,6 +311,37 @@ def function_at(signature: Any) -> Callable[[Any], Callable[..., Any]]:
 
     overload(at)(compiled_at)
     return at
+
+
+def _build_store(typing_context: Any, address: Any, value: Any) -> Any:
+    def build(context: Any, builder: Any, _: Any, arguments: Any) -> Any:
+        pointer = builder.inttoptr(arguments[0], context.get_data_type(value).as_pointer())
+        builder.store(context.data_model_manager[value].as_data(builder, arguments[1]), pointer)
+        return context.get_dummy_value()
+
+    return types.void(types.intp, value), build
+
+
+_store: Any = intrinsic(_build_store)
+
+
+def _write(address: int, value: Any) -> None:
+    _store(address, value)
+
+
+_compiled_write: Any = cached(njit(**NO_ALLOCATION)(_write), _write)
+
+
+def in_memory(value: Any) -> NDArray[np.uint8]:
+    """Return a copy of a tuple of arrays and numbers as compiled code has it in memory.
+
+    Compiled code with the address of the copy as an argument of the type ``CPointer(typeof(value))`` reads
+    the tuple as entry 0. The arrays are shared: they must exist as long as the copy is read.
+    """
+    context = cpu_target.target_context
+    copy = np.zeros(context.get_abi_sizeof(context.get_data_type(typeof(value))), np.uint8)
+    _compiled_write(copy.ctypes.data, value)
+    return copy
 
 
 def _with_bounds_checks(function: Any, copies: dict[int, Any]) -> FunctionType:

@@ -7,8 +7,9 @@ import hashlib
 import os
 import re
 import sys
+import threading
 import traceback
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from functools import lru_cache
 from pathlib import Path
 from types import ModuleType
@@ -74,12 +75,9 @@ def load_with_digest(reference: str, what: str) -> tuple[Any, str]:
     if match is None:
         raise InputError(f"{what}: expected path/to/file.py:name, received {shown(reference)}")
     path, name = Path(os.path.expanduser(match["file"])), match["name"]
-    try:
-        source = path.read_bytes()
-    except (OSError, ValueError) as error:  # ValueError: a zero in the path
-        raise InputError(f"{what}: expected a readable file of Python, {without_breaks(error)}") from None
-    digest = hashlib.sha256(source).hexdigest()
-    module = _module(path, source, digest, what)
+    if not (getattr(_THREAD, "only_loaded", False) and path in _LOADED):
+        _LOADED[path] = _read(path, what)
+    module, digest = _LOADED[path]
     defined = vars(module)
     if name not in defined:
         candidates = [key for key, value in defined.items() if callable(value) and _is_of(module, value)]
@@ -88,6 +86,31 @@ def load_with_digest(reference: str, what: str) -> tuple[Any, str]:
             f"{what}: expected {expected} in {path}, received {name}{did_you_mean(name, candidates)}"
         )
     return defined[name], digest
+
+
+@contextlib.contextmanager
+def only_loaded() -> Iterator[None]:
+    """Let this thread neither read nor run a file again that this process has loaded: it must not wait."""
+    _THREAD.only_loaded = True
+    try:
+        yield
+    finally:
+        _THREAD.only_loaded = False
+
+
+_THREAD = threading.local()
+
+_LOADED: dict[Path, tuple[ModuleType, str]] = {}
+"""Last content of each file: its module and its digest."""
+
+
+def _read(path: Path, what: str) -> tuple[ModuleType, str]:
+    try:
+        source = path.read_bytes()
+    except (OSError, ValueError) as error:  # ValueError: a zero in the path
+        raise InputError(f"{what}: expected a readable file of Python, {without_breaks(error)}") from None
+    digest = hashlib.sha256(source).hexdigest()
+    return _module(path, source, digest, what), digest
 
 
 def _is_of(module: ModuleType, value: Any) -> bool:

@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spheretwin.models.actuator import Actuator, CoilGeometry, Magnet
-from spheretwin.models.base.errors import InputError
+from spheretwin.models.base.extras import missing
 from spheretwin.models.design.workspace import pose
 from spheretwin.models.kinematics import frame_of_axis, rotation
 from spheretwin.models.magnetics import fill_torque_matrix, scratch_of, torque_model
@@ -134,9 +134,9 @@ def direct_torque_matrix(
         near = np.arccos(np.clip(coil_axes @ axis, -1.0, 1.0)) < near_angle
         for here, rule in ((near, quadrature.near), (~near, quadrature.far)):
             magnet = pole_magnet(pole, axis, float(polarity * (1 + gain)), rule.stacked)
-            on_coils = _torque_on_coils(magnet, coil_axes[here], coils.distance_m[here], actuator.coil, rule)
+            on_coils = torque_on_coils(magnet, coil_axes[here], coils.distance_m[here], actuator.coil, rule)
             torque[here] -= (1 + coils.gain[here, None]) * on_coils
-    return torque[actuator.groups].sum(axis=1).T
+    return actuator.of_groups(torque)
 
 
 def compare(
@@ -231,26 +231,23 @@ def pole_magnet(magnet: Magnet, axis: Array, polarity: float, stacked: int) -> A
         from magpylib import Collection
         from magpylib.magnet import Cylinder
     except ImportError:
-        raise InputError(
-            "magnetics: expected the extra `spheretwin[magnetics]` to compute fields,"
-            " received an installation without magpylib"
-        ) from None
+        raise missing("magnetics", "magpylib", "magnetics", "to compute fields") from None
     from scipy.spatial.transform import Rotation
 
-    cylinders = [
+    pieces = [
         Cylinder(
             polarization=(0.0, 0.0, polarity * magnet.remanence_T),
             dimension=(2 * radius, top - bottom),
             position=0.5 * (top + bottom) * axis,
             orientation=Rotation.from_matrix(frame_of_axis(axis)),
         )
-        for radius, bottom, top in _cylinders(magnet, stacked)
+        for radius, bottom, top in cylinders(magnet, stacked)
     ]
-    return Collection(cylinders)
+    return Collection(pieces)
 
 
 @lru_cache(maxsize=8)
-def _cylinders(magnet: Magnet, stacked: int) -> list[tuple[float, float, float]]:
+def cylinders(magnet: Magnet, stacked: int) -> list[tuple[float, float, float]]:
     """Return radius, lower and upper end of cylinders that represent a magnet, m from the joint centre.
 
     A ground front becomes steps: rings of equal width, each at the mean height of the front over it. The
@@ -280,7 +277,7 @@ def lorentz_force(magnet: Any, position: Array, element: Array) -> Array:
     return np.asarray(np.cross(element, magnet.getB(position)))
 
 
-def _torque_on_coils(magnet: Any, axes: Array, farther_m: Array, coil: CoilGeometry, rule: Rule) -> Array:
+def torque_on_coils(magnet: Any, axes: Array, farther_m: Array, coil: CoilGeometry, rule: Rule) -> Array:
     """Return the torque of a magnet on one ampere in each of k coils, about the joint centre: (k, 3), N·m."""
     turned = np.array([frame_of_axis(axis).T for axis in axes]).reshape(-1, 3, 3)
     position, element = ((vectors @ turned).reshape(-1, 3) for vectors in conductors(coil, rule))

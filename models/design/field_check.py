@@ -90,9 +90,9 @@ def judge(
     Raises
     ------
     InputError
-        magpylib is not installed.
+        magpylib is not installed, or the actuator has a torque field.
     """
-    tilt_rad = np.radians(_tilts_deg(poses, seed))
+    curve, tilt_rad = actuator.torque_curve, np.radians(_tilts_deg(poses, seed))
     compared = direct_summation.compare(actuator, tilt_rad, seed, track=track)
     errors = direct_summation.errors(compared, actuator.group.current_limit_A, seed=seed)
     torque, quadrature = _torque(errors), _quadrature(errors)
@@ -102,7 +102,7 @@ def judge(
         sources=Sources(
             quadrature_of_largest_torque=_of_largest(errors.quadrature_Nm, errors),
             curve_between_samples_of_peak=_curve_error(actuator),
-            lookup_of_peak=curve_check.largest_lookup_error(actuator.torque_curve),
+            lookup_of_peak=curve_check.largest_lookup_error(curve),
         ),
         checks=[torque, quadrature, *_scatter(actuator, seed), *published_values.checks(actuator)],
         warnings=geometry_check.of_geometry(actuator),

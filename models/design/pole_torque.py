@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from spheretwin.models.actuator import CoilGeometry, Magnet
 from spheretwin.models.base.errors import InputError
+from spheretwin.models.base.extras import missing
 from spheretwin.models.magnetics import computed_from
 from spheretwin.models.torque_curve import TorqueCurve, head
 
@@ -359,10 +360,7 @@ def _solenoid_field() -> SolenoidField:
     try:
         from magpylib.core import magnet_cylinder_axial_Bfield
     except ImportError:
-        raise InputError(
-            "magnetics: expected the extra `spheretwin[magnetics]` to compute the torque curve,"
-            " received an installation without magpylib"
-        ) from None
+        raise missing("magnetics", "magpylib", "magnetics", "to compute the torque curve") from None
     return magnet_cylinder_axial_Bfield
 
 

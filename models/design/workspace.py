@@ -107,6 +107,10 @@ SECTORS = 6
 SAME_TILT_RAD = np.radians(0.5)
 SAME_FIGURE = 0.01
 
+# Figures of poses that symmetry maps onto each other differ by rounding, some 1e-14, which depends on the
+# processor: they are equal, and the first pose counts.
+ROUNDING = 1e-11
+
 # Figure of each pose that is minimised.
 Figure = Callable[[Capability], Array]
 
@@ -148,7 +152,7 @@ def worst_by_tilt(
     """
     start = _starts(workspace, on_grid, figure)
     poses = _downhill(start, _steps(workspace) * [0, 1, 1], figure, actuator, workspace.tilt_rad[-1])
-    order = np.lexsort((figure(poses.capability), start[:, 0]))
+    order = np.lexsort((_rounded(figure(poses.capability)), start[:, 0]))
     _, first = np.unique(start[order, 0], return_index=True)
     return poses.at(order[first])
 
@@ -169,7 +173,7 @@ def local_minima(workspace: Workspace, by_tilt: WorstPoses, figure: Figure, actu
     poses = _downhill(start, _steps(workspace), figure, actuator, workspace.tilt_rad[-1])
     value, tilt = figure(poses.capability), poses.tilt_azimuth_spin_rad[:, 0]
     distinct: list[int] = []
-    for i in np.argsort(value, kind="stable"):
+    for i in np.argsort(_rounded(value), kind="stable"):
         near = [
             k
             for k in distinct
@@ -182,6 +186,20 @@ def local_minima(workspace: Workspace, by_tilt: WorstPoses, figure: Figure, actu
 
 def _alike(a: float, b: float) -> bool:
     return a == b or abs(a - b) <= SAME_FIGURE * max(abs(a), abs(b))
+
+
+def _rounded(value: Array) -> Array:
+    """Return figures rounded to the digits that do not depend on the processor."""
+    finite = np.isfinite(value)
+    exponent = np.floor(np.log10(np.abs(np.where(finite & (value != 0), value, 1.0))))
+    quantum = 10.0**exponent * ROUNDING
+    return np.where(finite, np.round(np.where(finite, value, 0.0) / quantum) * quantum, value)
+
+
+def _first_least(value: Array) -> Any:
+    """Return the index of the first least value along the last axis; values equal but for rounding tie."""
+    least = value.min(axis=-1, keepdims=True)
+    return (value <= least + ROUNDING * np.abs(np.where(np.isfinite(least), least, 0.0))).argmax(axis=-1)
 
 
 def _steps(workspace: Workspace) -> Array:
@@ -202,7 +220,7 @@ def _starts(workspace: Workspace, on_grid: Capability, figure: Figure) -> Array:
     starts = []
     for tilt, at_tilt in zip(workspace.tilt_rad, value, strict=True):
         for sector in sectors:
-            azimuth, spin = np.unravel_index(at_tilt[sector].argmin(), at_tilt[sector].shape)
+            azimuth, spin = np.unravel_index(_first_least(at_tilt[sector].ravel()), at_tilt[sector].shape)
             if at_tilt[sector][azimuth, spin] < np.inf:  # otherwise no pose of the sector is reachable
                 starts.append((tilt, workspace.azimuth_rad[sector[azimuth]], workspace.spin_rad[spin]))
     return np.array(starts)
@@ -216,12 +234,12 @@ def _downhill(
     offsets = offsets[np.argsort(np.any(offsets, axis=1), kind="stable")]  # no move comes first and wins ties
     at, scale = start.copy(), np.ones(len(start))
     for _ in range(ROUNDS):
-        around = at[:, None] + scale[:, None, None] * (offsets * steps)  # (n, offsets, 3)
-        around[..., 0] = np.clip(around[..., 0], 0.0, largest_tilt)
-        q = pose(*np.moveaxis(around, -1, 0)).reshape(-1, 3)
+        neighbours = at[:, None] + scale[:, None, None] * (offsets * steps)  # (n, offsets, 3)
+        neighbours[..., 0] = np.clip(neighbours[..., 0], 0.0, largest_tilt)
+        q = pose(*np.moveaxis(neighbours, -1, 0)).reshape(-1, 3)
         value = np.where(reachable(q, actuator), figure(capability(q, actuator)), np.inf)
-        best = value.reshape(around.shape[:2]).argmin(axis=1)
-        at = around[np.arange(len(at)), best]
+        best = _first_least(value.reshape(neighbours.shape[:2]))
+        at = neighbours[np.arange(len(at)), best]
         scale = np.where(best == 0, scale / 2, scale)
     q = pose(*at.T)
     return WorstPoses(at, q, capability(q, actuator))

@@ -68,8 +68,8 @@ class FaultLog:
             if state and started:
                 delay_s = rows[TIME_TO_DETECTION][tick, group]
                 is_reported = state == REPORTED or delay_s < 0
-                found = f"detected after {1e3 * delay_s:.3g} ms"
-                started[-1].detection = "reported to the controller" if is_reported else found
+                detection = f"detected after {1e3 * delay_s:.3g} ms"
+                started[-1].detection = "reported to the controller" if is_reported else detection
 
     def note(self, t_s: float, text: str) -> None:
         """Ignore a message: the rows contain every fault."""

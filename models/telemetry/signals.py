@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import cache
-from itertools import accumulate
+from itertools import accumulate, groupby
 
 from spheretwin.models.base.errors import InputError, shown
 
@@ -76,6 +77,16 @@ class Signal:
         labels = self.labels or tuple(map(str, range(self.size)))
         return [f"{self.name}[{label}]" for label in labels]
 
+    def scalars(self) -> tuple[Signal, ...]:
+        """Return a signal for each number of a row, with a plain name such as ``q_rad_alpha``."""
+        if self.size == 1:
+            return (self,)
+        labels = self.labels or tuple(map(str, range(self.size)))
+        return tuple(
+            Signal(f"{self.name}_{_plain(label)}", self.unit, 1, self.meaning, (label,), self.states)
+            for label in labels
+        )
+
     def __hash__(self) -> int:
         """Return the hash of the name, which Python caches: caches by signals are read at every chunk."""
         return hash(self.name)
@@ -90,7 +101,31 @@ def _is_label(value: object) -> bool:
     return isinstance(value, str) and value.isprintable() and value != "" and "," not in value
 
 
+def merged(signals: Sequence[Signal]) -> tuple[Signal, ...]:
+    """Return the signals of which `Signal.scalars` made these; others stay as they are."""
+    runs = [list(run) for _, run in groupby(signals, _origin)]
+    return tuple(
+        replace(first, name=_origin(first)[0], size=len(run), labels=tuple(s.labels[0] for s in run))
+        if (first := run[0]).size == 1 and first.labels
+        else first
+        for run in runs
+    )
+
+
+def _origin(signal: Signal) -> tuple[str, ...]:
+    """Return what the scalars of one vector share; the name alone of any other signal."""
+    if signal.size > 1 or not signal.labels:
+        return (signal.name,)
+    return signal.name.removesuffix(f"_{_plain(signal.labels[0])}"), signal.unit, signal.meaning
+
+
+def _plain(label: str) -> str:
+    """Return a label as part of a name that any program reads."""
+    return re.sub(r"\W+", "_", _ASCII.get(label, label.removeprefix("group ")), flags=re.ASCII)
+
+
 ANGLES = ("α", "β", "γ")
+_ASCII = dict(zip(ANGLES, ("alpha", "beta", "gamma"), strict=True))
 AXES = ("x", "y", "z")
 
 MOTION_SIGNALS = (

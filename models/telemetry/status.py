@@ -57,7 +57,7 @@ class Status(StrEnum):
         2,
     )
     FAILSAFE = "failsafe", Level.ERROR, "the amplifiers were switched off for safety: the run ends here", 3
-    INTERRUPTED = "interrupted", Level.WARN, "the run was interrupted"
+    INTERRUPTED = "interrupted", Level.WARN, "the run was interrupted", 4
 
 
 BY_CODE = {status.code: status for status in Status if status.code is not None}

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from spheretwin.models.base.errors import InputError, did_you_mean
 from spheretwin.models.telemetry import checksums
-from spheretwin.models.telemetry.signals import Signal, offsets, width
+from spheretwin.models.telemetry.signals import Signal, merged, offsets, width
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -83,9 +83,20 @@ class Table:
         first, size = places[name]
         return self.values[:, first] if size == 1 else self.values[:, first : first + size]
 
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.keys())
+
+    def keys(self) -> tuple[str, ...]:
+        """Return the names of the columns, in order."""
+        return tuple(signal.name for signal in self.signals)
+
     def rows(self, first: int, last: int) -> Table:
         """Return the rows from `first` to `last`, exclusive (a view)."""
         return Table(self.signals, self.values[first:last])
+
+    def scalars(self) -> Table:
+        """Return the same numbers with one column for each, for programs that read no vectors."""
+        return Table(tuple(scalar for signal in self.signals for scalar in signal.scalars()), self.values)
 
     def write_parquet(self, path: Path, metadata: Mapping[str, str]) -> None:
         """Write all columns, their units, `metadata` and checksums, completely or not at all.
@@ -119,6 +130,8 @@ class Table:
 def read_parquet(path: Path, *, rows: bool = True) -> tuple[Table, dict[str, str]]:
     """Read a table and the metadata of its file, and compare its checksums.
 
+    Scalar columns that `Table.scalars` made are vectors again.
+
     Parameters
     ----------
     path : Path
@@ -151,7 +164,7 @@ def read_parquet(path: Path, *, rows: bool = True) -> tuple[Table, dict[str, str
         raise InputError(f"telemetry {path}: expected each column once, received {', '.join(twice)} twice")
     parts = [_flat(arrow[signal.name], signal.size) for signal in signals]
     texts = {name: text for name, text in metadata.items() if name not in checksums.METADATA}
-    return Table(signals, np.concatenate(parts, axis=1)), texts
+    return Table(merged(signals), np.concatenate(parts, axis=1)), texts
 
 
 def _texts(metadata: Mapping[bytes, bytes] | None) -> dict[str, str]:

@@ -44,10 +44,12 @@ def main() -> int:
     broken = 0
     for matrix, direction in itertools.product(cases.MATRICES, cases.DIRECTIONS):
         cut, worst = compared(cases, matrix, direction)
-        kept = worst <= BOUND and cut > 0
-        broken += not kept
+        within_bounds = worst <= BOUND and cut > 0
+        broken += not within_bounds
         names = f"{matrix.__name__:25} {direction.__name__:16}"
-        print(f"{names} {CASES_EACH:>10} {cut:>5} {worst:>8.1e}   {'' if kept else 'BROKEN'}".rstrip())
+        print(
+            f"{names} {CASES_EACH:>10} {cut:>5} {worst:>8.1e}   {'' if within_bounds else 'BROKEN'}".rstrip()
+        )
     return 1 if broken else 0
 
 

@@ -25,7 +25,7 @@ STOPS = 20
 def looked_at(bench: Bench, ended: threading.Event) -> None:
     """Keep the interpreter busy with what a page asks for."""
     while not ended.is_set():
-        bench.state(), bench.history()
+        bench.state(), bench.bins()
         sum(i * i for i in range(3000))
 
 

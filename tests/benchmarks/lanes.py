@@ -7,13 +7,12 @@ import argparse
 import json
 import sys
 
-import gymnasium
 import llvmlite.binding
 import numpy as np
 from measuring import fastest, ratio, seconds_of, tell
 
-import spheretwin.envs  # noqa: F401 (registers the environments)
 from spheretwin import plant
+from spheretwin.envs import TwinVectorEnv
 from spheretwin.models.base.compiled import allocation_free, compiled
 from spheretwin.plant.friction import friction, slow_down
 from spheretwin.plant.lagrangian_rotor import LagrangianData
@@ -35,8 +34,12 @@ def single(changes):
 def lockstep(changes):
     """Time of the same step of one of many plants, s."""
     plants = _plants(changes)
-    step = lambda: [plants.step(np.zeros(18), np.zeros(3), dt, STEPS) for _ in range(CALLS)]  # noqa: E731
-    return lambda: seconds_of(step) / (PLANTS * STEPS * CALLS)
+
+    def work():
+        for _ in range(CALLS):
+            plants.step(np.zeros(18), np.zeros(3), dt, STEPS)
+
+    return lambda: seconds_of(work) / (PLANTS * STEPS * CALLS)
 
 
 def single_without_field():
@@ -59,8 +62,12 @@ def single_without_field():
 def lockstep_without_field():
     """Time of the same step of one of many plants, s."""
     plants = _plants(FRICTION)
-    step = lambda: [plants.step_torque(np.zeros(3), dt, STEPS) for _ in range(CALLS)]  # noqa: E731
-    return lambda: seconds_of(step) / (PLANTS * STEPS * CALLS)
+
+    def work():
+        for _ in range(CALLS):
+            plants.step_torque(np.zeros(3), dt, STEPS)
+
+    return lambda: seconds_of(work) / (PLANTS * STEPS * CALLS)
 
 
 def _plants(changes):
@@ -85,13 +92,13 @@ def _coast_without_field(calls, rotor, resistance, friction_q):
 
 def environment(actions):
     """Time of one control period of one of many plants in an environment, with new episodes, s."""
-    envs = gymnasium.make_vec("spheretwin/Track-v0", num_envs=PLANTS, actions=actions, variants=4)
-    envs.reset(seed=0)
-    rest, steps = np.zeros(envs.action_space.shape, np.float32), STEPS * CALLS
+    episodes = TwinVectorEnv(PLANTS, "Track", actions=actions, variants=4)
+    episodes.reset(seed=0)
+    rest, steps = np.zeros(episodes.action_space.shape, np.float32), STEPS * CALLS
 
     def work():
         for _ in range(steps):  # a list would keep the observations
-            envs.step(rest)
+            episodes.step(rest)
 
     return lambda: seconds_of(work) / (PLANTS * steps)
 

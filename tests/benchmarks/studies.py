@@ -138,21 +138,21 @@ def peak_MB(rows: int) -> float:
 
 def ratios() -> list[dict[str, Any]]:
     """Rows of the ratios; of those that cannot be measured there are none."""
-    found = []
+    results = []
     with timers_stopped():
         for study, count, at_least in ((afsm(), AFSM_ROWS, 1.7), (load("robustness"), ROBUSTNESS_ROWS, None)):
             sides = {each: rows_seconds(study, count, each) for each in (1, 2)}
             taken = fastest(sides, ROUNDS)
             name = f"one thread over two, whole rows of 1 s, {study.name}"
-            found.append(ratio(name, taken[1] / count, taken[2] / count, at_least=at_least))
+            results.append(ratio(name, taken[1] / count, taken[2] / count, at_least=at_least))
         with early_seconds() as early:
             if early:
                 sides = {engine: row_seconds(engine) for engine in ("lagrangian", "mujoco")}
                 taken = fastest({"early": early, **sides}, rounds=40)
                 for engine, at_most in (("lagrangian", 0.1), ("mujoco", 0.4)):
                     name = f"row of 1 s under AFSM, {engine}, over a run of it at {EARLY}"
-                    found.append(ratio(name, taken[engine], taken["early"], at_most=at_most))
-    return found
+                    results.append(ratio(name, taken[engine], taken["early"], at_most=at_most))
+    return results
 
 
 def main() -> int:

@@ -34,6 +34,7 @@ VOLATILE = (
     (r"simulated in \d+\.\d+ s: \S+ times", "simulated in DURATION"),
     (r"(open it: +)\S*rerun\b", r"\1rerun"),
     (r"(\"versions\": )\{[^}]*\}", r"\1VERSIONS"),
+    (r"(which the extra \w+ installs: ).*", r"\1COMMAND"),
     (r"\b[0-9a-f]{8}-[0-9a-f]{4}-[0-9a-f]{4}-[0-9a-f]{4}-[0-9a-f]{12}\b", "UUID"),
 )
 """Texts that vary by machine, version or time, and their placeholders. A case adds its own by `replaced`."""
@@ -70,9 +71,9 @@ def expected_path(name: str) -> Path:
 
 def check(name: str, cases: Cases) -> None:
     """Compare the text of a case with the approved one."""
-    found = difference(expected_path(name).read_text(encoding="utf-8"), stable(cases[name]()))
-    assert not found, (
-        f"{name}: the content changed. If it is right: python -m tests.content.approve {name}\n{found}"
+    result = difference(expected_path(name).read_text(encoding="utf-8"), stable(cases[name]()))
+    assert not result, (
+        f"{name}: the content changed. If it is right: python -m tests.content.approve {name}\n{result}"
     )
 
 

@@ -66,8 +66,8 @@ def html_text(page: str) -> str:
     parser.feed(page)
     figures = []
     for script in parser.scripts:
-        if found := re.match(r"\s*const figures = (\{.*?\});\n", script, re.DOTALL):
-            for name, figure in json.loads(found.group(1)).items():
+        if match := re.match(r"\s*const figures = (\{.*?\});\n", script, re.DOTALL):
+            for name, figure in json.loads(match.group(1)).items():
                 figures += [f"plot {name}", *(f"  {line}" for line in plotly_lines(figure))]
     return "\n".join([*parser.lines, *figures])
 

@@ -40,14 +40,14 @@ def recording_text(path: Path, scenario: bool = False) -> str:
                     times = mine
                 out.append(f"  {line}")
     # The order of the layouts in a file has no meaning.
-    found = ["\n".join(_layout(reader.stream(store=store))) for store in reader.blueprints()]
-    for place, text in enumerate(sorted(found)):
+    results = ["\n".join(_layout(reader.stream(store=store))) for store in reader.blueprints()]
+    for place, text in enumerate(sorted(results)):
         out += [f"layout {place}", text]
     return "\n".join(out)
 
 
 def _columns(stream) -> Columns:
-    found: Columns = {}
+    result: Columns = {}
     for chunk in stream:
         batch = chunk.to_record_batch()
         rows = [bytes(row) for row in batch.column("rerun.controls.RowId").to_pylist()]
@@ -56,9 +56,9 @@ def _columns(stream) -> Columns:
         for name in batch.schema.names:
             if name in (TIMELINE, "blueprint") or name.startswith("rerun.controls"):
                 continue
-            by_component = found.setdefault(chunk.entity_path, {})
+            by_component = result.setdefault(chunk.entity_path, {})
             by_component.setdefault(name, []).append((times, rows, batch.column(name)))
-    return found
+    return result
 
 
 def _component(name: str, parts: list) -> Iterator[str]:

@@ -356,17 +356,17 @@ def events():
     out[800:, 1], delay[800:, 1] = 3, 0.6
     lines = []
     for size in (1000, 1, 170):
-        log, found = FaultLog(), Events()
+        log, outcome = FaultLog(), Events()
         happened = []
         for first in range(0, ticks, size):
             rows = table.rows(first, first + size)
             log.write(rows)
-            happened += found.of(rows)
+            happened += outcome.of(rows)
         lines.append(f"chunks of {size}")
         lines += (
             [each.text() for each in log.faults]
             + [repr(each) for each in happened]
-            + [repr(found.end(Status.COMPLETED))]
+            + [repr(outcome.end(Status.COMPLETED))]
         )
     return "\n".join(lines)
 

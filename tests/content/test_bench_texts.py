@@ -132,7 +132,7 @@ def a_script_of_commands():
                 {key: value for key, value in differences(before, after).items() if key not in VARIABLE}
             )
             before = after
-        lines += ["## history", *tree(plain(made.history())), "## bounds", *tree(plain(made.bounds()))]
+        lines += ["## bins", *tree({**plain(made.bins()), "run": 0})]
         lines += [made.scenario_toml(), made.command_line()]
     table, metadata = read_parquet(folder / "r.parquet")
     lines += [f"{signal.name}: {array(table[signal.name])}" for signal in table.signals]
@@ -167,52 +167,22 @@ def a_script_of_operators():
         (3, "check", "a"),
         (4, "leave", "c"),
         (4, "leave", "b"),
-        (
-            5,
-            "check_silence",
-        ),
-        (
-            6,
-            "check_silence",
-        ),
-        (
-            6.5,
-            "check_silence",
-        ),
-        (
-            7,
-            "check_silence",
-        ),
+        (5, "check_silence"),
+        (6, "check_silence"),
+        (6.5, "check_silence"),
+        (7, "check_silence"),
         (7, "ask", "d"),
         (8, "register", "a"),
-        (
-            16.9,
-            "check_silence",
-        ),
-        (
-            17.5,
-            "check_silence",
-        ),
+        (16.9, "check_silence"),
+        (17.5, "check_silence"),
         (18, "register", "a"),
-        (
-            18.5,
-            "check_silence",
-        ),
+        (18.5, "check_silence"),
         (19, "ask", "a"),
-        (
-            30,
-            "check_silence",
-        ),
-        (
-            31,
-            "check_silence",
-        ),
+        (30, "check_silence"),
+        (31, "check_silence"),
         (32, "register", "e"),
         (33, "ask", "f"),
-        (
-            42.5,
-            "check_silence",
-        ),
+        (42.5, "check_silence"),
     ]
     steps += [(50, "register", f"client {place}") for place in range(70)]
     for now, name, *arguments in steps:
@@ -311,10 +281,12 @@ def row(setting):
 def choices():
     """What the page of a bench offers."""
     with bench(controller__law="pid") as made:
-        offered = choices_of(made)
+        offered = choices_of(made, scratch("bench_folder"))
         content = {
             "targets": {name: list(modes) for name, modes in offered.targets.items()},
-            **{name: list(getattr(offered, name)) for name in ("scenarios", "shapes", "laws")},
+            "scenarios": list(offered.scenarios()),
+            "shapes": list(offered.shapes),
+            "laws": list(offered.laws()),
             "limits": plain(offered.limits),
             "settings": list(map(row, offered.settings())),
             "fields": list(map(row, settings_of(made.fields()[:3]))),

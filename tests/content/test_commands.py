@@ -5,9 +5,10 @@ import json
 import os
 import re
 
+import numpy as np
 import pytest
 
-from spheretwin import cli
+from spheretwin import cli, machine
 from tests.content.content import check, command, scratch
 from tests.content.values import tree
 
@@ -39,6 +40,7 @@ HELP = [
     "magnetics curve --help",
     "magnetics check --help",
     "magnetics map --help",
+    "log check --help",
     "simulate tilt --help run",
     "simulate hold --help controller.governor",
     "bench --help watchdog",
@@ -133,6 +135,9 @@ REFUSED = [
     "magnetics map --need 0",
     "magnetics map --largest-tilt 86",
     "magnetics check --mjcf nothing.xml",
+    "log check",
+    "log check a.txt",
+    "log check nothing.csv --accept gap",
     "explain",
     "explain x",
     "--x",
@@ -235,6 +240,23 @@ def reviews():
     return "\n".join([text, *csv[:3], *csv[-2:], f"{len(csv)} lines", words])
 
 
+def logs():
+    """Exported files of a run, and verdicts on its log and on a log with wrong units and a gap."""
+    folder, call = recorded(), "simulate nutation --duration 1 --plant.engine lagrangian"
+    text = several(
+        [
+            f"{call} --export-log {folder}/log.parquet --export-truth {folder}/truth.json",
+            f"log check {folder}/log.parquet --scenario nutation",
+            f"log check {folder}/log.parquet --json",
+        ]
+    )
+    log = machine.read(folder / "log.parquet")
+    rows = np.delete(np.arange(len(log)), np.s_[300:400])
+    wrong = machine.Log(log.t_s[rows], 1e3 * log.current_A[rows], log.angle_rad[rows][:, [1, 0, 2]])
+    machine.write(wrong, folder / "wrong.csv")
+    return "\n\n".join([text, stated("log", "check", f"{folder}/wrong.csv", "--accept", "current-unit")])
+
+
 def sweeps():
     folder = recorded()
     (folder / "mine.toml").write_text(
@@ -269,6 +291,7 @@ CASES = {
     "command_runs": runs,
     "command_reviews": reviews,
     "command_sweeps": sweeps,
+    "command_logs": logs,
     "command_magnetics": magnetics,
 }
 

@@ -67,7 +67,7 @@ def direct_sums():
         "flat": direct_summation.FLAT,
     }
     for name, subject in (("ground", actuator), ("flat", flat)):
-        content[f"{name}: cylinders"] = direct_summation._cylinders(subject.magnet, 4)
+        content[f"{name}: cylinders"] = direct_summation.cylinders(subject.magnet, 4)
         content[f"{name}: reach"] = direct_summation._rim_reaches_winding(subject)
         content[f"{name}: matrix"] = direct_summation.direct_torque_matrix(q, subject, FEW)
         content[f"{name}: displaced"] = direct_summation.direct_torque_matrix(

@@ -122,11 +122,11 @@ def tuning_page() -> str:
 
 
 def crosscheck_page() -> str:
-    found = evidence()
-    with patch.object(crosscheck_verb.suite, "run", lambda *_: found):
+    result = evidence()
+    with patch.object(crosscheck_verb.suite, "run", lambda *_: result):
         outputs = [command("crosscheck", *more) for more in ((), ("--verbose",), ("--json",))]
     return "\n".join(
-        [folder_text(lambda folder: suite.write(folder, found), scratch("crosscheck")), *outputs]
+        [folder_text(lambda folder: suite.write(folder, result), scratch("crosscheck")), *outputs]
     )
 
 

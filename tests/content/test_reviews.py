@@ -73,8 +73,8 @@ def review_json() -> str:
         (("first.parquet", "other.parquet"), ("--tolerance", "gate")),
     ):
         text = review_of(*names, options=(*options, "--json"))
-        found = json.loads(text.partition("stdout:\n")[2].partition("\n")[0])
-        out += [text.partition("stdout:")[0], *tree(found)]
+        report = json.loads(text.partition("stdout:\n")[2].partition("\n")[0])
+        out += [text.partition("stdout:")[0], *tree(report)]
     return "\n".join(out)
 
 
@@ -92,8 +92,8 @@ def review_merge() -> str:
     path = scratch("merge") / "all.rrd"
     path.unlink(missing_ok=True)
     text = review_of("first.parquet", "other.parquet", options=("--merge", path))
-    found = recording_text(path).splitlines()
-    return "\n".join([text, *(line for line in found if not line.startswith("    "))])
+    result = recording_text(path).splitlines()
+    return "\n".join([text, *(line for line in result if not line.startswith("    "))])
 
 
 def exported() -> str:

@@ -30,8 +30,10 @@ def ranges() -> str:
     ]
     for low, high, least in product((-3.0, -0.2, 0.0, 0.31, 7.9), (0.32, 8.0, 8.4, 95.0), (0.01, 2.0)):
         low, high = min(low, high), max(low, high)
-        found = [*extents.labelled(low, high, least), *extents.labelled(low, high, least, 3)]
-        lines.append(f"{low} {high} {least}: {array(np.array(found))} {extents.span_text(low, high, least)}")
+        results = [*extents.labelled(low, high, least), *extents.labelled(low, high, least, 3)]
+        lines.append(
+            f"{low} {high} {least}: {array(np.array(results))} {extents.span_text(low, high, least)}"
+        )
     for ended_s, rows in ((None, 3000), (2.5, 3000), (None, 40), (0.01, 3)):
         tracker = ExtentTracker({"a": 2, "b": 1})
         assert tracker.extents(None) is None
@@ -51,8 +53,8 @@ def ranges() -> str:
             limits = [
                 of.limit(*channels, least=least, above_zero=up) for least in (0.1, 30) for up in (False, True)
             ]
-            found = [*limits, *of.bounds(*channels), *of.band(*channels, least=0.5)]
-            lines.append(f"{channels}: {array(np.array(found))} {of.largest(12.0, *channels)!r}")
+            results = [*limits, *of.bounds(*channels), *of.band(*channels, least=0.5)]
+            lines.append(f"{channels}: {array(np.array(results))} {of.largest(12.0, *channels)!r}")
     shown = [
         run_of(RAMP),
         run_of(SPIKE + 0.01 * RAMP, "2 b"),
@@ -60,13 +62,13 @@ def ranges() -> str:
     ]
     for chosen in (shown, shown[:2], shown[1:2], shown[2:]):
         columns = [run.table["q_rad"][:, 0] for run in chosen]
-        found = [
+        results = [
             runs.settled_range(chosen, columns, 1e-3),
             runs.settled_range(chosen, columns, 5.0, [RAMP + 9]),
         ]
-        found.append(runs.quantity_range(VALUE, chosen, [0]))
+        results.append(runs.quantity_range(VALUE, chosen, [0]))
         lines += [
-            f"{array(np.array(each[:2]))} {[outside.text() for outside in each.outside]}" for each in found
+            f"{array(np.array(each[:2]))} {[outside.text() for outside in each.outside]}" for each in results
         ]
     lines.append(f"{runs.leaders([run.table for run in shown])}")
     return "\n".join(lines)
@@ -83,8 +85,8 @@ def decimated() -> str:
         lines += [f"{length} {most}", *(f"  {name} {array(part)}" for name, part in bounds._asdict().items())]
         lines += [f"  cells {name} {array(part)}" for name, part in cells._asdict().items()]
     for lines_per_octave in (1, 3, 12):
-        found = decimation.octave_maxima(0.5 + COUNT, WAVE, lines_per_octave)
-        lines.append(f"octaves {lines_per_octave} {array(found[0])} {array(found[1])}")
+        result = decimation.octave_maxima(0.5 + COUNT, WAVE, lines_per_octave)
+        lines.append(f"octaves {lines_per_octave} {array(result[0])} {array(result[1])}")
     for immediate, rate_Hz in product((False, True), (10.0, 60.0)):
         bins = decimation.TimeBins(rate_Hz, immediate=immediate)
         sent = [bins.add(1e-3 * COUNT[k : k + 130], WAVE[k : k + 130, None]) for k in range(0, 3000, 130)]

@@ -106,8 +106,8 @@ def test_where_the_model_is_true_it_is_the_torque_of_the_coils(engine):
 
 def test_an_unused_applied_torque_is_nan_and_changes_no_bit():
     scenario = scenarios.load("hold", {"duration": 0.1})
-    silent, told = simulate(scenario, law=asking(asks=False)), simulate(scenario, law=asking())
-    np.testing.assert_array_equal(silent.telemetry["q_rad"], told.telemetry["q_rad"])
+    silent, logged = simulate(scenario, law=asking(asks=False)), simulate(scenario, law=asking())
+    np.testing.assert_array_equal(silent.telemetry["q_rad"], logged.telemetry["q_rad"])
     logging = Law("unasked", asking_step, np.array([0.5, 0.03]), np.zeros(3), BELIEVED)
     lost = simulate(scenario, law=logging)
     assert (lost.status, len(lost.telemetry)) == ("diverged", 0)  # it logs what is no number
@@ -124,7 +124,7 @@ def test_a_restored_session_continues_with_the_applied_torque(nominal):
 
 def test_a_change_outside_the_law_keeps_the_applied_torque(tmp_path):
     scenario = scenarios.load("hold")
-    with Session(scenario, asking()) as kept, Session(scenario, asking()) as changed:
+    with Session(scenario, asking()) as unchanged, Session(scenario, asking()) as changed:
         changed.advance(20)
         changed.set("plant.group_gain", [1.0] * 18)  # builds the controller anew
-        assert changed.advance(20).values.tobytes() == kept.advance(40).rows(20, 40).values.tobytes()
+        assert changed.advance(20).values.tobytes() == unchanged.advance(40).rows(20, 40).values.tobytes()

@@ -148,8 +148,8 @@ RAISED = {
 @pytest.mark.parametrize("law", RAISED)
 def test_what_a_law_raises_is_one_line_and_exit_1(file, law, capfd):
     for more in ([], ["--json"]):
-        told = f"spheretwin: law {law}: {RAISED[law]}\n"
-        assert printed(capfd, "--controller.law", f"{file}:{law}", *more) == (1, "", told)
+        message = f"spheretwin: law {law}: {RAISED[law]}\n"
+        assert printed(capfd, "--controller.law", f"{file}:{law}", *more) == (1, "", message)
 
 
 def test_rows_before_a_compiled_law_raised_are_kept(file, tmp_path, capfd):
@@ -161,8 +161,8 @@ def test_rows_before_a_compiled_law_raised_are_kept(file, tmp_path, capfd):
 def test_under_a_watchdog_the_line_has_the_time_of_the_exception(file, capfd):
     """The currents run down first, and the line must not have the time of their end."""
     watched = ["--hardware", "electronics", "--watchdog.rundown-s", "0.01"]
-    told = f"spheretwin: law raises: {RAISED['raises']}\n"
-    assert printed(capfd, "--controller.law", f"{file}:raises", *watched) == (1, "", told)
+    message = f"spheretwin: law raises: {RAISED['raises']}\n"
+    assert printed(capfd, "--controller.law", f"{file}:raises", *watched) == (1, "", message)
 
 
 @pytest.mark.parametrize(
@@ -189,8 +189,8 @@ def test_a_row_whose_law_raises_has_failed(file, law, tmp_path, capfd):
     )
     assert cli.main(["sweep", str(source), "--out", str(tmp_path / "out"), "--json"]) == 1
     out, err = capfd.readouterr()
-    (found,) = json.loads(out)["summary"].values()
-    assert found["statuses"] == {"failed": 2}
+    (report,) = json.loads(out)["summary"].values()
+    assert report["statuses"] == {"failed": 2}
     assert err.startswith("spheretwin: sweep: 2 of 2 rows failed, the first with key ")
     # A law in plain Python that raises an ordinary exception has no time of its own.
     assert err.endswith(f"{RAISED[law]}\n")
@@ -289,24 +289,24 @@ NOT_COMPILED = {
 @pytest.mark.parametrize("law", NOT_COMPILED)
 def test_why_a_law_does_not_compile_is_one_line(file, law, capfd):
     expected = "a function of (t, reference, measurement, parameters, state, torque) that numba compiles"
-    told = f"spheretwin: law {law}: expected {expected}, received {NOT_COMPILED[law]}\n"
-    assert printed(capfd, "--controller.law", f"{file}:{law}") == (2, "", told)
+    message = f"spheretwin: law {law}: expected {expected}, received {NOT_COMPILED[law]}\n"
+    assert printed(capfd, "--controller.law", f"{file}:{law}") == (2, "", message)
 
 
 @pytest.mark.parametrize("law", ["outside", "outside_below"])
 @pytest.mark.parametrize("verb", ["simulate", "sweep"])
 def test_a_law_that_writes_outside_its_arrays_is_found_on_request(file, law, verb, tmp_path, capfd):
-    told = f"law {law}: expected a torque at 0 s, received IndexError: index is out of bounds\n"
+    message = f"law {law}: expected a torque at 0 s, received IndexError: index is out of bounds\n"
     checked = ["--controller.law", f"{file}:{law}", "--controller.check-bounds", "true"]
     if verb == "simulate":
-        assert printed(capfd, *checked) == (1, "", f"spheretwin: {told}")
+        assert printed(capfd, *checked) == (1, "", f"spheretwin: {message}")
         return
     (source := tmp_path / "study.toml").write_text(
         'name = "outside"\nscenario = "hold"\nfields = {duration = 0.01}\n'
         f'law = [{{law = "{file}:{law}", check_bounds = true}}]\n'
     )
     assert cli.main(["sweep", str(source), "--out", str(tmp_path / "out"), "--json"]) == 1
-    assert capfd.readouterr().err.endswith(told)
+    assert capfd.readouterr().err.endswith(message)
 
 
 @pytest.mark.parametrize("law", ["pd", "afsm_eso"])

@@ -32,11 +32,11 @@ def refusal(make, **changes):
 @pytest.mark.parametrize("field", ["parameters", "state"])
 def test_numbers_are_copied_as_compiled_code_takes_them(field):
     mine = np.arange(6.0)[::2]
-    kept = getattr(law(**{field: mine}), field)
+    copy = getattr(law(**{field: mine}), field)
     mine[:] = -1.0
-    np.testing.assert_array_equal(kept, [0, 2, 4])
-    assert kept.flags.c_contiguous
-    assert kept.dtype == np.float64
+    np.testing.assert_array_equal(copy, [0, 2, 4])
+    assert copy.flags.c_contiguous
+    assert copy.dtype == np.float64
 
 
 @pytest.mark.parametrize(

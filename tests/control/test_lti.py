@@ -119,11 +119,11 @@ HOLD = {"plant.engine": "lagrangian", "duration": 0.5}
 
 def test_a_positive_gain_is_the_shipped_pd_law():
     law = Law.from_lti(gain([[2.0, 0.05]]))
-    told = {"controller.law": "pd", "controller.level": "torque"}
+    fields = {"controller.law": "pd", "controller.level": "torque"}
     gains = {"controller.stiffness": 2.0, "controller.damping": 0.05}
     own, shipped = (
         simulate(scenarios.load("hold", HOLD), law=law),
-        simulate(scenarios.load("hold", HOLD | told | gains)),
+        simulate(scenarios.load("hold", HOLD | fields | gains)),
     )
     # Products are added in another order; a stable loop does not let that grow.
     np.testing.assert_allclose(own.telemetry["q_rad"], shipped.telemetry["q_rad"], rtol=0, atol=1e-12)
@@ -150,8 +150,8 @@ from spheretwin.control.law import Law
 lead = Law.from_lti(signal.TransferFunction([20.0, -19.0], [1.0, -0.6], dt={PERIOD_S}), name="lead")
 """
     (path := tmp_path / "mine.py").write_text(text)
-    told = HOLD | {"controller.law": f"{path}:lead"}
-    own = simulate(scenarios.load("hold", told))
+    fields = HOLD | {"controller.law": f"{path}:lead"}
+    own = simulate(scenarios.load("hold", fields))
     np.testing.assert_array_equal(
         own.telemetry["q_rad"],
         simulate(scenarios.load("hold", HOLD), law=Law.from_lti(LEAD)).telemetry["q_rad"],
@@ -159,8 +159,8 @@ lead = Law.from_lti(signal.TransferFunction([20.0, -19.0], [1.0, -0.6], dt={PERI
     with pytest.raises(
         InputError, match=r"law lead: expected a control period of 0\.001 s, received 0\.002 s"
     ):
-        simulate(scenarios.load("hold", told | {"controller.period_s": 2e-3}))
-    shorter = told | {"controller.parameters": [0.0] * 5}
+        simulate(scenarios.load("hold", fields | {"controller.period_s": 2e-3}))
+    shorter = fields | {"controller.parameters": [0.0] * 5}
     assert simulate(scenarios.load("hold", shorter)).status == "diverged"
 
 

@@ -111,13 +111,13 @@ def test_currents_of_a_file_are_commanded_at_their_times(tmp_path):
     t_s, currents_A = np.array([0.01, 0.02, 0.0255, 0.04]), generator.uniform(-1, 1, (4, 18))
     path, ticks = series_file(tmp_path, t_s, currents_A), 1e-3 * np.arange(50)
     fields = FAST | {"duration": 0.05, "manual.file": path}
-    held = simulate(scenarios.load("sinusoid", fields)).telemetry["current_command_A"]
+    zero_order_hold = simulate(scenarios.load("sinusoid", fields)).telemetry["current_command_A"]
     before = [max(sum(t_s <= t + 1e-9) - 1, 0) for t in ticks]
-    np.testing.assert_array_equal(held, currents_A[before])
+    np.testing.assert_array_equal(zero_order_hold, currents_A[before])
     linear = simulate(scenarios.load("sinusoid", fields | {"manual.between": "linear"})).telemetry
     expected = np.stack([np.interp(ticks, t_s, column) for column in currents_A.T], axis=1)
     np.testing.assert_allclose(linear["current_command_A"], expected, atol=1e-10)  # times within 1e-12
-    assert np.abs(expected - held).max() > 0.1
+    assert np.abs(expected - zero_order_hold).max() > 0.1
 
 
 def test_a_file_of_currents_is_replayed_and_its_limit_counts(tmp_path):

@@ -149,22 +149,22 @@ def test_a_session_exchanges_it_and_knows_it_in_another_process(file):
         session.advance(50)
         session.set("controller.stiffness", 500.0)
         session.advance(50)
-        kept = pickle.loads(pickle.dumps(session.snapshot()))
+        snapshot = pickle.loads(pickle.dumps(session.snapshot()))
         ahead = session.advance(50).values.tobytes()
         session.set("controller.law", "pd")
         session.advance(10)
         session.set("controller.law", f"{file}:ready")
         assert [change.name for change in session.journal][-1] == "controller.law"
-        session.restore(kept)
+        session.restore(snapshot)
         assert session.advance(50).values.tobytes() == ahead
 
 
 def test_a_session_keeps_the_law_that_it_read(file):
-    with Session(load(f"{file}:ready")) as kept, Session(load(f"{file}:ready")) as session:
+    with Session(load(f"{file}:ready")) as unchanged, Session(load(f"{file}:ready")) as session:
         file.write_text(FILE.replace("parameters[0] * error", "3 * parameters[0] * error"))
         session.set("disturbance.load", 0.5)
-        kept.set("disturbance.load", 0.5)
-        assert session.advance(50).values.tobytes() == kept.advance(50).values.tobytes()
+        unchanged.set("disturbance.load", 0.5)
+        assert session.advance(50).values.tobytes() == unchanged.advance(50).values.tobytes()
     edited = simulate(load(f"{file}:ready", "--duration", "0.05"))
     file.write_text(FILE)
     assert (
@@ -218,8 +218,8 @@ def test_what_a_plain_law_raises_is_told_in_one_line_and_keeps_the_json_alone(tm
     assert cli.main(["simulate", "hold", "--controller.law", f"{path}:fails", "--json"]) == 1
     out, err = capsys.readouterr()
     assert out == ""
-    told = [line for line in err.splitlines() if line != "here"]
-    assert told == [
+    messages = [line for line in err.splitlines() if line != "here"]
+    assert messages == [
         "spheretwin: law fails: expected a torque at 0 s, received ZeroDivisionError: division by zero"
     ]
 

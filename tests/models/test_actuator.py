@@ -111,7 +111,7 @@ def test_two_groups_cannot_give_three_torques(tmp_path):
     tilted = re.compile(r"(?s)<replicate count=.12. euler=.0 0 30.>\s*<frame.*?</replicate>")
     text = tilted.sub("", TEXT).replace(RING + SITE, '<replicate count="4" euler="0 0 90">' + SITE)
     (path := tmp_path / "mine.xml").write_text(text)
-    with pytest.raises(InputError, match="at least 3 groups of two coils, received 2"):
+    with pytest.raises(InputError, match="at least 3 groups of coils, received 2"):
         actuators.load(path)
 
 

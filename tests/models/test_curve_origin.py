@@ -64,7 +64,7 @@ def test_each_number_has_a_line_of_its_own(actuator):
 
 def test_a_curve_that_says_nothing_of_the_front_was_computed_for_flat_poles(actuator):
     said = {k: v for k, v in actuator.torque_curve.computed_for.items() if k != "magnet front_radius_m"}
-    older = replace(actuator, torque_curve=replace(actuator.torque_curve, computed_for=said))
+    older = replace(actuator, torque_data=replace(actuator.torque_curve, computed_for=said))
     (line,) = disagreements(older)
     assert line.endswith("was computed for magnet front_radius_m 0, the model has 0.05")
     assert disagreements(replace(older, magnet=replace(actuator.magnet, front_radius_m=0.0))) == []
@@ -73,12 +73,12 @@ def test_a_curve_that_says_nothing_of_the_front_was_computed_for_flat_poles(actu
 def test_a_curve_that_does_not_say_is_taken_as_it_is(actuator):
     curve = replace(actuator.torque_curve, computed_for=None)
     coil = replace(actuator.coil, turns=1.0)
-    assert disagreements(replace(actuator, torque_curve=curve, coil=coil)) == []
+    assert disagreements(replace(actuator, torque_data=curve, coil=coil)) == []
 
 
 def test_a_file_s_name_cannot_break_the_line(actuator):
     curve = replace(actuator.torque_curve, name="torque curve a\x1b[2J\nb.csv")
-    (line,) = disagreements(replace(actuator, torque_curve=curve, coil=replace(actuator.coil, turns=1.0)))
+    (line,) = disagreements(replace(actuator, torque_data=curve, coil=replace(actuator.coil, turns=1.0)))
     assert line.isprintable()
 
 

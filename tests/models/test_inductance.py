@@ -52,13 +52,13 @@ def test_inclined_coils_have_the_flux_of_magpylibs_field(degrees):
     axis, side = np.array([np.sin(angle), 0, np.cos(angle)]), np.array([np.cos(angle), 0, -np.sin(angle)])
     up = np.array([0.0, 1.0, 0.0])
     x, weight = np.polynomial.legendre.leggauss(8)
-    around = 2 * np.pi * np.arange(24) / 24
+    azimuth = 2 * np.pi * np.arange(24) / 24
     points, areas = [], []
     for radius, height, share in sections(4, 6):
         for rho, w in zip(radius * (x + 1) / 2, weight * radius / 2, strict=True):
-            for psi in around:
+            for psi in azimuth:
                 points.append(height * axis + rho * (np.cos(psi) * side + np.sin(psi) * up))
-                areas.append(share * w * rho * 2 * np.pi / len(around))
+                areas.append(share * w * rho * 2 * np.pi / len(azimuth))
     loops = [
         magpylib.current.Circle(diameter=2 * r, current=share, position=(0, 0, z)) for r, z, share in turns
     ]
@@ -71,13 +71,13 @@ def test_inclined_coils_have_the_flux_of_magpylibs_field(degrees):
 def test_neighbours_have_two_per_cent_of_the_inductance_of_a_group():
     share = mutual_inductance(ACTUATOR) / GROUP_H
     cosine = np.abs(ACTUATOR.group_axes @ ACTUATOR.group_axes.T)
-    found = {
+    results = {
         round(float(np.degrees(np.arccos(c))), 2): s
         for c, s in zip(cosine.ravel(), share.ravel(), strict=True)
         if 0.5 < c < 0.999
     }
     # Around the equator, across layers, and along the outer layers: 30, 28 and 26.42 degrees.
-    assert {angle: round(100 * value, 2) for angle, value in found.items() if angle < 35} == {
+    assert {angle: round(100 * value, 2) for angle, value in results.items() if angle < 35} == {
         30.0: -1.75,
         28.0: -2.05,
         26.42: -2.34,

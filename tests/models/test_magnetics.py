@@ -67,7 +67,7 @@ def test_matrix_is_linear_in_the_torque_curve(actuator):
     curves = [2.0 * actuator.torque_curve.torque_Nm_per_A, -3e-3 * np.sin(phi) * np.exp(np.cos(phi))]
     for q in random_poses(5):
         first, second, both = (
-            torque_matrix(q, replace(actuator, torque_curve=TorqueCurve(phi, curve)))
+            torque_matrix(q, replace(actuator, torque_data=TorqueCurve(phi, curve)))
             for curve in (*curves, sum(curves))
         )
         # Rounding of the table's coefficients, of the size of the curve, in 32 pairs a column.

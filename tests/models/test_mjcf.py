@@ -35,14 +35,14 @@ def edited_unnoticed(path, old, new):
 
 def test_a_file_is_read_once(tmp_path, monkeypatch):
     (path := tmp_path / "mine.xml").write_text(TEXT)
-    kept = mjcf.read(path)
-    assert mjcf.read(path) is kept
+    original = mjcf.read(path)
+    assert mjcf.read(path) is original
     (tmp_path / "other.xml").write_text(TEXT)  # a neighbour that the file does not name
     path.touch()
-    assert mjcf.read(path) is kept
+    assert mjcf.read(path) is original
     monkeypatch.chdir(tmp_path)
-    assert mjcf.read(path.relative_to(tmp_path)) is kept
-    assert mjcf.read(tmp_path / "other.xml") is not kept
+    assert mjcf.read(path.relative_to(tmp_path)) is original
+    assert mjcf.read(tmp_path / "other.xml") is not original
 
 
 def test_an_edit_of_the_same_size_and_time_is_read(tmp_path):
@@ -94,8 +94,8 @@ def included(folder, inner, name="rotor.xml", comment=""):
 def test_an_edited_include_is_read_again(tmp_path, inner, name):
     (folder := tmp_path / "model").mkdir()
     path = included(folder, inner, name)
-    kept = mjcf.read(path)
-    assert mjcf.read(path) is kept
+    original = mjcf.read(path)
+    assert mjcf.read(path) is original
     edited_unnoticed(folder / inner, "2.219e-3", "2.220e-3")
     assert inertia(path)[0] == 2.220e-3
 
@@ -120,10 +120,10 @@ def test_text_that_moves_from_one_include_to_the_next_is_a_change(tmp_path):
     first.write_text(text)
     (tmp_path / "b.xml").write_text(f"<mujoco/>{mass}{size}")
     (tmp_path / "c.xml").write_text("<mujoco/>")
-    kept = mjcf.read(first)
+    original = mjcf.read(first)
     (tmp_path / "b.xml").write_text(f"<mujoco/>{mass}")
     (tmp_path / "c.xml").write_text(f"{size}<mujoco/>")
-    assert mjcf.read(first) is not kept
+    assert mjcf.read(first) is not original
 
 
 def test_files_that_name_each_other_are_looked_into_once(tmp_path):
@@ -198,17 +198,17 @@ def test_a_mesh_that_another_replaces_is_read_again(tmp_path):
 
 
 def test_a_run_does_not_change_what_is_kept():
-    kept = mjcf.read(actuators.MJCF_PATH)
+    original = mjcf.read(actuators.MJCF_PATH)
 
     def numbers():
         return [
             (model.body_inertia.copy(), model.body_mass.copy(), model.opt.timestep, model.opt.disableflags)
-            for model in (kept.described, kept.bare, kept.loaded)
+            for model in (original.described, original.bare, original.loaded)
         ]
 
     before = numbers()
     for payload_kg in (0.0, 0.05):
-        MujocoRotor(kept, 1e-3, "Euler", 0.2, payload_kg, 1.62)
+        MujocoRotor(original, 1e-3, "Euler", 0.2, payload_kg, 1.62)
     for ours, theirs in zip(before, numbers(), strict=True):
         np.testing.assert_equal(ours, theirs)
 
@@ -310,7 +310,7 @@ def test_a_stage_is_switched_off_only_where_it_has_nothing_to_do(parts, names, n
 
 
 def test_the_shipped_model_needs_no_stage():
-    kept = mjcf.read(actuators.MJCF_PATH)
-    for model in (kept.bare, kept.loaded):
+    original = mjcf.read(actuators.MJCF_PATH)
+    for model in (original.bare, original.loaded):
         for bit in (CONSTRAINT, SPRING, DAMPER, ACTUATION):
             assert mjcf.idle_stages(model) & bit

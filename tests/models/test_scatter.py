@@ -21,6 +21,7 @@ from spheretwin.models.magnetics import (
     torque_model,
 )
 from spheretwin.models.scatter import Scatter, no_scatter, part_errors, scattered_model, summed_torque_matrix
+from tests.models.design.quadrature import COARSE
 
 ACTUATOR = actuators.load()
 PARTS = (len(ACTUATOR.pole_axes), len(ACTUATOR.coil_axes))
@@ -91,8 +92,8 @@ def test_one_moved_pole_and_one_moved_coil_are_where_their_errors_say():
     table[1][20] = -0.15, -0.004, 0.009, -2e-4
     errors = Scatter(*map(part_errors, table))
     q = np.array([0.3, -0.2, 0.5])
-    exact = direct_torque_matrix(q, ACTUATOR, scatter=errors)
-    nominal = direct_torque_matrix(q, ACTUATOR)
+    exact = direct_torque_matrix(q, ACTUATOR, COARSE, errors)
+    nominal = direct_torque_matrix(q, ACTUATOR, COARSE)
     change = exact - nominal
     model = compiled(q, ACTUATOR, errors) - torque_matrix(q, ACTUATOR)
     # The change is about a tenth of the matrix; its second-order rest is a few percent of it.
@@ -148,7 +149,7 @@ def test_a_pole_alone_has_a_line_of_its_own():
 
 
 def test_a_curve_without_sensitivities_refuses_errors_of_distance():
-    bare = replace(ACTUATOR, torque_curve=replace(ACTUATOR.torque_curve, distance_sensitivity=None))
+    bare = replace(ACTUATOR, torque_data=replace(ACTUATOR.torque_curve, distance_sensitivity=None))
     rng = np.random.default_rng(1)
     scattered_model(bare, scatter(rng, 0.1, 0.01))
     with pytest.raises(InputError, match="expected its sensitivities to distance"):

@@ -65,9 +65,9 @@ def test_table_goes_by_its_rows(torques):
         [0, 0, 0.4],
     ]
     np.testing.assert_allclose(linear, expected, atol=1e-16)
-    held = TableDisturbance(file=torques, between="held").sample(t, None)
+    steps = TableDisturbance(file=torques, between="held").sample(t, None)
     rows = [[0.1, 0, 0], [0.3, -0.2, 0], [0, 0, 0.4]]
-    np.testing.assert_array_equal(held, np.array(rows)[[0, 0, 0, 1, 1, 2, 2]])
+    np.testing.assert_array_equal(steps, np.array(rows)[[0, 0, 0, 1, 1, 2, 2]])
 
 
 def test_an_edit_of_the_file_changes_no_table_that_is_made(tmp_path, torques):

@@ -9,9 +9,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from spheretwin import scenario as scenarios
-from spheretwin.metrics import METRICS, PlannedRun
+from spheretwin.metrics import METRICS
 from spheretwin.models.telemetry.signals import width
 from spheretwin.models.telemetry.table import Table
+from spheretwin.reduction import PlannedRun
 from spheretwin.run import figures_of
 from spheretwin.simulation import simulate
 
@@ -28,8 +29,8 @@ def runs():
 
 @pytest.mark.parametrize("name", METRICS)
 def test_every_metric_says_what_it_is(name):
-    told = METRICS[name].__doc__.strip().splitlines()[0]
-    assert told.endswith(".")
+    first_line = METRICS[name].__doc__.strip().splitlines()[0]
+    assert first_line.endswith(".")
     assert METRICS[name].value.__doc__
 
 

@@ -17,12 +17,12 @@ def scenario(*terms, **changes):
 
 
 def run(exogenous, cuts=(), start=0, end=LENGTH):
-    found, tick, ends = [], start, [*cuts, end]
+    result, tick, ends = [], start, [*cuts, end]
     while tick < end:
         rows = exogenous.rows(tick, min(each for each in ends if each > tick) - tick)
-        found.append(rows)
+        result.append(rows)
         tick += len(rows.t)
-    return [np.concatenate(parts) for parts in zip(*found, strict=True)]
+    return [np.concatenate(parts) for parts in zip(*result, strict=True)]
 
 
 def test_chunks_change_no_bit_of_a_random_term():
@@ -94,9 +94,9 @@ def test_a_trajectory_of_the_user_s_is_followed_instead():
     named = run(InputGenerator(scenarios.load("nutation")))
     assert own[1].tobytes() == named[1].tobytes()
     assert own[2].tobytes() == run(InputGenerator(scenario()))[2].tobytes()
-    kept = InputGenerator(scenario(), Own())
-    kept.scenario = scenario(RANDOM_TERM)
-    assert run(kept)[1].tobytes() == named[1].tobytes()
+    generator = InputGenerator(scenario(), Own())
+    generator.scenario = scenario(RANDOM_TERM)
+    assert run(generator)[1].tobytes() == named[1].tobytes()
 
 
 def test_one_that_fails_later_is_refused_then():

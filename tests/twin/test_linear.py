@@ -56,13 +56,13 @@ def test_one_physics_step_of_either_engine_has_the_model_s_derivatives(engine, p
     A, B = cont2discrete((model.system.A, model.system.B, model.system.C, model.system.D), h)[:2]
     # What a step changes, over its length, is A and B to first order: 1e-6 of their largest entries. The
     # engine's own steps are off by (18 1/s² h²)^2, 2e-11; differences of 1e-3 by 1e-16 / 1e-3 / h, 2e-10.
-    found = gradient(after, np.zeros(9))
+    result = gradient(after, np.zeros(9))
     unit = np.eye(6)
     assert np.abs(model.system.A).max() > 10
     np.testing.assert_allclose(
-        (found[:, :6] - unit) / h, (A - unit) / h, rtol=0, atol=1e-6 * np.abs(model.system.A).max()
+        (result[:, :6] - unit) / h, (A - unit) / h, rtol=0, atol=1e-6 * np.abs(model.system.A).max()
     )
-    np.testing.assert_allclose(found[:, 6:] / h, B / h, rtol=0, atol=1e-6 * np.abs(model.system.B).max())
+    np.testing.assert_allclose(result[:, 6:] / h, B / h, rtol=0, atol=1e-6 * np.abs(model.system.B).max())
 
 
 @pytest.mark.parametrize("pose", POSES, ids=str)
@@ -110,8 +110,8 @@ def test_currents_pull_as_the_compiled_torque_matrix_says(actuator, pose):
 
 def test_a_mistaken_controller_is_part_of_the_true_model(actuator):
     """The torque of a command: through the nominal matrix to currents, through the true one back."""
-    told = {"plant.group_gain": UNEVEN, "nominal.torque_scale": 1.25}
-    model, plain = linearise(scenario(told), TILTED), linearise(scenario(), TILTED)
+    fields = {"plant.group_gain": UNEVEN, "nominal.torque_scale": 1.25}
+    model, plain = linearise(scenario(fields), TILTED), linearise(scenario(), TILTED)
     command = model.input_at_rest
 
     def given(q):
@@ -155,13 +155,13 @@ def test_a_lag_is_one_more_pole_of_every_response(inputs, states):
 
 def test_a_lag_under_load_is_the_same_for_torques_and_for_the_currents_that_answer_them(actuator):
     """Currents commanded as the allocation does, also as it follows the pose, are a torque commanded."""
-    told = {"drive.time_constant_s": 4e-3}
-    by_torque = linearise(scenario(told), TILTED, lag=True).system
-    model = linearise(scenario(told), TILTED, inputs="currents", lag=True)
-    by_currents, held = model.system, linearise(scenario(told), TILTED).input_at_rest
+    fields = {"drive.time_constant_s": 4e-3}
+    by_torque = linearise(scenario(fields), TILTED, lag=True).system
+    model = linearise(scenario(fields), TILTED, inputs="currents", lag=True)
+    by_currents, input_at_rest = model.system, linearise(scenario(fields), TILTED).input_at_rest
 
     def allocated(q):
-        return inverse(rate_jacobian(q).T @ torque_matrix(q, actuator)) @ held
+        return inverse(rate_jacobian(q).T @ torque_matrix(q, actuator)) @ input_at_rest
 
     np.testing.assert_allclose(allocated(TILTED), model.input_at_rest, rtol=0, atol=1e-6 * 0.1)
     follows = np.hstack([gradient(allocated, TILTED), np.zeros((18, 21))])
@@ -192,12 +192,12 @@ def test_the_prototype_s_lag_is_that_of_its_amplifiers():
 
 
 def test_the_nominal_model_is_what_the_controller_knows():
-    told = {
+    fields = {
         "nominal.inertia_kg_m2": [2e-3, 3e-3, 4e-3], "nominal.time_constant_s": 3e-3,
         "nominal.torque_scale": 1.3, "plant.viscous_Nm_s": [1e-3] * 3,
         "plant.modelling_torque_Nm": [0.01] * 3,
     }  # fmt: skip
-    model = linearise(scenario(told), np.zeros(3), nominal=True, lag=True)
+    model = linearise(scenario(fields), np.zeros(3), nominal=True, lag=True)
     np.testing.assert_allclose(
         np.linalg.inv(model.system.A[3:6, 6:]), np.diag([2e-3, 3e-3, 4e-3]), rtol=1e-12
     )
@@ -207,14 +207,14 @@ def test_the_nominal_model_is_what_the_controller_knows():
 
 
 def test_nominal_friction_and_limit_are_those_of_the_data_sheet():
-    told = {
+    fields = {
         "nominal.inertia_kg_m2": [2e-3, 3e-3, 4e-3], "nominal.viscous_Nm_s": [1e-3, 2e-3, 3e-3],
         "plant.viscous_Nm_s": [0.1] * 3, "drive.current_limit_A": 1e-3, "nominal.current_limit_A": 5.0,
     }  # fmt: skip
-    model = linearise(scenario(told), np.zeros(3), nominal=True)
+    model = linearise(scenario(fields), np.zeros(3), nominal=True)
     # A product and a quotient round.
     np.testing.assert_allclose(model.system.A[3:6, 3:6], -np.diag([0.5, 2 / 3, 0.75]), rtol=1e-12, atol=1e-15)
-    resting = initial_config(scenario(told), None, None)
+    resting = initial_config(scenario(fields), None, None)
     assert linearisation_data(resting.scenario, resting.files, nominal=True).current_limit_A == 5.0
     assert linearisation_data(resting.scenario, resting.files, nominal=False).current_limit_A == 1e-3
 

@@ -5,10 +5,13 @@ import pytest
 
 from spheretwin import metrics
 from spheretwin import scenario as scenarios
-from spheretwin.metrics import BAND_rad, PlannedRun, SquaresByPiece
+from spheretwin.metrics import BAND_rad
 from spheretwin.models import actuator as actuators
-from spheretwin.models.telemetry.signals import Signal
+from spheretwin.models.base.errors import InputError
+from spheretwin.models.telemetry.signals import Signal, common_signals, width
 from spheretwin.models.telemetry.table import Table
+from spheretwin.reduction import PlannedRun
+from spheretwin.session import Session
 
 ROWS = np.random.default_rng(0).normal(size=(1000, 3)) * 10.0 ** np.array([-6, -2, 2])
 SIZES = pytest.mark.parametrize("size", [1, 7, 1000])
@@ -22,16 +25,16 @@ def in_turn(rows, start):
     return total
 
 
-def chunks(size):
-    return [ROWS[first : first + size] for first in range(0, len(ROWS), size)]
+def fed(kind, signal, rows, size, session_scenario, ticks=1000):
+    """A metric that has processed rows in chunks of a size."""
+    metric = kind(PlannedRun(session_scenario, actuators.load(), ticks))
+    for first in range(0, len(rows), size):
+        metric.write(Table((signal,), rows[first : first + size]))
+    return metric
 
 
 def value(kind, column, size, session_scenario):
-    planned = PlannedRun(session_scenario, actuators.load(), len(ROWS))
-    metric = kind(planned)
-    for rows in chunks(size):
-        metric.write(Table((Signal(column, "1", 3, "values"),), rows))
-    return metric.value()
+    return fed(kind, Signal(column, "1", 3, "values"), ROWS, size, session_scenario).value()
 
 
 @pytest.fixture(scope="module")
@@ -40,25 +43,36 @@ def scenario():
 
 
 @SIZES
-def test_sums_round_at_every_row_and_nowhere_else(size):
-    start = np.linspace(0.1, 0.5, 3)
-    total = start.copy()
-    for rows in chunks(size):
-        metrics.add_rows(rows, total)
-    np.testing.assert_array_equal(total, in_turn(ROWS, start))
+@pytest.mark.parametrize("planned", [0, 200, 1000, 1030])
+def test_pieces_are_separate_sums(size, planned, scenario):
+    starts = [0, *(tick for tick in range(planned // 2 % 256, len(ROWS), 256) if tick)]
+    sums = np.array([in_turn(part, np.zeros(3)) for part in np.split(ROWS**2, starts[1:])])
+    of_tail = np.searchsorted(starts, len(ROWS) // 2, side="right") - 1
+    signal = Signal("error_rad", "rad", 3, "values")
+    for kind, first in ((metrics.RmsError, 0), (metrics.TailRmsError, of_tail)):
+        expected = np.sqrt(sums[first:].sum(axis=0) / (len(ROWS) - starts[first]))
+        np.testing.assert_array_equal(fed(kind, signal, ROWS, size, scenario, planned).value(), expected)
 
 
 @SIZES
-@pytest.mark.parametrize("planned", [0, 200, 1000, 1030])
-def test_pieces_are_separate_sums(size, planned):
-    squares, half = SquaresByPiece(planned), planned // 2
-    for rows in chunks(size):
-        squares.add(rows)
-    starts = [tick for tick in range(half % 256, len(ROWS), 256) if tick]
-    for piece, first in enumerate([0, *starts], start=squares.piece(0)):
-        sums = [in_turn(part, np.zeros(3)) for part in np.split(ROWS**2, starts)[piece - squares.piece(0) :]]
-        expected = np.sqrt(np.array(sums).sum(axis=0) / (len(ROWS) - first))
-        np.testing.assert_array_equal(squares.rms(piece), expected)
+def test_logged_losses_are_added_in_turn(size, scenario):
+    groups = len(actuators.load().groups)
+    rows = np.random.default_rng(1).random((200, groups))
+    signal = Signal("copper_loss_W", "W", groups, "losses")
+    common = common_signals(groups)
+    metric = metrics.CopperLoss(PlannedRun(Session(scenario).scenario, actuators.load(), 200))
+    for first in range(0, len(rows), size):
+        part = rows[first : first + size]
+        metric.write(Table((*common, signal), np.hstack([np.zeros((len(part), width(common))), part])))
+    assert metric.value() == float(in_turn(rows, np.zeros(groups)).sum() * scenario.controller.period_s)
+
+
+def test_rows_without_a_signal_or_of_another_actuator_are_refused(scenario):
+    metric = metrics.MaxAbsCurrent(PlannedRun(scenario, actuators.load(), 10))
+    with pytest.raises(InputError, match="expected telemetry with 18 columns of current_A, received none"):
+        metric.write(Table((Signal("error_rad", "rad", 3, "errors"),), ROWS))
+    with pytest.raises(InputError, match="expected telemetry with 18 columns of current_A, received 3"):
+        metric.write(Table((Signal("current_A", "A", 3, "currents"),), ROWS))
 
 
 @SIZES

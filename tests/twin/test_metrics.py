@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 
 from spheretwin import scenario as scenarios
-from spheretwin.metrics import METRICS, PIECE_TICKS, BAND_rad, PlannedRun
+from spheretwin.metrics import METRICS, PIECE_TICKS, BAND_rad
 from spheretwin.models.telemetry.signals import width
 from spheretwin.models.telemetry.table import Table
+from spheretwin.reduction import PlannedRun
 from spheretwin.run import figures_of
 from spheretwin.session import Session
 from spheretwin.simulation import simulate

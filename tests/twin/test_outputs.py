@@ -30,9 +30,9 @@ def test_a_recording_that_cannot_be_put_in_its_place_costs_no_telemetry(session,
     follow(session, 50, files.sinks)
     record.mkdir()
     (fault,) = files.close()
-    (kept,) = tmp_path.glob(".x.rrd.*.part")
+    (left_over,) = tmp_path.glob(".x.rrd.*.part")
     assert f"{fault}".startswith(f"output: {record} could not be written, ")
-    assert f"{fault}".endswith(f"{kept}")
+    assert f"{fault}".endswith(f"{left_over}")
     assert (files.record, files.telemetry) == (None, telemetry)
     assert len(read_parquet(telemetry)[0]) == 50
 

@@ -182,7 +182,7 @@ def test_it_converts_to_the_tables_of_other_packages(run):
 
 def test_a_missing_package_is_named(run, monkeypatch):
     monkeypatch.setitem(sys.modules, "pandas", None)
-    with pytest.raises(InputError, match="expected pandas to be installed"):
+    with pytest.raises(InputError, match="expected pandas, which the extra tables installs: "):
         run.to_pandas()
 
 

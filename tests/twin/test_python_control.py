@@ -106,10 +106,10 @@ def test_its_systems_are_laws_and_its_designs_run():
     assert done.returncode == 0, done.stderr
 
 
-@pytest.mark.parametrize("found", [None, ModuleType("control")], ids=["nothing", "a folder of its name"])
-def test_where_it_is_not_to_be_had_it_is_told_in_one_line(found, monkeypatch):
-    monkeypatch.setitem(sys.modules, "control", found)
+@pytest.mark.parametrize("result", [None, ModuleType("control")], ids=["nothing", "a folder of its name"])
+def test_where_it_is_not_to_be_had_it_is_told_in_one_line(result, monkeypatch):
+    monkeypatch.setitem(sys.modules, "control", result)
     with pytest.raises(
-        InputError, match="expected an installed python-control for kind control, received no"
+        InputError, match="expected python-control for kind control, which the extra control installs"
     ):
         linearise(scenario.load("hold"), kind="control")

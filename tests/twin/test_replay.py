@@ -78,10 +78,10 @@ def test_another_file_than_the_run_s_is_refused_on_one_line(folder, name, edit):
     path = written(folder / "a.parquet", [("nominal.torque_curve", "later.csv")])
     replay.read(path)
     edit(folder / name)
-    with pytest.raises(InputError, match="as it was at the start of the run") as told:
+    with pytest.raises(InputError, match="as it was at the start of the run") as refusal:
         replay.read(path)
-    assert str(folder / name) in f"{told.value}"
-    assert "\n" not in f"{told.value}"
+    assert str(folder / name) in f"{refusal.value}"
+    assert "\n" not in f"{refusal.value}"
 
 
 def test_an_edited_mesh_is_refused(folder):

@@ -7,8 +7,9 @@ import pytest
 
 from spheretwin import scenario as scenarios
 from spheretwin.analysis.recorded_run import read
-from spheretwin.metrics import METRICS, PlannedRun
+from spheretwin.metrics import METRICS
 from spheretwin.models.base.errors import InputError
+from spheretwin.reduction import PlannedRun
 from spheretwin.run import OTHER_KEYS, Figures, figures_of, summary
 from spheretwin.session import Session
 from spheretwin.simulation import follow, simulate
@@ -28,19 +29,21 @@ def followed(ticks):
 
 
 def test_a_summary_has_the_metrics_and_what_stands_beside_them(run):
-    told = followed(200)
-    assert set(told) == {*METRICS, *OTHER_KEYS}
-    assert (told["status"], told["simulated_s"]) == ("completed", 0.2)
+    written = followed(200)
+    assert set(written) == {*METRICS, *OTHER_KEYS}
+    assert (written["status"], written["simulated_s"]) == ("completed", 0.2)
     figures = figures_of(run)
-    assert {name: told[name] for name in METRICS} == figures  # followed or kept, it is one run
-    assert json.loads(json.dumps(told)) == told | {"scenario": json.loads(json.dumps(told["scenario"]))}
+    assert {name: written[name] for name in METRICS} == figures  # followed or kept, it is one run
+    assert json.loads(json.dumps(written)) == written | {
+        "scenario": json.loads(json.dumps(written["scenario"]))
+    }
 
 
 def test_a_run_without_a_row_has_no_figures():
-    told = followed(0)
-    assert [told[name] for name in METRICS] == [None] * len(METRICS)
-    assert told["realtime_factor"] is None
-    assert told["warnings"] == told["notes"] == []
+    written = followed(0)
+    assert [written[name] for name in METRICS] == [None] * len(METRICS)
+    assert written["realtime_factor"] is None
+    assert written["warnings"] == written["notes"] == []
 
 
 def test_a_function_of_the_user_s_is_one_more_figure(run):
@@ -75,8 +78,8 @@ def test_what_fails_or_is_no_json_is_told_with_its_name(run):
 
 
 def test_the_realtime_factor_is_simulated_time_per_wall_time():
-    told = followed(200)
-    assert told["realtime_factor"] == told["simulated_s"] / told["wall_s"]
+    written = followed(200)
+    assert written["realtime_factor"] == written["simulated_s"] / written["wall_s"]
 
 
 def test_an_event_at_the_end_of_a_run_is_not_in_its_log(tmp_path):

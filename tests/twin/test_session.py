@@ -5,11 +5,13 @@ import json
 import numpy as np
 import pytest
 
+from spheretwin import scenario as scenarios
 from spheretwin.control.law import Law, NominalModel
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.telemetry.signals import Signal
 from spheretwin.models.telemetry.table import Table, read_parquet
 from spheretwin.provenance import facts_of
+from spheretwin.session import Session
 from spheretwin.simulation import follow, simulate
 from tests.twin.session_cases import ENGINES, SHIPPED, compiled_law, recorded, rows, scenario, session
 
@@ -34,12 +36,12 @@ def test_a_law_that_raises_ends_the_session_until_it_is_restored():
 
 
 def test_nothing_is_run_where_no_tick_is_asked_for():
-    idle, kept = session(), session()
+    idle, unchanged = session(), session()
     for _ in range(3):
         table = idle.advance(0)
         assert (len(table), table.signals) == (0, idle.signals)
     assert (idle.tick, idle.t_s, idle.status) == (0, 0.0, "running")
-    assert rows(idle.advance(20)) == rows(kept.advance(20))
+    assert rows(idle.advance(20)) == rows(unchanged.advance(20))
 
 
 @pytest.mark.parametrize("ticks", [-1, 1.5, "3", None, np.float64(2.0)])
@@ -167,7 +169,20 @@ def test_a_shipped_law_handed_over_is_the_same_law():
 def test_tables_of_a_session_are_its_own():
     live = session()
     first = live.advance(10)
-    kept = rows(first)
+    first_rows = rows(first)
     live.advance(10)
-    assert rows(first) == kept
+    assert rows(first) == first_rows
     assert isinstance(first, Table)
+
+
+@pytest.mark.parametrize(
+    ("scenario", "law", "message"),
+    [
+        ("nutation", None, "expected a scenario, as spheretwin.load returns it, received 'nutation'"),
+        (None, None, "expected a scenario, as spheretwin.load returns it, received none"),
+        (scenarios.load("hold"), "mine.py:Mine", "expected a Law, received 'mine.py:Mine'"),
+    ],
+)
+def test_what_is_no_scenario_or_no_law_is_refused(scenario, law, message):
+    with pytest.raises(InputError, match=message):
+        Session(scenario, law)

@@ -206,10 +206,10 @@ def test_two_laws_of_one_name_are_two_to_a_snapshot():
 
     with Session(hold(), law(1e-3)) as session:
         session.advance(3)
-        kept = session.snapshot()
+        snapshot = session.snapshot()
         session.set("controller.law", law(2e-3))
         second = session.snapshot()
-        session.restore(kept)
+        session.restore(snapshot)
         np.testing.assert_array_equal(session.advance(1)["torque_command_Nm"], 1e-3)
         session.restore(second)
         np.testing.assert_array_equal(session.advance(1)["torque_command_Nm"], 2e-3)
@@ -277,16 +277,16 @@ def tables(tmp_path):
 
 
 def test_tables_that_are_gone_do_not_hinder_other_changes(tables):
-    with Session(scenarios.load(str(tables))) as kept, Session(scenarios.load(str(tables))) as session:
+    with Session(scenarios.load(str(tables))) as unchanged, Session(scenarios.load(str(tables))) as session:
         for each in ("poses.csv", "torques.csv"):
             (tables.parent / each).unlink()
-        for each in (kept, session):
+        for each in (unchanged, session):
             each.advance(20)
         for name, value in (("disturbance.load", 0.0), ("controller.law", "pd"), ("controller.law", "afsm")):
             session.set(name, value)
-        kept.set("controller.law", "pd")
-        kept.set("controller.law", "afsm")
-        assert session.advance(50).values.tobytes() == kept.advance(50).values.tobytes()
+        unchanged.set("controller.law", "pd")
+        unchanged.set("controller.law", "afsm")
+        assert session.advance(50).values.tobytes() == unchanged.advance(50).values.tobytes()
 
 
 def test_a_table_that_is_set_is_read_again(tables):
@@ -367,8 +367,8 @@ def test_a_fault_that_starts_after_the_last_tick_is_warned_of(start_s, warns):
     """The last tick of 0.05 s is at 0.049 s; a fault starts at the first tick from its time on."""
     fault = {"target": "coil.00", "mode": "open", "start_s": start_s}
     with Session(scenarios.load("hold", {"duration": 0.05, "fault": [fault]})) as session:
-        told = f"the fault coil.00 open does not occur: it starts at {start_s:g} s, the run ends at 0.05 s"
-        assert session.warnings() == [told] * warns
+        message = f"the fault coil.00 open does not occur: it starts at {start_s:g} s, the run ends at 0.05 s"
+        assert session.warnings() == [message] * warns
 
 
 def test_another_member_keeps_what_it_has_of_the_same_kind(file):

@@ -204,8 +204,8 @@ def test_a_fault_that_an_event_adds_starts_when_it_says(start_s):
     fault = {"target": "coil.07", "mode": "open", "start_s": start_s}
     events = [{"t_s": 0.01, "set": "fault", "value": fault}]
     run = simulate(scenarios.load("nutation", {"duration": 0.05, "event": events}))
-    works = run.telemetry["current_A"][:, 7] != 0
-    assert works.tolist() == [tick < max(10, round(start_s / 1e-3)) for tick in range(50)]
+    conducts = run.telemetry["current_A"][:, 7] != 0
+    assert conducts.tolist() == [tick < max(10, round(start_s / 1e-3)) for tick in range(50)]
 
 
 def test_events_are_checked_in_the_order_of_their_times():

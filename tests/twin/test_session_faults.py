@@ -88,11 +88,11 @@ def test_a_snapshot_goes_on_with_all_that_is_wrong(whole, tick, further):
     """Pickled, into a session that was elsewhere meanwhile."""
     with Session(scenario()) as session, Session(scenario(hardware="ideal", fault=[])) as other:
         session.advance(tick)
-        kept = pickle.dumps(session.snapshot())
+        snapshot = pickle.dumps(session.snapshot())
         session.advance(further)
         other.advance(10)
         for restored in (session, other):
-            restored.restore(pickle.loads(kept))
+            restored.restore(pickle.loads(snapshot))
             after = restored.advance(min(TICKS - tick, 200)).values
             assert after.tobytes() == whole[tick : tick + 200].tobytes()
 
@@ -215,14 +215,14 @@ def test_a_run_of_faults_set_on_the_way_is_replayed(tmp_path):
 @pytest.mark.parametrize("kind", ["amplifier", "dac", "pot", "encoder", "adc", "controller"])
 def test_what_is_held_after_a_restore_is_what_it_was(kind, hardware):
     none = {"hardware": hardware, "fault": [], "detector.detect": False, "duration": 0.2}
-    held = {"target": TARGETS[kind].names(18)[-1], "mode": "stuck"}
+    stuck = {"target": TARGETS[kind].names(18)[-1], "mode": "stuck"}
     with (
-        Session(scenario(**{**none, "fault": [{**held, "start_s": 0.12}]})) as planned,
+        Session(scenario(**{**none, "fault": [{**stuck, "start_s": 0.12}]})) as planned,
         Session(scenario(**none)) as session,
         Session(scenario(**none)) as other,
     ):
         planned.advance(START)
         session.advance(START)
         other.restore(pickle.loads(pickle.dumps(session.snapshot())))
-        other.set("fault", held)
+        other.set("fault", stuck)
         assert same_columns(other.advance(50), planned.advance(50)) == []

@@ -32,7 +32,7 @@ def test_a_curve_that_is_edited_meanwhile_changes_nothing_of_a_session(tmp_path)
     left_alone, edited = Session(scenario), Session(scenario)
     for session in (left_alone, edited):
         session.advance(100)
-    kept = edited.snapshot()
+    snapshot = edited.snapshot()
     halved = [line if line[0] in "#p" else f"{line.split(',')[0]},{float(line.split(',')[1]) / 2}"
               for line in curve.read_text().splitlines()]  # fmt: skip
     curve.write_text("\n".join(halved))
@@ -40,20 +40,20 @@ def test_a_curve_that_is_edited_meanwhile_changes_nothing_of_a_session(tmp_path)
         session.set("controller.reaching_gain", 30.0)
         session.set("plant.modelling_error", 0.1)
     assert edited.advance(200).values.tobytes() == left_alone.advance(200).values.tobytes()
-    edited.restore(kept)  # of the same curve, as this session has it
+    edited.restore(snapshot)  # of the same curve, as this session has it
     with pytest.raises(InputError, match="same model and torque curves"):
-        Session(scenario).restore(kept)
+        Session(scenario).restore(snapshot)
 
 
 def test_a_session_remembers_the_laws_that_it_has_been_given():
     session = Session(scenarios.load("hold"), own("mine"))
     session.advance(50)
-    kept = session.snapshot()
+    snapshot = session.snapshot()
     expected = session.advance(50).values
     session.set("controller.law", "pd")
     session.set("controller.law", own("another"))
     session.advance(10)
-    session.restore(kept)
+    session.restore(snapshot)
     assert session.law.name == "mine"
     assert session.advance(50).values.tobytes() == expected.tobytes()
 

@@ -54,10 +54,10 @@ KINDS = [
 @pytest.mark.parametrize(("name", "value"), KINDS, ids=[f"{name}-{i}" for i, (name, _) in enumerate(KINDS)])
 def test_a_change_acts_from_its_tick_on_and_not_before(engine, name, value):
     at, changes = 340, {"plant.engine": engine, "disturbance.load": 1.0}
-    kept, changed = session(**changes), session(**changes)
+    unchanged, changed = session(**changes), session(**changes)
     before = changed.advance(at)
     changed.set(name, value)
-    after, expected = changed.advance(60), kept.advance(at + 60)
+    after, expected = changed.advance(60), unchanged.advance(at + 60)
     assert rows(before) == rows(expected.rows(0, at))
     assert after["t_s"][0] == expected["t_s"][at]
     # Where the rotor is is what was before; what acts on it from this tick on, or the next, is not.
@@ -72,10 +72,10 @@ def test_a_change_acts_from_its_tick_on_and_not_before(engine, name, value):
 @pytest.mark.parametrize("engine", ENGINES)
 def test_another_allocation_acts_from_its_tick_on(engine):
     changes = {"plant.engine": engine, "nominal.current_limit_A": 0.4}  # where the limit acts, they differ
-    kept, changed = session(**changes), session(**changes)
+    unchanged, changed = session(**changes), session(**changes)
     before = changed.advance(40)
     changed.set("allocation", "bounded")
-    after, expected = changed.advance(20), kept.advance(60)
+    after, expected = changed.advance(20), unchanged.advance(60)
     assert expected["allocation_scale"][40] < 1
     assert rows(before) == rows(expected.rows(0, 40))
     np.testing.assert_array_equal(after["torque_command_Nm"][0], expected["torque_command_Nm"][40])
@@ -84,10 +84,10 @@ def test_another_allocation_acts_from_its_tick_on(engine):
 
 def test_gravity_acts_from_its_tick_on():
     changes = {"plant.payload_kg": 0.05, "plant.engine": "lagrangian"}
-    kept, changed = session(**changes), session(**changes)
+    unchanged, changed = session(**changes), session(**changes)
     changed.advance(100)
     changed.set("plant.gravity_m_s2", 0.0)
-    after, expected = changed.advance(50), kept.advance(150).rows(100, 150)
+    after, expected = changed.advance(50), unchanged.advance(150).rows(100, 150)
     np.testing.assert_array_equal(after["q_rad"][0], expected["q_rad"][0])
     assert not np.array_equal(after["q_rad"][1], expected["q_rad"][1])
 
@@ -111,30 +111,33 @@ def test_a_law_object_may_replace_a_shipped_one_and_back(kind):
 
 def test_a_change_beside_the_law_keeps_what_the_law_remembers():
     # What the law itself made of its parameters belongs to it as its memory does.
-    kept, changed = session(compiled_law(), name="hold"), session(compiled_law(), name="hold")
+    unchanged, changed = session(compiled_law(), name="hold"), session(compiled_law(), name="hold")
     changed.advance(300)
     changed.set("drive.current_limit_A", 7.0)  # never reached: the future is the same
-    expected = kept.advance(600)
+    expected = unchanged.advance(600)
     assert np.abs(expected["current_command_A"]).max() < 7.0
     assert rows(changed.advance(300)) == rows(expected.rows(300, 600))
 
 
 @pytest.mark.parametrize("engine", ENGINES)
 def test_a_limit_that_is_never_met_may_move_without_a_trace(engine):
-    kept, changed = session(**{"plant.engine": engine} | WORN), session(**{"plant.engine": engine} | WORN)
+    unchanged, changed = (
+        session(**{"plant.engine": engine} | WORN),
+        session(**{"plant.engine": engine} | WORN),
+    )
     for _ in range(4):
         changed.advance(150)
         changed.set("drive.current_limit_A", 7.0 + changed.tick / 1e3)
-    expected = kept.advance(1000)
+    expected = unchanged.advance(1000)
     assert np.abs(expected["current_command_A"]).max() < 7.0
     assert rows(changed.advance(400)) == rows(expected.rows(600, 1000))
 
 
 def test_a_change_of_the_plant_keeps_the_solver_s_warm_start(sticky):
-    kept, changed = session(**{"plant.mjcf": sticky}), session(**{"plant.mjcf": sticky})
+    unchanged, changed = session(**{"plant.mjcf": sticky}), session(**{"plant.mjcf": sticky})
     changed.advance(150)
     changed.set("plant.group_gain", [1.0] * 18)  # what it is when not given
-    assert rows(changed.advance(200)) == rows(kept.advance(350).rows(150, 350))
+    assert rows(changed.advance(200)) == rows(unchanged.advance(350).rows(150, 350))
 
 
 SAME = [
@@ -152,39 +155,39 @@ SAME = [
 def test_a_change_to_what_is_changes_no_bit(engine, sticky):
     model = {"plant.mjcf": sticky} if engine == "mujoco" else {}
     changes = {"plant.engine": engine, "disturbance.load": 1.0} | model | WORN | ASKEW
-    kept, changed = session(**changes), session(**changes)
+    unchanged, changed = session(**changes), session(**changes)
     table = [changed.advance(130)]
     for name, value in SAME:
         changed.set(name, value)
         table.append(changed.advance(47))
-    assert b"".join(map(rows, table)) == rows(kept.advance(130 + 47 * len(SAME)))
+    assert b"".join(map(rows, table)) == rows(unchanged.advance(130 + 47 * len(SAME)))
     assert [change.name for change in changed.journal] == [name for name, _ in SAME]
-    assert changed.scenario == kept.scenario
+    assert changed.scenario == unchanged.scenario
 
 
 def test_the_same_law_object_once_more_changes_no_bit():
     law = compiled_law()
-    kept, changed = session(law, name="hold"), session(law, name="hold")
+    unchanged, changed = session(law, name="hold"), session(law, name="hold")
     changed.advance(100)
     changed.set("controller.law", law)
-    assert rows(changed.advance(100)) == rows(kept.advance(200).rows(100, 200))
+    assert rows(changed.advance(100)) == rows(unchanged.advance(200).rows(100, 200))
 
 
 @pytest.mark.parametrize("at", [1, 500, BLOCK_TICKS, BLOCK_TICKS + 1])
 def test_a_change_of_the_disturbance_does_not_touch_the_random_stream(at):
-    kept, changed = session(), session()
+    unchanged, changed = session(), session()
     changed.advance(at)
     changed.set("disturbance.load", 2.0)
     ticks = 2 * BLOCK_TICKS
     after, expected = (
         changed.advance(ticks)["disturbance_Nm"],
-        kept.advance(at + ticks)["disturbance_Nm"][at:],
+        unchanged.advance(at + ticks)["disturbance_Nm"][at:],
     )
     # 0.05 N·m more, and the same draws: three sums up to 0.15 N·m, each of which rounds by 1.4e-17.
     np.testing.assert_allclose(after - 0.05, expected, rtol=0, atol=4.2e-17)
     changed.set("disturbance.load", 1.0)
     np.testing.assert_array_equal(
-        changed.advance(ticks)["disturbance_Nm"], kept.advance(ticks)["disturbance_Nm"]
+        changed.advance(ticks)["disturbance_Nm"], unchanged.advance(ticks)["disturbance_Nm"]
     )
 
 
@@ -225,25 +228,25 @@ REFUSED = [
 @pytest.mark.parametrize("engine", ENGINES)
 @pytest.mark.parametrize(("name", "value", "part"), REFUSED, ids=[f"{i}" for i in range(len(REFUSED))])
 def test_a_change_that_is_none_is_refused_and_nothing_changes(engine, name, value, part):
-    changed, kept = session(**{"plant.engine": engine}), session(**{"plant.engine": engine})
-    for each in (changed, kept):
+    changed, unchanged = session(**{"plant.engine": engine}), session(**{"plant.engine": engine})
+    for each in (changed, unchanged):
         each.advance(120)
         each.set("disturbance.load", 1.0)
     with pytest.raises(InputError) as caught:
         changed.set(name, value)
     assert part in str(caught.value)
     assert "\n" not in str(caught.value)
-    assert same_future(changed, kept)
+    assert same_future(changed, unchanged)
     assert changed.law.name == "afsm"
 
 
 @pytest.mark.parametrize("name", ["plant.integrator"])
 def test_what_only_the_engine_refuses_changes_nothing_either(name):
-    changed, kept = session(**{"plant.engine": "lagrangian"}), session(**{"plant.engine": "lagrangian"})
-    changed.advance(100), kept.advance(100)
+    changed, unchanged = session(**{"plant.engine": "lagrangian"}), session(**{"plant.engine": "lagrangian"})
+    changed.advance(100), unchanged.advance(100)
     with pytest.raises(InputError, match="integrator RK4, received Euler"):
         changed.set(name, "Euler")
-    assert same_future(changed, kept)
+    assert same_future(changed, unchanged)
 
 
 def test_the_journal_keeps_the_value_that_was_given_then():

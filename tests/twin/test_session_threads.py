@@ -44,11 +44,11 @@ class Held:
 
 
 def test_a_second_thread_is_refused_while_the_first_is_at_work():
-    held = Held()
-    busy = session(held.law(), name="hold")
+    blocked = Held()
+    busy = session(blocked.law(), name="hold")
     with ThreadPoolExecutor(1) as pool:
         advancing = pool.submit(busy.advance, 20)
-        assert held.entered.wait(30)
+        assert blocked.entered.wait(30)
         try:
             taken = [
                 lambda: busy.advance(1),
@@ -61,9 +61,9 @@ def test_a_second_thread_is_refused_while_the_first_is_at_work():
                 with pytest.raises(SpheretwinError, match="one thread at a time"):
                     call()
         finally:
-            held.go.set()
+            blocked.go.set()
         first = advancing.result()
-    alone = session(held.law(), name="hold")
+    alone = session(blocked.law(), name="hold")
     assert rows(first) == rows(alone.advance(20))
     assert busy.journal == ()
     assert same_future(busy, alone)

@@ -83,16 +83,14 @@ def test_the_solver_s_warm_start_is_restored(sticky):
     original = session(**{"plant.mjcf": sticky})
     original.advance(237)
     taken = original.snapshot()
+    warm_start = original._runtime._rotor.rotor.data.qacc_warmstart.copy()
     expected = rows(original.advance(200))
     other = session(**{"plant.mjcf": sticky})
     other.restore(pickle.loads(pickle.dumps(taken)))
+    # Equal rows alone do not show it: on some processors the solver reaches the same bits from any start.
+    assert np.any(warm_start)
+    assert np.array_equal(other._runtime._rotor.rotor.data.qacc_warmstart, warm_start)
     assert rows(other.advance(200)) == expected
-    # Without the warm start, which lies among the numbers of the state, the bits are others.
-    other.restore(taken)
-    data = other._runtime._rotor.rotor.data
-    assert np.any(data.qacc_warmstart)
-    data.qacc_warmstart[:] = 0.0
-    assert rows(other.advance(200)) != expected
 
 
 @pytest.mark.parametrize("engine", ENGINES)

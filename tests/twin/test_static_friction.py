@@ -75,11 +75,11 @@ def test_the_rows_account_for_the_energy_of_friction_and_cable(engine, actuator)
             for q, v in zip(run["q_rad"][[0, -1]], run["qdot_rad_s"][[0, -1]], strict=True)
         ]
         moved = np.diff(run["q_rad"], axis=0)
-        works = [np.sum(run[name][:-1] * moved) for name in ("friction_Nm", "cable_Nm")]
-        return kinetic[1] - kinetic[0] - sum(works), works, kinetic[0]
+        dissipated_J = [np.sum(run[name][:-1] * moved) for name in ("friction_Nm", "cable_Nm")]
+        return kinetic[1] - kinetic[0] - sum(dissipated_J), dissipated_J, kinetic[0]
 
-    left_J, works, first_J = unbalanced_J(5e-4)
-    assert max(works) < -0.02 * first_J  # each takes energy here
+    left_J, dissipated_J, first_J = unbalanced_J(5e-4)
+    assert max(dissipated_J) < -0.02 * first_J  # each takes energy here
     assert abs(left_J) < 1e-4 * first_J
     # Torques are held over each step, so that the works are nearly exact: at least second order.
     assert abs(left_J) < 0.3 * abs(unbalanced_J(1e-3)[0])
@@ -185,8 +185,8 @@ def test_the_linear_model_has_the_spring_and_the_torque_of_the_cable(actuator):
     np.testing.assert_allclose(
         M @ (model.system.A - bare.system.A)[3:, :3], -np.diag(SPRING_Nm_rad), rtol=0, atol=1e-12
     )
-    held = SPRING_Nm_rad * (pose - NEUTRAL_rad) - CONSTANT_Nm
-    np.testing.assert_allclose(model.input_at_rest - bare.input_at_rest, held, rtol=0, atol=1e-12)
+    torque_Nm = SPRING_Nm_rad * (pose - NEUTRAL_rad) - CONSTANT_Nm
+    np.testing.assert_allclose(model.input_at_rest - bare.input_at_rest, torque_Nm, rtol=0, atol=1e-12)
     nominal, other = (
         linearise(scenarios.load("hold", changes), pose, nominal=True).system.A
         for changes in (STILL, STILL | CABLE)

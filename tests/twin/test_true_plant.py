@@ -31,10 +31,10 @@ def test_torque_is_that_of_the_currents_times_their_gains(engine, actuator):
 
 def test_an_open_group_is_one_that_the_controller_does_not_know_of():
     open_group = [0.0] + 17 * [1.0]
-    kept, broken = table(400), table(400, changes={"plant.group_gain": open_group})
-    np.testing.assert_array_equal(broken["current_command_A"][0], kept["current_command_A"][0])
+    healthy, broken = table(400), table(400, changes={"plant.group_gain": open_group})
+    np.testing.assert_array_equal(broken["current_command_A"][0], healthy["current_command_A"][0])
     assert np.abs(broken["current_command_A"][:, 0]).max() > 0.01
-    assert not np.array_equal(broken["q_rad"], kept["q_rad"])
+    assert not np.array_equal(broken["q_rad"], healthy["q_rad"])
     none = table(30, "hold", STILL | {"plant.group_gain": 18 * [0.0]})
     np.testing.assert_array_equal(none["torque_Nm"], 0)
     np.testing.assert_array_equal(none["q_rad"], 0)
@@ -187,8 +187,8 @@ def unbalanced_J(engine, step_s, actuator, changes):
     changes = changes | {"plant.engine": engine, "plant.step_s": step_s, "controller.period_s": step_s}
     run = table(round(0.4 / step_s) + 1, changes=LOADED | changes | {"plant.modelling_error": 0.2})
     ends = [energy_J(run["q_rad"][i], run["qdot_rad_s"][i], actuator, 0.2) for i in (0, -1)]
-    works = works_J(run, step_s, np.array(LOADED["plant.modelling_torque_Nm"]))
-    return abs(ends[1] - ends[0] - sum(works.values())), works
+    work_J = works_J(run, step_s, np.array(LOADED["plant.modelling_torque_Nm"]))
+    return abs(ends[1] - ends[0] - sum(work_J.values())), work_J
 
 
 def order_of(steps, left_J):
@@ -202,10 +202,10 @@ def test_energy_is_kept_by_the_rows_of_the_telemetry_alone(engine, actuator):
     steps = np.array([8e-3, 4e-3, 2e-3])
     left_J = [unbalanced_J(engine, step_s, actuator, FRICTIONLESS)[0] for step_s in steps]
     assert 3.7 < order_of(steps, left_J) < 4.3, left_J
-    left_J, works = unbalanced_J(engine, 5e-4, actuator, FRICTIONLESS)
+    left_J, work_J = unbalanced_J(engine, 5e-4, actuator, FRICTIONLESS)
     # Measured 1e-14 J of some 20 mJ that go in and out; any of the works left out would be seen.
     assert left_J < 1e-13
-    assert min(abs(work) for name, work in works.items() if name != "friction") > 1e-5
+    assert min(abs(work) for name, work in work_J.items() if name != "friction") > 1e-5
 
 
 @pytest.mark.parametrize("engine", ENGINES)

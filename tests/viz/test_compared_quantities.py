@@ -20,10 +20,10 @@ RANDOM = np.random.default_rng(0)
 
 def test_the_whole_error_is_the_angle_of_the_rotation_between():
     q, q_ref = RANDOM.uniform(-1.2, 1.2, size=(2, 200, 3))
-    for found, pose, wanted in zip(angle_between(q, q_ref), q, q_ref, strict=True):
+    for result, pose, wanted in zip(angle_between(q, q_ref), q, q_ref, strict=True):
         R = rotation(pose).T @ rotation(wanted)
         # The trace loses half of the digits near 0 and π, where none of these are.
-        assert found == pytest.approx(np.arccos((np.trace(R) - 1) / 2), abs=1e-9)
+        assert result == pytest.approx(np.arccos((np.trace(R) - 1) / 2), abs=1e-9)
 
 
 @pytest.mark.parametrize("angle", [0.0, 1e-12, 1e-6, 0.1, 3.0, np.pi])
@@ -105,9 +105,9 @@ def test_compared_quantities_are_those_of_a_recording_or_of_the_telemetry(actuat
 
 def test_compared_quantities_have_units_titles_and_limits():
     by_name = {quantity.name: quantity for quantity in COMPARED_QUANTITIES}
-    assert by_name["error_β_mrad"].heading == "error of β [mrad]"
-    assert by_name["angle_γ_rad"].heading == "angle γ [rad]"
-    assert by_name["sliding_α_rad_s"].heading == "sliding of α [rad/s]"
+    assert by_name["error_β_mrad"].heading == "β error [mrad]"
+    assert by_name["angle_γ_rad"].heading == "γ angle [rad]"
+    assert by_name["sliding_α_rad_s"].heading == "α sliding [rad/s]"
     assert by_name["error_angle_deg"].heading == "error as one angle [°]"
     assert by_name["largest_current_A"].heading == "top current [A]"
     assert by_name["torque_command_norm_Nm"].heading == "command [N·m]"

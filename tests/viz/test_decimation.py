@@ -44,12 +44,12 @@ def test_cells_have_mean_and_standard_deviation_of_each_column():
 def test_every_part_of_an_octave_keeps_its_highest_line(each):
     frequency = np.arange(1, 2000) * 0.1
     values = np.random.default_rng(1).uniform(size=len(frequency))
-    few, kept = octave_maxima(frequency, values, each)
+    few, highest = octave_maxima(frequency, values, each)
     assert np.all(np.diff(few) > 0)
     parts = np.floor(each * np.log2(frequency / frequency[0])).astype(int)
     expected = [values[parts == part].max() for part in np.unique(parts)]
-    assert list(kept) == expected
-    assert set(zip(few, kept, strict=True)) <= set(zip(frequency, values, strict=True))
+    assert list(highest) == expected
+    assert set(zip(few, highest, strict=True)) <= set(zip(frequency, values, strict=True))
 
 
 def test_no_spectrum_is_none():

@@ -83,12 +83,12 @@ def test_the_margin_is_how_far_a_command_can_be_scaled(rows):
     factor = 1 + MARGIN.values(rows)
     scaled = np.max(np.abs(factor * commands), axis=1)
     largest = np.max(np.abs(commands), axis=1)
-    told = largest > LIMIT_A / (1 + quantities.MOST)
-    assert 0 < np.count_nonzero(told & (largest <= LIMIT_A)) < COUNT
-    within = told & (largest <= LIMIT_A)
+    expected = largest > LIMIT_A / (1 + quantities.MOST)
+    assert 0 < np.count_nonzero(expected & (largest <= LIMIT_A)) < COUNT
+    within = expected & (largest <= LIMIT_A)
     np.testing.assert_allclose(scaled[within], LIMIT_A, rtol=1e-15)
     np.testing.assert_array_equal(factor[largest > LIMIT_A], 1.0)
-    np.testing.assert_allclose(factor[~told], 1 + quantities.MOST, rtol=1e-15)
+    np.testing.assert_allclose(factor[~expected], 1 + quantities.MOST, rtol=1e-15)
 
 
 def test_nothing_is_left_where_the_limit_has_cut_the_torque(rows):
@@ -129,8 +129,8 @@ def test_coupling_of_equal_inertias_is_that_of_the_paper(rows, actuator):
 def test_copper_loss_is_of_cold_coils_without_a_column(rows, actuator):
     expected = [actuator.group.resistance_ohm * current @ current for current in rows.table["current_A"]]
     np.testing.assert_allclose(COPPER_LOSS.values(rows)[:, 0], expected, rtol=1e-13)
-    told = Signal("copper_loss_W", "W", 18, "heat of the coils")
-    signals = (*SIGNALS, told)
+    loss = Signal("copper_loss_W", "W", 18, "heat of the coils")
+    signals = (*SIGNALS, loss)
     table = Table(signals, np.hstack([rows.table.values, np.full((COUNT, 18), 0.5)]))
     np.testing.assert_array_equal(COPPER_LOSS.values(rows._replace(table=table))[:, 0], 9.0)
 

@@ -39,8 +39,8 @@ def made(ticks, signals=SIGNALS, first=0):
 
 def thinned(thinning, tables):
     """Rows that are kept of tables that come one after the other."""
-    kept = [each for table in tables for each in thinning.add(table)]
-    return np.concatenate([each.values for each in [*kept, *thinning.flush()]])
+    rows = [each for table in tables for each in thinning.add(table)]
+    return np.concatenate([each.values for each in [*rows, *thinning.flush()]])
 
 
 def slowly(table):
@@ -73,27 +73,27 @@ def long():
 
 
 @pytest.fixture(scope="module")
-def kept(long):
+def thinned_rows(long):
     return thinned(FirstAndExtremeRows(RATE_Hz), [long])
 
 
-def test_the_first_rows_of_bins_and_those_that_stand_out_are_kept_and_no_others(long, kept):
-    assert kept.tobytes() == slowly(long).tobytes()
+def test_the_first_rows_of_bins_and_those_that_stand_out_are_kept_and_no_others(long, thinned_rows):
+    assert thinned_rows.tobytes() == slowly(long).tobytes()
 
 
-def test_every_window_has_its_extremes(long, kept):
-    of_all, of_kept = (np.floor(values[:, 0] / WINDOW_S + 1e-6) for values in (long.values, kept))
+def test_every_window_has_its_extremes(long, thinned_rows):
+    of_all, of_kept = (np.floor(values[:, 0] / WINDOW_S + 1e-6) for values in (long.values, thinned_rows))
     for window in range(2):
-        whole, some = long.values[of_all == window], kept[of_kept == window]
+        whole, some = long.values[of_all == window], thinned_rows[of_kept == window]
         np.testing.assert_array_equal(some.max(axis=0), whole.max(axis=0))
         np.testing.assert_array_equal(some.min(axis=0), whole.min(axis=0))
 
 
 @given(st.lists(st.integers(1, 25_299), max_size=12))
-def test_the_same_rows_however_they_come_in_chunks(long, kept, places):
+def test_the_same_rows_however_they_come_in_chunks(long, thinned_rows, places):
     ends = sorted({*places, len(long)})
     chunks = [long.rows(first, last) for first, last in zip([0, *ends], ends, strict=False)]
-    assert thinned(FirstAndExtremeRows(RATE_Hz), chunks).tobytes() == kept.tobytes()
+    assert thinned(FirstAndExtremeRows(RATE_Hz), chunks).tobytes() == thinned_rows.tobytes()
 
 
 def test_a_change_of_columns_ends_a_window():

@@ -15,7 +15,7 @@ from spheretwin.analysis.recorded_run import Reviewed, events, of_the_actuator
 from spheretwin.analysis.review import LONGEST_VALUE, common_conditions, scenario_differences
 from spheretwin.analysis.run_summary import amplitudes, peaks
 from spheretwin.metrics import BAND_rad
-from spheretwin.models.actuator import MJCF_PATH
+from spheretwin.models.actuator import MJCF_PATH, Actuator
 from spheretwin.models.base.errors import InputError, shortened, shown
 from spheretwin.models.telemetry.run_record import RunFacts
 from spheretwin.models.telemetry.status import Event, Status
@@ -175,6 +175,13 @@ def _rows(run: Reviewed, table: Table) -> QuantityRows:
     return QuantityRows(table, table.rows(0, 1), files.actuator, scenario.drive.current_limit_A)
 
 
+def subject_of(scenario: ResolvedScenario, actuator: Actuator) -> RecordingSubject:
+    """Return what is drawn of a machine without a run."""
+    from spheretwin.viz.recording.part import RecordingSubject  # Rerun is slow to import
+
+    return RecordingSubject(actuator, (), _facts(scenario, ""))
+
+
 def _facts(scenario: ResolvedScenario, law: str) -> RunFacts:
     return RunFacts(
         name=scenario.name,
@@ -208,6 +215,7 @@ def _runs_text(runs: Sequence[Reviewed], drawn_runs: Sequence[ComparedRun]) -> s
 
 if TYPE_CHECKING:
     from spheretwin.viz.pages.markdown import Drawing
+    from spheretwin.viz.recording.part import RecordingSubject
 
 PAGE = "review.html"
 

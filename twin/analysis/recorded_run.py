@@ -20,7 +20,9 @@ from spheretwin.analysis.recovery import hold_rows, ticks_of
 from spheretwin.faults.fault_injector import FaultMessages
 from spheretwin.models.base.errors import InputError, shown
 from spheretwin.models.base.files import whole_file
+from spheretwin.models.telemetry import joint_states
 from spheretwin.models.telemetry.checksums import has_checksums
+from spheretwin.models.telemetry.joint_states import ANGLE_NAMES, Topic, group_names
 from spheretwin.models.telemetry.run_record import Change, RunRecord
 from spheretwin.models.telemetry.status import Event, Events, Level, Status
 from spheretwin.models.telemetry.table import Table, read_parquet
@@ -258,7 +260,7 @@ def _changes(run: Reviewed) -> Iterator[Change]:
     yield from run.record.journal
 
 
-KINDS = (".csv", ".parquet")
+KINDS = (".csv", ".parquet", ".mcap")
 
 
 def check(path: Path) -> None:
@@ -271,12 +273,17 @@ def check(path: Path) -> None:
     """
     if path.suffix not in KINDS:
         raise InputError(
-            f"command line: expected --export FILE.csv or FILE.parquet, received {shown(str(path))}"
+            "command line: expected --export FILE.csv, FILE.parquet or FILE.mcap,"
+            f" received {shown(str(path))}"
         )
 
 
 def export(run: Reviewed, path: Path) -> None:
-    """Write all columns of a run; each number in CSV as Python writes it, which no bit is lost by.
+    """Write all columns of a run, a scalar column for each number.
+
+    A Parquet file is again the file of a run. CSV has each number as Python writes it, which loses no bit.
+    MCAP has times to 1 ns, the angles and rates of the controller as topic ``angles``, the commanded currents
+    as ``currents`` and all other columns as ``telemetry``.
 
     Raises
     ------
@@ -284,9 +291,27 @@ def export(run: Reviewed, path: Path) -> None:
         The file cannot be written; what was there before is untouched.
     """
     if path.suffix == ".parquet":
-        run.table.write_parquet(path, run.metadata)
-        return
-    with whole_file(path) as temporary, temporary.open("w", encoding="utf-8", newline="") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow([name for signal in run.table.signals for name in signal.headings()])
-        writer.writerows(map(repr, row) for row in run.table.values.tolist())
+        run.table.scalars().write_parquet(path, run.metadata)
+    elif path.suffix == ".mcap":
+        joint_states.write(path, run.table["t_s"], _topics(run.table), run.metadata)
+    else:
+        with whole_file(path) as temporary, temporary.open("w", encoding="utf-8", newline="") as file:
+            writer = csv.writer(file, lineterminator="\n")
+            writer.writerow([name for signal in run.table.signals for name in signal.headings()])
+            writer.writerows(map(repr, row) for row in run.table.values.tolist())
+
+
+def _topics(table: Table) -> dict[str, Topic]:
+    """Return the topics of a run; angles and rates are those of the controller, if they are columns."""
+    columns = {signal.name for signal in table.signals}
+    sensed = {"q_measured_rad", "qdot_estimated_rad_s"} <= columns
+    q, qdot = ("q_measured_rad", "qdot_estimated_rad_s") if sensed else ("q_rad", "qdot_rad_s")
+    others = [signal for signal in table.signals if signal.name not in ("t_s", q, qdot, "current_command_A")]
+    scalars = [scalar.name for signal in others for scalar in signal.scalars()]
+    return {
+        "angles": Topic(ANGLE_NAMES, {"position": table[q], "velocity": table[qdot]}),
+        "currents": Topic(
+            group_names(table["current_command_A"].shape[1]), {"effort": table["current_command_A"]}
+        ),
+        "telemetry": Topic(scalars, {"effort": np.column_stack([table[signal.name] for signal in others])}),
+    }

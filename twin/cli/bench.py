@@ -7,9 +7,10 @@ import contextlib
 import json
 import shlex
 import sys
+import tempfile
 import warnings
 import webbrowser
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, Literal, get_args, get_origin
@@ -22,38 +23,50 @@ from pydantic_core import PydanticUndefined
 from spheretwin import outputs
 from spheretwin import scenario as scenarios
 from spheretwin.bench import Bench
+from spheretwin.bench.folder import Folder
+from spheretwin.bench.folder_files import FolderFiles
 from spheretwin.bench.modes import Limits
 from spheretwin.bench.operators import GONE_s, Operators
-from spheretwin.cli.common import interruptible, print_message
+from spheretwin.cli.common import interruptible, print_message, warn
+from spheretwin.cli.drive import add_link_options, limited_rate, open_link
+from spheretwin.cli.machine import STANDARD_STREAMS, add_frame_option
 from spheretwin.cli.options import Parser, number, whole
 from spheretwin.control.laws import LAWS
 from spheretwin.faults.targets import TARGETS
+from spheretwin.machine.link.controller_scenario import left_out
 from spheretwin.models.base.errors import InputError
+from spheretwin.models.base.extras import missing
 from spheretwin.models.base.mujoco_library import timers_stopped
 from spheretwin.scenario import reading
 from spheretwin.scenario.fields import families, without_indices
 from spheretwin.scenario.reading import shipped
 from spheretwin.scenario.sections import Scenario
+from spheretwin.session import Session
 from spheretwin.trajectories import SHAPES
 from spheretwin.viz.bench.protocols import Choices, FieldSetting
 from spheretwin.viz.terminal import runs
 
 TRAJECTORY = "trajectory"
 
+# Numbers of the controller that are not gains.
+NO_GAINS = ("controller.period_s",)
+
 # Fields of a shape that the page does not offer: its name, and the approach, which the bench computes.
 NO_SHAPE = ("shape", "approach")
 
 
-def choices_of(bench: Bench) -> Choices:
-    """Return the choices of the page of a bench."""
+def choices_of(bench: Bench, folder: Path | None = None) -> Choices:
+    """Return the choices of the page of a bench, with the files of a folder; default: the working folder."""
+    files = FolderFiles(folder or Path())
     groups = len(bench.actuator.groups)
     return Choices(
         settings=lambda: settings_of(bench.fields()),
         shape=lambda name: shape_settings(name, bench),
         read=read,
-        scenarios=shipped(),
+        scenarios=lambda: [*shipped(), *files.scenarios()],
         shapes=tuple(SHAPES),
-        laws=tuple(LAWS),
+        laws=lambda: [*LAWS, *files.laws()],
+        runs=files.runs,
         limits=Limits(),
         targets={name: tuple(target.modes) for target in TARGETS.values() for name in target.names(groups)},
     )
@@ -117,6 +130,8 @@ def read(name: str, text: str) -> Any:
         raise InputError(f"{name}: expected a value, received {text}: {error}") from None
     if any(token.startswith("--") for token in tokens):
         raise InputError(f"{name}: expected a value, received {text}")
+    if name == "controller.law":  # as a flag, a file would be run now, in the thread that serves the pages
+        return " ".join(tokens)
     return reading.overrides([f"--{name}", *tokens])[name]
 
 
@@ -137,7 +152,27 @@ def _gathered(fields: Mapping[str, Any]) -> dict[str, Any]:
 
 def _setting(name: str, value: Any, field: FieldInfo) -> FieldSetting:
     choices = families(Scenario).get(without_indices(name)) or _literals(field.annotation)
-    return FieldSetting(name, written(value), _default_text(field), _meaning(field), choices)
+    limits = _range(name, value, field)
+    return FieldSetting(name, written(value), _default_text(field), _meaning(field), choices, limits)
+
+
+def _range(name: str, value: Any, field: FieldInfo) -> tuple[float, float] | None:
+    """Return the range of a gain's slider, from its bound to four times its default; else None."""
+    numbers = value if isinstance(value, tuple) else (value,)
+    is_gain = name.startswith("controller.") and name.count(".") == 1 and name not in NO_GAINS
+    if not is_gain or not numbers or not all(type(number) in (int, float) for number in numbers):
+        return None
+    default = _default(field)
+    defaults = default if isinstance(default, tuple) else (default,)
+    largest = max((abs(number) for number in defaults if isinstance(number, int | float)), default=0.0)
+    low, high = 0.0, 4 * largest or 1.0
+    for mark in (*field.metadata, *_marks(field.annotation)):
+        match mark:
+            case Ge(ge=bound) | Gt(gt=bound):
+                low = float(bound)  # type: ignore[arg-type]
+            case Le(le=bound) | Lt(lt=bound):
+                high = min(high, float(bound))  # type: ignore[arg-type]
+    return low, high
 
 
 def _default(field: FieldInfo) -> Any:
@@ -180,12 +215,9 @@ def _literals(annotation: Any) -> tuple[str, ...]:
 
 PORT = 8080
 
-EXAMPLE = "hold"
+EXAMPLE = "bench"
 
 LARGEST_PORT = 65_535
-
-# A page that is closed says so at once; this process may be silent itself while something is compiled.
-SILENCE_S = 10.0
 
 
 def declare(parser: Parser) -> None:
@@ -213,17 +245,32 @@ def declare(parser: Parser) -> None:
         help=f"time for which the twin continues after its page is closed; {GONE_s:g} s unless given",
     )
     parser.add_argument("--record", help="record from the start")
+    parser.add_argument(
+        "--folder",
+        type=Path,
+        default=Path(),
+        metavar="DIR",
+        help="files that the page names are below it; the working folder unless given",
+    )
+    add_link_options(
+        parser,
+        "drive a machine at udp://HOST:PORT or serial:DEVICE@BAUD, with the options of `drive`: --arm,"
+        " --frame, --limit-angle-deg, …",
+        listed=False,
+    )
+    add_frame_option(parser, listed=False)
     parser.set_run(run, has_fields=True)
 
 
 def run(options: argparse.Namespace) -> bool:
     """Run the verb until it is interrupted; return True if all recordings are complete."""
     if find_spec("viser") is None:
-        raise InputError(
-            "bench: expected viser, which the extra bench installs: pip install 'spheretwin[bench]'"
-        )
+        raise missing("bench", "viser", "bench")
     scenario = scenarios.load(options.scenario, reading.overrides(options.fields))
-    outputs.check([options.record] if options.record else [])
+    scenario = limited_rate(scenario, options.limit_rate_rad_s)
+    recordings = [options.record.resolve()] if options.record else []
+    outputs.check(recordings)
+    folder = Folder(options.folder, scenario, recordings)
     # viser may be missing.
     from spheretwin.viz.bench import server
     from spheretwin.viz.bench.page import Page
@@ -234,26 +281,80 @@ def run(options: argparse.Namespace) -> bool:
     print(f"bench: preparing {scenario.name}", file=sys.stderr, flush=True)  # it may have to be compiled
     with listening, interruptible() as stop_requested, contextlib.ExitStack() as stack:
         stack.enter_context(timers_stopped())
-        bench = stack.enter_context(Bench(scenario, Operators(options.hold_after, SILENCE_S)))
-        page = stack.enter_context(Page(bench, choices_of(bench), listening))
+        machine = stack.enter_context(_machine(options, scenario, stop_requested))
+        bench = stack.enter_context(Bench(scenario, Operators(options.hold_after), folder, machine))
+        page = stack.enter_context(Page(bench, choices_of(bench, options.folder), listening))
         bench.begin()
-        _record(bench, options.record)
-        print(f"bench: {page.address} (Ctrl-C ends it)", flush=True)
+        _record(bench, recordings)
+        address = page.address
+        print(f"bench: {address} (Ctrl-C ends it)", flush=True)
         if not options.no_browser:
-            webbrowser.open(page.address)
-        page.show(stop_requested)
+            stack.enter_context(_browser(address))
+        page.show(_announced(page, address, stop_requested))
     return _report(bench)
 
 
-def _record(bench: Bench, recording: Path | None) -> None:
-    if recording and (refused := bench.command("record", recording=str(recording)).wait()):
-        raise InputError(refused)
+@contextlib.contextmanager
+def _machine(
+    options: argparse.Namespace, scenario: Scenario, stop_requested: Callable[[], bool]
+) -> Iterator[Session | None]:
+    """Connect to the machine of the command line, and yield a session with it as the plant; None without."""
+    if options.machine is None:
+        if options.arm:
+            raise InputError("command line: expected --arm with --machine, received it alone")
+        yield None
+        return
+    if options.machine == STANDARD_STREAMS:
+        raise InputError("command line: expected --machine with udp:// or serial:, received -")
+    warn(left_out(scenario))
+    with open_link(options, scenario, stop_requested) as link:
+        yield link.session(scenario)
+
+
+def _record(bench: Bench, recordings: list[Path]) -> None:
+    for recording in recordings:
+        bench.do("record", recording=str(recording))
+
+
+@contextlib.contextmanager
+def _browser(address: str) -> Iterator[None]:
+    """Open an address in the browser, by a file that only this account can read.
+
+    The command line of a browser is visible to all accounts of the machine.
+    """
+    try:
+        descriptor, name = tempfile.mkstemp(prefix="bench-", suffix=".html", dir=Path.home())
+    except (OSError, RuntimeError):  # no home that can be written: the address is printed
+        yield
+        return
+    try:
+        with open(descriptor, "w", encoding="utf-8") as file:
+            file.write(f'<meta http-equiv="refresh" content="0; url={address}">')
+        webbrowser.open(Path(name).as_uri())
+        yield
+    finally:
+        Path(name).unlink(missing_ok=True)
+
+
+def _announced(page: Any, address: str, ended: Callable[[], bool]) -> Callable[[], bool]:
+    """Return `ended`, which also prints the address for the next browser once one has used the last one."""
+
+    def announce() -> bool:
+        nonlocal address
+        if page.address != address:
+            address = page.address
+            print(f"bench: for another browser: {address}", flush=True)
+        return ended()
+
+    return announce
 
 
 def _report(bench: Bench) -> bool:
-    """Print the recorded files and failed recordings; return True if none failed."""
+    """Print the written files and what failed; return True if nothing did."""
     state = bench.state()
     runs.print_written([Path(file) for file in state.completed_files])
     if state.recording:
         print_message(f"not completed: {', '.join(state.recording)}")
-    return not state.recording
+    if bench.stalled:
+        print_message(f"{state.reason}")
+    return not (state.recording or bench.stalled)

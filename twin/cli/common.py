@@ -11,6 +11,7 @@ import signal
 import socket
 import sys
 import threading
+import time
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
@@ -62,6 +63,14 @@ def _plain(value: Any) -> Any:
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
+def keep_viewer(stop_requested: Callable[[], bool]) -> None:
+    """Serve a live view after its run, until Ctrl-C; without a terminal nobody would press it."""
+    if sys.stderr.isatty():
+        print("the run has ended; Ctrl-C closes the viewer", file=sys.stderr, flush=True)
+        while not stop_requested():
+            time.sleep(0.1)
+
+
 HINT_s = 1.0
 """Time after the first signal until a line explains the effect of a second one."""
 
@@ -97,9 +106,14 @@ def interruptible(remark: str = "") -> Iterator[Callable[[], bool]]:
             signal.signal(number, handler)
 
 
-_ENDINGS = [
-    getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP", "SIGBREAK") if hasattr(signal, name)
-]
+def ending_signals(module: Any = signal) -> list[int]:
+    """Return the signals that request the end of a process: Windows has no SIGHUP, others no SIGBREAK."""
+    return [
+        getattr(module, name) for name in ("SIGINT", "SIGTERM", "SIGHUP", "SIGBREAK") if hasattr(module, name)
+    ]
+
+
+_ENDINGS = ending_signals()
 
 
 @contextlib.contextmanager

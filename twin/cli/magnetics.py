@@ -3,20 +3,22 @@
 from __future__ import annotations
 
 import argparse
+import math
 import sys
 from pathlib import Path
 from typing import Any
 
-from spheretwin.cli.common import print_json, report_broken, warn, warn_about_model
+from spheretwin.cli.common import print_json, print_message, report_broken, warn, warn_about_model
 from spheretwin.cli.options import Parser, number, whole
 from spheretwin.models import actuator as actuators
 from spheretwin.models import torque_curve
 from spheretwin.models.actuator import MJCF_PATH, TORQUE_CURVE_PATH
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.base.files import check_writable
-from spheretwin.models.design import curve_check, field_check, torque_map
+from spheretwin.models.design import curve_check, field_check, iron_hoop, rotor_field, torque_map
 from spheretwin.models.design.curve_check import ComputedCurve
 from spheretwin.models.design.workspace import LARGEST_TILT_DEG
+from spheretwin.models.magnetics import SAME, computed_from
 from spheretwin.viz.pages import magnetics
 from spheretwin.viz.pages.markdown import prepare, save_text
 from spheretwin.viz.terminal import runs
@@ -24,6 +26,8 @@ from spheretwin.viz.terminal.progress import tracked
 from spheretwin.viz.terminal.tables import print_checks, terminal_console
 
 CURVE = "torque curve from 0 to 180 degrees, columns phi_deg,torque_Nm_per_A"
+
+MOST_DEGREE = 300  # some gigabytes
 
 MOST_POSES = 10_000  # some four hours
 
@@ -44,6 +48,44 @@ def declare(parser: Parser) -> None:
     curve.add_argument("--out", metavar="FILE.csv", help="write the curve here, not to stdout")
     curve.add_argument("--csv", type=Path, metavar="FILE.csv", help=f"check this {CURVE}")
     curve.set_run(run_curve)
+
+    field = _part(
+        parts,
+        "field",
+        "compute the torque field of any arrangement of magnets",
+        "Compute the torque of one ampere in a coil as a vector function of its direction in the rotor frame"
+        " from the magnets and the coils of the model file, with magpylib.",
+    )
+    field.add_argument("--out", metavar="FILE.csv", help="write the field here, not to stdout")
+    field.add_argument(
+        "--step",
+        type=number("a divisor of 180 from 0.25 to 30", lambda step: 0.25 <= step <= 30 and not 180 % step),
+        default=1.0,
+        metavar="DEG",
+        help="step of the samples, degrees (default: 1)",
+    )
+    field.add_argument(
+        "--degree",
+        type=whole(MOST_DEGREE, first=3),
+        default=rotor_field.DEGREE,
+        metavar="N",
+        help=f"largest degree of the harmonics (default: {rotor_field.DEGREE})",
+    )
+    field.add_argument(
+        "--on-iron",
+        action="store_true",
+        help="put the back of each magnet on an infinite plane of iron, by its mirror image",
+    )
+    field.set_run(run_field)
+
+    hoop = _part(
+        parts,
+        "hoop",
+        "compute the effect of the iron behind the poles by finite elements",
+        "Compare the torque curve of a pole on caps of iron with that of a pole in air, by axisymmetric"
+        " finite elements (scikit-fem).",
+    )
+    hoop.set_run(run_hoop)
 
     check = _part(
         parts,
@@ -103,9 +145,8 @@ def _add_curve(part: Parser) -> None:
     part.add_argument(
         "--csv",
         type=Path,
-        default=TORQUE_CURVE_PATH,
         metavar="FILE.csv",
-        help=f"{CURVE} (default: the shipped one)",
+        help=f"{CURVE}, or a torque field (default: the file of the model file)",
     )
 
 
@@ -157,6 +198,8 @@ def run_curve(options: argparse.Namespace) -> bool:
 
 def _compute(options: argparse.Namespace) -> bool:
     """Compute the curve, check it, write it."""
+    if _is_known(options.mjcf):
+        print_message(f"{options.mjcf} has the poles and coils of {TORQUE_CURVE_PATH}: the curve is the same")
     computed = curve_check.compute(options.mjcf, tracked("torque curve"))
     warn_about_model(options.mjcf)
     warn(computed.warnings)
@@ -180,6 +223,55 @@ def _compute(options: argparse.Namespace) -> bool:
     else:
         _print_text(computed)
     return report_broken("magnetics curve", computed.checks)
+
+
+def run_field(options: argparse.Namespace) -> bool:
+    """Run the part; return True if no bound is broken."""
+    if options.out:
+        check_writable(options.out)
+    computed = rotor_field.compute(
+        options.mjcf, options.step, options.degree, options.on_iron, tracked("field of the magnets")
+    )
+    warn_about_model(options.mjcf)
+    if options.out:
+        save_text(options.out, computed.csv)
+    if options.json:
+        print_json(
+            {
+                "peak_Nm_per_A": computed.field.peak_Nm_per_A,
+                "rows": computed.field.torque_Nm_per_A.size // 3,
+                "upper_degrees": computed.degree_share,
+                "checks": computed.checks,
+            }
+        )
+    elif options.out:
+        print_checks("magnetics field", computed.checks, options.verbose)
+        runs.print_written([options.out])
+    else:
+        print(computed.csv, end="")
+    return report_broken("magnetics field", computed.checks)
+
+
+def run_hoop(options: argparse.Namespace) -> bool:
+    """Run the part; return True."""
+    magnet, coil = actuators.read_magnet_and_coil(options.mjcf)
+    angles = tracked("caps of iron")(range(len(iron_hoop.HALF_ANGLES_DEG)))
+    effects = [iron_hoop.effect(magnet, coil, iron_hoop.HALF_ANGLES_DEG[i]) for i in angles]
+    warn_about_model(options.mjcf)
+    if options.json:
+        print_json({"effects": [effect._asdict() for effect in effects]})
+    else:
+        runs.print_rows(*magnetics.hoop_table(effects), 1)
+    return True
+
+
+def _is_known(mjcf: Path) -> bool:
+    """True if nothing that the shipped curve depends on differs in a model."""
+    known = dict(torque_curve.read(TORQUE_CURVE_PATH).computed_for or {})
+    numbers = computed_from(*actuators.read_magnet_and_coil(mjcf))
+    return known.keys() == numbers.keys() and all(
+        math.isclose(known[name], number, rel_tol=SAME) for name, number in numbers.items()
+    )
 
 
 def _print_text(computed: ComputedCurve) -> None:

@@ -69,7 +69,7 @@ class Parser(argparse.ArgumentParser):
                 nargs="?",
                 const="",
                 metavar="SECTION",
-                help="show this help, or the fields of a section, or of all",
+                help="show this help, or the fields of a section, or all",
             )
 
     def error(self, message: str) -> NoReturn:

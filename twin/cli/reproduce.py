@@ -6,7 +6,7 @@ import argparse
 import time
 from collections.abc import Sequence
 
-from spheretwin.cli.common import print_json, print_message
+from spheretwin.cli.common import print_json, print_message, report_broken
 from spheretwin.cli.options import Parser, whole
 from spheretwin.models.base.errors import InputError, did_you_mean, shown
 from spheretwin.models.base.mujoco_library import timers_stopped
@@ -17,20 +17,25 @@ from spheretwin.paper.runner import make_plan, run_with_cache, summarise, unexpe
 from spheretwin.plant.plant_tick import ENGINES
 from spheretwin.viz.pages.markdown import prepare
 from spheretwin.viz.terminal import runs as tables
-from spheretwin.viz.terminal.progress import runs
+from spheretwin.viz.terminal.progress import runs, tracked
+from spheretwin.viz.terminal.tables import print_checks
 from spheretwin.viz.terminal.texts import Verdict, print_verdicts
 
 SEEDS, MOST = 20, 1000
 ALL = "all"
+TWIN = "twin"
 
 
 def declare(parser: Parser) -> None:
     """Declare the arguments of the verb."""
     parser.description = (
         "Run the paper's experiments over several seeds: a verdict for each, tables, figures, one page."
-        " Exit code 1 if a run ended unexpectedly."
+        f" {TWIN} runs the workflow of a digital twin on a hidden machine, from design to watch. Exit code 1"
+        " if a run ended unexpectedly or a check failed."
     )
-    parser.add_argument("names", metavar="NAME", nargs="+", help=f"{', '.join(EXPERIMENTS)}, or {ALL}")
+    parser.add_argument(
+        "names", metavar="NAME", nargs="+", help=f"{', '.join(EXPERIMENTS)}, or {ALL}; or {TWIN} alone"
+    )
     parser.add_argument("--out", help="write a page with figures into this folder")
     parser.add_argument("--figure-format")
     parser.add_argument("--json", help="print the rows as JSON, alone on stdout")
@@ -38,7 +43,6 @@ def declare(parser: Parser) -> None:
     parser.add_argument(
         "--seeds",
         type=whole(MOST),
-        default=SEEDS,
         metavar="N",
         help=f"runs of each case, {SEEDS} unless given",
     )
@@ -56,6 +60,9 @@ def declare(parser: Parser) -> None:
 
 def run(options: argparse.Namespace) -> bool:
     """Run the verb; return True if every run ended as expected."""
+    if TWIN in options.names:
+        return _twin(options)
+    options.seeds = options.seeds or SEEDS
     plans = [
         make_plan(EXPERIMENTS[name], options.seeds, options.limit, options.plant)
         for name in _named(options.names)
@@ -93,6 +100,35 @@ def run(options: argparse.Namespace) -> bool:
     return not bad
 
 
+def _twin(options: argparse.Namespace) -> bool:
+    """Run the workflow of a digital twin; return True if every check holds."""
+    given = [f"--{name}" for name in ("seeds", "limit", "plant") if getattr(options, name)]
+    if options.names != [TWIN] or given:
+        received = " ".join([*options.names, *given])
+        raise InputError(
+            f"reproduce: expected {TWIN} alone, without --seeds, --limit and --plant, received {received}"
+        )
+    from spheretwin.machine import workflow_page  # SciPy's optimiser is slow to import
+    from spheretwin.machine.workflow import run_workflow
+    from spheretwin.machine.workflow_checks import checks_of
+
+    if options.out:
+        prepare(options.out)
+    started = time.perf_counter()
+    result = run_workflow(track=tracked("design"))
+    wall_s = time.perf_counter() - started
+    checks = checks_of(result)
+    command = f"spheretwin reproduce {TWIN}"
+    written = workflow_page.write(options.out, result, command, options.figure_format) if options.out else []
+    if options.json:
+        figures = workflow_page.figures(result)
+        print_json({"checks": checks, **figures, "wall_s": wall_s, "versions": versions()})
+    else:
+        print_checks(f"reproduce {TWIN}, {wall_s:.1f} s", checks, options.verbose)
+        tables.print_written(written)
+    return report_broken(f"reproduce {TWIN}", checks)
+
+
 def _named(names: Sequence[str]) -> list[str]:
     """Return the requested experiments, each once, in the order of the list.
 
@@ -103,7 +139,7 @@ def _named(names: Sequence[str]) -> list[str]:
     """
     for name in names:
         if name != ALL and name not in EXPERIMENTS:
-            valid = [*EXPERIMENTS, ALL]
+            valid = [*EXPERIMENTS, ALL, TWIN]
             raise InputError(
                 f"reproduce: expected {', '.join(valid)}, received {shown(name)}{did_you_mean(name, valid)}"
             )

@@ -41,7 +41,10 @@ def declare(parser: Parser) -> None:
         f" {', '.join(tolerances.shipped())}",
     )
     parser.add_argument(
-        "--export", type=Path, metavar="FILE", help="write the columns of the run as .csv or .parquet"
+        "--export",
+        type=Path,
+        metavar="FILE",
+        help="write the columns of the run as .csv, .parquet or .mcap, one for each number",
     )
     parser.add_argument(
         "--merge",

@@ -5,7 +5,6 @@ from __future__ import annotations
 import argparse
 import contextlib
 import sys
-import time
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -14,10 +13,12 @@ import numpy as np
 
 from spheretwin import outputs, replay
 from spheretwin import scenario as scenarios
-from spheretwin.cli.common import interruptible, print_json, print_message, warn
+from spheretwin.cli.common import interruptible, keep_viewer, print_json, print_message, warn
 from spheretwin.cli.options import Parser, number
 from spheretwin.loop import is_user_law
-from spheretwin.metrics import BAND_rad, PlannedRun
+from spheretwin.machine import export
+from spheretwin.machine.twin_file import read_twin
+from spheretwin.metrics import BAND_rad
 from spheretwin.models.base.errors import InputError, LawError, SpheretwinError
 from spheretwin.models.base.mujoco_library import timers_stopped
 from spheretwin.models.telemetry.checksums import NO_CHECKSUMS, has_checksums
@@ -26,6 +27,7 @@ from spheretwin.models.telemetry.signals import ANGLES
 from spheretwin.models.telemetry.status import Status
 from spheretwin.models.telemetry.table import TelemetryBuffer
 from spheretwin.outputs import Outputs
+from spheretwin.reduction import PlannedRun
 from spheretwin.replay import RunPlan
 from spheretwin.run import Figures, Run, UserMetric, load_metrics, own_values, summary
 from spheretwin.scenario import reading
@@ -47,7 +49,7 @@ def declare(parser: Parser) -> None:
         "--record-rate",
         type=number("a number of Hz above 0", lambda rate_Hz: rate_Hz > 0),
         metavar="HZ",
-        help="rows per second of the recording; every row unless given",
+        help="rows per second of the recording; default: all",
     )
     parser.add_argument("--telemetry", type=Path, metavar="FILE.parquet", help="write the telemetry")
     parser.add_argument("--live", action="store_true", help="run in real time, with a viewer on 127.0.0.1")
@@ -55,7 +57,7 @@ def declare(parser: Parser) -> None:
         "--live-window",
         type=number("a number of s above 0", lambda window_s: window_s > 0),
         metavar="S",
-        help=f"time that the plots of the live view show; the last {LIVE_WINDOW_S:g} s unless given",
+        help=f"time that the live plots show; default: {LIVE_WINDOW_S:g} s",
     )
     parser.add_argument(
         "--view",
@@ -66,12 +68,25 @@ def declare(parser: Parser) -> None:
     parser.add_argument(
         "--replay", type=Path, metavar="RUN.parquet", help="replay the run of a telemetry file"
     )
+    parser.add_argument("--twin", type=Path, metavar="TWIN.toml", help="use the fields of an identified twin")
+    parser.add_argument(
+        "--export-log",
+        type=Path,
+        metavar="FILE",
+        help="write what a laboratory would record (.parquet)",
+    )
+    parser.add_argument(
+        "--export-truth",
+        type=Path,
+        metavar="FILE",
+        help="write true parameters (.json) and states (.parquet)",
+    )
     parser.add_argument(
         "--metric",
         action="append",
         default=[],
         metavar="FILE.py:NAME",
-        help="own metric: a function of the run (`spheretwin.run.Run`); repeatable",
+        help="own metric: a function of the run; repeatable",
     )
     parser.add_argument("--json", help="print the figures as JSON, alone on stdout")
     parser.set_run(run, has_fields=True)
@@ -92,7 +107,8 @@ def run(options: argparse.Namespace) -> bool:
             f"command line: expected --live-window with --live, received {options.live_window:g} alone"
         )
     own = load_metrics(options.metric)
-    outputs.check([path for path in (options.record, options.telemetry) if path])
+    exported = export.check_paths(options.export_log, options.export_truth)
+    outputs.check([*filter(None, [options.record, options.telemetry]), *exported])
     outputs.check_rate(options.record_rate, options.record, plan.scenario.controller.period_s)
     with interruptible() as stop_requested, Session(plan.scenario) as session:
         figures = Figures(PlannedRun(session.initial_scenario, session.actuator, plan.ticks))
@@ -110,12 +126,13 @@ def run(options: argparse.Namespace) -> bool:
             plan.first_tick,
             options.live_window or LIVE_WINDOW_S,
         )
+        log_files = export.Export(session, options.export_log, options.export_truth)
         try:
             with progress, timers_stopped(), _code_of_the_user(session, options.json):
                 status = follow(
                     session,
                     plan.ticks,
-                    [*sinks, *files.sinks],
+                    [*sinks, *files.sinks, *log_files.sinks],
                     journal=plan.journal,
                     live=options.live,
                     stop_requested=stop_requested,
@@ -129,13 +146,11 @@ def run(options: argparse.Namespace) -> bool:
                 _print_results(session, plan, status, run_summary, tuple(values), faults)
             if status != Status.COMPLETED:
                 print_message(_ending(session, plan, status))
-            if options.live and sys.stderr.isatty():
-                print("the run has ended; Ctrl-C closes the viewer", file=sys.stderr, flush=True)
-                while not stop_requested():
-                    time.sleep(0.1)
+            if options.live:
+                keep_viewer(stop_requested)
         finally:
-            file_errors = files.close()
-            _report_files(files, file_errors, options.json)
+            file_errors = [*files.close(), *log_files.close()]
+            _report_files(files, log_files, file_errors, options.json)
     return status == Status.COMPLETED and not file_errors and not own_faults
 
 
@@ -161,15 +176,18 @@ def _own_values(
 
 def _is_bare(options: argparse.Namespace, rest: Sequence[str]) -> bool:
     """True if no argument was given."""
-    chosen = (options.record, options.telemetry, options.replay, options.metric, options.live, options.json)
+    chosen = (
+        options.record, options.telemetry, options.replay, options.metric, options.live, options.json,
+        options.export_log, options.export_truth,
+    )  # fmt: skip
     return options.scenario is None and not any(chosen) and not rest
 
 
 def _planned(options: argparse.Namespace, rest: Sequence[str]) -> RunPlan:
     """Return the run plan, from a scenario and flags or from the file of a run."""
     if options.replay:
-        if options.scenario or rest:
-            received = " ".join([*filter(None, [options.scenario]), *rest])
+        if options.scenario or rest or options.twin:
+            received = " ".join([*filter(None, [options.scenario, options.twin and "--twin"]), *rest])
             raise InputError(
                 f"command line: expected --replay without scenario and fields, received {received}"
             )
@@ -179,7 +197,8 @@ def _planned(options: argparse.Namespace, rest: Sequence[str]) -> RunPlan:
         return plan
     if options.scenario is None:
         raise InputError(f"command line: expected a scenario ({', '.join(shipped())}), received none")
-    scenario = scenarios.load(options.scenario, reading.overrides(rest))
+    twin = read_twin(options.twin) if options.twin else {}
+    scenario = scenarios.load(options.scenario, {**twin, **reading.overrides(rest)})
     return RunPlan(scenario, scenario.ticks, ())
 
 
@@ -207,10 +226,13 @@ def _planned_s(plan: RunPlan) -> float:
     return plan.ticks * plan.scenario.controller.period_s
 
 
-def _report_files(files: Outputs, errors: Sequence[SpheretwinError], as_json: bool) -> None:
+def _report_files(
+    files: Outputs, log_files: export.Export, errors: Sequence[SpheretwinError], as_json: bool
+) -> None:
     """Print the paths of the complete files and the errors of the others."""
     if not as_json:
         runs.print_files(files.record, files.telemetry)
+        runs.print_written(log_files.written)
     for error in errors:
         print_message(str(error))
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import contextlib
+import json
 import math
 import shlex
 import sys
@@ -14,6 +15,7 @@ from typing import Any
 from spheretwin.cli.common import interruptible, print_json, print_message
 from spheretwin.cli.options import Parser, whole
 from spheretwin.models.base.errors import InputError
+from spheretwin.models.base.extras import install_command
 from spheretwin.models.base.mujoco_library import timers_stopped
 from spheretwin.models.telemetry.run_record import versions
 from spheretwin.models.telemetry.status import Status
@@ -78,14 +80,31 @@ def declare(parser: Parser) -> None:
         help="tune the gains that the section [optimise] of the study names",
     )
     parser.add_argument("--trials", type=whole(), metavar="N", help="trials of each law, with --optimise")
+    parser.add_argument(
+        "--twin",
+        type=Path,
+        metavar="TWIN.toml",
+        help="run each row on machines drawn from the covariance of an identified twin",
+    )
+    parser.add_argument(
+        "--draws", type=whole(100_000), metavar="N", help="machines of --twin; 100 unless given"
+    )
     parser.add_argument("--figure-format")
     parser.add_argument("--json", help="print the result as JSON, alone on stdout")
     parser.set_run(run)
 
 
+DRAWS = 100
+"""Machines of a twin unless their number is given."""
+
+
 def run(options: argparse.Namespace) -> bool:
     """Run the verb; return True if all requested rows are finished and none has failed."""
     study = load(options.study)
+    if options.twin:
+        study = _over_twin(study, options.twin, options.draws or DRAWS)
+    elif options.draws:
+        raise InputError("command line: expected --draws with --twin, received it alone")
     if options.optimise:
         return _optimised(study, options)
     if options.trials:
@@ -110,7 +129,9 @@ def run(options: argparse.Namespace) -> bool:
     if options.json:
         print_json({**_outcome_json(outcome), "summary": printed, "versions": versions()})
     else:
-        runs.print_rows(f"{study.name}: {outcome.rows} of {outcome.of} rows", *report.medians(printed), 1)
+        limited = "" if outcome.of == outcome.study_rows else f", the first of {outcome.study_rows}"
+        title = f"{study.name}: {outcome.rows} of {outcome.of} rows{limited}"
+        runs.print_rows(title, *report.medians(printed), 1)
         if outcome.startup_s is not None:
             print(f"took   {outcome.wall_s:.1f} s, {outcome.startup_s:.1f} s of it to start")
         print(f"table  {outcome.table}")
@@ -144,6 +165,34 @@ def _tracked(name: str, what: str) -> Iterator[dict[str, Callable[..., Any]]]:
         yield {"done": done, "stop_requested": stop_requested}
 
 
+def _over_twin(study: Study, twin: Path, draws: int) -> Study:
+    """Return a study with the fields of a twin, and an axis of machines that its logs allow.
+
+    Raises
+    ------
+    InputError
+        The twin cannot be used, or the study has another axis over one of its parameters.
+    """
+    from spheretwin.machine.twin_file import draw_fields, read_twin
+
+    drawn = draw_fields(twin, draws, study.seed)
+    if taken := sorted({axis.field for axis in study.axis if axis.field.rstrip(".0123456789") in drawn}):
+        raise InputError(
+            f"study {study.name}: expected no axis over a parameter of the twin, received {', '.join(taken)}"
+        )
+    fields = {**study.fields, **read_twin(twin)}
+    axes = [
+        {"kind": "values", "field": name, "values": values, "zip": "twin" if len(drawn) > 1 else None}
+        for name, values in drawn.items()
+    ]
+    content = study.model_dump(mode="json") | {
+        "fields": {name: value for name, value in fields.items() if name not in drawn},
+        "axis": [*(axis.model_dump(mode="json") for axis in study.axis), *axes],
+    }
+    combined = Study.model_validate_json(json.dumps(content))
+    return combined.model_copy(update={"folder": study.folder, "optimise": study.optimise})
+
+
 def _is_complete(done: int, of: int, what: str) -> bool:
     """Return True if all were finished; otherwise print how to continue."""
     if done < of:
@@ -171,7 +220,7 @@ def _optimised(study: Study, options: argparse.Namespace) -> bool:
     command = f"spheretwin sweep {shlex.quote(options.study)} --optimise{trials}"
     written = tuning_page.write(folder, study, outcome, command, options.figure_format)
     if not report.can_be_drawn():
-        print_message("sweep: no figures without the extra `spheretwin[plots]`")
+        print_message(f"sweep: no figures were drawn: {install_command('plots')} installs what they need")
     printed = tuning_page.summary(outcome, objectives)
     if options.json:
         print_json({**printed, "versions": versions()})
@@ -212,7 +261,7 @@ def _report(
         of = outcome.of, outcome.study_rows
         folder, source, kind = outcome.table.parent, options.study, options.figure_format
         return report.write(folder, rows, printed, of, source, kind)
-    print_message("sweep: no report was written: it needs the extra `spheretwin[plots]`")
+    print_message(f"sweep: no report was written: {install_command('plots')} installs what it needs")
     return []
 
 

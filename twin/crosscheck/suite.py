@@ -6,7 +6,15 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import NamedTuple, Protocol, TypeVar
 
-from spheretwin.crosscheck import coil_driven, dynamics, friction, identities, stiction, trajectories
+from spheretwin.crosscheck import (
+    coil_driven,
+    dynamics,
+    end_stops,
+    friction,
+    identities,
+    stiction,
+    trajectories,
+)
 from spheretwin.crosscheck.friction import HingeFriction, VISCOUS_Nm_s
 from spheretwin.crosscheck.hinge import PUSH, Bearing, START_rad_s
 from spheretwin.models import actuator as actuators
@@ -55,6 +63,7 @@ PARTS = (
     Part("torque-free rotor", lambda on: identities.check_free_rotor(on.mjcf, on.actuator)),
     Part("friction", lambda on: friction.compare(on.mjcf, on.actuator)),
     Part("static friction", lambda on: stiction.compare(on.mjcf, on.actuator)),
+    Part("end stops", lambda on: end_stops.compare(on.mjcf, on.actuator)),
     Part("coil-driven motion", lambda on: coil_driven.compare(on.mjcf, on.actuator)),
     Part("closed loop", lambda on: trajectories.compare_closed_loop(on.mjcf)),
 )

@@ -12,12 +12,13 @@ from __future__ import annotations
 
 from functools import cache
 from hashlib import blake2b
+from math import sqrt
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from spheretwin.models.base.compiled import allocation_free
+from spheretwin.models.base.compiled import allocation_free, high_product, inlined, rounding_each
 
 # Of SeedSequence: multipliers and starts of its hashes, on words of 32 bits.
 _WORD = np.uint64(0xFFFFFFFF)
@@ -159,12 +160,7 @@ def _fill_words(pool: NDArray[np.uint64], words: NDArray[np.uint64]) -> None:
 @allocation_free
 def _next(high: np.uint64, low: np.uint64, odd_high: np.uint64, odd_low: np.uint64) -> tuple:
     """Return the next state, in halves of 64 bits: times the factor, plus the odd number of the stream."""
-    # The high half of the product of the low ones, from products of their halves.
-    a, b = low >> _HALF, low & _WORD
-    c, d = _FACTOR_LOW >> _HALF, _FACTOR_LOW & _WORD
-    middle = a * d + (b * d >> _HALF)
-    carried = (middle & _WORD) + b * c
-    over = a * c + (middle >> _HALF) + (carried >> _HALF)
+    over = high_product(low, _FACTOR_LOW)
     return _sum(over + high * _FACTOR_LOW + low * _FACTOR_HIGH, low * _FACTOR_LOW, odd_high, odd_low)
 
 
@@ -177,6 +173,11 @@ def _sum(high: np.uint64, low: np.uint64, other_high: np.uint64, other_low: np.u
 # The generator counts in blocks of four numbers; a tick takes one block.
 NUMBERS_PER_COUNT = 4
 
+# Of Philox: factors of the rounds, and steps of the keys.
+_PHILOX_A, _PHILOX_C = np.uint64(0xD2E7470EE14C6C93), np.uint64(0xCA5A826395121157)
+_STEP_0, _STEP_1 = np.uint64(0x9E3779B97F4A7C15), np.uint64(0xBB67AE8584CAA73B)
+_ROUNDS, _ZERO = 10, np.uint64(0)
+
 
 Streams = tuple[tuple[str, int], ...]
 """Names of random streams and their widths in numbers per tick."""
@@ -188,18 +189,13 @@ def width_of(streams: Streams) -> int:
 
 
 def noise_table(seed: int, first: int, ticks: int, streams: Streams) -> NDArray[np.float64]:
-    """Return the numbers of some streams, (ticks, width), one stream next to the other."""
-    rows = [noise_rows(seed, first, ticks, width, name) for name, width in streams]
-    return np.ascontiguousarray(np.concatenate([np.empty((ticks, 0)), *rows], axis=1))
+    """Return standard normal numbers at consecutive control ticks, one stream next to the other.
 
-
-def noise_rows(seed: int, first: int, ticks: int, width: int, name: str) -> NDArray[np.float64]:
-    """Return standard normal numbers at consecutive control ticks.
-
-    Every four columns have a stream ``SeedSequence([seed, stream_key(name), block])``, counted by tick:
-    each number depends only on seed, name, tick and column. Neither blocks of ticks nor further columns
-    change a bit, and there is no state. The Box-Muller transform maps four uniform numbers to four normal
-    ones. The usual ziggurat method consumes a varying count of numbers and cannot be indexed by tick.
+    Every four columns of a stream are a ``np.random.Philox(SeedSequence([seed, stream_key(name), block]))``,
+    counted by tick: each number depends only on seed, name, tick and column. Neither blocks of ticks nor
+    further columns change a bit, and there is no state. The Box-Muller transform maps four uniform numbers
+    to four normal ones. The usual ziggurat method consumes a varying count of numbers and cannot be indexed
+    by tick.
 
     Parameters
     ----------
@@ -209,26 +205,80 @@ def noise_rows(seed: int, first: int, ticks: int, width: int, name: str) -> NDAr
         First tick.
     ticks : int
         Number of ticks.
-    width : int
-        Numbers per tick.
-    name : str
-        Name of the stream.
+    streams : tuple of (str, int)
+        Names and widths, numbers per tick.
 
     Returns
     -------
-    (ticks, width) array
+    (ticks, total width) array
         At most 8.6 in magnitude: the uniform numbers are multiples of 2⁻⁵³.
     """
-    rows, key = np.empty((ticks, width)), stream_key(name)
-    for block, column in enumerate(range(0, width, NUMBERS_PER_COUNT)):
-        counted = np.random.Philox(np.random.SeedSequence([seed, key, block])).advance(first)
-        uniform = np.random.Generator(counted).random((ticks, NUMBERS_PER_COUNT))
-        rows[:, column : column + NUMBERS_PER_COUNT] = _normal(uniform)[:, : width - column]
+    rows, column = np.empty((ticks, width_of(streams))), 0
+    for name, width in streams:
+        last = column + width
+        entropy = np.array([*_words(seed), *_words(stream_key(name)), 0], dtype=np.uint64)
+        _fill_normal(entropy, first, rows[:, column:last])
+        column = last
     return rows
 
 
-def _normal(uniform: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return independent standard normal numbers (n, 4) from uniform numbers from 0 to below 1."""
-    radius = np.sqrt(-2 * np.log1p(-uniform[:, :2]))
-    angle = 2 * np.pi * uniform[:, 2:]
-    return np.concatenate([radius * np.cos(angle), radius * np.sin(angle)], axis=1)
+def _fill_normal(entropy: NDArray[np.uint64], first: int, rows: NDArray[np.float64]) -> None:
+    """Fill the rows of one stream; `entropy` ends with the number of the block, which is overwritten.
+
+    The functions are those of NumPy: compiled ones of another library round differently.
+    """
+    ticks, width = rows.shape
+    pairs, with_sine = 2 * -(-width // NUMBERS_PER_COUNT), 2 * ((width + 1) // NUMBERS_PER_COUNT)
+    uniform, angle = np.empty((2, pairs, ticks))
+    with np.errstate(over="ignore"):  # uncompiled: the overflow of products is intended
+        _fill_pairs(entropy, np.empty((2, _POOL), np.uint64), np.uint64(first), uniform, angle)
+    logarithm, sine = np.log1p(uniform, out=uniform), np.sin(angle[:with_sine])
+    _transform(logarithm, np.cos(angle, out=angle), sine, rows)
+
+
+@rounding_each
+def _fill_pairs(
+    entropy: NDArray[np.uint64],
+    scratch: NDArray[np.uint64],
+    first: np.uint64,
+    uniform: NDArray[np.float64],
+    angle: NDArray[np.float64],
+) -> None:
+    """Fill ``-u`` and ``2 pi v`` (pairs, ticks) with the uniform numbers of two pairs of each block."""
+    pool, words = scratch[0], scratch[1]
+    for block in range(uniform.shape[0] // 2):
+        entropy[entropy.shape[0] - 1] = block
+        _fill_pool(entropy, pool)
+        _fill_words(pool, words)
+        key_0, key_1 = words[0] | words[1] << _HALF, words[2] | words[3] << _HALF
+        for tick in range(uniform.shape[1]):
+            a, b, c, d = _philox(first + np.uint64(tick) + _ONE, key_0, key_1)
+            uniform[2 * block, tick] = -(np.float64(a >> _UNUSED) * NUMBER)
+            uniform[2 * block + 1, tick] = -(np.float64(b >> _UNUSED) * NUMBER)
+            angle[2 * block, tick] = 2 * np.pi * (np.float64(c >> _UNUSED) * NUMBER)
+            angle[2 * block + 1, tick] = 2 * np.pi * (np.float64(d >> _UNUSED) * NUMBER)
+
+
+@rounding_each
+def _transform(
+    logarithm: NDArray[np.float64], cosine: NDArray[np.float64], sine: NDArray[np.float64], rows: NDArray
+) -> None:
+    """Fill rows with the normal numbers of all pairs: cosines of a block first, then its sines."""
+    for tick in range(rows.shape[0]):
+        for column in range(rows.shape[1]):
+            block, place = column // NUMBERS_PER_COUNT, column % NUMBERS_PER_COUNT
+            pair = 2 * block + place % 2
+            turn = cosine[pair, tick] if place < 2 else sine[pair, tick]
+            rows[tick, column] = sqrt(-2.0 * logarithm[pair, tick]) * turn
+
+
+@inlined
+def _philox(count: np.uint64, key_0: np.uint64, key_1: np.uint64) -> tuple:
+    """Return the four numbers of a count below 2⁶⁴: Philox 4x64 of ten rounds."""
+    a, b, c, d = count, _ZERO, _ZERO, _ZERO
+    for _ in range(_ROUNDS):
+        high_a, low_a = high_product(_PHILOX_A, a), _PHILOX_A * a
+        high_c, low_c = high_product(_PHILOX_C, c), _PHILOX_C * c
+        a, b, c, d = high_c ^ b ^ key_0, low_c, high_a ^ d ^ key_1, low_a
+        key_0, key_1 = key_0 + _STEP_0, key_1 + _STEP_1
+    return a, b, c, d

@@ -3,19 +3,19 @@
 >>> import gymnasium
 >>> import spheretwin.envs
 >>> envs = gymnasium.make_vec("spheretwin/Track-v0", num_envs=64)
+>>> envs.reset(seed=0)[0].shape[0]
+64
 """
 
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from spheretwin.models.base.errors import InputError
+from spheretwin.models.base.extras import missing
 
 try:
     import gymnasium
 except ModuleNotFoundError:
-    raise InputError(
-        "environments: expected gymnasium, which the extra rl installs: pip install 'spheretwin[rl]'"
-    ) from None
+    raise missing("environments", "gymnasium", "rl") from None
 
 from spheretwin.envs.settings import TASKS
 

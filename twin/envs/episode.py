@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from spheretwin.electronics.coil import CurrentLag, advance_lag
 from spheretwin.models.base.compiled import allocation_free
-from spheretwin.plant.lanes import HELD, LANES, QDOT, LaneField, Q, advance, advance_without_field
+from spheretwin.plant.lanes import HELD, LANES, QDOT, LaneField, Q, advance
+from spheretwin.plant.plant_tick import FASTEST_RATE_rad_s
 
 Array = NDArray[np.float64]
 
@@ -50,7 +51,6 @@ class Episodes(NamedTuple):
     constant: Array  # (v, 3) N·m, subtracted as a disturbance is
     hinge_range: Array  # (3, 2) rad
     weights: Array  # (4,) of the terms of the reward
-    bounds: Array  # (15,) of the observation
     current: Array  # (n, groups) A
     mean_current: Array  # (n, groups) A, over a physics step
     lag: CurrentLag
@@ -103,17 +103,18 @@ def advance_episodes(
         variant, tick = episodes.variant[i], min(episodes.tick[i], episodes.disturbance.shape[1] - 1)
         block, lane = blocks[i // LANES], i % LANES
         for k in range(3):
-            held = -episodes.disturbance[variant, tick, k] - episodes.constant[variant, k]
+            torque_Nm = -episodes.disturbance[variant, tick, k] - episodes.constant[variant, k]
             if not physics.by_current:
-                held += min(max(actions[i, k], -limit), limit)
-            block[HELD + k * LANES + lane] = held
+                torque_Nm += min(max(actions[i, k], -limit), limit)
+            block[HELD + k * LANES + lane] = torque_Nm
     if physics.by_current:
         for _ in range(physics.substeps):
             for i in range(n):
                 advance_lag(episodes.lag, actions[i], episodes.current[i], episodes.mean_current[i])
             advance(blocks, field, episodes.mean_current, physics.step_s, 1, physics.slows)
     else:
-        advance_without_field(blocks, physics.step_s, physics.substeps, physics.slows)
+        no_currents = episodes.mean_current[:0]
+        advance(blocks, field, no_currents, physics.step_s, physics.substeps, physics.slows)
     ended = 0
     for i in range(n):
         block, lane = blocks[i // LANES], i % LANES
@@ -140,7 +141,7 @@ def observe(block: Array, lane: int, i: int, episodes: Episodes, row: NDArray[np
         row[k], row[3 + k] = q - reference[0, k], qdot - reference[1, k]
         row[6 + k], row[9 + k], row[12 + k] = q, qdot, reference[2, k]
     for place in range(15):
-        bound = episodes.bounds[place]
+        bound = BOUNDS[place]
         row[place] = min(max(row[place], -bound), bound) if row[place] == row[place] else 0.0
 
 
@@ -148,7 +149,9 @@ def observe(block: Array, lane: int, i: int, episodes: Episodes, row: NDArray[np
 def _judge(block: Array, lane: int, i: int, episodes: Episodes) -> int:
     """Return how episode i goes on after its control period."""
     for k in range(3):
-        if not (isfinite(block[Q + k * LANES + lane]) and abs(block[QDOT + k * LANES + lane]) < 1e6):
+        if not (
+            isfinite(block[Q + k * LANES + lane]) and abs(block[QDOT + k * LANES + lane]) < FASTEST_RATE_rad_s
+        ):
             return DIVERGED
     for k in range(3):
         q = block[Q + k * LANES + lane]
@@ -163,7 +166,7 @@ def _reward(
 ) -> None:
     """Write the terms of the reward, and add to the figures of the episode."""
     weights, code = episodes.weights, episodes.code[i]
-    if code == DIVERGED or code == LEFT_WORKSPACE:  # noqa: SIM109 (no tuple in compiled code)
+    if code not in (RUNNING, COMPLETED):
         terms[3] = -weights[3]
     if code == DIVERGED:
         return

@@ -48,7 +48,7 @@ class Settings(BaseModel):
         (), description="fields that differ from episode to episode, and their distributions"
     )
     variants: Annotated[int, Field(ge=1, le=100_000)] = Field(
-        64, description="different episodes, drawn at the start; without axes and seeds there is one"
+        64, description="different episodes, drawn at the start; each has a seed of its own, unless it is set"
     )
     variants_seed: Annotated[int, Field(ge=0)] = Field(0, description="seed of these")
     reward: Reward = Reward()

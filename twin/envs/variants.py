@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -48,7 +49,6 @@ def build_variants(settings: Settings) -> Variants:
     """
     generator = np.random.default_rng(settings.variants_seed)
     first = _load(settings, {})
-    # Without an axis only what the seed draws can differ.
     count = settings.variants
     values = {axis.field: axis.quantile(generator.uniform(2**-53, 1, count)) for axis in settings.axes}
     seeds = generator.integers(0, 2**31, count)
@@ -79,14 +79,18 @@ def _load(settings: Settings, drawn: dict[str, Any]) -> Scenario:
     # The physics step of a scenario makes whole control periods; that of the environment is checked there.
     fixed = {"duration": settings.episode_s, "plant.engine": "lagrangian", "plant.step_s": settings.step_s}
     scenario = scenarios.load(settings.scenario, {**settings.changes, **fixed, **drawn})
-    ideal = scenarios.load("hold")
     for section in _IDEAL:
-        if getattr(scenario, section) != getattr(ideal, section):
+        if getattr(scenario, section) != getattr(_ideal(), section):
             raise InputError(
                 f"environment: expected ideal sensors and amplifiers, and no faults or events, received"
                 f" another {section} in scenario {scenario.name}"
             )
     return scenario
+
+
+@cache
+def _ideal() -> Scenario:
+    return scenarios.load("hold")
 
 
 def _ideal_joint(one: Parameters) -> Parameters:

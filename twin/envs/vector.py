@@ -95,7 +95,6 @@ class TwinVectorEnv(VectorEnv[Any, Any, Any]):
             constant=np.array([one.constant_torque_Nm for one in variants.parameters]),
             hinge_range=variants.hinge_range,
             weights=np.array([weights.tracking, weights.rate, weights.effort, weights.failure]),
-            bounds=BOUNDS,
             current=np.zeros((num_envs, groups)),
             mean_current=np.zeros((num_envs, groups)),
             lag=variants.lag,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib.util
 import json
 from collections.abc import Callable, Mapping
 from functools import cache
@@ -10,6 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from spheretwin.casadi import nmpc_file
 from spheretwin.control.laws.afsm_eso import PRESETS
 from spheretwin.models import actuator
 from spheretwin.models.telemetry.status import Status
@@ -192,6 +194,10 @@ FULL_CURRENT: dict[str, Any] = {
 ALLOCATIONS = ("least_norm", "bounded")
 
 
+# Without its package no case is run, and the page has no section of it.
+PREDICTIVE = ELECTRONICS.conditions if importlib.util.find_spec("casadi") else ()
+
+
 def cases() -> list[Case]:
     """Cases of every tuned law under every condition, then of presets and of the full current."""
     return [
@@ -203,7 +209,7 @@ def cases() -> list[Case]:
             *(preset_case(hardware, condition, preset) for preset in hardware.presets),
             *(limit_case(condition, allocation) for allocation in _allocations(hardware, condition)),
         )
-    ]
+    ] + [predictive_case(condition) for condition in PREDICTIVE]
 
 
 def tuned_case(hardware: Hardware, condition: Condition, gains: TunedGains) -> Case:
@@ -223,6 +229,12 @@ def limit_case(condition: Condition, allocation: str) -> Case:
     """Case with the full current at the start of the sinusoid."""
     fields = {**FULL_CURRENT, "allocation": allocation}
     return _case(IDEAL, condition, f"full current, {allocation}", fields, {"limit": allocation})
+
+
+def predictive_case(condition: Condition) -> Case:
+    """Case of predictive control under a condition of the tilt; one run, as it takes half a minute."""
+    case = _case(ELECTRONICS, condition, "predictive control", {"controller.law": nmpc_file()}, {})
+    return case._replace(single_run=True, comparable=False)
 
 
 def _allocations(hardware: Hardware, condition: Condition) -> tuple[str, ...]:

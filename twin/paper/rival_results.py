@@ -14,6 +14,7 @@ from spheretwin.paper.page import ERRORS, NONE, figures_named
 from spheretwin.paper.rival_conditions import (
     ALLOCATIONS,
     COMPLETE,
+    ELECTRONICS,
     HARDWARE,
     Condition,
     Hardware,
@@ -47,8 +48,10 @@ class Result(NamedTuple):
         return not np.isfinite(self.largest_rad)
 
 
-def results(hardware: Hardware, condition: Condition, outcomes: Outcomes) -> list[Result]:
-    """Results under a condition: tuned laws by limit, then presets."""
+def results(
+    hardware: Hardware, condition: Condition, outcomes: Outcomes, seeds: int | None = None
+) -> list[Result]:
+    """Results under a condition: tuned laws by limit, then presets; of the first seeds, or of all."""
     tuned = [
         (
             gains.law,
@@ -70,7 +73,7 @@ def results(hardware: Hardware, condition: Condition, outcomes: Outcomes) -> lis
     return [
         Result(law, label, limit, *_medians(hardware, runs))
         for law, label, limit, case in (*tuned, *shipped)
-        if (runs := outcomes.runs(case))
+        if (runs := outcomes.runs(case)[:seeds])
     ]
 
 
@@ -186,6 +189,37 @@ def complete_prototype(hardware: Hardware, outcomes: Outcomes) -> list[ResultTab
     ]
     head = ("limit, A/s", "law", "median error, degrees", "worst error, degrees", "variation, A/s")
     return [ResultTable(f"{hardware.title} with every imperfection", head, rows, 2)] if every else []
+
+
+def predictive_control(outcomes: Outcomes) -> list[ResultTable]:
+    """Largest error and variation of predictive control, PID and AFSM-ESO on the seeds of the first."""
+    compared = (OUR_LAW, "pid")
+    rows: list[tuple[str, ...]] = []
+    for condition in conditions.PREDICTIVE:
+        own = outcomes.runs(conditions.predictive_case(condition))
+        if not own:
+            continue
+        rows.append((condition.name, "predictive control", *_predictive_cells(_medians(ELECTRONICS, own))))
+        rows += [
+            (condition.name, result.label, *_predictive_cells(result[3:]))
+            for result in _by_limit_and_preset(results(ELECTRONICS, condition, outcomes, len(own)))
+            if result.law in compared
+        ]
+    head = ("condition", "law", "largest error, degrees", "variation, A/s")
+    return [ResultTable("Predictive control of the tilt", head, rows, 2)] if rows else []
+
+
+def _by_limit_and_preset(every: Sequence[Result]) -> list[Result]:
+    """Tuned laws within the largest limit, and the presets as shipped."""
+    limit = max(ELECTRONICS.limits_A_s)
+    return [result for result in every if result.limit_A_s in (limit, None)]
+
+
+def _predictive_cells(figures: Sequence[float]) -> tuple[str, str]:
+    largest_rad, _, variation_A_s, _ = figures
+    if not np.isfinite(largest_rad):
+        return "lost", NONE
+    return f"{np.degrees(largest_rad):.3f}", f"{variation_A_s:.1f}"
 
 
 def _spread(result: Result) -> tuple[str, str, str]:

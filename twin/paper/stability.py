@@ -7,8 +7,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from spheretwin import scenario as scenarios
 from spheretwin.models.telemetry.status import Status
 from spheretwin.models.telemetry.table import Table
+from spheretwin.paper import frequency_response as responses
 from spheretwin.paper.experiment import Case, Experiment, Finding, Outcome, Outcomes, ResultTable, Section
 from spheretwin.paper.laws import COMPARED_LAWS, ComparedLaw
 from spheretwin.paper.lyapunov import Descent, descent
@@ -19,6 +21,9 @@ from spheretwin.viz.pages.markdown import Drawing
 SCENARIO = "sinusoid"
 
 LAWS = tuple(law for law in COMPARED_LAWS if law.law in ("afsm", "pid", "afsm_eso"))
+
+# The laws that are linear at rest; AFSM switches.
+LOOPS = tuple(law for law in LAWS if law.law in ("pid", "afsm_eso"))
 
 LONG_s = 600.0
 LOADS = (1.0, 5.0)
@@ -52,6 +57,7 @@ def cases() -> list[Case]:
         *(reaching(law, load) for law in LAWS for load in LOADS),
         *(drift(law) for law in LAWS),
         *of_margins.values(),
+        *(frequency_response(law) for law in LOOPS),
     ]
 
 
@@ -69,6 +75,17 @@ def margin(law: ComparedLaw, quantity: Margin) -> list[Case]:
     """Cases of a law at every step of a margin."""
     conditions = [_worse(quantity, step) for step in quantity.steps]
     return [_case(law, *condition, EXPECTED)._replace(comparable=False) for condition in conditions]
+
+
+def frequency_response(law: ComparedLaw) -> Case:
+    """Case of the multisine on a rotor at rest."""
+    return Case(
+        name=f"{law.law}: frequency response",
+        scenario="hold",
+        fields={"controller.law": law.law, **responses.fields()},
+        details={"condition": "frequency response"},
+        single_run=True,
+    )
 
 
 def _worse(quantity: Margin, step: float) -> tuple[str, dict[str, Any]]:
@@ -118,11 +135,15 @@ class StabilityMeasures(NamedTuple):
     gains: tuple[float, float] | None
     """Largest ξ̂ and ζ̂ at the end; None for laws without them."""
     descent: Descent | None
+    response: responses.Response | None = None
+    """Measured response of the opened loop; None for runs without the multisine."""
 
 
 def reduce(run: Run) -> StabilityMeasures:
     """Reduce a run."""
     table, period_s = run.telemetry, run.scenario.controller.period_s
+    if run.scenario.name == "hold":
+        return StabilityMeasures(None, None, None, None, None, responses.measured(table, period_s))
     ticks = round(SPAN_s / period_s)
     is_long = run.scenario.duration >= LONG_s and len(table) >= 2 * ticks
     surface = SLOPE * table["error_rad"] + table["qdot_rad_s"] - table["qdot_ref_rad_s"]
@@ -176,6 +197,16 @@ MARGIN = (
 )
 
 
+RESPONSE = (
+    f"A multisine of {len(responses.LINES_Hz)} lines from {responses.LINES_Hz[0]} to"
+    f" {responses.LINES_Hz[-1]} Hz, {1e3 * responses.AMPLITUDE_Nm:g} mN·m each, acts as a disturbance on α of"
+    " a rotor at rest, on ideal hardware without lag. The response of the opened loop is the ratio of the"
+    " torque of the law to the torque that the rotor receives. The linear model has the law, differentiated"
+    " at rest, and the linear plant, sampled at the control period. AFSM is left out: its switching has no"
+    " linear model."
+)
+
+
 def sections(outcomes: Outcomes) -> list[Section]:
     """Descent and reaching, ten minutes, and margins of each law."""
     drawings = [lambda: _draw(outcomes)] if _tested(outcomes) else []
@@ -183,6 +214,7 @@ def sections(outcomes: Outcomes) -> list[Section]:
         Section("Descent and reaching", REACHING, [_reaching(outcomes)]),
         Section("Ten minutes", DRIFT, [_drift(outcomes)]),
         Section("Margins", MARGIN, [_margins(outcomes)], drawings),
+        *_response_section(outcomes),
     ]
 
 
@@ -196,11 +228,54 @@ def holds(outcome: Outcome) -> bool:
     return outcome.is_complete and bool(np.all(outcome.tail_rms_error < HOLDS_rad))
 
 
-def ends_of(held: Sequence[bool]) -> tuple[int | None, int | None]:
+def ends_of(kept_within: Sequence[bool]) -> tuple[int | None, int | None]:
     """Return the indices of the last step up to which a law always holds, and of the first without."""
-    first = held.index(False) if False in held else None
-    last = (len(held) if first is None else first) - 1
+    first = kept_within.index(False) if False in kept_within else None
+    last = (len(kept_within) if first is None else first) - 1
     return (last if last >= 0 else None), first
+
+
+def _response_section(outcomes: Outcomes) -> list[Section]:
+    """Section of the frequency responses, if they were run."""
+    by_law = {law: run.data.response for law in LOOPS for run in outcomes.runs(frequency_response(law))}
+    if not by_law:
+        return []
+    linear = {
+        law: responses.linear_loop(scenarios.load("hold", frequency_response(law).fields)).response(
+            responses.LINES_Hz
+        )
+        for law in by_law
+    }
+    rows = [
+        (law.label, source, *_response_cells(responses.margins(responses.LINES_Hz, response)))
+        for law in by_law
+        for source, response in (("measured", by_law[law]), ("linear", linear[law]))
+    ]
+    head = ("law", "response", "crossover, Hz", "phase margin, degrees", "gain margin, dB")
+    table = ResultTable("Gain and phase margins of the sampled loop", head, rows, 2)
+    return [Section("Frequency response", RESPONSE, [table], [lambda: _bode(by_law, linear)])]
+
+
+def _response_cells(margins: responses.Margins) -> tuple[str, ...]:
+    return tuple(NONE if np.isnan(value) else f"{value:.1f}" for value in margins)
+
+
+def _bode(
+    measured: dict[ComparedLaw, responses.Response], linear: dict[ComparedLaw, responses.Response]
+) -> Drawing:
+    from spheretwin.viz.figures import frequency_response as figures
+
+    frequency_Hz = np.array(responses.LINES_Hz, np.float64)
+    figure = figures.bode(
+        {law.law: figures.LoopResponse(frequency_Hz, measured[law], linear[law]) for law in measured},
+        {law.law: law.label for law in measured},
+        "Loop of alpha, opened at the torque of the law",
+    )
+    caption = (
+        "Gain and phase of the opened loop of α at rest. Markers: measured with a multisine; lines: linear"
+        " model of the sampled loop. Dashed: gain 1 and −180 degrees."
+    )
+    return Drawing("stability_frequency_response.svg", caption, figure)
 
 
 def _reaching_runs(outcomes: Outcomes) -> list[tuple[ComparedLaw, float, StabilityMeasures]]:

@@ -1,9 +1,10 @@
 """Plant: public step of one plant and of many, control period of the loop, two rotor engines, friction.
 
+>>> import numpy as np
 >>> from spheretwin import plant
 >>> parameters = plant.parameters("nutation", {"plant.payload_kg": 0.1})
 >>> state = plant.State(np.zeros(3), np.zeros(3))
->>> state = plant.step(state, currents, np.zeros(3), parameters, 5e-4)
+>>> state = plant.step(state, np.full(18, 0.5), np.zeros(3), parameters, 5e-4)  # A, N·m, s
 """
 
 from importlib import import_module

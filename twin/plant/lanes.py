@@ -48,9 +48,11 @@ class LaneField(NamedTuple):
     line_weights: Array  # (n, lines)
     group_axes: Array  # (n, 3, groups)
     tables: Array  # (tables, intervals, 4)
-    table_of: NDArray[np.int64]  # (n,) number of each plant's table
+    fields: Array  # (tables, t + 2, p + 3, 3)
+    table_of: NDArray[np.int64]  # (n,) number of each plant's table and field
     pair_gain: Array  # (n, 2, pairs)
     pair_stretch: Array  # (n, 2, pairs)
+    coils: Array  # (n, 4, coils)
     torque_gain: Array  # (n, groups)
     G: Array  # (3, groups)
     scratch: Array  # (5, pairs)
@@ -67,7 +69,7 @@ def advance(blocks: Array, field: LaneField, currents: Array, dt: float, steps: 
         Changed in place; HELD has the torque on the hinges besides field, spring and friction.
     field : LaneField
     currents : (n, groups) array, A
-        At most as many plants as there are lanes.
+        Of the first n plants; on the others no field acts.
     dt : float, s
     steps : int
     slows : bool
@@ -76,6 +78,8 @@ def advance(blocks: Array, field: LaneField, currents: Array, dt: float, steps: 
     for number in range(blocks.shape[0]):
         block, first = blocks[number], number * LANES
         plants = min(LANES, currents.shape[0] - first)
+        for i in range(TORQUE_S, TORQUE_S + _TRIPLE):
+            block[i] = 0.0
         for _ in range(steps):
             _predict(block, dt)
             if slows:
@@ -89,20 +93,16 @@ def advance(blocks: Array, field: LaneField, currents: Array, dt: float, steps: 
 
 
 @allocation_free
-def advance_without_field(blocks: Array, dt: float, steps: int, slows: bool) -> None:
-    """Advance all plants under HELD, the torque on the hinges besides spring and friction."""
-    for number in range(blocks.shape[0]):
-        block = blocks[number]
-        for i in range(TORQUE_S, TORQUE_S + _TRIPLE):
-            block[i] = 0.0
-        for _ in range(steps):
-            _predict(block, dt)
-            if slows:
-                _slow_down(block, dt)
-            _collect_torque(block)
-            _step_rotor(block, dt)
-            if slows:
-                _slow_down(block, dt)
+def roll_out(
+    blocks: Array, field: LaneField, currents: Array, dt: float, steps: int, slows: bool, angles: Array
+) -> None:
+    """Advance all plants under rows of currents (rows, n, groups); write the angles reached (rows, n, 3)."""
+    for row in range(currents.shape[0]):
+        advance(blocks, field, currents[row], dt, steps, slows)
+        for plant in range(currents.shape[1]):
+            block, lane = plant // LANES, plant % LANES
+            for i in range(3):
+                angles[row, plant, i] = blocks[block, Q + i * LANES + lane]
 
 
 @inlined
@@ -141,6 +141,8 @@ def _compute_field(block: Array, lane: int, field: LaneField, plant: int, curren
         field.tables[field.table_of[plant]],
         field.pair_gain[plant],
         field.pair_stretch[plant],
+        field.coils[plant],
+        field.fields[field.table_of[plant]],
     )
     q, effective, torque_S = field.vectors[0], field.vectors[1], field.vectors[2]
     gain, groups = field.torque_gain[plant], field.torque_gain.shape[1]

@@ -109,6 +109,38 @@ def step(state: State, currents: Array, disturbance: Array, parameters: Paramete
     return State(q, qdot)
 
 
+@compiled
+def roll_out(
+    state: State, currents: Array, disturbance: Array, parameters: Parameters, dt: float, steps: int, q: Array
+) -> State:
+    """Write the angles that a plant reaches under a sequence of currents, and return its last state.
+
+    Parameters
+    ----------
+    state : State
+        At the start.
+    currents : (m, n) array, A
+        Of each group, held over some steps.
+    disturbance : (3,) array, N·m
+    parameters : Parameters
+    dt : float, s
+        Length of a step.
+    steps : int
+        Steps under each row of currents.
+    q : (m, 3) array, rad
+        Result: angles after each row of currents.
+    """
+    groups = parameters.torque_gain.shape[0]
+    G, vectors = np.empty((3, groups)), np.empty((10, max(3, groups)))
+    scratch = np.empty((5, parameters.magnetics.line_weights.shape[0] * groups))
+    present, qdot = state.q_rad.copy(), state.qdot_rad_s.copy()
+    for k in range(currents.shape[0]):
+        for _ in range(steps):
+            _advance(present, qdot, currents[k], disturbance, parameters, dt, vectors, G, scratch)
+        q[k] = present
+    return State(present, qdot)
+
+
 @allocation_free
 def _advance(
     q: Array,

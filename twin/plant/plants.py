@@ -11,7 +11,7 @@ from spheretwin.models.base.errors import InputError
 from spheretwin.models.magnetics import TorqueModel, scratch_of
 from spheretwin.plant import lanes
 from spheretwin.plant.lanes import LANES, LaneField
-from spheretwin.plant.plant_step import Parameters, State, step
+from spheretwin.plant.plant_step import Parameters, State, roll_out
 
 Array = NDArray[np.float64]
 Plant = int | NDArray[np.integer] | NDArray[np.bool_]
@@ -27,7 +27,8 @@ class Plants:
     Parameters
     ----------
     parameters : Parameters or sequence of Parameters
-        Of all plants, or of each; all with equal numbers of pole lines and groups.
+        Of all plants, or of each; all with equal numbers of pole lines and groups, and torque curves, or
+        torque fields of one size.
     count : int, optional
         Number of plants; only with parameters of all.
 
@@ -39,13 +40,16 @@ class Plants:
     Raises
     ------
     InputError
-        No plant, a count with a sequence, or different numbers of pole lines or groups.
+        No plant, a count with a sequence, or magnetics of different sizes.
 
     Examples
     --------
-    >>> plants = Plants(plant.parameters("nutation"), 64)
-    >>> plants.step(currents, np.zeros(3), 5e-4, steps=2)
-    >>> plants.q_rad  # (64, 3)
+    >>> import numpy as np
+    >>> from spheretwin import plant
+    >>> plants = plant.Plants(plant.parameters("nutation"), 64)
+    >>> plants.step(np.full(18, 0.5), np.zeros(3), 5e-4, steps=2)  # A, N·m, s
+    >>> plants.q_rad.shape
+    (64, 3)
     """
 
     def __init__(self, parameters: Parameters | Sequence[Parameters], count: int | None = None) -> None:
@@ -67,9 +71,11 @@ class Plants:
             line_weights=np.empty((n, lines)),
             group_axes=np.empty((n, 3, groups)),
             tables=models[0].table[None],
+            fields=models[0].field[None],
             table_of=np.zeros(n, np.int64),
             pair_gain=np.empty((n, 2, pairs)),
             pair_stretch=np.empty((n, 2, pairs)),
+            coils=np.empty((n, *models[0].coils.shape)),
             torque_gain=np.empty((n, groups)),
             G=np.empty((3, groups)),
             scratch=scratch_of(models[0]),
@@ -80,7 +86,7 @@ class Plants:
         self._write(lanes.INERTIA, np.ones((blocks * LANES, 3)))
         self.blocks[:, lanes.SMOOTHING : lanes.SMOOTHING + LANES] = 1.0
         self._constant_Nm = np.zeros((n, 3))
-        self._tables = [models[0].table]
+        self._tables = [models[0]]
         for number, one in enumerate(each):
             self._set(number, one)
 
@@ -151,7 +157,7 @@ class Plants:
             self._each("currents", currents, self.groups),
             self._each("disturbance", disturbance),
         )
-        general = self._advance_general(currents, disturbance, dt, steps)
+        general = self._advance_general(currents[None], disturbance, dt, steps)
         self._write(lanes.HELD, -(disturbance + self._constant_Nm))
         lanes.advance(self.blocks, self.field, currents, dt, steps, self._slows)
         self._put(general)
@@ -165,12 +171,56 @@ class Plants:
             Generalised torque, held over the steps.
         dt : float, s
         steps : int
+
+        Raises
+        ------
+        InputError
+            Another shape, or a number that is not finite.
         """
         torque_q = self._each("torque_q", torque_q)
-        general = self._advance_general(np.zeros((len(self), self.groups)), -torque_q, dt, steps)
+        general = self._advance_general(np.zeros((1, len(self), self.groups)), -torque_q, dt, steps)
         self._write(lanes.HELD, torque_q - self._constant_Nm)
-        lanes.advance_without_field(self.blocks, dt, steps, self._slows)
+        lanes.advance(self.blocks, self.field, np.empty((0, self.groups)), dt, steps, self._slows)
         self._put(general)
+
+    def roll_out(self, currents: ArrayLike, disturbance: ArrayLike, dt: float, steps: int = 1) -> Array:
+        """Advance all plants under a sequence of currents and return the angles that they reach.
+
+        Parameters
+        ----------
+        currents : (m, n, groups) array, A
+            Rows of currents of each plant, each held over some steps.
+        disturbance : (3,) or (n, 3) array, N·m
+        dt : float, s
+        steps : int
+            Steps under each row.
+
+        Returns
+        -------
+        (m, n, 3) array, rad
+
+        Raises
+        ------
+        InputError
+            Another shape of currents or disturbance, or a number that is not finite.
+        """
+        sequence = np.asarray(currents, np.float64)
+        if sequence.ndim != 3 or sequence.shape[1:] != (len(self), self.groups):
+            raise InputError(
+                f"plants: expected currents of (rows, {len(self)}, {self.groups}), received {sequence.shape}"
+            )
+        if not np.all(np.isfinite(sequence)):
+            raise InputError("plants: expected finite currents, received others")
+        reached = np.empty((len(sequence), len(self), 3))
+        disturbance = self._each("disturbance", disturbance)
+        general = self._advance_general(sequence, disturbance, dt, steps, reached)
+        if ideal := [number for number in range(len(self)) if number not in general]:
+            self._write(lanes.HELD, -(disturbance + self._constant_Nm))
+            angles, currents = np.empty_like(reached), np.ascontiguousarray(sequence)
+            lanes.roll_out(self.blocks, self.field, currents, dt, steps, self._slows, angles)
+            reached[:, ideal] = angles[:, ideal]
+        self._put(general)
+        return reached
 
     def _set(self, number: int, parameters: Parameters) -> None:
         model, field = parameters.magnetics, self.field
@@ -178,6 +228,11 @@ class Plants:
             raise InputError(
                 f"plants: expected {field.line_axes.shape[1]} pole lines and {self.groups} groups,"
                 f" received {model.line_axes.shape[0]} and {model.group_axes.shape[1]}"
+            )
+        if (model.coils.shape, model.field.shape) != (field.coils[0].shape, field.fields[0].shape):
+            raise InputError(
+                f"plants: expected torque fields of {field.coils.shape[2]} coils and {field.fields[0].shape}"
+                f" coefficients, received {model.coils.shape[1]} and {model.field.shape}"
             )
         self._parameters[number] = parameters
         block, lane = divmod(number, LANES)
@@ -207,30 +262,46 @@ class Plants:
             field.pair_gain[:, 0] = 1.0
         field.line_axes[number], field.line_weights[number] = model.line_axes, model.line_weights
         field.group_axes[number] = model.group_axes
+        field.coils[number] = model.coils
         if field.pair_gain.shape[2]:
             field.pair_gain[number] = model.pair_gain if pairs else ([1.0], [0.0])
             field.pair_stretch[number] = model.pair_stretch if pairs else 0.0
-        if not any(table is model.table for table in self._tables):
-            self._tables.append(model.table)
-            field = field._replace(tables=np.stack(self._tables))
-        field.table_of[number] = next(
-            place for place, table in enumerate(self._tables) if table is model.table
-        )
+        places = [
+            place
+            for place, other in enumerate(self._tables)
+            if other.table is model.table and other.field is model.field
+        ]
+        if not places:
+            places = [len(self._tables)]
+            self._tables.append(model)
+            field = field._replace(
+                tables=np.stack([one.table for one in self._tables]),
+                fields=np.stack([one.field for one in self._tables]),
+            )
+        field.table_of[number] = places[0]
         self.field = field
 
     def _advance_general(
-        self, currents: Array, disturbance: Array, dt: float, steps: int
+        self, currents: Array, disturbance: Array, dt: float, steps: int, angles: Array | None = None
     ) -> dict[int, State]:
-        """Return the states that plants with a general joint reach, by their number."""
+        """Return the states that plants with a general joint reach, by their number; write their angles."""
         general = [number for number, one in enumerate(self._parameters) if one.joint is not None]
         if not general:
             return {}
         reached, q, qdot = {}, self.q_rad, self.qdot_rad_s
+        rows = np.empty((len(currents), 3))
         for number in general:
-            state = State(q[number], qdot[number])
-            for _ in range(steps):
-                state = step(state, currents[number], disturbance[number], self._parameters[number], dt)
-            reached[number] = state
+            reached[number] = roll_out(
+                State(q[number], qdot[number]),
+                np.ascontiguousarray(currents[:, number]),
+                disturbance[number],
+                self._parameters[number],
+                dt,
+                steps,
+                rows,
+            )
+            if angles is not None:
+                angles[:, number] = rows
         return reached
 
     def _put(self, states: dict[int, State]) -> None:

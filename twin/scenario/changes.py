@@ -42,6 +42,9 @@ FAULT = "fault"
 STATE = "state"
 """Name of a change of the state of the plant in a journal; not a field."""
 
+EXTERNAL = "external"
+"""Name of the journal entry of a controller or plant outside of the process; not a field."""
+
 
 class StateChange(BaseModel):
     """New pose, rates and currents of the plant."""

@@ -240,6 +240,10 @@ def explain(error: ValidationError, scenario: type[BaseModel]) -> str:
     path = first["loc"]
     place, received = place_of(scenario, path), shown(first["input"])
     here = f"{place.dotted}: " if place.dotted else ""
+    if numbers := _numbers_of(first["type"], place.dotted, scenario):
+        name, _, index = place.dotted.rpartition(".")
+        named = name if index.isdecimal() else place.dotted
+        return f"{named}: expected {numbers}, received {received}"
     match first["type"]:
         case "value_error":
             message = str(first["ctx"]["error"])
@@ -256,6 +260,27 @@ def explain(error: ValidationError, scenario: type[BaseModel]) -> str:
             valid = re.findall("'([^']*)'", first["ctx"]["expected"])
             received += did_you_mean(str(first["input"]), valid)
     return f"{here}expected {_expected(first)}, received {received}"
+
+
+NUMBERS = {2: "two numbers", 3: "three numbers", 4: "four numbers", 6: "six numbers"}
+
+
+def _numbers_of(kind: str, dotted: str, scenario: type[BaseModel]) -> str:
+    """Return how many numbers a list must have, if an error says that it has another number or is no list."""
+    if kind not in ("missing", "tuple_type", "too_long"):
+        return ""
+    name, _, index = dotted.rpartition(".")
+    listed = without_indices(name if kind == "missing" and index.isdecimal() else dotted)
+    field = next((field for known, field in every_field(scenario) if known == listed), None)
+    return NUMBERS.get(_length(field.annotation), "") if field else ""
+
+
+def _length(annotation: Any) -> int:
+    """Return the length of the list of numbers that an annotation contains; 0 if there is none."""
+    inside = get_args(annotation)
+    if get_origin(annotation) is tuple:
+        return 0 if Ellipsis in inside or any(get_origin(part) is tuple for part in inside) else len(inside)
+    return max(map(_length, inside), default=0)
 
 
 def _expected(error: Mapping[str, Any]) -> str:

@@ -1,4 +1,4 @@
-"""Files of a scenario: model, torque curves, and a digest that identifies them."""
+"""Files of a scenario: model, torque curves or fields, and a digest that identifies them."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import mujoco
 import numpy as np
 
 from spheretwin.models import actuator as actuators
-from spheretwin.models import mjcf, torque_curve
+from spheretwin.models import mjcf, torque_field
 from spheretwin.models.actuator import Actuator
 from spheretwin.models.mjcf import Mjcf
 from spheretwin.scenario.fields import SHIPPED
@@ -23,7 +23,7 @@ class Files(NamedTuple):
     model: Mjcf
     actuator: Actuator
     nominal: Actuator
-    """Actuator of the controller's data sheet: the same model file with the nominal torque curve."""
+    """Actuator of the controller's data sheet: the same model file with the nominal torque curve or field."""
 
 
 def files_of(scenario: Scenario) -> Files:
@@ -53,18 +53,20 @@ def reload_files(files: Files, before: ResolvedScenario, scenario: Scenario) -> 
         return files_of(scenario)
     actuator, nominal, curve = files.actuator, files.nominal, nominal_curve(scenario)
     if scenario.plant.torque_curve != before.plant.torque_curve:
-        actuator = _with_curve(files.model, scenario.plant.torque_curve or SHIPPED)
+        actuator = _with_curve(files.model, scenario, scenario.plant.torque_curve or SHIPPED)
     if curve != before.nominal.torque_curve:
-        nominal = _with_curve(files.model, curve)
+        nominal = _with_curve(files.model, scenario, curve)
     return Files(files.model, actuator, nominal)
 
 
-def _with_curve(model: Mjcf, curve: str) -> Actuator:
-    return actuators.from_model(model.described, torque_curve.read(_path(curve)))
+def _with_curve(model: Mjcf, scenario: Scenario, curve: str) -> Actuator:
+    mjcf_path = Path(scenario.plant.mjcf or actuators.MJCF_PATH)
+    path = _path(curve) or actuators.torque_path(mjcf_path, model.described)
+    return actuators.from_model(model.described, torque_field.read(path))
 
 
-def _path(curve: str) -> Path:
-    return actuators.TORQUE_CURVE_PATH if curve == SHIPPED else Path(curve)
+def _path(curve: str) -> Path | None:
+    return None if curve == SHIPPED else Path(curve)
 
 
 def named_files(scenario: Scenario) -> tuple[str | None, ...]:
@@ -79,5 +81,5 @@ def digest(files: Files) -> str:
     for model, buffer in zip(models, content, strict=True):
         mujoco.mj_saveModel(model, None, buffer)
     for actuator in (files.actuator, files.nominal):
-        content += [actuator.torque_curve.phi_rad, actuator.torque_curve.torque_Nm_per_A]
+        content += actuator.torque_data.content
     return hashlib.sha256(b"".join(array.tobytes() for array in content)).hexdigest()

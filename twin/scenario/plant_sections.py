@@ -9,6 +9,7 @@ from pydantic import BaseModel, ConfigDict, Field, field_validator
 from spheretwin.control.law import NonNegative, Positive
 from spheretwin.plant.bristle_friction import StictionSection
 from spheretwin.plant.cable import CableSection
+from spheretwin.plant.end_stops import EndStopsSection
 from spheretwin.plant.magnet_heat import ThermalSection
 from spheretwin.plant.mass_properties import MassSection
 from spheretwin.plant.part_scatter import PartScatter
@@ -64,6 +65,7 @@ class PlantSection(Section):
     )
     stiction: StictionSection = StictionSection()
     cable: CableSection = CableSection()
+    end_stops: EndStopsSection = EndStopsSection()
     thermal: ThermalSection = ThermalSection()
     group_gain: tuple[Bounded, ...] | None = Field(
         None, description="torque per ampere of each group over that of the torque curve; 1 unless given"
@@ -81,7 +83,7 @@ class PlantSection(Section):
     )
     torque_curve: Annotated[str, Field(min_length=1)] | None = Field(
         None,
-        description="torque curve as CSV; the shipped one unless given",
+        description="torque curve or torque field as CSV; that of the model file unless given",
         json_schema_extra={"path": True},
     )
 
@@ -100,8 +102,8 @@ class NominalSection(Section):
     )
     torque_curve: Annotated[str, Field(min_length=1)] | None = Field(
         None,
-        description="torque curve as CSV, or `shipped`; shipped unless given, and with a plant.mjcf, which is"
-        " another machine, plant.torque_curve",
+        description="torque curve or field as CSV, or `shipped`, the model file's; shipped unless given,"
+        " and with a plant.mjcf, which is another machine, plant.torque_curve",
         json_schema_extra={"path": SHIPPED},
     )
     torque_scale: Annotated[float, Field(ge=-1e3, le=1e3)] = Field(
@@ -114,10 +116,12 @@ class NominalSection(Section):
         None, description="largest group current that is commanded, A; the model file's unless given"
     )
     coulomb_Nm: NonNegativeTriple | None = Field(
-        None, description="Coulomb friction of each hinge, N·m; 0 unless given"
+        None,
+        description="Coulomb friction of each hinge, N·m; 0 unless given; unused without feed-forward",
     )
     viscous_Nm_s: NonNegativeTriple | None = Field(
-        None, description="viscous friction of each hinge, N·m·s; 0 unless given"
+        None,
+        description="viscous friction of each hinge, N·m·s; 0 unless given; unused without feed-forward",
     )
     delay_s: Annotated[float, Field(ge=0, le=1)] | None = Field(
         None, description="delay from a command to the amplifiers, s; 0 unless given"

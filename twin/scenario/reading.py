@@ -53,7 +53,7 @@ def read(source: str) -> dict[str, Any]:
         The scenario does not exist, or its file cannot be read.
     """
     fields, folder = read_toml("scenario", source, FOLDER)
-    return resolve_paths(folder, fields)
+    return resolve_paths(str(FOLDER) if source in shipped() else folder, fields)
 
 
 def read_toml(what: str, source: str, shipped_folder: Traversable) -> tuple[dict[str, Any], str]:

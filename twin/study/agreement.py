@@ -9,9 +9,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from spheretwin.metrics import PlannedRun
 from spheretwin.models.base.errors import SpheretwinError
 from spheretwin.models.telemetry.status import Status
+from spheretwin.reduction import PlannedRun
 from spheretwin.run import Figures
 from spheretwin.simulation import follow
 from spheretwin.study.grid import Row

@@ -65,6 +65,8 @@ class Grid:
         for group in self._groups:
             _check_lengths(study, group)
         self._points = _points(study)
+        self._drawn = [axis.field for axis in study.drawn_axes]
+        self._fields = [axis.field for axis in study.axis]
         self._laws: Sequence[Mapping[str, Any] | None] = study.law or (None,)
         self._sizes = [
             *(len(group[next(iter(group))]) for group in self._groups),
@@ -93,9 +95,8 @@ class Grid:
         values: dict[str, Any] = {}
         for group, place in zip(self._groups, places, strict=True):
             values |= {field: listed[place] for field, listed in group.items()}
-        random = zip(self._study.drawn_axes, self._points[point].tolist(), strict=True)
-        values |= {axis.field: value for axis, value in random}
-        ordered = {axis.field: values[axis.field] for axis in self._study.axis}
+        values |= zip(self._drawn, self._points[point].tolist(), strict=True)
+        ordered = {field: values[field] for field in self._fields}
         key = _key(ordered, self._laws[law], repeat)
         drawn_from = f"repeat {repeat}" if self._study.common_seeds else key
         return Row(number, key, _seed(self._study.seed, drawn_from), ordered, self._laws[law], repeat)
@@ -161,8 +162,10 @@ def _points(study: Study) -> NDArray[np.float64]:
     axes = study.drawn_axes
     if not axes:
         return np.empty((1, 0))
-    uniform = _uniform(study, len(axes), study.samples or 1)
-    return np.stack([axis.quantile(column) for axis, column in zip(axes, uniform.T, strict=True)], axis=1)
+    points = _uniform(study, len(axes), study.samples or 1)
+    for place, axis in enumerate(axes):  # in place: a million rows take 8 MB an axis
+        points[:, place] = axis.quantile(points[:, place])
+    return points
 
 
 def _uniform(study: Study, axes: int, samples: int) -> NDArray[np.float64]:
@@ -170,15 +173,28 @@ def _uniform(study: Study, axes: int, samples: int) -> NDArray[np.float64]:
     generator = np.random.default_rng([study.seed, STAGE])
     if study.design == "random":
         points = generator.random((samples, axes))
-    else:
+    elif study.design == "sobol":
         from scipy.stats import qmc  # slow to import
 
-        if study.design == "sobol":
-            # A power of two of points is generated: a longer study begins with the same points.
-            points = qmc.Sobol(axes, rng=generator).random_base2((samples - 1).bit_length())[:samples]
-        else:
-            points = qmc.LatinHypercube(axes, rng=generator).random(samples)
-    return np.clip(points, np.finfo(float).eps, 1 - np.finfo(float).eps)
+        # A power of two of points is generated: a longer study begins with the same points.
+        points = qmc.Sobol(axes, rng=generator).random_base2((samples - 1).bit_length())[:samples]
+    else:
+        points = _latin_hypercube(generator, axes, samples)
+    return np.clip(points, np.finfo(float).eps, 1 - np.finfo(float).eps, out=points)
+
+
+def _latin_hypercube(generator: np.random.Generator, axes: int, samples: int) -> NDArray[np.float64]:
+    """Points (samples, axes) of which each axis has one in each of `samples` equal intervals.
+
+    They are those of ``scipy.stats.qmc.LatinHypercube``, whose import takes as long as 150 rows.
+    """
+    generator = generator.spawn(1)[0]
+    points = generator.random((samples, axes))
+    for axis in range(axes):
+        places = np.arange(1, samples + 1)
+        generator.shuffle(places)
+        points[:, axis] = (places - points[:, axis]) / samples
+    return points
 
 
 def _mixed(number: int, sizes: Sequence[int]) -> list[int]:
@@ -219,16 +235,21 @@ class Template:
         Text before each gap, and behind the last.
     order : sequence of int
         Index of the value of each gap.
+    own : set of str
+        Sections with a gap. All scenarios share the other ones, which also need no second set-up.
     kind : type
         Of the scenario.
     source : str
         Its origin, for messages.
     """
 
-    def __init__(self, parts: Sequence[str], order: Sequence[int], kind: type[Scenario], source: str) -> None:
+    def __init__(
+        self, parts: Sequence[str], order: Sequence[int], own: set[str], kind: type[Scenario], source: str
+    ) -> None:
         self._first, *self._parts = parts
         self._order, self._kind, self._source = order, kind, source
-        self._texts_are_checked = False
+        self._shared: dict[str, Any] | None = None
+        self._own = own
 
     def scenario(self, values: Sequence[Any]) -> Scenario:
         """Scenario with some values in the gaps.
@@ -241,10 +262,10 @@ class Template:
         filled = (self._text(values[place]) for place in self._order)
         text = self._first + "".join(chain.from_iterable(zip(filled, self._parts, strict=True)))
         scenario = reading.from_json(text, self._source, self._kind)
-        if not self._texts_are_checked:
+        if self._shared is None:
             reading.check_texts(self._source, scenario)
-            self._texts_are_checked = True
-        return check_events(scenario, self._source)
+            self._shared = {name: section for name, section in scenario if name not in self._own}
+        return check_events(scenario.model_copy(update=self._shared), self._source)
 
     def _text(self, value: float) -> str:
         """Number as JSON text, which is almost always its Python text."""
@@ -276,11 +297,12 @@ def template_of(fields: dict[str, Any], gaps: Sequence[str], source: str) -> Tem
     if any(text.count(mark) != 1 for mark in marks):
         return None
     order = sorted(range(len(gaps)), key=lambda place: text.index(marks[place]))
+    own = {dotted.partition(".")[0] for dotted in gaps}
     parts = []
     for place in order:
         part, text = text.split(marks[place])
         parts.append(part)
-    return Template([*parts, text], order, kind, source)
+    return Template([*parts, text], order, own, kind, source)
 
 
 def are_numbers(values: Iterable[Any]) -> bool:

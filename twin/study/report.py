@@ -29,6 +29,9 @@ MOST_SQUARES = 60
 LEAST_SPREAD = 10
 """Least number of completed rows for a distribution."""
 
+MOST_RANKED = 100_000
+"""Rows from which on only some of a law, evenly spaced, are ranked and drawn as dots."""
+
 
 def drawings(rows: Rows) -> Iterator[Drawing]:
     """Figures of a study, in the order of its page; none without a completed row."""
@@ -85,8 +88,9 @@ def _map(rows: Rows, varied: Mapping[str, NDArray[Any]]) -> Drawing:
 def _many(rows: Rows, numbers: Mapping[str, NDArray[Any]]) -> Iterator[Drawing]:
     from spheretwin.viz.figures import distributions
 
-    complete = {law: _complete(rows, law) for law in rows.law_names}
-    complete = {law: of_law for law, of_law in complete.items() if np.count_nonzero(of_law) >= LEAST_SPREAD}
+    complete = {law: np.flatnonzero(_complete(rows, law)) for law in rows.law_names}
+    complete = {law: of_law[:: 1 + len(of_law) // MOST_RANKED] for law, of_law in complete.items()
+                if len(of_law) >= LEAST_SPREAD}  # fmt: skip
     if not complete:
         return
     y: Array = rows.figures[str(rows.main)]

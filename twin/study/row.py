@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from spheretwin.metrics import METRICS, PlannedRun
+from spheretwin.metrics import METRICS
 from spheretwin.models.base.errors import (
     InputError,
     LawError,
@@ -22,6 +22,7 @@ from spheretwin.models.base.user_code import is_reference
 from spheretwin.models.telemetry.parquet import TelemetryFile
 from spheretwin.models.telemetry.table import TelemetryBuffer
 from spheretwin.provenance import record_of
+from spheretwin.reduction import PlannedRun
 from spheretwin.run import Figures, Run, load_metrics, own_values
 from spheretwin.scenario import reading
 from spheretwin.scenario.changes import check_events, fields_with, is_tag
@@ -130,11 +131,23 @@ class Rows:
             return Result(FAILED, None, exception_text(error), {})
 
     def session(self, scenario: Scenario) -> Session:
-        """Session of a row's scenario; its files are read once for a study."""
+        """Session of a row's scenario without unread sensors; its files are read once for a study."""
         named = named_files(scenario)
         if named not in self._files:
             self._files[named] = files_of(scenario)
-        return Session(scenario, files=self._files[named])
+        return Session(self._without_unread(scenario), files=self._files[named])
+
+    def _without_unread(self, scenario: Scenario) -> Scenario:
+        """Scenario without the noise of current sensors if neither detector nor telemetry has their currents.
+
+        No other number depends on it, and it is most of a row's random numbers.
+        """
+        sensors = scenario.sensors
+        is_read = scenario.detects or scenario.event or self.study.telemetry or self._own
+        if is_read or not sensors.current.noise_A:
+            return scenario
+        current = sensors.current.model_copy(update={"noise_A": 0.0})
+        return scenario.model_copy(update={"sensors": sensors.model_copy(update={"current": current})})
 
     def command(self, row: Row) -> str:
         """Command line that runs a row alone; with the values of the row if they make no scenario."""

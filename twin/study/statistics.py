@@ -105,11 +105,14 @@ def _rows(file: pyarrow.parquet.ParquetFile) -> Rows:
         for field in schema
         if field.name not in (*FIXED, *axes) and not pa.types.is_string(field.type)
     ]
-    columns = file.read(columns=[*TEXTS, "row", *axes, *figures], use_threads=False)
-    texts = {name: np.array(columns[name].to_pylist(), dtype=object) for name in TEXTS}
+
+    def column(name: str) -> pa.ChunkedArray:  # one at a time: a million rows take 8 MB each
+        return file.read(columns=[name], use_threads=False).column(0)
+
+    texts = {name: _texts(column(name)) for name in TEXTS}
     return Rows(
         study,
-        columns["row"].to_numpy(),
+        column("row").to_numpy(),
         texts["key"],
         np.array([_label(law) for law in texts["law"]], dtype=object),
         texts["status"],
@@ -117,9 +120,17 @@ def _rows(file: pyarrow.parquet.ParquetFile) -> Rows:
             [error or reason or "" for error, reason in zip(texts["error"], texts["reason"], strict=True)],
             dtype=object,
         ),
-        {field: _values(columns[field]) for field in axes},
-        {name: largest(columns[name]) for name in sorted(figures, key=_place)},
+        {field: _values(column(field)) for field in axes},
+        {name: largest(column(name)) for name in sorted(figures, key=_place)},
     )
+
+
+def _texts(column: pa.ChunkedArray) -> Texts:
+    """Texts of a column, equal ones as one object."""
+    import pyarrow.compute as compute
+
+    coded = compute.dictionary_encode(column.combine_chunks(), null_encoding="encode")
+    return np.array(coded.dictionary.to_pylist(), dtype=object)[coded.indices.to_numpy()]
 
 
 def largest(column: pa.ChunkedArray) -> Array:
@@ -216,9 +227,8 @@ def strongest(ranks: Iterable[Rank]) -> list[int]:
 
 def _ranks(values: NDArray[np.float64]) -> NDArray[np.float64]:
     """Ranks about their mean, of length 1; zeros if all values are equal."""
-    from scipy.stats import rankdata  # slow to import
-
-    about = rankdata(values) - (len(values) + 1) / 2
+    _, place, count = np.unique(values, return_inverse=True, return_counts=True)
+    about = (np.cumsum(count) - (count - 1) / 2)[place] - (len(values) + 1) / 2
     size = np.sqrt(np.sum(about * about))
     return about / size if size > 0 else about
 

@@ -166,17 +166,17 @@ def _columns(schema: pa.Schema, records: list[dict[str, Any]]) -> dict[str, Any]
     import pyarrow as pa
 
     return {
-        field.name: pa.array([_cell(record[field.name], field) for record in records], type=field.type)
+        field.name: pa.array(_cells([record[field.name] for record in records], field.type), type=field.type)
         for field in schema
     }
 
 
-def _cell(value: Any, field: pa.Field) -> Any:
-    """A value as a column holds it."""
+def _cells(values: list[Any], kind: pa.DataType) -> list[Any]:
+    """Values as a column holds them: text of JSON, and whole numbers as floats, where its type needs them."""
     import pyarrow as pa
 
-    if value is None or (pa.types.is_string(field.type) and isinstance(value, str)):
-        return value
-    if pa.types.is_string(field.type):
-        return json.dumps(value)
-    return float(value) if pa.types.is_float64(field.type) else value
+    if pa.types.is_string(kind):
+        return [value if value is None or isinstance(value, str) else json.dumps(value) for value in values]
+    if pa.types.is_float64(kind):
+        return [None if value is None else float(value) for value in values]
+    return values

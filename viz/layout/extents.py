@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from math import ceil, floor, log10
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,6 +32,10 @@ _NICE_ABOVE_ZERO = (1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 10.0)
 
 # Share of a range beyond the greatest labelled number: otherwise half of its height would be cut.
 ROOM = 0.06
+
+
+Corner = Literal["RightTop", "LeftTop", "RightBottom", "LeftBottom"]
+"""Corner of a plot, by the name that the viewer gives it."""
 
 
 class PlotChannel(NamedTuple):
@@ -99,6 +103,24 @@ class Extents:
             return text
         until = self.t_s[min(outside[-1] + 1, len(self.t_s) - 1)]
         return f"{text} in first {until:.2g} s"
+
+    def emptiest_corner(self, band: tuple[float, float], *channels: PlotChannel) -> Corner:
+        """Return the corner of a plot with a range into which the lines of some channels reach the least."""
+        middle, half = (band[0] + band[1]) / 2, (band[1] - band[0]) / 2
+        late = self.t_s > (self.t_s[0] + self.t_s[-1]) / 2
+
+        def reach(of: Mapping[str, Array], sign: float, places: NDArray[np.bool_]) -> float:
+            bounds = np.concatenate([self._bounds(of, channel)[places] for channel in channels], axis=1)
+            share = sign * (np.nan_to_num(bounds, nan=middle) - middle) / half
+            return float(np.sum(np.clip(share, 0.0, 1.0))) / max(1, int(np.count_nonzero(places)))
+
+        reaches: dict[Corner, float] = {
+            "LeftTop": reach(self._high, 1.0, ~late),  # the first of equal ones: it leaves the end free
+            "RightTop": reach(self._high, 1.0, late),
+            "LeftBottom": reach(self._low, -1.0, ~late),
+            "RightBottom": reach(self._low, -1.0, late),
+        }
+        return min(reaches, key=lambda corner: reaches[corner])
 
     def _largest(self, *channels: PlotChannel) -> Array:
         """Return the largest magnitude among some channels in each span; 0 if there is no number."""

@@ -61,7 +61,7 @@ def compare(plots: Plots) -> rrb.Container:
         plots.whole(f"{name}: {ROLES}", "rad", *angles, least=LEAST_rad, axis=axis)
         for axis, name in enumerate(ANGLES)
     ]
-    turning = plots.about_zero(f"rates: {ROLES}", "rad/s", *rates, least=LEAST_rad_s)
+    turning = plots.about_zero(f"rates, colours as above: {ROLES}", "rad/s", *rates, least=LEAST_rad_s)
     apart = plots.above_zero(
         "tip's distance from its reference", "mm", quantity(TIP_DISTANCE), least=TIP_DISTANCE.floor
     )
@@ -108,7 +108,7 @@ def phase_plane(plots: Plots) -> rrb.Spatial2DView:
     """Rate of the error over what of the sliding variable is the error's, with its last second."""
     view = rrb.Spatial2DView(
         origin=f"/{PHASE_PLANE}",
-        name="phase plane: ė up, s - ė right; line s = 0",
+        name="rad/s: phase plane, ė up, s - ė right; line s = 0",
         time_ranges=time_range(PHASE_TRAIL_S),
     )
     return plots.square(view, PlotChannel(SLIDING), least=0.1)
@@ -138,12 +138,11 @@ def control(plots: Plots) -> rrb.Container:
     lines = [plots.signal("torque_command_Nm"), quantity(DELIVERED), plots.signal("disturbance_Nm")]
     torques = [
         plots.about_zero(
-            f"torque {name}",
+            f"{name}: ●coils ×command +load",
             "N·m",
             *lines,
             least=DELIVERED.floor,
             axis=axis,
-            key=": ●coils ×command +load",
         )
         for axis, name in enumerate(ANGLES)
     ]
@@ -244,7 +243,7 @@ def hardware(plots: Plots) -> rrb.Container:
         return rrb.Vertical(*state_views, name="hardware")
     chain = rrb.Grid(*shown, grid_columns=2)
     return rrb.Horizontal(
-        rrb.Vertical(*state_views, row_shares=[3, 2]), chain, column_shares=[2, 3], name="hardware"
+        rrb.Vertical(*state_views, row_shares=[3, 2]), chain, column_shares=[1, 2], name="hardware"
     )
 
 
@@ -285,7 +284,7 @@ def overview(plots: Plots) -> rrb.Container:
             high=1.05 * MOST,
         ),
         rrb.Horizontal(plots.states(), log(), column_shares=[1, 1]),
-        row_shares=[3, 3, 2, 4 if any(own_signal.states for own_signal in plots.view.own) else 3],
+        row_shares=[3, 3, 2.5, 4 if any(own_signal.states for own_signal in plots.view.own) else 3],
     )
     return rrb.Horizontal(left, right, column_shares=[4, 5], name="overview")
 

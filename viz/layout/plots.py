@@ -19,8 +19,9 @@ from spheretwin.viz.layout.view import (
     DERIVED,
     ENDED,
     ENVELOPE,
+    LIMITS,
     MARKS,
-    STATES,
+    RUN,
     STYLES,
     TELEMETRY,
     TIMELINE,
@@ -32,6 +33,9 @@ from spheretwin.viz.layout.view import (
 from spheretwin.viz.quantities import Quantity
 
 Range = tuple[float, float]
+
+KEY = "●"
+"""First marker of a key in the title of a plot."""
 
 
 class PlotLine(NamedTuple):
@@ -61,6 +65,8 @@ class _Plot(NamedTuple):
     contents: list[str]
     fit: Callable[[Extents], Fit] | None
     """None if title and range are known before the run."""
+    legend: list[PlotChannel]
+    """Lines of its legend; none without a legend."""
 
 
 class Plots:
@@ -96,7 +102,6 @@ class Plots:
         *lines: PlotLine,
         least: float,
         axis: int | None = None,
-        key: str = "",
     ) -> rrb.TimeSeriesView:
         """Make a plot with the range of the settled run; its title gives the extent outside.
 
@@ -110,8 +115,6 @@ class Plots:
             Half of the range at least.
         axis : int, optional
             Hinge whose entries are drawn; all unless given.
-        key : str
-            Markers of the lines, which such a plot has instead of a legend.
 
         Notes
         -----
@@ -123,9 +126,9 @@ class Plots:
             limit = extents.limit(*(PlotChannel(line.name) for line in lines), least=least)
             suffix = extents.largest(limit, *(PlotChannel(line.name, axis) for line in lines))
             reach = (1 + ROOM) * limit
-            return Fit(f"{what} ±{number(limit)} {unit}{key}{suffix}", (-reach, reach))
+            return Fit(f"{what} ±{number(limit)} {unit}{suffix}", (-reach, reach))
 
-        return self._plot(f"{what} [{unit}]{key}", lines, axis, fit)
+        return self._plot(f"{what} [{unit}]", lines, axis, fit)
 
     def above_zero(self, what: str, unit: str, line: PlotLine, *, least: float) -> rrb.TimeSeriesView:
         """Make a plot of a quantity that is never negative, with the range of the settled run."""
@@ -160,7 +163,10 @@ class Plots:
 
     def states(self, name: str = "states") -> rrb.StateTimelineView:
         """Make a timeline with the lanes of states."""
-        view = rrb.StateTimelineView(origin=f"/{STATES}", name=name, time_view=self._time_axis())
+        signals = [f"/{own.name}/**" for own in self.view.own if own.states]
+        view = rrb.StateTimelineView(
+            contents=[f"/{RUN}", f"/{LIMITS}", *signals], name=name, time_view=self._time_axis()
+        )
         self._states.append(view)
         return view
 
@@ -176,17 +182,21 @@ class Plots:
         if extents.ended_s is not None:
             axis = time_axis(shown_until_s(self.view.duration_s, extents.ended_s))
             changes |= {f"{view.blueprint_path()}/TimeAxis": axis for view in self._states}
-        for view, contents, fit in self._plots:
+        for view, contents, fit, legend in self._plots:
             path = view.blueprint_path()
             if fit:
                 title, band = fit(extents)
                 changes[path] = ViewBlueprint.from_fields(display_name=title)
                 changes[f"{path}/ScalarAxis"] = rrb.ScalarAxis(range=band)
+                if legend:
+                    changes[f"{path}/PlotLegend"] = rrb.PlotLegend(extents.emptiest_corner(band, *legend))
             if axis:
                 changes[f"{path}/TimeAxis"] = axis
                 changes[f"{path}/ViewContents"] = ViewContents(query=[*contents, f"/{ENDED}"])
         for square, channel, least in self._squares:
             size = extents.limit(channel, least=least) / 2
+            title = f"±{number(size)} {square.name}"
+            changes[square.blueprint_path()] = ViewBlueprint.from_fields(display_name=title)
             bounds = rrb.VisualBounds2D(x_range=[-size, size], y_range=[-size, size])
             changes[f"{square.blueprint_path()}/VisualBounds2D"] = bounds
         return changes
@@ -209,8 +219,9 @@ class Plots:
         marked = tuple(line.name for line in fields if line.size <= MOST_MARKED)
         if len(marked) > 1 or (axis is None and any(1 < line.size <= MOST_MARKED for line in fields)):
             contents.append(f"/{self.marked.setdefault(marked, f'{MARKS}/{len(self.marked)}')}")
-        # A legend of one line would repeat the title, and cover a part of a small plot.
-        has_legend = axis is None and len(marked) == len(fields) and sum(line.size for line in fields) > 1
+        # A legend of one line would repeat the title, and so would one of a title with a key of markers.
+        several = len(marked) == len(fields) and sum(line.size for line in fields) > 1
+        has_legend = axis is None and several and KEY not in title
         one = [place == axis for place in range(len(ANGLES))]
         view = rrb.TimeSeriesView(
             origin="/",
@@ -228,7 +239,8 @@ class Plots:
             ],
             overrides=overrides or None,
         )
-        self._plots.append(_Plot(view, contents, fit))
+        legend = [PlotChannel(line.name) for line in fields] if has_legend else []
+        self._plots.append(_Plot(view, contents, fit, legend))
         return view
 
     def _visualizer(self, line: PlotLine) -> tuple[str, Visualizer]:
@@ -243,7 +255,7 @@ class Plots:
 
         Otherwise None: the axis is as long as the data, and needs no room in the file.
         """
-        return _following_axis(self.view.window_s) if self.view.live else None
+        return following_axis(self.view.shown_s) if self.view.live else None
 
 
 def time_axis(until_s: float) -> rrb.TimeAxis:
@@ -253,7 +265,7 @@ def time_axis(until_s: float) -> rrb.TimeAxis:
     return rrb.TimeAxis(view_range=whole)
 
 
-def _following_axis(window_s: float) -> rrb.TimeAxis:
+def following_axis(window_s: float) -> rrb.TimeAxis:
     """Time axis over a window that ends at the cursor."""
     boundary = rrb.TimeRangeBoundary
     window = rr.TimeRange(start=boundary.cursor_relative(seconds=-window_s), end=boundary.cursor_relative())

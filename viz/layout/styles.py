@@ -38,6 +38,18 @@ _SECONDARY = (
 # and commands last and thin.
 _ACTUAL = ("q_rad", "qdot_rad_s", "torque_delivered_Nm")
 
+# They have a plot each, whose title names them: a legend with the names of the axes alone covers less of it.
+_ALONE = (
+    "error_mrad",
+    "coupling_torque_Nm",
+    "rate_error_rad_s",
+    "measurement_error_mrad",
+    "sliding_s",
+    "friction_Nm",
+    "presliding_rad",
+    "cable_Nm",
+)
+
 _AXIS_MARKERS = (MarkerShape.Circle, MarkerShape.Diamond, MarkerShape.Up)
 
 
@@ -105,7 +117,8 @@ def _look(batch: rr.ComponentBatchLike) -> pa.Array:
 
 
 def _names(name: str, labels: tuple[str, ...], unit: str) -> list[str]:
-    return [f"{_short(name)} {label} [{unit}]".replace("  ", " ") for label in labels]
+    short = "" if name in _ALONE else f"{_short(name)} "
+    return [f"{short}{label} [{unit}]".replace("  ", " ") for label in labels]
 
 
 def _short(name: str) -> str:

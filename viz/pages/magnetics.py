@@ -8,6 +8,7 @@ from pathlib import Path
 from spheretwin.models.base.checks import bound_shares
 from spheretwin.models.design.curve_check import ComputedCurve, CurvePeak, JudgedCurve, Misfit
 from spheretwin.models.design.field_check import FieldVerdict
+from spheretwin.models.design.iron_hoop import Effect
 from spheretwin.models.design.torque_map import TorqueSurvey, WeakPose, WorkspaceVerdict, direction_text
 from spheretwin.viz.pages import markdown
 from spheretwin.viz.pages.markdown import Drawing, write_page
@@ -54,6 +55,16 @@ def judged_curve_table(path: Path, judged: JudgedCurve) -> TitledTable:
         ("difference of look-up table and spline", f"{judged.lookup_error:.1e} of the peak"),
     ]
     return f"torque curve {path}", CURVE_HEAD, rows
+
+
+def hoop_table(effects: Sequence[Effect]) -> TitledTable:
+    """Return the effects of caps of iron on the torque curve."""
+    rows = [
+        (f"{effect.half_angle_deg:g}°", f"{effect.peak:.3f}", f"{effect.mean:.3f}", f"{effect.mesh:.0e}")
+        for effect in effects
+    ]
+    head = ("half angle of the iron", "peak", "mean to 27°", "half the elements")
+    return "torque of a pole on iron over that of a pole in air", head, rows
 
 
 def field_table(verdict: FieldVerdict) -> TitledTable:

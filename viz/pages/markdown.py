@@ -17,7 +17,7 @@ from markdown_it import MarkdownIt
 from markdown_it.token import Token
 
 from spheretwin.models.base.checks import Check, broken
-from spheretwin.models.base.errors import InputError
+from spheretwin.models.base.extras import missing
 from spheretwin.models.base.files import make_folder, whole_file
 from spheretwin.models.telemetry.run_record import versions
 
@@ -170,10 +170,7 @@ def prepare(folder: Path, *libraries: str) -> None:
     """
     for library in ("matplotlib", *libraries):
         if find_spec(library) is None:
-            raise InputError(
-                "output: expected the extra `spheretwin[plots]` to draw figures,"
-                f" received an installation without {library}"
-            )
+            raise missing("output", library, "plots", "to draw figures")
     make_folder(folder)
 
 

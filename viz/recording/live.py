@@ -208,16 +208,61 @@ class _Handler(ABC, BaseHTTPRequestHandler):
         """Leave the terminal to the run."""
 
 
-# Recorded together: a viewer that draws in software on busy cores takes no more than some twenty entities a
-# second. With four times as many it was 22 s late after half a minute, with these 2 s.
-_TOGETHER_S = 1.0
+TOGETHER_S = 1.0
+"""Time that is recorded together.
+
+A viewer that draws in software on busy cores takes no more than some twenty entities a second. With four
+times as many it was 22 s late after half a minute, with these 2 s.
+"""
+
+
+class LivePage:
+    """Page at 127.0.0.1 that shows a recording as it grows to any number of viewers.
+
+    Nobody waits for a viewer: viewers read a bounded buffer in memory, and one that is too far behind
+    continues with the newest data. The page answers as soon as the object exists.
+
+    Parameters
+    ----------
+    recording : RecordingStream
+        New, without a destination.
+
+    Raises
+    ------
+    SpheretwinError
+        Rerun's viewer is not there.
+    """
+
+    def __init__(self, recording: rr.RecordingStream) -> None:
+        self._recording = recording
+        self._bytes = rr.binary_stream(recording)
+        self._broadcast = Broadcast()
+        self._begun = False
+        self._server = ViewerServer(self._broadcast)
+
+    @property
+    def address(self) -> str:
+        """Page to open in a browser."""
+        return self._server.address
+
+    def send(self) -> None:
+        """Send viewers the data recorded since the last call; the first call sends what each needs."""
+        encoded = self._bytes.read() or b""
+        if not self._begun:
+            self._begun = True
+            self._broadcast.begin(encoded[:HEADER_BYTES] + messages(encoded))
+        elif piece := messages(encoded):
+            self._broadcast.send(piece)
+
+    def close(self) -> None:
+        """Stop the server."""
+        self._broadcast.end()
+        self._server.close()
+        self._recording.disconnect()
 
 
 class LiveView(Stream):
     """Takes a run's telemetry chunk by chunk and shows it to any number of viewers.
-
-    The run waits for no viewer: viewers read a bounded buffer in memory, and one that is too far
-    behind continues with the newest data. The page answers as soon as the object exists.
 
     Parameters
     ----------
@@ -242,17 +287,14 @@ class LiveView(Stream):
         window_s: float = LIVE_WINDOW_S,
     ) -> None:
         super().__init__(actuator, signals, facts, RowSelection(), live=True, shown=shown, window_s=window_s)
-        self._together = max(1, round(_TOGETHER_S / facts.sections["controller"]["period_s"]))
-        self._bytes = rr.binary_stream(self.recording)
-        self._broadcast = Broadcast()
-        self._begun = False
-        self._server = ViewerServer(self._broadcast)
+        self._together = max(1, round(TOGETHER_S / facts.sections["controller"]["period_s"]))
+        self._page = LivePage(self.recording)
         self.begin()
 
     @property
     def address(self) -> str:
         """Page to open in a browser."""
-        return self._server.address
+        return self._page.address
 
     def connect(self) -> None:
         """Send the layout before all else."""
@@ -264,12 +306,7 @@ class LiveView(Stream):
 
     def send(self) -> None:
         """Send viewers the data recorded since the last call."""
-        encoded = self._bytes.read() or b""
-        if not self._begun:
-            self._begun = True
-            self._broadcast.begin(encoded[:HEADER_BYTES] + messages(encoded))
-        elif piece := messages(encoded):
-            self._broadcast.send(piece)
+        self._page.send()
 
     def complete(self) -> None:
         """Stop the server.
@@ -279,8 +316,6 @@ class LiveView(Stream):
         SpheretwinError
             Some of the view could not be made.
         """
-        self._broadcast.end()
-        self._server.close()
-        self.recording.disconnect()
+        self._page.close()
         if self.fault:
             raise SpheretwinError(f"live view: {self.fault}")

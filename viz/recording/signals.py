@@ -44,8 +44,7 @@ RATE = "record_rate_Hz"
 
 def facts_as_json(facts: RunFacts, rate_Hz: float | None) -> rr.AnyValues:
     """Return the facts of a run, the versions that made it, and the rate of the rows."""
-    stated = {name: value for name, value in asdict(facts).items() if name != "changed"}  # among the sections
-    text = json.dumps({**stated, RATE: rate_Hz, "versions": versions()}, default=str)
+    text = json.dumps({**asdict(facts), RATE: rate_Hz, "versions": versions()}, default=str)
     return rr.AnyValues(facts=text, facts_checksum=text_checksum(text))
 
 
@@ -91,20 +90,19 @@ def _as_markdown(facts: RunFacts) -> str:
 
 
 def _table(title: str, fields: Mapping[str, Any]) -> list[str]:
-    rows = [row for name, value in fields.items() for row in _table_rows(name, value)]
+    rows = [f"| {name} | {text} |" for name, text in field_texts(fields)]
     return [f"## {title}", "", "| field | value |", "|---|---|", *rows, ""]
 
 
-def _table_rows(name: str, value: Any) -> Iterator[str]:
-    """Rows of a value: one for each entry of a table, and of each table in a list."""
-    if isinstance(value, Mapping):
-        for key, entry in value.items():
-            yield from _table_rows(f"{name}.{key}", entry)
-    elif isinstance(value, list) and any(isinstance(entry, Mapping) for entry in value):
-        for place, entry in enumerate(value):
-            yield from _table_rows(f"{name}.{place}", entry)
-    else:
-        yield f"| {name} | {_value_text(value)} |"
+def field_texts(fields: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
+    """Yield name and text of each field, also of those in tables and in lists of tables."""
+    for name, value in fields.items():
+        if isinstance(value, list) and any(isinstance(entry, Mapping) for entry in value):
+            value = {str(place): entry for place, entry in enumerate(value)}
+        if isinstance(value, Mapping):
+            yield from ((f"{name}.{inner}", text) for inner, text in field_texts(value))
+        else:
+            yield name, _value_text(value)
 
 
 def _value_text(value: Any) -> str:

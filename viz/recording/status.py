@@ -13,7 +13,7 @@ from spheretwin.models.telemetry.signals import Signal
 from spheretwin.models.telemetry.status import QUIET_S, Event, Events, Level, Status
 from spheretwin.models.telemetry.table import Table, rank_lost, saturated
 from spheretwin.viz import theme
-from spheretwin.viz.layout.view import EVENTS, STATES, shown_until_s
+from spheretwin.viz.layout.view import EVENTS, LIMITS, RUN, shown_until_s
 from spheretwin.viz.recording.part import (
     RecordingPart,
     RecordingSubject,
@@ -61,7 +61,7 @@ class StateChanges:
 
 
 def _entity(signal: Signal, place: int) -> str:
-    names = [STATES, signal.name, *signal.labels[place : place + 1]]
+    names = [signal.name, *signal.labels[place : place + 1]]
     return "/".join(rr.escape_entity_path_part(name.replace(" ", "-")) for name in names)
 
 
@@ -131,9 +131,6 @@ def log_lines(recording: rr.RecordingStream, events: list[Event], first: int = 0
         sums = line_checksums(list(zip(t_ns, level, text, strict=True)), first)
         recording.send_columns(EVENTS, time_index(np.array(t_s)), [*lines, checksums(sums)])
 
-
-RUN = f"{STATES}/run"
-LIMITS = f"{STATES}/limits"
 
 WITHIN, VOLTAGE, CURRENT, RANK = LEVELS = (
     "within limits",

@@ -12,6 +12,7 @@ from spheretwin.models.telemetry.run_record import RunFacts
 from spheretwin.models.telemetry.signals import ANGLES
 from spheretwin.models.telemetry.status import Level, Status
 from spheretwin.models.telemetry.table import Table, rank_lost, saturated
+from spheretwin.viz.recording.signals import field_texts
 
 FAILSAFE_REASON = "failsafe_reason"
 """Signal of runs with a watchdog."""
@@ -21,6 +22,16 @@ FAILSAFE_REASON = "failsafe_reason"
 _LINE_BREAK = "  \n"
 
 _SYMBOLS = {Level.INFO: "✔", Level.WARN: "⚠", Level.ERROR: "✗"}
+
+# Chosen fields that the headline and the line of the faults state.
+_STATED = (
+    "hardware",
+    "controller.law",
+    "plant.modelling_error",
+    "plant.payload_kg",
+    "disturbance.load",
+    FAULT,
+)
 
 _HEADLINES = {Status.COMPLETED: "COMPLETED", Status.INTERRUPTED: "INTERRUPTED", Status.FAILSAFE: "FAILSAFE"}
 
@@ -70,7 +81,7 @@ class Summary:
 
     def running(self) -> str:
         """Return the text of a run in progress."""
-        return f"**▶ RUNNING · {self._run_text()}**"
+        return _LINE_BREAK.join([f"**▶ RUNNING · {self._run_text()}**", *self._chosen_lines()])
 
     def ended(self, status: Status) -> str:
         """Return the text of a run that has ended."""
@@ -80,7 +91,7 @@ class Summary:
             if reason := self._reason(status):
                 lines.append(f"**{reason}**")
             lines.append(self._figures())
-        lines.extend(self._fault_lines())
+        lines += [*self._fault_lines(), *self._chosen_lines()]
         return _LINE_BREAK.join([f"**{_SYMBOLS[status.level]} {headline} · {self._run_text()}**", *lines])
 
     def cut_off(self) -> str:
@@ -88,7 +99,8 @@ class Summary:
         until = f"the recording was not closed; its rows end at {self.last_s:.3g} s"
         until += f" of {self._facts.duration_s:g} s"
         headline = f"**{_SYMBOLS[Level.WARN]} NOT CLOSED · {self._run_text()}**"
-        return _LINE_BREAK.join([headline, f"**{until}**", self._figures(), *self._fault_lines()])
+        lines = [f"**{until}**", self._figures(), *self._fault_lines(), *self._chosen_lines()]
+        return _LINE_BREAK.join([headline, *lines])
 
     def _reason(self, status: Status) -> str:
         if status in (Status.COMPLETED, Status.RUNNING):
@@ -118,6 +130,12 @@ class Summary:
         if planned > len(texts):
             texts.append(f"{planned - len(texts)} of {planned} planned faults did not start")
         return [f"faults: {'; '.join(texts)}"] if texts else []
+
+    def _chosen_lines(self) -> list[str]:
+        """Return what was chosen or differs from the defaults, and is not in the other lines."""
+        fields = {name: value for name, value in self._facts.changed.items() if name not in _STATED}
+        texts = [f"{name} {text}" for name, text in field_texts(fields)]
+        return [f"chosen: {' · '.join(texts)}"] if texts else []
 
     def _run_text(self) -> str:
         facts = self._facts

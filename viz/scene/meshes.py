@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from spheretwin.models.actuator import CoilGeometry, read_magnet_and_coil
 from spheretwin.models.base.errors import InputError, without_breaks
 from spheretwin.models.base.mujoco_library import compiler_warnings
-from spheretwin.models.mjcf import fingerprint
+from spheretwin.models.mjcf import fingerprint, missing_meshes
 from spheretwin.viz import theme
 from spheretwin.viz.scene.solids import merged_surface, revolved_surface
 
@@ -219,7 +219,7 @@ def _meshes(mjcf: Path, _: str) -> Meshes:
     try:
         # not `models.mjcf.read`: it leaves out visual meshes, the only ones needed here
         with compiler_warnings():  # a run has them from there
-            model = mujoco.MjModel.from_xml_path(str(mjcf))
+            model = _drawable(mjcf)
     except ValueError as error:
         raise InputError(
             f"model {mjcf}: expected meshes that can be drawn, {without_breaks(error)}"
@@ -241,6 +241,17 @@ def _meshes(mjcf: Path, _: str) -> Meshes:
     places = tuple(_nearest(data, geom, sites) for geom in coils)
     at = [sites[place] for place in places]
     return Meshes(_coils(data, at, mjcf) if coils else None, places, pieces)
+
+
+def _drawable(mjcf: Path) -> mujoco.MjModel:
+    """Return a model with the meshes whose files are there; the reader of the model warns of the others."""
+    spec = mujoco.MjSpec.from_file(str(mjcf))
+    lost = set(missing_meshes(spec, mjcf).values())
+    for geom in [geom for geom in spec.geoms if geom.meshname in lost]:
+        spec.delete(geom)
+    for mesh in [mesh for mesh in spec.meshes if (mesh.name or Path(mesh.file).stem) in lost]:
+        spec.delete(mesh)
+    return spec.compile()
 
 
 def _coils(data: mujoco.MjData, at: list[int], mjcf: Path) -> rr.Mesh3D:

@@ -69,8 +69,8 @@ def _band(first: Array, last: Array, sections: int) -> Surface:
 def _circle(point: Array, angle: Array) -> NDArray[np.float32]:
     """A point (distance from z, height) carried around z: (angles, 3)."""
     distance, height = point
-    around = [distance * np.cos(angle), distance * np.sin(angle), height + 0 * angle]
-    return np.stack(around, axis=1).astype(np.float32)
+    points = [distance * np.cos(angle), distance * np.sin(angle), height + 0 * angle]
+    return np.stack(points, axis=1).astype(np.float32)
 
 
 def tube(inner: float, outer: float, low: float, high: float, sections: int) -> Surface:

@@ -96,7 +96,7 @@ def print_run_report(run: dict[str, Any], nominal_errors: Sequence[NominalError]
     for place in range(max(len(run["error_peaks"][axis]) for axis in ANGLES)):
         peaks = (run["error_peaks"][axis][place : place + 1] for axis in ANGLES)
         label = f"{('strongest', 'second', 'third')[place]} oscillation"
-        table.add_row(label, *(_peak(*found) if found else NONE for found in peaks))
+        table.add_row(label, *(_peak(*peak) if peak else NONE for peak in peaks))
     tables.print_table(table)
     for row in rows:
         if not row.each_axis:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import os
 import shlex
 import shutil
 import sys
@@ -129,9 +128,21 @@ def print_files(record: Path | None, telemetry: Path | None) -> None:
         console.print(f"open it:   {escape(command)}", soft_wrap=True)
 
 
+def print_link(link: Mapping[str, Any]) -> None:
+    """Print the counts of frames and the distributions of times of a link, one line each."""
+    console = tables.terminal_console()
+    counts = ", ".join(f"{count} {name}" for name, count in link["frames"].items() if count)
+    console.print(f"frames received: {counts or 'none'}", soft_wrap=True)
+    for name in ("latency", "turnaround", "jitter"):
+        times = link.get(name, {})
+        if times.get("max_ms") is not None:
+            quantiles = ", ".join(f"{key.removesuffix('_ms')} {value:.3g} ms" for key, value in times.items())
+            console.print(f"{name}: {quantiles}")
+
+
 def rerun_command() -> str:
     """Return the command that starts the viewer from this folder: a name on the search path, or a path."""
-    name = "rerun.exe" if os.name == "nt" else "rerun"
+    name = "rerun.exe" if sys.platform == "win32" else "rerun"
     installed = Path(sys.executable).with_name(name)
     on_path = shutil.which("rerun")
     if not installed.exists() or (on_path and Path(on_path).samefile(installed)):

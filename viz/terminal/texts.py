@@ -43,6 +43,17 @@ def print_facts(title: str, facts: Sequence[tuple[str, str, str, str, str, str]]
                 print("\n".join(_wrapped(label + text, width, 2 * INDENT)))
 
 
+def print_findings(title: str, findings: Sequence[tuple[str, str, str, str]], lines: Sequence[str]) -> None:
+    """Print a verdict, then name, severity, place and advice of each finding, then more lines."""
+    width = tables.terminal_console().width
+    print(title)
+    for name, severity, where, advice in findings:
+        print("\n".join(_wrapped(f"{severity} {name}: {where}", width, INDENT, "- ")))
+        print("\n".join(_wrapped(f"{advice}.", width, 2 * INDENT)))
+    for line in lines:
+        print("\n".join(_wrapped(line, width, INDENT)))
+
+
 def print_sections(sections: Sequence[str]) -> None:
     """Print the names of the sections, and how their fields are printed."""
     width = tables.terminal_console().width

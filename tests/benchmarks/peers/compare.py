@@ -19,7 +19,7 @@ import numpy as np
 import ours
 from problem import problem
 from ratios import fastest, seconds_of
-from telling import Taken, Told
+from report import Report, Taken
 
 from spheretwin.simulation import simulate
 
@@ -49,62 +49,62 @@ ROUNDS = 3
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--json", action="store_true")
-    told = Told(parser.parse_args().json)
-    single_runs(told)
-    rows = peer(told, "jax_rows")
+    report = Report(parser.parse_args().json)
+    single_runs(report)
+    rows = peer(report, "jax_rows")
     if rows:
-        lagrangian, mjx = peer(told, "jax_lagrangian"), peer(told, "mjx_rotor")
+        lagrangian, mjx = peer(report, "jax_lagrangian"), peer(report, "mjx_rotor")
         rotors = [(lagrangian, ROWS, BATCHES), *([(mjx, MJX_ROWS, MJX_BATCHES)] if mjx else [])]
-        hold_traces(told, rows, [rotor for rotor, *_ in rotors])
-        many_rows(told, "pd", rows, rotors)
-        many_rows(told, "afsm", rows, rotors[:1])
-    kept = told.finished()
-    return 0 if kept and rows else 1  # without JAX the bar is not held
+        hold_traces(report, rows, [rotor for rotor, *_ in rotors])
+        many_rows(report, "pd", rows, rotors)
+        many_rows(report, "afsm", rows, rotors[:1])
+    passed = report.finished()
+    return 0 if passed and rows else 1  # without JAX the bar is not held
 
 
-def peer(told: Told, name: str):
+def peer(report: Report, name: str):
     """Module of a peer; None where what it is written in is not installed."""
     try:
         with redirect_stdout(sys.stderr):  # libraries tell there what they do without
             return importlib.import_module(name)
     except ImportError as error:
-        told.not_installed(name, error)
+        report.not_installed(name, error)
         return None
 
 
-def single_runs(told: Told) -> None:
+def single_runs(report: Report) -> None:
     """Peers that run one row at a time."""
-    told.head("One run at a time, PD: time of a simulated second, of cores, and over ours")
+    report.head("One run at a time, PD: time of a simulated second, of cores, and over ours")
     scenario, lagrangian = ours.scenario("pd"), ours.scenario("pd", "lagrangian")
     numbers, telemetry = problem(scenario), simulate(scenario).telemetry
     work = {"ours": partial(simulate, scenario), "ours, on the Lagrangian": partial(simulate, lagrangian)}
-    for module in filter(None, (peer(told, "plain_mujoco"), peer(told, "drake_plant"))):
-        hold_trace(told, module.NAME, module.run(numbers), telemetry, (LINEAR_rad, LINEAR_A))
+    for module in filter(None, (peer(report, "plain_mujoco"), peer(report, "drake_plant"))):
+        hold_trace(report, module.NAME, module.run(numbers), telemetry, (LINEAR_rad, LINEAR_A))
         work[module.NAME] = partial(module.run, numbers)
     taken = timed(work)
     for name, each in taken.items():
-        told.time(name, each.of(scenario.duration), taken["ours"].of(scenario.duration))
+        report.time(name, each.of(scenario.duration), taken["ours"].of(scenario.duration))
 
 
-def hold_traces(told: Told, rows, rotors) -> None:
+def hold_traces(report: Report, rows, rotors) -> None:
     """Hold one run of each kind of rotor against ours."""
-    told.head("Many rows at once: are they the same?")
+    report.head("Many rows at once: are they the same?")
     scenario = ours.scenario("pd")
     numbers, telemetry = problem(scenario), simulate(scenario).telemetry
     for rotor in rotors:
-        hold_trace(told, rotor.NAME, rows.trace(numbers, rotor.Rotor), telemetry, (SAME_rad, SAME_A))
+        hold_trace(report, rotor.NAME, rows.trace(numbers, rotor.Rotor), telemetry, (SAME_rad, SAME_A))
 
 
-def hold_trace(told: Told, name: str, trace, telemetry, bounds) -> None:
+def hold_trace(report: Report, name: str, trace, telemetry, bounds) -> None:
     """Hold angles and currents of a whole run against ours; one of another length is not the same."""
     units = {"q_rad": "rad", "current_A": "A"}
     for (column, unit), theirs, bound in zip(units.items(), trace, bounds, strict=True):
         same = theirs.shape == telemetry[column].shape
         apart = float(np.max(np.abs(theirs - telemetry[column]))) if same else np.inf
-        told.agreement(f"{name}: {column} of PD over 5 s, largest difference", apart, bound, unit)
+        report.agreement(f"{name}: {column} of PD over 5 s, largest difference", apart, bound, unit)
 
 
-def many_rows(told: Told, law: str, rows, rotors) -> None:
+def many_rows(report: Report, law: str, rows, rotors) -> None:
     """Peers that run many rows at once, and the bar."""
     study = ours.study(law, ROWS)
     figures, numbers = ours.carried_out(study), ours.problems(study)
@@ -115,17 +115,17 @@ def many_rows(told: Told, law: str, rows, rotors) -> None:
         for batch, on_each_core in batches:
             name = f"{rotor.NAME}, {batch} rows {'on each core' if on_each_core else 'at once'}"
             work[name] = ready = rows.Rows(numbers[:most], rotor.Rotor, batch, on_each_core)
-            hold_figures(told, f"{name}, {law}", ready(), figures, SAME_FIGURES[law])
+            hold_figures(report, f"{name}, {law}", ready(), figures, SAME_FIGURES[law])
             count[name], compile_s[name] = most, ready.compile_s
-    told.head(f"{ROWS} rows of a second on all cores, {law}: time of a row, of cores, and over ours")
+    report.head(f"{ROWS} rows of a second on all cores, {law}: time of a row, of cores, and over ours")
     of_row = {name: each.of(count[name]) for name, each in timed(work).items()}
     for name, each in of_row.items():
-        told.time(name, each, of_row[mine], compile_s[name])
+        report.time(name, each, of_row[mine], compile_s[name])
     peers = [each for name, each in of_row.items() if name not in (mine, prepared)]
     best, least = min(each.wall_s for each in peers), min(each.cores_s for each in peers)
     for name in (mine, prepared):
-        told.ratio(f"{name}, over the best of JAX, {law}", of_row[name].wall_s / best, AT_MOST)
-        told.ratio(f"the same, time of cores, {law}", of_row[name].cores_s / least)
+        report.ratio(f"{name}, over the best of JAX, {law}", of_row[name].wall_s / best, AT_MOST)
+        report.ratio(f"the same, time of cores, {law}", of_row[name].cores_s / least)
 
 
 def timed(work: dict[str, Callable[[], object]]) -> dict[str, Taken]:
@@ -144,13 +144,15 @@ def timed(work: dict[str, Callable[[], object]]) -> dict[str, Taken]:
     return {name: Taken(wall[name], min(cores[name])) for name in work}
 
 
-def hold_figures(told: Told, name: str, theirs, figures, bound: float) -> None:
+def hold_figures(report: Report, name: str, theirs, figures, bound: float) -> None:
     """Hold the figures of all rows against those of the study."""
     apart = [
         np.abs(getattr(theirs, figure) / known[: len(getattr(theirs, figure))] - 1)
         for figure, known in figures.items()
     ]
-    told.agreement(f"{name}: errors of all rows, largest difference", float(np.max(apart)), bound, "relative")
+    report.agreement(
+        f"{name}: errors of all rows, largest difference", float(np.max(apart)), bound, "relative"
+    )
 
 
 if __name__ == "__main__":

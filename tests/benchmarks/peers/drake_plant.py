@@ -36,8 +36,8 @@ class Controller(LeafSystem):
         self.q_rad, self.current_A = [], []
         self._state = self.DeclareVectorInputPort("state", 6)
         # Whatever is held is Python's own; the state that Drake sees says only that it has changed.
-        held = self.DeclareDiscreteState(1)
-        after_a_step = {self.discrete_state_ticket(held)}
+        held_torque = self.DeclareDiscreteState(1)
+        after_a_step = {self.discrete_state_ticket(held_torque)}
         self.DeclareAbstractOutputPort(
             "torque_S",
             lambda: Value([ExternallyAppliedSpatialForce()]),

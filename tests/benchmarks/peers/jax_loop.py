@@ -67,20 +67,20 @@ def closed_loop(problem: Problem, law, rotor, traced: bool = False):
                 command = allocated(G, cartesian(turns(q), torque), drive.current_limit_A)
             mean = command + drive.mean_share * (current - command)
             if substep == 0:
-                kept = Trace(jnp.stack(q), mean) if traced else None
+                traces = Trace(jnp.stack(q), mean) if traced else None
             current = command + drive.decay * (current - command)
             moving = rotor.step(moving, tuple(jnp.sum(row * mean) for row in G), hinges)
         worst = tuple(jnp.maximum(most, jnp.abs(each)) for most, each in zip(worst, error, strict=True))
         squares = tuple(total + each**2 for total, each in zip(squares, error, strict=True))
-        return (moving, memory, current, worst, squares), kept
+        return (moving, memory, current, worst, squares), traces
 
     def row(reference, disturbance, inertia):
         nothing = 0.0 * inertia[0]
         none, at_rest = (nothing,) * 3, jnp.zeros(problem.magnetics.group_axes.shape[1])
         start = rotor.start(tuple(reference[0, 0]), inertia), law.start(), at_rest, none, none
-        (*_, worst, squares), kept = jax.lax.scan(tick, start, (reference, disturbance))
+        (*_, worst, squares), traces = jax.lax.scan(tick, start, (reference, disturbance))
         if traced:
-            return kept
+            return traces
         return Figures(jnp.stack(worst), jnp.sqrt(jnp.stack(squares) / len(reference)))
 
     return row

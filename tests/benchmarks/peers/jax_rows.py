@@ -17,8 +17,8 @@ CORES = os.cpu_count() or 1
 def trace(problem: Problem, rotor_kind) -> Trace:
     """One run, as arrays."""
     row = _row(problem, rotor_kind, traced=True)
-    kept = jax.jit(row)(problem.reference, problem.disturbance, problem.inertia)
-    return Trace(*map(np.asarray, kept))
+    trajectory = jax.jit(row)(problem.reference, problem.disturbance, problem.inertia)
+    return Trace(*map(np.asarray, trajectory))
 
 
 class Rows:

@@ -10,7 +10,8 @@ import pyarrow.parquet as parquet
 from problem import Problem, problem
 
 from spheretwin import scenario as scenarios
-from spheretwin.metrics import METRICS, PlannedRun
+from spheretwin.metrics import METRICS
+from spheretwin.reduction import PlannedRun
 from spheretwin.scenario.sections import Scenario
 from spheretwin.session import Session
 from spheretwin.study import grid, row, runner

@@ -95,7 +95,7 @@ def test_norm_is_that_of_a_general_solver(actuator):
         if scale < 1:
             continue
         size = np.abs(G).max()
-        found = minimize(
+        solution = minimize(
             lambda z: 0.5 * z @ z,
             current / LIMIT + 0.1 * rng.normal(size=18),
             jac=lambda z: z,
@@ -108,8 +108,8 @@ def test_norm_is_that_of_a_general_solver(actuator):
             method="SLSQP",
             options={"ftol": 1e-12, "maxiter": 300},
         )
-        assert found.success
-        np.testing.assert_allclose(current / LIMIT, found.x, atol=1e-5)
+        assert solution.success
+        np.testing.assert_allclose(current / LIMIT, solution.x, atol=1e-5)
         compared += 1
 
 
@@ -181,8 +181,8 @@ def test_path_ends_well_within_its_steps_and_may_be_left_at_any(actuator, matrix
         G, start, largest = beyond_reach(rng, matrix, actuator)
         groups = G.shape[1]
         scratch = np.empty((SCRATCH_ROWS, groups))
-        found, _, needed = follow_path(G, start, 1e9, STEPS_PER_GROUP * groups, scratch)
-        assert found == pytest.approx(largest, rel=1e-9)
+        result, _, needed = follow_path(G, start, 1e9, STEPS_PER_GROUP * groups, scratch)
+        assert result == pytest.approx(largest, rel=1e-9)
         assert needed <= 1.5 * groups
         before = 0.0
         for steps in range(1, needed + 1):

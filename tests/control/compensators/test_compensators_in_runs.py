@@ -169,10 +169,10 @@ def test_a_snapshot_goes_on_bit_for_bit(name):
 
 
 def test_a_change_beside_it_moves_no_bit():
-    with Session(tilt(**ON)) as kept, Session(tilt(**ON)) as changed:
+    with Session(tilt(**ON)) as unchanged, Session(tilt(**ON)) as changed:
         changed.advance(33)
         changed.set("plant.group_gain", [1.0] * 18)  # builds the controller anew
-        assert changed.advance(67).values.tobytes() == kept.advance(100).rows(33, 100).values.tobytes()
+        assert changed.advance(67).values.tobytes() == unchanged.advance(100).rows(33, 100).values.tobytes()
 
 
 def test_a_file_replays_to_the_same_bytes(tmp_path, capsys):

@@ -78,9 +78,9 @@ def test_it_is_the_motion_of_the_nominal_model_to_second_order(delay_s, actuator
             state = solve_ivp(moving, (at, until), state, method="DOP853", rtol=1e-11, atol=1e-13).y[:, -1]
             at = until
         assert at == pytest.approx(delay_s)
-        found = way.measurement[:2]
+        result = way.measurement[:2]
         moved = [np.abs(state[:3] - Q).max(), np.abs(state[3:] - V).max()]
-        errors.append(np.abs(found - state.reshape(2, 3)).max(axis=1) / moved)
+        errors.append(np.abs(result - state.reshape(2, 3)).max(axis=1) / moved)
     assert (errors[1] < 1e-2).all()
     assert (np.log2(errors[0] / errors[2]) > 2 * 1.8).all()
 
@@ -143,10 +143,10 @@ def test_with_the_true_model_it_is_the_future_motion_of_the_rotor(periods):
     table = simulate(still_air(drive__delay_s=periods * 1e-3), law=TELLING).telemetry
     for predicted, true in (("q_predicted_rad", "q_rad"), ("qdot_predicted_rad_s", "qdot_rad_s")):
         # From 10 ms on: the first command is a jump of the currents, the others are not.
-        now, then, found = (each[10:] for each in (table[true][:-periods], table[true][periods:],
+        now, then, result = (each[10:] for each in (table[true][:-periods], table[true][periods:],
                                                    table[predicted][:-periods]))  # fmt: skip
         # Of second order in a period of 1 ms; an angle of the sine turns with 3 1/s, currents lag by 0.7 ms.
-        assert np.abs(found - then).max() < 2e-4 * np.abs(then - now).max()
+        assert np.abs(result - then).max() < 2e-4 * np.abs(then - now).max()
     np.testing.assert_array_equal(table["q_handed"], table["q_predicted_rad"])
     np.testing.assert_array_equal(table["v_handed"], table["qdot_predicted_rad_s"])
     np.testing.assert_array_equal(table["q_kept"], table["q_rad"])
@@ -187,5 +187,5 @@ def test_a_law_receives_a_delay_of_zero_with_prediction():
         predicted = len(session.law.state)
         session.set("controller.prediction.on", False)
         session.advance(10)
-        told = len(session.law.state)
-    assert told - predicted == 3 * 2  # a PID remembers what it asked for over as many periods
+        size = len(session.law.state)
+    assert size - predicted == 3 * 2  # a PID remembers what it asked for over as many periods

@@ -82,18 +82,18 @@ def settled_s(kind, rate):
 def test_ramp_is_followed_exactly_after_the_stated_time(kind, rate):
     settled = math.ceil(settled_s(kind, rate) / PERIOD)
     time = PERIOD * np.arange(settled + 300)
-    found = estimates(built(kind), on_all_axes(rate * time))[settled:]
+    result = estimates(built(kind), on_all_axes(rate * time))[settled:]
     # Angles are rounded to half a unit in the last place, which the slope magnifies by 1/T a few times over.
     rounding = 4 * np.spacing(abs(rate) * time[-1]) / PERIOD
-    np.testing.assert_allclose(found, rate, rtol=1e-11, atol=rounding)
+    np.testing.assert_allclose(result, rate, rtol=1e-11, atol=rounding)
 
 
 @EACH
 @pytest.mark.parametrize("acceleration", [2.0, -30.0])
 def test_lag_behind_a_ramp_of_the_rate_is_the_derived_one(kind, acceleration):
     time = PERIOD * np.arange(1500)
-    found = estimates(built(kind), on_all_axes(0.5 * acceleration * time**2))[-300:]
-    lag = time[-300:, None] - found / acceleration
+    result = estimates(built(kind), on_all_axes(0.5 * acceleration * time**2))[-300:]
+    lag = time[-300:, None] - result / acceleration
     rounding = 4 * np.spacing(0.5 * time[-1] ** 2) / PERIOD
     derived = ESTIMATORS[kind]().derived(sampling()).lag_s
     np.testing.assert_allclose(lag, np.broadcast_to(derived, lag.shape), rtol=1e-9, atol=rounding)
@@ -210,15 +210,15 @@ class SlowDifferentiator:
         self.z = np.array([angle, 0.0, 0.0]) if self.z is None else self.z
         z = np.array([[1, T, T**2 / 2], [0, 1, T], [0, 0, 1]]) @ self.z
         ahead = z[0] - angle
-        sign, held, cube = np.sign(ahead), min(abs(ahead), 1.1 * L * T**3), 0.0
-        if abs(ahead) > held:  # in the third root of the error
-            roots = np.roots([1, 2 * L ** (1 / 3) * T, 2.12 * L ** (2 / 3) * T**2, held - abs(ahead)])
+        sign, limited, cube = np.sign(ahead), min(abs(ahead), 1.1 * L * T**3), 0.0
+        if abs(ahead) > limited:  # in the third root of the error
+            roots = np.roots([1, 2 * L ** (1 / 3) * T, 2.12 * L ** (2 / 3) * T**2, limited - abs(ahead)])
             cube = roots[np.abs(roots.imag) <= 1e-9 * np.abs(roots)].real.max()
         self.z = np.array(
             [
                 angle + sign * cube**3,
-                z[1] - sign * (2.12 * L ** (2 / 3) * cube * T + 1.5 * held / T),
-                z[2] - sign * held / T**2,
+                z[1] - sign * (2.12 * L ** (2 / 3) * cube * T + 1.5 * limited / T),
+                z[2] - sign * limited / T**2,
             ]
         )
         return self.z[1]
@@ -234,9 +234,9 @@ def test_machine_code_is_the_slow_copy(kind):
     angle[300:] += 0.5
     slow = SLOW[kind](150.0, PERIOD, NOISE)
     expected = [slow(sample) for sample in angle]
-    found = estimates(built(kind, bandwidth_rad_s=150.0), on_all_axes(angle))[:, 0]
+    result = estimates(built(kind, bandwidth_rad_s=150.0), on_all_axes(angle))[:, 0]
     # The covariance and the eigenvalues are rounded, magnified by the slope's 1/T.
-    np.testing.assert_allclose(found, expected, rtol=1e-8, atol=1e-9)
+    np.testing.assert_allclose(result, expected, rtol=1e-8, atol=1e-9)
 
 
 @EACH

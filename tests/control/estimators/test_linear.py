@@ -21,8 +21,8 @@ BANDWIDTHS = pytest.mark.parametrize("bandwidth", [20.0, 150.0, 1000.0])
 def transfer(kind, bandwidth, period=PERIOD):
     """Numerator and denominator in z⁻¹, from angle to rate."""
     if kind == "difference":
-        kept = np.exp(-bandwidth * period)
-        return (1 - kept) / period * np.array([1, -1]), np.array([1, -kept])
+        pole = np.exp(-bandwidth * period)
+        return (1 - pole) / period * np.array([1, -1]), np.array([1, -pole])
     (alpha,), (beta,) = gains(np.array([bandwidth * period]))
     return beta / period * np.array([1, -1, 0]), np.array([1, alpha + beta - 2, 1 - alpha])
 
@@ -31,13 +31,13 @@ def transfer(kind, bandwidth, period=PERIOD):
 @BANDWIDTHS
 def test_estimator_is_its_transfer_function(kind, bandwidth):
     angle = np.cumsum(np.random.default_rng(0).normal(scale=1e-3, size=1000))
-    found = estimates(built(kind, bandwidth_rad_s=bandwidth), on_all_axes(angle))[:, 0]
+    result = estimates(built(kind, bandwidth_rad_s=bandwidth), on_all_axes(angle))[:, 0]
     # It starts at rest at the first angle, as a filter does at zero.
     rest = angle - angle[0]
     numerator, denominator = transfer(kind, bandwidth)
     _, simulated = dlsim((numerator, denominator, PERIOD), rest)
     for expected in (lfilter(numerator, denominator, rest), simulated[:, 0]):
-        np.testing.assert_allclose(found, expected, rtol=1e-8, atol=1e-10)  # sums of 1000 rounded terms / T
+        np.testing.assert_allclose(result, expected, rtol=1e-8, atol=1e-10)  # sums of 1000 rounded terms / T
 
 
 @LINEAR

@@ -34,8 +34,8 @@ def poles(bandwidths):
 @pytest.mark.parametrize("bandwidths", TUNINGS)
 def test_poles_are_where_they_are_placed(bandwidths):
     # The double pole is known to the root of rounding, the polynomial is not.
-    found = np.poly(error_map(bandwidths))
-    np.testing.assert_allclose(found, np.poly(poles(bandwidths)), rtol=1e-10, atol=1e-10)
+    coefficients = np.poly(error_map(bandwidths))
+    np.testing.assert_allclose(coefficients, np.poly(poles(bandwidths)), rtol=1e-10, atol=1e-10)
 
 
 def test_the_error_on_the_exact_model_decays_to_nothing(actuator):
@@ -86,12 +86,14 @@ def errors_under(push, bandwidths, period_s=PERIOD):
     return np.array(errors)
 
 
-def stated(bandwidths, held):
+def stated(bandwidths, zero_order_hold):
     """The factors of N of the docstring, for a staircase or for any disturbance of bounded rate."""
     a, _, b = poles(bandwidths)
     p, r, T = 1 / (1 - a), 1 / (1 - b), PERIOD
-    of_rate = p**2 + 2 * p * r - 3 * p - 1.5 * r + (7 / 4 if held else 11 / 6)
-    return np.array([T**3 * a**2 * b * p**2 * r, T**2 * of_rate, T * (2 * p + r - (1.5 if held else 2))])
+    of_rate = p**2 + 2 * p * r - 3 * p - 1.5 * r + (7 / 4 if zero_order_hold else 11 / 6)
+    return np.array(
+        [T**3 * a**2 * b * p**2 * r, T**2 * of_rate, T * (2 * p + r - (1.5 if zero_order_hold else 2))]
+    )
 
 
 def responses(bandwidths, instants):
@@ -109,11 +111,11 @@ def responses(bandwidths, instants):
 POINTS, WEIGHTS = np.polynomial.legendre.leggauss(4)
 
 
-@pytest.mark.parametrize("held", [True, False])
+@pytest.mark.parametrize("zero_order_hold", [True, False])
 @pytest.mark.parametrize("bandwidths", [*TUNINGS, (30.0, 50.0), (3000.0, 2000.0)])
-def test_the_bound_is_the_sum_of_magnitudes_of_the_response(bandwidths, held):
+def test_the_bound_is_the_sum_of_magnitudes_of_the_response(bandwidths, zero_order_hold):
     """The largest error that any disturbance of bounded rate can lead to is this sum, for a linear system."""
-    if held:  # it changes where a period begins: all of the next one is left, as seen at its end
+    if zero_order_hold:  # it changes where a period begins: all of the next one is left, as seen at its end
         F, error, total = error_map(bandwidths), np.array([0.0, 0.0, 1.0]), np.zeros(3)
         for _ in range(int(40 / min(bandwidths) / PERIOD) + 10):
             total += PERIOD * np.abs(error)
@@ -122,7 +124,7 @@ def test_the_bound_is_the_sum_of_magnitudes_of_the_response(bandwidths, held):
         instants, weights = PERIOD * (POINTS + 1) / 2, PERIOD * WEIGHTS / 2
         total = sum(np.abs(error) @ weights for error in responses(bandwidths, instants))
     # Sums of some 1e3 numbers; the angle's entries are 1e-6 of others of F, which round at 1e-16.
-    np.testing.assert_allclose(total, stated(bandwidths, held), rtol=1e-8)
+    np.testing.assert_allclose(total, stated(bandwidths, zero_order_hold), rtol=1e-8)
 
 
 def test_the_response_has_one_sign_for_all_poles():
@@ -163,7 +165,7 @@ def worst(bandwidths, rates, times):
 
 @pytest.mark.parametrize("bandwidths", TUNINGS)
 def test_no_disturbance_of_bounded_rate_passes_the_bound_and_a_steady_one_attains_it(bandwidths):
-    generator, bound = np.random.default_rng(0), stated(bandwidths, held=False)
+    generator, bound = np.random.default_rng(0), stated(bandwidths, zero_order_hold=False)
     times = np.full(4, PERIOD / 4)
     for period in (1, 7, 50, 400, 1000):  # rates that change their sign after so many ticks, or at random
         square = np.sign(np.sin(np.pi * (np.arange(2000) + 0.5) / period))
@@ -180,7 +182,7 @@ def test_the_bound_of_continuous_time_is_passed_by_a_staircase(bandwidths, share
     """So that the sampled one is needed: at 1 kHz its third factor is larger by what is expected."""
     wo, wd = bandwidths
     steady = np.abs(errors_under(PERIOD * np.arange(2000), bandwidths)[-1])
-    np.testing.assert_allclose(steady, stated(bandwidths, held=True), rtol=1e-6)
+    np.testing.assert_allclose(steady, stated(bandwidths, zero_order_hold=True), rtol=1e-6)
     passed_by = steady[2] / (2 / wo + 1 / wd) - 1
     assert passed_by == pytest.approx(share, rel=0.02)
     # To the first order of T² it is (2 ω_o + ω_d) T²/12; the next order is some (ω_o T)² / 60 of that.
@@ -202,5 +204,7 @@ def test_a_schedule_leaves_the_fast_poles_their_directions():
 
 
 def test_without_a_bandwidth_no_disturbance_is_learnt():
-    found = seen(ObserverState(RotorMotion(REST, REST), (0.3, 0.3, 0.3)), (0.1, 0.2, 0.3), REST, (500.0, 0.0))
-    assert found.disturbance == (0.3, 0.3, 0.3)
+    result = seen(
+        ObserverState(RotorMotion(REST, REST), (0.3, 0.3, 0.3)), (0.1, 0.2, 0.3), REST, (500.0, 0.0)
+    )
+    assert result.disturbance == (0.3, 0.3, 0.3)

@@ -44,8 +44,8 @@ def test_observer_has_the_documented_poles(bandwidth, period_s):
     a = np.exp(-bandwidth * period_s)
     # Three poles at once are known to the cube root of rounding; the coefficients of 1 − z to rounding, up to
     # the size of the entries, 1/T² of them at most.
-    found = np.poly(np.linalg.eigvals(error - np.eye(3)))
-    np.testing.assert_allclose(found, np.poly([a - 1] * 3), rtol=1e-6, atol=1e-13)
+    coefficients = np.poly(np.linalg.eigvals(error - np.eye(3)))
+    np.testing.assert_allclose(coefficients, np.poly([a - 1] * 3), rtol=1e-6, atol=1e-13)
 
 
 def observed(actuator, gains, load_Nm, ticks):

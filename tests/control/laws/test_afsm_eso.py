@@ -237,7 +237,7 @@ def test_with_another_inertia_the_poles_are_stable_in_the_documented_range(
 
 
 def test_at_the_nominal_inertia_the_poles_are_those_of_observer_and_surface(actuator):
-    found = np.linalg.eigvals(closed_loop("ideal", 0.0, actuator.inertia))
+    eigenvalues = np.linalg.eigvals(closed_loop("ideal", 0.0, actuator.inertia))
     gains = AFSMWithObserver()
     slope, reaching, wo, wd = (
         getattr(gains, name)[1]
@@ -253,7 +253,7 @@ def test_at_the_nominal_inertia_the_poles_are_those_of_observer_and_surface(actu
     of_surface = np.roots([1, damping + stiffness / 2, stiffness]) + 1
     expected = np.poly([*of_surface, *np.exp(-np.array([wo, wo, wd]) * PERIOD)])
     # Double poles are known to the root of rounding; their polynomial, from entries of 1e6 T², to 1e-8.
-    np.testing.assert_allclose(np.poly(found), expected, rtol=1e-7)
+    np.testing.assert_allclose(np.poly(eigenvalues), expected, rtol=1e-7)
 
 
 @pytest.mark.parametrize("preset", PRESETS)

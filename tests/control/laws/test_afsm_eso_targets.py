@@ -51,20 +51,20 @@ def afsm():
 @pytest.mark.parametrize("seed", SEEDS)
 @pytest.mark.parametrize(("m", "load"), CONDITIONS)
 def test_ideal_is_exact_and_takes_no_more_than_afsm(afsm, m, load, seed):
-    found, other = flown(m, load, seed), afsm[m, load, seed]
-    assert largest(found) <= (0.0045 if (m, load) == (0.2, 1.0) else 0.0085)
-    assert max(found["tail_rms_error_rad"]) <= 4.5e-4
-    assert found["rms_torque_Nm"] <= other["rms_torque_Nm"]
-    assert found["current_variation_A_s"] <= other["current_variation_A_s"]
+    result, other = flown(m, load, seed), afsm[m, load, seed]
+    assert largest(result) <= (0.0045 if (m, load) == (0.2, 1.0) else 0.0085)
+    assert max(result["tail_rms_error_rad"]) <= 4.5e-4
+    assert result["rms_torque_Nm"] <= other["rms_torque_Nm"]
+    assert result["current_variation_A_s"] <= other["current_variation_A_s"]
 
 
 @pytest.mark.parametrize("seed", SEEDS)
 @pytest.mark.parametrize(("m", "load"), CONDITIONS)
 def test_fast_is_twice_as_exact(afsm, m, load, seed):
-    found = flown(m, load, seed, **{"controller.preset": "fast"})
-    assert largest(found) <= (0.002 if (m, load) == (0.2, 1.0) else 0.004)
-    assert max(found["tail_rms_error_rad"]) <= 2.5e-4
-    assert found["current_variation_A_s"] <= afsm[m, load, seed]["current_variation_A_s"]
+    result = flown(m, load, seed, **{"controller.preset": "fast"})
+    assert largest(result) <= (0.002 if (m, load) == (0.2, 1.0) else 0.004)
+    assert max(result["tail_rms_error_rad"]) <= 2.5e-4
+    assert result["current_variation_A_s"] <= afsm[m, load, seed]["current_variation_A_s"]
 
 
 @pytest.mark.parametrize("seed", SEEDS)

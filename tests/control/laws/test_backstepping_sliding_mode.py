@@ -69,13 +69,13 @@ def course(period_s, actuator):
         )
     )
     assert run.telemetry["allocation_scale"].min() == 1.0
-    g, J, told = run.scenario.controller, actuator.inertia, run.telemetry
+    g, J, telemetry = run.scenario.controller, actuator.inertia, run.telemetry
     slope, h, rate = g.surface_slope[0], g.reaching_gain[0], g.adaptation_rate[0]
-    s, e = told["sliding_s"], told["error_rad"]
+    s, e = telemetry["sliding_s"], telemetry["error_rad"]
     # What is logged has been moved on by this tick already.
-    off = told["adapted_torque_Nm"] + period_s * rate * J * s - told["disturbance_Nm"]
+    off = telemetry["adapted_torque_Nm"] + period_s * rate * J * s - telemetry["disturbance_Nm"]
     w = 2 * slope * h
-    kinetic = [s_k @ inertia_matrix(q, J) @ s_k for q, s_k in zip(told["q_rad"], s, strict=True)]
+    kinetic = [s_k @ inertia_matrix(q, J) @ s_k for q, s_k in zip(telemetry["q_rad"], s, strict=True)]
     V = 0.5 * (np.array(kinetic) + w * (J * e**2).sum(1) + (off**2 / (J * rate)).sum(1))
     switched = g.switching[0] * np.abs(s) * np.minimum(1, np.abs(s) / g.layer[0])
     decrease = (J * (h * (s**2 + switched) - w * e * s + w * slope * e**2)).sum(1)

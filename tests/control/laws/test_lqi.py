@@ -38,10 +38,10 @@ def test_poles_obey_the_return_difference(weights):
     """|p(jω)|² of fast ticks is ω⁶ + w_r² ω⁴ + w_e² ω² + w_i²: the cost's own spectrum."""
     period_s = 1e-7
     stiffness, damping, integral = regulator(*weights, period_s)
-    found = [damping**2 - 2 * stiffness, stiffness**2 - 2 * integral * damping, integral**2]
+    results = [damping**2 - 2 * stiffness, stiffness**2 - 2 * integral * damping, integral**2]
     # Sampling moves the gains by half a period times the fastest pole, up to 400 1/s.
     size = max(weights[0] ** 0.5, weights[1], weights[2] ** (1 / 3)) ** np.array([2, 4, 6])
-    np.testing.assert_allclose(found / size, np.square(weights)[[1, 0, 2]] / size, atol=1e-3)
+    np.testing.assert_allclose(results / size, np.square(weights)[[1, 0, 2]] / size, atol=1e-3)
 
 
 def test_a_triple_pole_is_among_its_gains():
@@ -65,9 +65,9 @@ def test_law_is_the_feedback_with_these_gains(actuator):
 
 
 @pytest.mark.parametrize(
-    ("weights", "period_s", "told"),
+    ("weights", "period_s", "message"),
     [((0.0, 0.0, 1e9), 1.0, "for ticks of 1 s"), ((3e7, 6e-4, 6e-9), 1e-3, "nearer to each other")],
 )
-def test_weights_without_a_solution_are_refused(weights, period_s, told):
-    with pytest.raises(InputError, match=told):
+def test_weights_without_a_solution_are_refused(weights, period_s, message):
+    with pytest.raises(InputError, match=message):
         regulator(*weights, period_s)

@@ -85,9 +85,9 @@ def test_closed_loop_poles_are_those_of_the_sampled_loop(actuator):
     kp, kd, ki, T = 4800.0, 120.0, 64000.0, PERIOD
     # With d = z - 1: angle d² = T²/2 (d + 2) v, rate d = T v, integral d = -ki T angle.
     exact = [1, kd * T + kp * T**2 / 2, kp * T**2 + ki * T**3 / 2, ki * T**3]
-    found = np.poly(np.linalg.eigvals(closed_loop(gains, PERIOD, actuator.inertia) - np.eye(3)))
+    coefficients = np.poly(np.linalg.eigvals(closed_loop(gains, PERIOD, actuator.inertia) - np.eye(3)))
     # Eigenvalues that nearly coincide are known to the cube root of rounding; their polynomial is not.
-    np.testing.assert_allclose(found, exact, rtol=1e-9)
+    np.testing.assert_allclose(coefficients, exact, rtol=1e-9)
 
 
 @pytest.mark.parametrize("bandwidth", [10.0, 40.0])
@@ -125,7 +125,7 @@ def test_the_current_limit_holds_the_integral(monkeypatch):
     """A step that asks for more than the coils get. Without tracking the integral winds up, and loses it."""
     weak = {"controller.law": "pid", "disturbance.load": 0.0}
     weak |= {"drive.current_limit_A": 2.0, "nominal.current_limit_A": 2.0}
-    held = simulate(scenarios.load("hold", weak))
+    limited = simulate(scenarios.load("hold", weak))
     build = PID.build
 
     def without_tracking(self, known):
@@ -135,7 +135,7 @@ def test_the_current_limit_holds_the_integral(monkeypatch):
 
     monkeypatch.setattr(PID, "build", without_tracking)
     assert simulate(scenarios.load("hold", weak)).status == "left_workspace"
-    assert held.status == "completed"
-    assert held.telemetry["allocation_scale"].min() < 0.2
-    start = held.telemetry["error_rad"][0]
-    assert np.max(-np.sign(start) * held.telemetry["error_rad"] / np.abs(start)) < 0.5
+    assert limited.status == "completed"
+    assert limited.telemetry["allocation_scale"].min() < 0.2
+    start = limited.telemetry["error_rad"][0]
+    assert np.max(-np.sign(start) * limited.telemetry["error_rad"] / np.abs(start)) < 0.5

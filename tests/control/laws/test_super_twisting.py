@@ -69,9 +69,9 @@ def test_the_surface_is_reached_in_finite_time(actuator, k1, k2, mu, load_Nm):
     gains = SuperTwisting(surface_slope=30.0, root_gain=k1, twisting_gain=k2, linear_share=mu)
     law = gains.build(known(actuator, period_s=period_s))
     _, bound = reached(gains, np.array(1.5), np.array(-load_Nm / J[1]))
-    found = on_an_axis(law, J, (0.05, 0.0), 1.2 * bound, period_s, load_Nm)
+    result = on_an_axis(law, J, (0.05, 0.0), 1.2 * bound, period_s, load_Nm)
     # What is logged of the integral has been moved on by its tick already: it belongs to the next s.
-    s, w = found[1:, 2], (found[:-1, 3] - load_Nm) / J[1]
+    s, w = result[1:, 2], (result[:-1, 3] - load_Nm) / J[1]
     V, _ = reached(gains, s, w)
     floor = (k1 * period_s / 2) ** 2
     # Within what a period does, which the docstring says; twice it, as the integral turns s round too.
@@ -87,10 +87,10 @@ def test_a_constant_load_leaves_no_error():
     run = simulate(scenarios.load("hold", {**fields, "plant.engine": "lagrangian"}))
     assert run.status == "completed"
     g = run.scenario.controller
-    around = (g.root_gain[0] * PERIOD / 2) ** 2
+    band = (g.root_gain[0] * PERIOD / 2) ** 2
     last = run.telemetry["error_rad"][-500:]
-    assert np.abs(last).max() < 4 * around / g.surface_slope[0]
-    assert np.abs(last.mean(0)).max() < 0.1 * around / g.surface_slope[0]
+    assert np.abs(last).max() < 4 * band / g.surface_slope[0]
+    assert np.abs(last.mean(0)).max() < 0.1 * band / g.surface_slope[0]
 
 
 def test_the_current_limit_holds_the_integral():

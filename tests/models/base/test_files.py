@@ -144,9 +144,9 @@ def test_a_folder_that_came_in_between_is_told_and_the_file_stays(tmp_path):
     output = OutputFile(path := tmp_path / "out.txt")
     output.path.write_text("new")
     path.mkdir()
-    with pytest.raises(SpheretwinError, match=r"output: .*out\.txt could not be written") as told:
+    with pytest.raises(SpheretwinError, match=r"output: .*out\.txt could not be written") as refusal:
         output.keep()
-    assert "\n" not in str(told.value)
+    assert "\n" not in str(refusal.value)
     assert output.path.read_text() == "new"
 
 

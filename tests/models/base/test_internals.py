@@ -7,11 +7,14 @@ import mujoco
 import numba
 import numpy as np
 import pytest
-from numba.core import ccallback, compiler, dispatcher, lowering
+from numba import types
+from numba.core import ccallback, compiler, dispatcher, event, lowering
 from numba.core.runtime import rtsys
 
 from spheretwin.models.base import mujoco_library, numba_internals
-from spheretwin.models.base.compiled import COMPILES, allocation_free, compiled
+from spheretwin.models.base.compiled import COMPILES, allocation_free, compilable, compiled
+from spheretwin.models.base.errors import EngineError
+from spheretwin.models.base.numba_internals import NO_ALLOCATION
 
 NUMBA = [
     (compiler.CompileResult, "_rebuild"),
@@ -19,6 +22,7 @@ NUMBA = [
     (rtsys, "initialize"),
     (ccallback.CFunc, "compile"),
     (dispatcher.Dispatcher, "enable_caching"),
+    (dispatcher.Dispatcher, "disable_compile"),
     (lowering.Lower, "_find_singly_assigned_variable"),
 ]
 MODEL = "<mujoco><worldbody><body><joint/><geom size='1'/></body></worldbody></mujoco>"
@@ -120,3 +124,71 @@ def test_timers_stop_and_run_again():
     with mujoco_library.timers_stopped():
         assert clock.value is None
     assert clock.value == before
+
+
+@pytest.mark.parametrize(
+    ("field", "kind"),
+    [("qpos", np.float64), ("ctrl", np.float64), ("xpos", np.float64), ("plugin", np.int32)],
+)
+def test_mjdata_has_the_layout_that_its_package_declares(field, kind):
+    model = mujoco.MjModel.from_xml_string(MODEL.replace("</worldbody>", "</worldbody><actuator/>"))
+    data = mujoco.MjData(model)
+    array = getattr(data, field)
+    view = mujoco_library.data_array(data._address, field, array.size, kind)
+    assert array.size == 0 or view.ctypes.data == array.ctypes.data, (
+        f"MuJoCo {mujoco.__version__} has {field} elsewhere in mjData: see mujoco_library.py"
+    )
+
+
+def test_another_layout_of_mjdata_is_refused_before_a_plugin_is_registered(monkeypatch):
+    offset = mujoco_library.data_offset
+    monkeypatch.setattr(
+        mujoco_library, "data_offset", lambda field: offset("qvel" if field == "qpos" else field)
+    )
+    with pytest.raises(EngineError, match="expected qpos at"):
+        mujoco_library.register_plugin("never", (), 0, 0, {})
+
+
+def test_a_copied_model_is_owned_by_python():
+    model = mujoco.MjModel.from_xml_string(MODEL)
+    copy = mujoco_library.copy_of_model(model._address)
+    assert copy._address != model._address
+    assert copy.nbody == model.nbody
+
+
+@needs_compiler
+def test_compiled_code_reads_a_tuple_from_memory():
+    pair = Pair(np.arange(3.0), np.arange(4.0))
+
+    @numba.cfunc(types.float64(types.CPointer(numba.typeof((pair, 7.5, 3)))), **NO_ALLOCATION)
+    def read(memory):
+        (first, second), number, count = memory[0]
+        return first[2] + 10 * second[3] + 100 * number + 1000 * count
+
+    memory = numba_internals.in_memory((pair, 7.5, 3))
+    assert read.ctypes(ctypes.c_void_p(memory.ctypes.data)) == 2 + 30 + 750 + 3000
+
+
+@needs_compiler
+def test_an_inlined_implementation_has_no_machine_code():
+    """Numba reports each function that it compiles: here only the caller."""
+    compiled_functions = []
+
+    class Listener(event.Listener):
+        def on_start(self, started):
+            compiled_functions.append(started.data["dispatcher"].py_func.__name__)
+
+        def on_end(self, ended):
+            pass
+
+    @compilable
+    def doubled(x):
+        return 2.0 * x
+
+    @allocation_free
+    def caller(x):
+        return doubled(x) + 1.0
+
+    with event.install_listener("numba:compile", Listener()):
+        assert caller(3.0) == 7.0
+    assert compiled_functions == ["caller"]

@@ -42,7 +42,7 @@ def test_a_dataclass_of_the_file_finds_its_module(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("text", "spec", "told"),
+    ("text", "spec", "message"),
     [
         (None, "gone.py:f", "law: expected a readable file of Python, No such file"),
         ("", "mine.py", "law: expected path/to/file.py:name, received "),
@@ -68,12 +68,12 @@ def test_a_dataclass_of_the_file_finds_its_module(tmp_path):
         (b"x = '\xff'", "mine.py:f", "SyntaxError"),
     ],
 )
-def test_what_cannot_be_used_is_refused_on_one_line(tmp_path, text, spec, told):
+def test_what_cannot_be_used_is_refused_on_one_line(tmp_path, text, spec, message):
     if text is not None:
         (tmp_path / "mine.py").write_bytes(text if isinstance(text, bytes) else text.encode())
     with pytest.raises(InputError) as refused:
         load_function(str(tmp_path / spec), "law")
-    assert told in f"{refused.value}"
+    assert message in f"{refused.value}"
     assert "\n" not in f"{refused.value}"
 
 

@@ -77,9 +77,9 @@ def test_an_unreadable_file_is_refused(tmp_path, name):
 def test_values_hold_or_are_joined_by_lines():
     series = TimeSeries(np.array([1.0, 2.0, 4.0]), np.array([[1.0, 10.0], [3.0, 20.0], [7.0, 0.0]]))
     t = np.array([0.0, 1.0, 1.5, 2.0, 3.0, 4.0, 9.0])
-    held = series.zero_order_hold(t, (-1.0, -2.0))
-    np.testing.assert_array_equal(held[:, 0], [-1, 1, 1, 3, 3, 7, 7])
-    np.testing.assert_array_equal(held[:, 1], [-2, 10, 10, 20, 20, 0, 0])
+    steps = series.zero_order_hold(t, (-1.0, -2.0))
+    np.testing.assert_array_equal(steps[:, 0], [-1, 1, 1, 3, 3, 7, 7])
+    np.testing.assert_array_equal(steps[:, 1], [-2, 10, 10, 20, 20, 0, 0])
     linear = series.interpolate(t)
     np.testing.assert_array_equal(linear[:, 0], [1, 1, 2, 3, 5, 7, 7])
     np.testing.assert_array_equal(linear[:, 1], [10, 10, 15, 20, 10, 0, 0])

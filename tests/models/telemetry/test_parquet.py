@@ -58,8 +58,8 @@ def test_parts_are_streams_that_any_arrow_reader_opens(tmp_path):
     streamed(path := tmp_path / "run.parquet", whole, 50)
     (part,) = parts_beside(path)
     with pa.ipc.open_stream(part.read_bytes()) as stream:
-        found = stream.read_all()
-    assert found.equals(whole.rows(0, 192).arrow(FACTS), check_metadata=True)
+        result = stream.read_all()
+    assert result.equals(whole.rows(0, 192).arrow(FACTS), check_metadata=True)
 
 
 def test_chunks_do_not_move_a_byte_of_the_file(tmp_path):
@@ -102,11 +102,11 @@ def test_columns_that_come_and_go_are_nan_where_they_are_not(tmp_path):
     ends = np.cumsum([len(piece) for piece in pieces])
     for piece, start, end in zip(pieces, [0, *ends], ends, strict=False):
         for sig in again.signals:
-            found = again[sig.name][start:end]
+            result = again[sig.name][start:end]
             if sig in piece.signals:
-                assert found.tobytes() == piece[sig.name].tobytes()
+                assert result.tobytes() == piece[sig.name].tobytes()
             else:
-                assert np.all(np.isnan(found))
+                assert np.all(np.isnan(result))
 
 
 def test_two_meanings_of_one_column_are_refused_and_the_parts_remain(tmp_path):

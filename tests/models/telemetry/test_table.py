@@ -20,6 +20,12 @@ def table():
     return Table(SIGNALS, values)
 
 
+def test_a_table_has_the_names_of_its_columns_in_order(table):
+    names = [signal.name for signal in SIGNALS]
+    assert list(table) == list(table.keys()) == names
+    assert np.array_equal(dict(table)["t_s"], table["t_s"])
+
+
 def test_columns_are_views_by_name(table):
     assert table["t_s"].shape == (20,)
     assert table["current_A"].shape == (20, 18)

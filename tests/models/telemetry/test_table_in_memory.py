@@ -14,21 +14,21 @@ def rows(signals, first, count):
 
 
 def test_all_rows_are_there_in_their_order():
-    kept = TelemetryBuffer((TIME, RATE), 10)
+    buffer = TelemetryBuffer((TIME, RATE), 10)
     chunks = [rows((TIME, RATE), 100 * i, count) for i, count in enumerate((3, 0, 5))]
     for chunk in chunks:
-        kept.write(chunk)
-    np.testing.assert_array_equal(kept.table.values, np.concatenate([chunk.values for chunk in chunks]))
-    assert kept.table.signals == (TIME, RATE)
+        buffer.write(chunk)
+    np.testing.assert_array_equal(buffer.table.values, np.concatenate([chunk.values for chunk in chunks]))
+    assert buffer.table.signals == (TIME, RATE)
 
 
 def test_a_column_that_comes_or_goes_is_nan_where_it_was_not():
-    kept = TelemetryBuffer((TIME, RATE), 6)
+    buffer = TelemetryBuffer((TIME, RATE), 6)
     first, second = rows((TIME, RATE), 0, 2), rows((TIME, GAIN), 50, 3)
-    kept.write(first)
-    kept.write(second)
-    kept.write(last := rows((TIME, RATE), 90, 1))
-    table = kept.table
+    buffer.write(first)
+    buffer.write(second)
+    buffer.write(last := rows((TIME, RATE), 90, 1))
+    table = buffer.table
     assert table.signals == (TIME, RATE, GAIN)
     np.testing.assert_array_equal(table["t_s"], [*first["t_s"], *second["t_s"], *last["t_s"]])
     np.testing.assert_array_equal(table["w"], [*first["w"], *np.full((3, 3), np.nan), *last["w"]])

@@ -77,11 +77,11 @@ def read_unless_refused(path):
 
 
 def same_run(run, other):
-    told = [json.dumps({**figures(each), "path": ""}) for each in (run, other)]
+    messages = [json.dumps({**figures(each), "path": ""}) for each in (run, other)]
     same_table = run.table.signals == other.table.signals and np.array_equal(
         run.table.values.view(np.uint64), other.table.values.view(np.uint64)
     )
-    return same_table and told[0] == told[1] and run.metadata == other.metadata
+    return same_table and messages[0] == messages[1] and run.metadata == other.metadata
 
 
 def passed(path, content, whole, capfd):
@@ -90,8 +90,8 @@ def passed(path, content, whole, capfd):
     if cli.main(["review", str(path), "--json"]) == cli.DONE:
         printed = capfd.readouterr()
         thinned = [f"spheretwin: warning: {path} keeps 60 rows a second"] if whole.rate_Hz else []
-        told = [line.split(" and those")[0] for line in printed.err.splitlines()]
-        return told == thinned and same_run(read(path), whole)
+        messages = [line.split(" and those")[0] for line in printed.err.splitlines()]
+        return messages == thinned and same_run(read(path), whole)
     return refused(capfd.readouterr(), path)
 
 
@@ -305,8 +305,8 @@ def test_odd_metadata_are_refused_on_one_line(files, tmp_path, capfd, odd, verb)
     arrow = pyarrow.parquet.ParquetFile(files[0]).read()
     metadata = {name: text for name, text in arrow.schema.metadata.items() if name.decode() not in METADATA}
     metadata |= {name.encode(): text for name, text in odd.items()}
-    kept = {name: text for name, text in metadata.items() if text is not None}
-    pyarrow.parquet.write_table(arrow.replace_schema_metadata(kept), path := tmp_path / "run.parquet")
+    results = {name: text for name, text in metadata.items() if text is not None}
+    pyarrow.parquet.write_table(arrow.replace_schema_metadata(results), path := tmp_path / "run.parquet")
     commands = {
         "review": ["review", str(path)],
         "--replay": ["simulate", "--replay", str(path)],

@@ -33,10 +33,10 @@ def test_json_has_the_difference_of_every_metric(tmp_path, capsys):
     first, _ = written(tmp_path, "first", duration=0.2)
     other, _ = written(tmp_path, "other", **{"duration": 0.2, "disturbance.load": 2.0})
     assert cli.main(["review", str(first), str(other), str(first), "--json"]) == 0
-    told = json.loads(capsys.readouterr().out)
-    to_other, to_itself = told["differences"]
+    report = json.loads(capsys.readouterr().out)
+    to_other, to_itself = report["differences"]
     assert (to_other["path"], to_itself["path"]) == (str(other), str(first))
-    a, b = told["runs"][:2]
+    a, b = report["runs"][:2]
     assert set(METRICS) | {"mechanical_work_J", "energy_J"} <= set(to_other)
     assert to_other["rms_torque_Nm"] == b["rms_torque_Nm"] - a["rms_torque_Nm"] != 0
     assert to_other["rms_error_rad"] == [

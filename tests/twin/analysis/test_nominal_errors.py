@@ -26,11 +26,11 @@ def test_the_modelling_error_is_in_the_inertia_alone(tmp_path):
 def test_friction_sensors_and_delay_that_the_controller_does_not_know_are_listed(tmp_path):
     friction = (0.002, 0.002, 0.003)
     changes = {"plant.modelling_error": 0.0, "plant.coulomb_Nm": friction, "nominal.torque_scale": 1.1}
-    found = errors(tmp_path, **changes, **{"drive.delay_s": 0.001})
-    assert set(found) == {"nominal.coulomb_Nm", "nominal.torque_scale", "nominal.delay_s"}
-    assert found["nominal.coulomb_Nm"][1:] == ("0 0 0", "0.002 0.002 0.003")
-    assert found["nominal.torque_scale"][1:] == ("1.1", "1")
-    assert found["nominal.delay_s"][1:] == ("0", "0.001")
+    result = errors(tmp_path, **changes, **{"drive.delay_s": 0.001})
+    assert set(result) == {"nominal.coulomb_Nm", "nominal.torque_scale", "nominal.delay_s"}
+    assert result["nominal.coulomb_Nm"][1:] == ("0 0 0", "0.002 0.002 0.003")
+    assert result["nominal.torque_scale"][1:] == ("1.1", "1")
+    assert result["nominal.delay_s"][1:] == ("0", "0.001")
 
 
 def test_a_controller_that_knows_the_truth_has_no_error(tmp_path):

@@ -42,9 +42,9 @@ def test_a_recording_says_what_the_telemetry_says_to_the_last_bit(files):
     telemetry, recording = map(read, files)
     assert recording.table.signals == telemetry.table.signals
     assert recording.table.values.tobytes() == telemetry.table.values.tobytes()
-    told = same_but_path(recording)
-    assert told == same_but_path(telemetry)
-    lines = [event["text"] for event in told["events"]]
+    reported = same_but_path(recording)
+    assert reported == same_but_path(telemetry)
+    lines = [event["text"] for event in reported["events"]]
     assert "controller.law set to pd" in lines
     assert any("coil.07 open" in line for line in lines)
     assert lines[-1] == "the run is complete"
@@ -59,20 +59,20 @@ def test_ticks_of_any_period_keep_their_bits(tmp_path, period_s):
 
 def test_a_review_reports_the_figures_of_the_run(files):
     run = simulate(scenarios.load("hold", WITH_EVENTS))
-    told = figures(read(files[0]))
+    reviewed = figures(read(files[0]))
     expected = figures_of(run)
-    assert {name: told[name] for name in expected} == expected
-    assert (told["scenario"], told["law"], told["status"]) == ("hold", "afsm", "completed")
-    assert told["energy_J"] == told["copper_loss_J"] + told["mechanical_work_J"]
+    assert {name: reviewed[name] for name in expected} == expected
+    assert (reviewed["scenario"], reviewed["law"], reviewed["status"]) == ("hold", "afsm", "completed")
+    assert reviewed["energy_J"] == reviewed["copper_loss_J"] + reviewed["mechanical_work_J"]
     facts = {
         "path": str(files[0]), "modelling_error": 0.0, "load": 1.0, "hardware": "ideal", "seed": 0,
         "reason": None, "whole": True, "rows": 2200, "record_rate_Hz": None, "planned_s": 2.2,
     }  # fmt: skip
-    assert {name: told[name] for name in facts} == facts
-    assert told["simulated_s"] == pytest.approx(2.2, rel=1e-12)  # a sum of periods
-    for column, of_axis in zip(run.telemetry["error_rad"].T, told["error_peaks"].values(), strict=True):
+    assert {name: reviewed[name] for name in facts} == facts
+    assert reviewed["simulated_s"] == pytest.approx(2.2, rel=1e-12)  # a sum of periods
+    for column, of_axis in zip(run.telemetry["error_rad"].T, reviewed["error_peaks"].values(), strict=True):
         assert [tuple(peak.values()) for peak in of_axis] == [*map(tuple, peaks(column, 1e-3))]
-    assert list(told["error_peaks"]) == ["α", "β", "γ"]
+    assert list(reviewed["error_peaks"]) == ["α", "β", "γ"]
 
 
 def test_a_run_without_its_law_file_is_reviewed(tmp_path):
@@ -167,8 +167,8 @@ def test_a_run_without_a_tick_is_reviewed(tmp_path):
     paths = tmp_path / "run.rrd", tmp_path / "run.parquet"
     assert Outputs(session, *paths, live=False).close() == []
     for path in paths:
-        told = figures(read(path))
-        assert (told["rows"], told["max_abs_error_rad"], told["energy_J"]) == (0, None, None)
+        reviewed = figures(read(path))
+        assert (reviewed["rows"], reviewed["max_abs_error_rad"], reviewed["energy_J"]) == (0, None, None)
 
 
 def test_wherever_a_recording_is_cut_its_whole_ticks_are_read(files, tmp_path):

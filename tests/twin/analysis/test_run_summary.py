@@ -26,11 +26,11 @@ def test_the_strongest_come_first():
     t = np.arange(8000) * PERIOD_s
     strengths = {10.0: 0.1, 33.3: 1.0, 120.7: 0.5, 200.0: 0.01}
     values = sum(size * np.sin(2 * np.pi * frequency * t) for frequency, size in strengths.items())
-    found = peaks(values, PERIOD_s)
-    assert len(found) == PEAKS
+    result = peaks(values, PERIOD_s)
+    assert len(result) == PEAKS
     # Each leaks a little into the others; they are hundreds of lines apart.
-    assert [peak.frequency_Hz for peak in found] == pytest.approx([33.3, 120.7, 10.0], abs=1e-3)
-    assert [peak.amplitude for peak in found] == pytest.approx([1.0, 0.5, 0.1], rel=1e-3)
+    assert [peak.frequency_Hz for peak in result] == pytest.approx([33.3, 120.7, 10.0], abs=1e-3)
+    assert [peak.amplitude for peak in result] == pytest.approx([1.0, 0.5, 0.1], rel=1e-3)
 
 
 @pytest.mark.parametrize("values", [[], [1.0] * 15, [0.0] * 100, [np.nan] * 100])

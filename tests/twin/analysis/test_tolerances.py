@@ -163,13 +163,13 @@ def runs(tmp_path_factory):
 def test_a_shipped_gate_lets_the_same_run_pass_and_stops_another(runs, name, capsys):
     first, near, far = ([str(path) for path in runs[each]] for each in ("first", "near", "far"))
     assert cli.main(["review", first[0], near[1], "--tolerance", name, "--json"]) == 0
-    told = json.loads(capsys.readouterr().out)
-    assert (told["within_tolerance"], told["exceeded"]) == (True, [])
+    report = json.loads(capsys.readouterr().out)
+    assert (report["within_tolerance"], report["exceeded"]) == (True, [])
     assert cli.main(["review", first[1], near[0], far[0], "--tolerance", name, "--json"]) == 1
     printed = capsys.readouterr()
-    told = json.loads(printed.out)
-    assert told["within_tolerance"] is False
-    assert {place["path"] for place in told["exceeded"]} == {far[0]}
+    report = json.loads(printed.out)
+    assert report["within_tolerance"] is False
+    assert {place["path"] for place in report["exceeded"]} == {far[0]}
     (line,) = printed.err.splitlines()
     assert "leaves its tolerance first at" in line
 

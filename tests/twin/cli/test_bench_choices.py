@@ -39,9 +39,9 @@ def test_families_and_names_can_be_chosen_from():
 
 
 def test_bounds_are_told_beside_the_meaning():
-    found = setting("plant.step_s", scenarios.load("hold"))
-    assert found.meaning == "physics step, s, ≥ 1e-07, ≤ 1"
-    assert found.default == "0.0005"
+    result = setting("plant.step_s", scenarios.load("hold"))
+    assert result.meaning == "physics step, s, ≥ 1e-07, ≤ 1"
+    assert result.default == "0.0005"
 
 
 def test_the_gains_are_those_of_the_law_that_is_in_force():
@@ -114,10 +114,13 @@ def test_a_law_of_a_persons_own_is_offered_with_its_own_bounds_and_defaults(tmp_
     (tmp_path / "mine.py").write_text(OWN)
     law = f"{tmp_path / 'mine.py'}:Mine"
     with Bench(scenarios.load("hold", {"plant.engine": "lagrangian", "controller.law": law})) as bench:
-        found = {each.name: each for each in settings_of(bench.fields())}
-    assert found["controller.law"].text == law
-    assert (found["controller.stiffness"].text, found["controller.stiffness"].default) == ("3 3 3", "3 3 3")
-    assert found["controller.stiffness"].meaning == "my own, > 0, ≤ 1e+09"
+        results = {each.name: each for each in settings_of(bench.fields())}
+    assert results["controller.law"].text == law
+    assert (results["controller.stiffness"].text, results["controller.stiffness"].default) == (
+        "3 3 3",
+        "3 3 3",
+    )
+    assert results["controller.stiffness"].meaning == "my own, > 0, ≤ 1e+09"
 
 
 OWN = """

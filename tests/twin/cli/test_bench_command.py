@@ -4,9 +4,12 @@ import os
 import re
 import signal
 import socket
+import stat
 import subprocess
 import sys
+import urllib.error
 import urllib.request
+from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
@@ -14,6 +17,8 @@ import pytest
 from spheretwin import cli
 from spheretwin.bench.operators import Operators
 from spheretwin.cli import bench
+from spheretwin.models.base.extras import install_command
+from spheretwin.models.telemetry.table import read_parquet
 from spheretwin.viz.bench.page import Page
 from tests.waiting import PATIENCE_S
 
@@ -36,18 +41,18 @@ def test_a_port_in_use_is_told_in_one_line(capsys):
 
 
 @pytest.mark.parametrize(
-    ("arguments", "told"),
+    ("arguments", "message"),
     [
         (["--port", "70000"], "expected a port from 0 to 65535, received 70000"),
         (["--plant.step-s", "-1"], "plant.step_s: expected"),
         (["--record", "/no/such/folder/a.rrd"], "/no/such/folder"),
     ],
 )
-def test_bad_input_is_told_before_anything_is_served(arguments, told, capsys):
+def test_bad_input_is_told_before_anything_is_served(arguments, message, capsys):
     assert cli.main(["bench", "hold", "--no-browser", *arguments]) == 2
     out, err = capsys.readouterr()
     assert out == ""
-    assert told in err
+    assert message in err
     assert err.count("\n") == 1
 
 
@@ -60,11 +65,18 @@ def test_ctrl_c_ends_it_and_what_was_recorded_is_kept(tmp_path):
         text=True,
         env={**os.environ, "PYTHONWARNINGS": "error"},
     ) as process:
-        first = process.stdout.readline()
-        address = first.split()[1]
+        address = process.stdout.readline().split()[1]
         assert address.startswith("http://127.0.0.1:")
-        with urllib.request.urlopen(address) as answer:  # it is said once the page answers
+        with pytest.raises(urllib.error.HTTPError) as refusal:
+            urllib.request.urlopen(address.partition("?")[0])
+        with refusal.value:  # the answer, with its connection
+            assert refusal.value.code == 403
+        browser = urllib.request.build_opener(urllib.request.HTTPCookieProcessor())
+        with browser.open(address) as answer:  # it is said once the page answers
             assert answer.status == 200
+        again = process.stdout.readline()
+        assert again.startswith("bench: for another browser: http://127.0.0.1:")
+        assert again.split()[-1] != address
         process.send_signal(signal.SIGINT)
         out, err = process.communicate(timeout=PATIENCE_S)
     # On a busy machine the end takes a while, and a line says what a second Ctrl-C would do.
@@ -77,7 +89,13 @@ def test_ctrl_c_ends_it_and_what_was_recorded_is_kept(tmp_path):
 def test_without_viser_it_says_what_brings_it(monkeypatch, capsys):
     monkeypatch.setattr("spheretwin.cli.bench.find_spec", lambda name: None)
     assert cli.main(["bench", "hold", "--no-browser"]) == 2
-    assert "spheretwin[bench]" in capsys.readouterr().err
+    assert install_command("bench") in capsys.readouterr().err
+
+
+def redirection(file):
+    """Address and permissions of the file that the browser opens; a command line is visible to everybody."""
+    path = Path(file.removeprefix("file://"))
+    return re.search('url=(.+)"', path.read_text())[1], stat.S_IMODE(path.stat().st_mode)
 
 
 @pytest.mark.parametrize("flags", [[], ["--no-browser", "--hold-after", "7"]], ids=["browser", "none"])
@@ -90,17 +108,98 @@ def test_a_browser_is_opened_at_the_printed_address_unless_it_is_not_to(capsys, 
 
     monkeypatch.setattr(bench, "Operators", operators)
     monkeypatch.setattr(Page, "show", lambda page, ended: None)
-    monkeypatch.setattr(bench.webbrowser, "open", opened.append)
+    monkeypatch.setattr(bench.webbrowser, "open", lambda file: opened.append(redirection(file)))
     assert cli.main(["bench", *COMMAND[4:], "--port", "0", *flags]) == cli.DONE
     out, err = capsys.readouterr()
-    address = re.fullmatch(r"bench: (http://127\.0\.0\.1:\d+) \(Ctrl-C ends it\)\n", out)[1]
-    assert opened == ([] if flags else [address])
-    assert silences == [(7.0 if flags else 2.0, 10.0)]
+    address = re.fullmatch(r"bench: (http://127\.0\.0\.1:\d+/\?token=[\w-]+) \(Ctrl-C ends it\)\n", out)[1]
+    assert not list(Path.home().glob("bench-*.html"))
+    assert opened == ([] if flags else [(address, 0o600)])
+    assert silences == [(7.0 if flags else 2.0,)]
     assert err == "bench: preparing hold\n"
 
 
 @pytest.mark.parametrize(("recording", "line"), [((), ""), (("c", "d"), "spheretwin: not completed: c, d\n")])
 def test_recordings_that_are_not_complete_fail_the_bench(capsys, recording, line):
     state = SimpleNamespace(completed_files=("a", "b"), recording=recording)
-    assert bench._report(SimpleNamespace(state=lambda: state)) == (not recording)
+    assert bench._report(SimpleNamespace(state=lambda: state, stalled=False)) == (not recording)
     assert capsys.readouterr() == ("written  a\nwritten  b\n", line)
+
+
+LAW = """
+import numba
+
+@numba.njit
+def hangs(t, reference, measurement, parameters, state, torque):
+    torque[0] = torque[1] = torque[2] = 0.0
+    while t > 0.05:
+        torque[0] += 1e-9
+"""
+
+
+def test_a_compiled_law_that_never_returns_ends_by_one_ctrl_c_with_complete_files(tmp_path):
+    """The compiled loop cannot be interrupted: the process ends around it."""
+    (tmp_path / "law.py").write_text(LAW)
+    driver = tmp_path / "driver.py"
+    driver.write_text(DRIVER)
+    with subprocess.Popen(
+        [sys.executable, str(driver), "--folder", str(tmp_path)],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    ) as process:
+        try:
+            assert process.stdout.readline().startswith("bench: http://127.0.0.1:")
+            assert process.stdout.readline() == "stalled\n"
+            process.send_signal(signal.SIGINT)
+            out, err = process.communicate(timeout=PATIENCE_S)
+        finally:
+            process.kill()
+    assert process.returncode == 1
+    assert out.split() == ["written", str(tmp_path / "run.parquet")]
+    assert f"LOOP STALLED: the law {tmp_path / 'law.py'}:hangs has not returned" in err
+    assert len(read_parquet(tmp_path / "run.parquet")[0]) > 0
+
+
+# The verb, with a script in place of a page.
+DRIVER = """
+import sys
+import threading
+
+from spheretwin import bench, cli
+from spheretwin.cli import bench as verb
+
+
+class Scripted(bench.Bench):
+    def begin(self):
+        super().begin()
+        threading.Thread(target=self._script, daemon=True).start()
+
+    def _script(self):
+        for name, arguments in (
+            ("set", {"name": "controller.law", "value": "law.py:hangs"}),
+            ("record", {"telemetry": "run.parquet"}),
+            ("start", {}),
+        ):
+            ticket = self.command(name, **arguments)
+            if ticket.wait(600) != "done":  # in a thread an error would leave the bench running for ever
+                print(name, "refused:", ticket.refused, flush=True)
+                return
+        while not self.state().completed_files:
+            pass
+        assert self.state().reason.startswith("LOOP STALLED")
+        print("stalled", flush=True)
+
+
+verb.Bench = Scripted
+arguments = ["bench", "hold", "--plant.engine", "lagrangian", "--no-browser", "--port", "0"]
+sys.exit(cli.main([*arguments, *sys.argv[1:]]))
+"""
+
+
+def test_a_folder_that_is_none_is_refused(tmp_path, capsys):
+    (tmp_path / "file").write_text("")
+    code = cli.main(
+        ["bench", *COMMAND[4:], "--no-browser", "--port", "0", "--folder", str(tmp_path / "file")]
+    )
+    assert code == 2
+    assert f"bench: expected a folder, received {tmp_path / 'file'}" in capsys.readouterr().err

@@ -283,11 +283,11 @@ def test_a_run_imports_nothing_that_it_does_not_need():
         "sys.exit(f'{code} {imported}')"
     )
     # The first run may have to compile, and the compiler imports more.
-    _, done = [
-        subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, cwd="/", check=False)
-        for _ in range(2)
-    ]
-    assert done.stderr.splitlines()[-1] == "0 []"
+    command, last_lines = [sys.executable, "-c", script], []
+    while "0 []" not in last_lines and len(last_lines) < 2:
+        done = subprocess.run(command, capture_output=True, text=True, cwd="/", check=False)
+        last_lines.append(done.stderr.splitlines()[-1])
+    assert last_lines[-1] == "0 []"
 
 
 @pytest.mark.parametrize("option", ["--help", "--version"])

@@ -51,8 +51,8 @@ def test_version_is_printed():
     [
         (["fly"], ["simulate", "magnetics", "fly"]),
         ([], ["VERB"]),
-        (["simulate", "--json"], ["hold, nutation, sinusoid, tilt"]),
-        (["simulate", "spiral"], ["hold, nutation, sinusoid, tilt", "spiral"]),
+        (["simulate", "--json"], ["bench, hold, nutation, sinusoid, tilt, ventusff"]),
+        (["simulate", "spiral"], ["bench, hold, nutation, sinusoid, tilt, ventusff", "spiral"]),
         (["simulate", "hold", "--controller.law", "pdd"], ["pd, pid, lqi", "'pdd'"]),
         (["simulate", "hold", "--controler.law", "pd"], ["controller", "controler"]),
         (["simulate", "hold", "--duration", "nan"], ["duration", "nan"]),
@@ -124,7 +124,14 @@ def test_the_verb_alone_lists_the_scenarios_a_line_each():
     code, stdout, stderr = called("simulate")
     assert code == cli.BAD_INPUT
     lines = stdout.splitlines()
-    assert [line.split()[0] for line in lines] == ["hold", "nutation", "sinusoid", "tilt"]
+    assert [line.split()[0] for line in lines] == [
+        "bench",
+        "hold",
+        "nutation",
+        "sinusoid",
+        "tilt",
+        "ventusff",
+    ]
     assert all(line.endswith(".") and len(line) > 30 for line in lines)
     assert stderr.count("\n") == 1
 

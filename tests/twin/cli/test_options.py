@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from spheretwin import cli
-from spheretwin.models.actuator import MJCF_PATH, TORQUE_CURVE_PATH
+from spheretwin.models.actuator import MJCF_PATH
 
 PART = {"curve": "run_curve", "check": "run_check", "map": "run_map"}
 
@@ -36,18 +36,24 @@ DEFAULTS = {
     "simulate hold": {
         "scenario": "hold", "record": None, "record_rate": None, "telemetry": None, "live": False,
         "live_window": None, "view": None, "replay": None, "metric": [], "json": False, "fields": [],
+        "export_log": None, "export_truth": None, "twin": None,
+    },
+    "log check a": {
+        "files": [Path("a")], "columns": None, "scenario": "hold", "accept": [], "json": False,
     },
     "bench": {
-        "scenario": "hold", "port": 8080, "no_browser": False, "hold_after": 2.0, "record": None,
-        "fields": [],
+        "scenario": "bench", "port": 8080, "no_browser": False, "hold_after": 2.0, "record": None,
+        "fields": [], "folder": Path(), "machine": None, "arm": False, "lockstep": False, "ramp_s": None,
+        "timeout_ms": None, "limit_current_A": None, "limit_angle_deg": None, "limit_rate_rad_s": None,
+        "limit_temperature_degC": None, "frame": "spheretwin",
     },
     "crosscheck": {**PAGE, "states": 10_000, "mjcf": MJCF_PATH, "verbose": False},
     "reproduce figure6": {
-        **PAGE, "names": ["figure6"], "verbose": False, "seeds": 20, "limit": None, "plant": None,
+        **PAGE, "names": ["figure6"], "verbose": False, "seeds": None, "limit": None, "plant": None,
     },
     "sweep paper": {
         **PAGE, "study": "paper", "threads": None, "engine": "local", "address": None, "limit": None,
-        "row": None, "optimise": False, "trials": None,
+        "row": None, "optimise": False, "trials": None, "twin": None, "draws": None,
     },
     "review a": {
         "runs": [Path("a")], "tolerance": None, "export": None, "merge": None, "figures": None,
@@ -57,10 +63,10 @@ DEFAULTS = {
     "explain x y": {"subject": ["x", "y"], "all": False, "json": False},
     "magnetics curve": {**MAGNETICS, "csv": None},
     "magnetics check": {
-        **MAGNETICS, "csv": TORQUE_CURVE_PATH, "poses": 15, "seed": 0, "figure_format": "svg",
+        **MAGNETICS, "csv": None, "poses": 15, "seed": 0, "figure_format": "svg",
     },
     "magnetics map": {
-        **MAGNETICS, "csv": TORQUE_CURVE_PATH, "need": None, "largest_tilt": 57.0, "figure_format": "svg",
+        **MAGNETICS, "csv": None, "need": None, "largest_tilt": 57.0, "figure_format": "svg",
     },
 }  # fmt: skip
 
@@ -80,6 +86,9 @@ def test_options_have_their_defaults(received, command):
         ("simulate hold", "--record", "record"),
         ("simulate hold", "--telemetry", "telemetry"),
         ("simulate", "--replay", "replay"),
+        ("simulate hold", "--export-log", "export_log"),
+        ("simulate hold", "--export-truth", "export_truth"),
+        ("log check a", "--columns", "columns"),
         ("bench", "--record", "record"),
         ("crosscheck", "--out", "out"),
         ("crosscheck", "--mjcf", "mjcf"),
@@ -108,6 +117,7 @@ def test_files_and_folders_are_paths(received, command, flag, name):
         ("sweep paper", "--optimise --json"),
         ("review a", "--json"),
         ("explain x", "--all --json"),
+        ("log check a", "--json"),
         ("magnetics map", "--json --verbose"),
     ],
 )

@@ -20,10 +20,10 @@ def test_json_stands_alone_and_the_page_is_written(tmp_path):
     arguments = ["figure11", "--json", "--seeds", "2", "--limit", "4", "--out", str(folder)]
     done = subprocess.run([*COMMAND, *arguments], capture_output=True, text=True)
     assert (done.returncode, done.stderr) == (0, "")
-    told = json.loads(done.stdout)
-    assert set(told) == {"rows", "seeds", "wall_s", "versions"}
-    assert [row["controller"] for row in told["rows"]] == ["pd", "adaptive_fuzzy", "afsm", "pid"]
-    for row in told["rows"]:
+    report = json.loads(done.stdout)
+    assert set(report) == {"rows", "seeds", "wall_s", "versions"}
+    assert [row["controller"] for row in report["rows"]] == ["pd", "adaptive_fuzzy", "afsm", "pid"]
+    for row in report["rows"]:
         assert (row["figure"], row["m"], row["L"], row["seeds"], row["status"]) == (
             "figure11",
             0,

@@ -9,6 +9,7 @@ import pytest
 from spheretwin import cli
 from spheretwin.cli import sweep
 from spheretwin.models.base.errors import SpheretwinError
+from spheretwin.models.base.extras import install_command
 from spheretwin.study import agreement, report
 from spheretwin.study.grid import Grid
 from spheretwin.study.runner import run as run_study
@@ -42,9 +43,9 @@ def test_json_stands_alone(source, tmp_path, capsys):
     path.write_text('metrics = ["rms_error_rad", "mine.py:loud"]\n' + path.read_text())
     assert cli.main(["sweep", source, "--out", str(tmp_path / "out"), "--json", "--limit", "2"]) == cli.DONE
     out, err = capsys.readouterr()
-    told = json.loads(out)
-    assert (told["rows"], told["of"], told["failed"], told["resumed"]) == (2, 2, 0, 0)
-    assert told["summary"]["afsm"]["loud"] == {"median": 1.0, "range_95": [1.0, 1.0]}
+    reported = json.loads(out)
+    assert (reported["rows"], reported["of"], reported["failed"], reported["resumed"]) == (2, 2, 0, 0)
+    assert reported["summary"]["afsm"]["loud"] == {"median": 1.0, "range_95": [1.0, 1.0]}
     assert err == "here\nhere\n"
 
 
@@ -77,7 +78,7 @@ def test_the_first_of_several_failed_rows_is_named(source, tmp_path, capsys):
 def test_without_matplotlib_there_is_a_table_and_a_word(source, tmp_path, capsys, monkeypatch):
     monkeypatch.setattr(report, "can_be_drawn", lambda: False)
     assert cli.main(["sweep", source, "--out", str(tmp_path / "out")]) == cli.DONE
-    assert "no report was written: it needs the extra `spheretwin[plots]`" in capsys.readouterr().err
+    assert f"no report was written: {install_command('plots')}" in capsys.readouterr().err
     assert {path.name for path in (tmp_path / "out").iterdir()} == {"journal.jsonl", "table.parquet"}
 
 
@@ -93,7 +94,7 @@ def test_plants_that_differ_are_told_in_one_line(source, tmp_path, capsys, monke
 
 
 @pytest.mark.parametrize(
-    ("arguments", "told"),
+    ("arguments", "message"),
     [
         (["papr"], "did you mean paper?"),
         (["paper", "--threads", "0"], "expected a whole number from 1 to 1024, received 0"),
@@ -104,15 +105,15 @@ def test_plants_that_differ_are_told_in_one_line(source, tmp_path, capsys, monke
         (
             ["paper", "--disturbance.load", "1"],
             "expected STUDY, --out, --threads, --engine, --address, --limit, --row, --optimise, --trials,"
-            " --figure-format or --json, received",
+            " --twin, --draws, --figure-format or --json, received",
         ),
     ],
 )
-def test_bad_input_is_one_line(arguments, told, capsys):
+def test_bad_input_is_one_line(arguments, message, capsys):
     assert cli.main(["sweep", *arguments]) == cli.BAD_INPUT
     out, err = capsys.readouterr()
     assert out == ""
-    assert told in err
+    assert message in err
     assert err.count("\n") == 1
 
 
@@ -179,19 +180,19 @@ def test_one_row_is_printed_with_its_values_its_figures_and_its_command(source, 
     monkeypatch.setenv("COLUMNS", "200")
     row = Grid(load_study(source))[2]
     assert cli.main(["sweep", source, "--row", row.key, "--json"]) == cli.DONE
-    told = json.loads(capsys.readouterr().out)
-    assert (told["row"], told["key"], told["seed"]) == (2, row.key, row.seed)
-    assert (told["values"], told["law"], told["reason"], told["error"]) == (
+    reported = json.loads(capsys.readouterr().out)
+    assert (reported["row"], reported["key"], reported["seed"]) == (2, row.key, row.seed)
+    assert (reported["values"], reported["law"], reported["reason"], reported["error"]) == (
         {"disturbance.load": 2.0}, None, None, None,
     )  # fmt: skip
-    assert cli.main([*shlex.split(told["command"])[1:], "--json"]) == cli.DONE
-    assert json.loads(capsys.readouterr().out)["rms_error_rad"] == told["rms_error_rad"]
+    assert cli.main([*shlex.split(reported["command"])[1:], "--json"]) == cli.DONE
+    assert json.loads(capsys.readouterr().out)["rms_error_rad"] == reported["rms_error_rad"]
     assert cli.main(["sweep", source, "--row", row.key]) == cli.DONE
     out, err = capsys.readouterr()
     title, *lines, command = out.splitlines()
-    assert (title.strip(), command, err) == ("row 2 of short", f"command  {told['command']}", "")
+    assert (title.strip(), command, err) == ("row 2 of short", f"command  {reported['command']}", "")
     cells = [[cell.strip() for cell in line.split("|")[1:-1]] for line in lines if line.startswith("| ")]
-    assert cells == [["", "value"], *([name, str(told[name])] for name in told if name != "command")]
+    assert cells == [["", "value"], *([name, str(reported[name])] for name in reported if name != "command")]
 
 
 @pytest.mark.parametrize(

@@ -74,10 +74,12 @@ HOLD = "hold", "--duration", "0.05"
 
 
 def test_functions_stand_among_the_figures(file, capsys):
-    code, told, _ = simulated(capsys, *HOLD, "--metric", f"{file}:largest", "--metric", f"{file}:first_half")
+    code, stdout, _ = simulated(
+        capsys, *HOLD, "--metric", f"{file}:largest", "--metric", f"{file}:first_half"
+    )
     assert code == 0
-    assert told["largest"] == told["max_abs_error_rad"]
-    assert told["first_half"] == 1.0
+    assert stdout["largest"] == stdout["max_abs_error_rad"]
+    assert stdout["first_half"] == 1.0
 
 
 def test_people_are_shown_them_too(file, capsys):
@@ -87,20 +89,20 @@ def test_people_are_shown_them_too(file, capsys):
 
 def test_a_function_that_fails_costs_neither_figures_nor_files(file, tmp_path, capsys):
     path = tmp_path / "run.parquet"
-    code, told, stderr = simulated(
+    code, stdout, stderr = simulated(
         capsys, *HOLD, "--metric", f"{file}:failing", "--metric", f"{file}:largest", "--telemetry", path
     )
     assert code == 1
     assert stderr == ""
-    assert told["failing"] is None
-    assert told["largest"] == told["max_abs_error_rad"]
-    (line,) = [warning for warning in told["warnings"] if warning.startswith("metric failing: ")]
+    assert stdout["failing"] is None
+    assert stdout["largest"] == stdout["max_abs_error_rad"]
+    (line,) = [warning for warning in stdout["warnings"] if warning.startswith("metric failing: ")]
     assert "did you mean error_rad?" in line
     assert len(read_parquet(path)[0]) == 50
 
 
 @pytest.mark.parametrize(
-    ("name", "told"),
+    ("name", "message"),
     [
         ("leaving", "it raised SystemExit: 0"),
         ("a_set", "expected a value in JSON types, received {1, 2}"),
@@ -110,13 +112,13 @@ def test_a_function_that_fails_costs_neither_figures_nor_files(file, tmp_path, c
         ("sly", "received a value of class Sly, which raises LookupError when it is written"),
     ],
 )
-def test_whatever_a_function_does_the_run_ends_as_it_would(file, name, told, capsys):
+def test_whatever_a_function_does_the_run_ends_as_it_would(file, name, message, capsys):
     code, figures, stderr = simulated(capsys, *HOLD, "--metric", f"{file}:{name}")
     assert (code, stderr) == (1, "")
     assert figures[name] is None
     assert figures["max_abs_error_rad"]
     (line,) = [warning for warning in figures["warnings"] if warning.startswith(f"metric {name}: ")]
-    assert told in line
+    assert message in line
 
 
 def test_what_a_function_prints_is_not_among_the_figures(file, capsys):
@@ -139,12 +141,12 @@ def test_a_replayed_run_shows_the_columns_that_came_on_its_way(file, tmp_path, c
     session.set("controller.law", "afsm")
     file_of_run.write(session.advance(30))
     file_of_run.close(record_of(session).metadata())
-    _, told, _ = simulated(capsys, "--replay", path, "--metric", f"{file}:columns")
-    assert {"q_rad", "sliding_s"} <= set(told["columns"])
+    _, stdout, _ = simulated(capsys, "--replay", path, "--metric", f"{file}:columns")
+    assert {"q_rad", "sliding_s"} <= set(stdout["columns"])
 
 
 @pytest.mark.parametrize(
-    ("specs", "told"),
+    ("specs", "message"),
     [
         (["mine.py:larges"], "received larges; did you mean largest?"),
         (["mine.py"], "expected path/to/file.py:name"),
@@ -155,7 +157,7 @@ def test_a_replayed_run_shows_the_columns_that_came_on_its_way(file, tmp_path, c
         (["other.py:status"], "expected another name than max_abs_error_rad"),
     ],
 )
-def test_what_is_no_metric_is_bad_input_before_the_run(file, specs, told, capsys, monkeypatch):
+def test_what_is_no_metric_is_bad_input_before_the_run(file, specs, message, capsys, monkeypatch):
     (file.parent / "other.py").write_text("def status(run): pass")
     monkeypatch.chdir(file.parent)
     arguments = [part for spec in specs for part in ("--metric", spec)]
@@ -163,7 +165,7 @@ def test_what_is_no_metric_is_bad_input_before_the_run(file, specs, told, capsys
     stdout, stderr = capsys.readouterr()
     assert stdout == ""
     (line,) = stderr.splitlines()
-    assert told in line
+    assert message in line
     assert not (file.parent / "run.parquet").exists()
 
 

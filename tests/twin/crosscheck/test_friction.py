@@ -19,7 +19,7 @@ TIGHT = {"method": "DOP853", "rtol": 1e-12, "atol": 1e-14}
 
 
 @pytest.fixture(scope="module")
-def found(actuator):
+def report(actuator):
     return friction.compare(actuators.MJCF_PATH, actuator)
 
 
@@ -74,8 +74,8 @@ def test_ideal_friction_holds_slides_and_holds_again_along_a_ramp(hinge):
     np.testing.assert_allclose(runs.ideal_ramp(hinge, len(up)), expected, rtol=0, atol=1e-9)
 
 
-def test_breakaway_of_ideal_friction_is_just_before_the_latest(found):
-    for bearing in found.bearings.values():
+def test_breakaway_of_ideal_friction_is_just_before_the_latest(report):
+    for bearing in report.bearings.values():
         hinge, ramp = bearing.hinge, bearing.ramp
         rate = runs.breakaway_rate_rad_s(hinge)
         passed = ramp.torque_Nm[np.argmax(ramp.ideal_rad_s >= rate)]
@@ -173,17 +173,17 @@ def test_a_hinge_too_light_for_the_constraint_never_loses_the_grip():
 # The part
 
 
-def test_every_bound_is_kept_and_every_bearing_is_told(found):
-    assert all(check.ok for check in found.checks)
-    assert len(found.checks) == 11
-    assert list(found.bearings) == ["2 mN·m", "5 mN·m"]
-    for check in found.checks:
+def test_every_bound_is_kept_and_every_bearing_is_told(report):
+    assert all(check.ok for check in report.checks)
+    assert len(report.checks) == 11
+    assert list(report.bearings) == ["2 mN·m", "5 mN·m"]
+    for check in report.checks:
         if "viscous" not in check.name:
-            assert {name.split(":")[0] for name in check.detail} == set(found.bearings)
+            assert {name.split(":")[0] for name in check.detail} == set(report.bearings)
 
 
-def test_below_its_level_our_stage_creeps_by_its_smoothing_and_mujoco_by_its_softness(found):
-    rates = [bearing.creep_rad_s for bearing in found.bearings.values()]
+def test_below_its_level_our_stage_creeps_by_its_smoothing_and_mujoco_by_its_softness(report):
+    rates = [bearing.creep_rad_s for bearing in report.bearings.values()]
     ours, theirs = ([rate[way] for rate in rates] for way in (friction.OURS, friction.MUJOCO))
     limit = 0.01 * 0.5 / np.sqrt(0.75)
     # Viscous friction, 1e-4 N·m·s, takes 8e-4 and 3e-4 off it: Coulomb's slope there is (1 - ¼)^1.5 of k(0).
@@ -214,7 +214,7 @@ def test_bounds_hold_for_actuators_of_other_inertia(tmp_path, share):
     assert broken(model, actuators.load(model)) == set()
 
 
-def test_options_of_a_file_change_nothing(tmp_path, actuator, found):
+def test_options_of_a_file_change_nothing(tmp_path, actuator, report):
     model = edited(
         tmp_path,
         ("<option ", '<option gravity="0 0 -5" solver="PGS" iterations="1" noslip_iterations="9" '),
@@ -222,7 +222,7 @@ def test_options_of_a_file_change_nothing(tmp_path, actuator, found):
         ('axis="0 0 1"', 'axis="0 0 1" solreffriction="0.1 2" solimpfriction="0.5 0.6 0.1 0.5 2"'),
     )
     same = friction.compare(model, actuator).checks
-    assert [check.value for check in same] == [check.value for check in found.checks]
+    assert [check.value for check in same] == [check.value for check in report.checks]
 
 
 OURS_SLIDES = {"stopping time, our stage", "stopping angle, our stage", "sliding"}
@@ -271,8 +271,8 @@ MUJOCO_STOPS = {"stopping time, MuJoCo", "stopping angle, MuJoCo"}
 def test_another_constraint_breaks_its_rows(monkeypatch, actuator, field, share, rows):
     right = moving._with_bearing
 
-    def other(kept, hinge):
-        changed = right(kept, hinge)
+    def other(original, hinge):
+        changed = right(original, hinge)
         getattr(changed.bare, field)[moving.GAMMA] *= share
         return changed
 

@@ -89,12 +89,12 @@ def test_one_error_moves_no_draw_of_the_other():
 def test_the_mean_of_many_sees_between_steps_with_the_variance_of_one_over_their_number(conversions):
     channel, step, runs = made(bits=12), 5 / 2**12, 20_000
     draws = np.random.default_rng(0).standard_normal((runs, conversions))
-    held = 100.3 * step
-    got = np.array([noisy(channel, held, step, row) for row in draws])
+    constant = 100.3 * step
+    got = np.array([noisy(channel, constant, step, row) for row in draws])
     # With noise of a step, quantisation adds a twelfth and shifts nothing, both to exp(-2π²) = 3e-9.
     variance = step**2 * (1 + 1 / 12) / conversions
     assert got.var() == pytest.approx(variance, rel=4 * np.sqrt(2 / runs))
-    assert abs(got.mean() - held) < 4 * np.sqrt(variance / runs)
+    assert abs(got.mean() - constant) < 4 * np.sqrt(variance / runs)
 
 
 def test_every_stride_th_draw_is_the_channel_s():

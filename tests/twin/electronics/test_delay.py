@@ -24,8 +24,8 @@ def in_force(made, commands, substeps):
 def test_a_command_is_held_back_by_its_steps(steps, substeps, ticks):
     commands = np.random.default_rng(ticks).normal(size=(ticks, 3))
     made = delay(DelaySection(delay_s=steps * STEP_S), STEP_S, substeps, 3)
-    held = np.repeat(commands, substeps, axis=0)
-    expected = np.concatenate([np.zeros((steps, 3)), held])[: len(held)]
+    substep_commands = np.repeat(commands, substeps, axis=0)
+    expected = np.concatenate([np.zeros((steps, 3)), substep_commands])[: len(substep_commands)]
     np.testing.assert_array_equal(in_force(made, commands, substeps), expected)
 
 

@@ -7,20 +7,20 @@ from hypothesis import strategies as st
 from scipy.stats import kstest
 
 from spheretwin.disturbances import term_draws
-from spheretwin.electronics.random_streams import noise_rows, noise_table, stream_key, width_of
+from spheretwin.electronics.random_streams import noise_table, stream_key, width_of
 
 SEED, TICKS, WIDTH, NAME = 7, 400, 11, "adc noise"
 
 
 @pytest.fixture(scope="module")
 def whole():
-    return noise_rows(SEED, 0, TICKS, WIDTH, NAME)
+    return noise_table(SEED, 0, TICKS, ((NAME, WIDTH),))
 
 
 @given(first=st.integers(0, TICKS - 1), ticks=st.integers(0, 40), width=st.integers(0, WIDTH))
 def test_neither_blocks_nor_further_columns_move_a_bit(whole, first, ticks, width):
     ticks = min(ticks, TICKS - first)
-    rows = noise_rows(SEED, first, ticks, width, NAME)
+    rows = noise_table(SEED, first, ticks, ((NAME, width),))
     assert rows.shape == (ticks, width)
     np.testing.assert_array_equal(rows, whole[first : first + ticks, :width])
 
@@ -37,7 +37,7 @@ def test_a_number_is_that_of_its_tick_alone(whole):
 
 
 def test_numbers_are_normal_and_independent():
-    rows = noise_rows(1, 0, 50_000, 8, NAME)
+    rows = noise_table(1, 0, 50_000, ((NAME, 8),))
     for column in rows.T:
         assert kstest(column, "norm").pvalue > 1e-3  # one fixed draw of eight: 0.8 % would fall below
     followed = np.concatenate([rows[1:], rows[:-1], rows[1:] ** 2 - 1], axis=1)
@@ -51,7 +51,7 @@ def test_numbers_are_normal_and_independent():
 
 
 def test_streams_are_those_of_the_seed_and_of_nothing_else(whole):
-    assert not np.any(noise_rows(SEED + 1, 0, TICKS, WIDTH, NAME) == whole)
+    assert not np.any(noise_table(SEED + 1, 0, TICKS, ((NAME, WIDTH),)) == whole)
     uniform = np.random.Generator(
         np.random.Philox(np.random.SeedSequence([SEED, stream_key(NAME), 0]))
     ).random(4 * TICKS)
@@ -61,7 +61,7 @@ def test_streams_are_those_of_the_seed_and_of_nothing_else(whole):
 
 @pytest.mark.parametrize("seed", [0, 2**32, 2**64 + 1, 10**40])
 def test_any_seed_will_do(seed):
-    assert np.isfinite(noise_rows(seed, 10**12, 5, 3, NAME)).all()
+    assert np.isfinite(noise_table(seed, 10**12, 5, ((NAME, 3),))).all()
 
 
 def test_streams_of_other_names_move_no_bit(whole):
@@ -71,3 +71,15 @@ def test_streams_of_other_names_move_no_bit(whole):
     np.testing.assert_array_equal(table[:, 2 : 2 + WIDTH], whole[30:80])
     assert not np.isin(np.delete(table, slice(2, 2 + WIDTH), axis=1), whole).any()
     assert noise_table(SEED, 0, 5, ()).shape == (5, 0)
+
+
+@pytest.mark.parametrize("seed", [0, 7, 2**64 + 1])
+@pytest.mark.parametrize(("first", "ticks", "width"), [(0, 1000, 18), (10**12, 7, 3), (5, 1, 6)])
+def test_bits_are_those_of_numpy(seed, first, ticks, width):
+    expected = np.empty((ticks, 0))
+    for block in range(-(-width // 4)):
+        stream = np.random.Philox(np.random.SeedSequence([seed, stream_key(NAME), block])).advance(first)
+        uniform = np.random.Generator(stream).random((ticks, 4))
+        radius, angle = np.sqrt(-2 * np.log1p(-uniform[:, :2])), 2 * np.pi * uniform[:, 2:]
+        expected = np.hstack([expected, radius * np.cos(angle), radius * np.sin(angle)])
+    np.testing.assert_array_equal(noise_table(seed, first, ticks, ((NAME, width),)), expected[:, :width])

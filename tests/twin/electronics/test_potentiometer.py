@@ -75,8 +75,8 @@ def test_the_voltage_rises_with_the_angle_at_the_largest_residual(seed):
 
 
 def test_a_residual_with_which_it_might_not_rise_is_refused():
-    told = "expected nonlinearity_rad below 0.06 rad, 6% of electrical_angle_rad.* received 0.07"
-    with pytest.raises(ValidationError, match=told):
+    message = "expected nonlinearity_rad below 0.06 rad, 6% of electrical_angle_rad.* received 0.07"
+    with pytest.raises(ValidationError, match=message):
         PotentiometerSection(electrical_angle_rad=1.0, nonlinearity_rad=0.07)
 
 

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from pydantic import ValidationError
 
 from spheretwin import scenario as scenarios
-from spheretwin.electronics.random_streams import noise_rows, noise_table
+from spheretwin.electronics.random_streams import noise_table
 from spheretwin.electronics.sensor_chain import SensorsSection, noise_streams, sense, sensor_chain
 from spheretwin.electronics.stages import SensorSetup
 from spheretwin.electronics.transducers import LAG, PotentiometerSection, wiper_angle
@@ -71,7 +71,7 @@ def test_hysteresis_is_the_difference_of_readings_from_both_sides():
 @pytest.mark.parametrize("side", [-1, 1])
 def test_repeatability_is_the_spread_of_readings_from_one_side(side):
     count, angles = 3000, approaches(3000, side)
-    draws = noise_rows(4, 0, len(angles), 2, "sensors.potentiometer noise")
+    draws = noise_table(4, 0, len(angles), (("sensors.potentiometer noise", 2),))
     reading = followed(made(), angles, draws)[len(angles) // count - 1 :: len(angles) // count]
     deviation = reading - side * WIDTH / 2
     assert 0.9 * SPREAD < np.abs(deviation).max() <= SPREAD * (1 + 1e-12)
@@ -107,7 +107,7 @@ def test_play_changes_no_other_number_and_is_the_channel_s_own():
             sense(chain, np.array([angle, angle, 0.0]), np.zeros(3), numbers, row)
             measured[name].append(row[0, :2].copy())
     play = np.array(measured["play"]) - np.array(measured["plain"])
-    numbers = noise_rows(3, 0, len(angles), 2, "sensors.potentiometer noise")
+    numbers = noise_table(3, 0, len(angles), (("sensors.potentiometer noise", 2),))
     for channel in range(2):
         expected = slow_wiper(angles, numbers[:, channel], WIDTH / 2, SPREAD) - angles
         # Sums of volts, in rad of 1 V/rad.
@@ -128,7 +128,7 @@ def test_telemetry_has_the_lead_of_the_wiper_and_snapshots_hold_it():
         second = session.advance(150).values.tobytes()
         session.restore(state)
         assert session.advance(150).values.tobytes() == second
-    numbers = noise_rows(0, 0, 150, 2, "sensors.potentiometer noise")
+    numbers = noise_table(0, 0, 150, (("sensors.potentiometer noise", 2),))
     for channel in range(2):
         q = first["q_rad"][:, channel]
         expected = slow_wiper(q, numbers[:, channel], WIDTH / 2, SPREAD) - q

@@ -173,14 +173,14 @@ def test_neutral_stages_move_no_bit():
         "drive.dac_offset_V": 1e-3,
         "drive.bandwidth_rad_s": 10.0,
     }
-    told = simulate(scenarios.load("hold", {"duration": 0.1, **neutral})).telemetry
-    assert told.values.tobytes() == plain.values.tobytes()
+    telemetry = simulate(scenarios.load("hold", {"duration": 0.1, **neutral})).telemetry
+    assert telemetry.values.tobytes() == plain.values.tobytes()
 
 
 def test_copper_loss_is_what_the_coils_say_they_lost():
     from spheretwin.run import figures_of
 
     run = simulate(driven("nutation", duration=0.3))
-    told = run.telemetry["copper_loss_W"].sum() * 1e-3
+    loss_J = run.telemetry["copper_loss_W"].sum() * 1e-3
     # The same numbers, added in another order.
-    assert figures_of(run)["copper_loss_J"] == pytest.approx(told, rel=1e-12)
+    assert figures_of(run)["copper_loss_J"] == pytest.approx(loss_J, rel=1e-12)

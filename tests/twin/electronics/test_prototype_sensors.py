@@ -63,13 +63,13 @@ def test_a_snapshot_goes_on_with_noise_and_memory(kind):
 
 
 def test_a_change_beside_it_leaves_the_estimator_s_memory():
-    with Session(prototype()) as kept, Session(prototype()) as changed:
-        kept.advance(200)
+    with Session(prototype()) as unchanged, Session(prototype()) as changed:
+        unchanged.advance(200)
         changed.advance(100)
         changed.set("disturbance.load", 0.0)
         changed.set("plant.group_gain", [1.0] * 18)
         changed.advance(100)
-        assert kept.advance(50).values.tobytes() == changed.advance(50).values.tobytes()
+        assert unchanged.advance(50).values.tobytes() == changed.advance(50).values.tobytes()
 
 
 def test_another_seed_is_another_prototype():
@@ -98,10 +98,10 @@ def test_a_field_that_is_set_is_not_set_by_the_hardware(tmp_path):
 def test_every_set_is_fields_of_a_scenario(name):
     scenario = scenarios.load("hold", {"hardware": name})
     for dotted, value in HARDWARE[name].items():
-        found = scenario
+        result = scenario
         for part in dotted.split("."):
-            found = getattr(found, part)
-        assert found == value, dotted
+            result = getattr(result, part)
+        assert result == value, dotted
 
 
 def test_a_run_of_the_prototype_is_replayed(tmp_path):

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from numba.core.runtime import _nrt_python, rtsys
 
 from spheretwin import electronics
-from spheretwin.electronics.random_streams import noise_rows, noise_table, stream_key, width_of
+from spheretwin.electronics.random_streams import noise_table, stream_key, width_of
 from spheretwin.electronics.sensor_chain import SensorsSection, noise_streams, sense, sensor_chain
 from spheretwin.models.base.compiled import compiled
 from spheretwin.scenario.fields import every_field
@@ -123,7 +123,7 @@ def slow_residual(fields, seed, channel, angle):
 def slow_chain(section, seed, q):
     """The chain of α, β and γ in NumPy, all ticks at once."""
     track, converter = section.potentiometer, section.adc
-    draws = noise_rows(seed, 0, len(q), 2 * converter.oversampling, "sensors.adc noise")
+    draws = noise_table(seed, 0, len(q), (("sensors.adc noise", 2 * converter.oversampling),))
     draws = draws.reshape(len(q), converter.oversampling, 2)
     turned = q + np.array(section.angle_offset_rad)
     angles = np.empty_like(q)

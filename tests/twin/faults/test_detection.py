@@ -34,11 +34,11 @@ def test_every_group_that_fails_is_found_and_named_and_no_other(hardware, mode, 
         assert out[-1].nonzero()[0].tolist() == [group]
         assert out[-1, group] == name
         took_s.append(delays[-1, group])
-        found = np.flatnonzero(out[:, group])[0]
-        assert run.telemetry["t_s"][found] == pytest.approx(START_S + took_s[-1], abs=1e-9)
+        result = np.flatnonzero(out[:, group])[0]
+        assert run.telemetry["t_s"][result] == pytest.approx(START_S + took_s[-1], abs=1e-9)
         # From the tick at which it is found on, it is asked for nothing.
-        assert run.telemetry["current_command_A"][:found, group].any()
-        assert not run.telemetry["current_command_A"][found:, group].any()
+        assert run.telemetry["current_command_A"][:result, group].any()
+        assert not run.telemetry["current_command_A"][result:, group].any()
     assert max(took_s) <= 0.1
     assert min(took_s) >= 3e-3  # no sooner than the ticks that a healthy current may look like none
 
@@ -104,9 +104,9 @@ def test_no_healthy_group_is_ever_found(label, name, hardware, ticks, changes):
 
 
 def test_a_supply_that_the_controller_does_not_know_leaves_its_thresholds():
-    told, weak = scenario(duration=0.1), scenario(duration=0.1, **{"drive.supply_V": 8.0})
+    nominal, weak = scenario(duration=0.1), scenario(duration=0.1, **{"drive.supply_V": 8.0})
     figures = []
-    for each in (told, weak, scenario(duration=0.1, **supply(8.0))):
+    for each in (nominal, weak, scenario(duration=0.1, **supply(8.0))):
         with Session(each) as session:
             detector = session._runtime._controller.supervision.detector
             figures.append((detector.threshold_A, detector.ticks, detector.reach_A))
@@ -152,16 +152,16 @@ def test_a_find_is_told_once_with_its_time():
     run = simulate(scenario(fault=[fault], duration=1.5))
     lines = FaultMessages()
     signals, values = run.telemetry.signals, run.telemetry.values
-    told = []
+    messages = []
     for first in range(0, len(values), 333):
-        told += lines.of(Table(signals, values[first : first + 333]))
+        messages += lines.of(Table(signals, values[first : first + 333]))
     after_ms = 1e3 * run.telemetry["time_to_detection_s"][-1, 7]
-    assert [text for _, text in told] == [
+    assert [text for _, text in messages] == [
         "coil.07 open",
         f"group 7 found open, {after_ms:.0f} ms after it failed",
         "coil.07 works again",
     ]
-    assert [t_s for t_s, _ in told] == pytest.approx([0.5, 0.5 + 1e-3 * after_ms, 1.2], abs=1e-9)
+    assert [t_s for t_s, _ in messages] == pytest.approx([0.5, 0.5 + 1e-3 * after_ms, 1.2], abs=1e-9)
 
 
 def test_messages_of_one_chunk_are_in_the_order_of_time():

@@ -31,9 +31,9 @@ def fault(name, mode, **more):
 def refused(*faults):
     with pytest.raises(InputError) as refusal:
         planned(*faults)
-    told = str(refusal.value)
-    assert "\n" not in told
-    return told
+    message = str(refusal.value)
+    assert "\n" not in message
+    return message
 
 
 @EACH
@@ -42,9 +42,9 @@ def test_its_modes_are_taken_and_all_others_refused_by_name(name):
         if mode in TARGETS[name].modes:
             assert planned(fault(name, mode)).fault[0].mode == mode
         else:
-            told = refused(fault(name, mode))
-            assert f"expected one of {', '.join(TARGETS[name].modes)} for {name}" in told
-            assert f"received mode {mode}" in told
+            message = refused(fault(name, mode))
+            assert f"expected one of {', '.join(TARGETS[name].modes)} for {name}" in message
+            assert f"received mode {mode}" in message
     assert "mode" in refused({**fault(name, MODES[0]), "mode": "bored"})
 
 
@@ -59,9 +59,9 @@ def test_values_are_those_of_the_mode(name):
             for value in (least, largest, np.nextafter((least + largest) / 2, largest)):
                 assert planned(fault(name, mode, value=float(value))).fault[0].effective_value == value
         for value in (np.nextafter(least, -np.inf), np.nextafter(largest, np.inf), -1e300, 1e300):
-            told = refused(fault(name, mode, value=float(value)))
-            assert f"expected a value from {least:g} to {largest:g} for {mode}" in told
-            assert meaning in told
+            message = refused(fault(name, mode, value=float(value)))
+            assert f"expected a value from {least:g} to {largest:g} for {mode}" in message
+            assert meaning in message
         for value in (np.nan, np.inf, -np.inf, "much"):
             refused(fault(name, mode, value=value))
         without = {key: given for key, given in fault(name, mode).items() if key != "value"}
@@ -81,11 +81,11 @@ def test_no_time_before_it_and_no_end_before_its_start(name):
 @EACH
 def test_only_of_groups_may_the_controller_know_and_only_of_those_that_there_are(name):
     mode, target = next(iter(TARGETS[name].modes)), TARGETS[name]
-    for told in ("reported_to_controller", "detection"):
+    for field in ("reported_to_controller", "detection"):
         if target.each_group:
-            planned(fault(name, mode, **{told: True}))
+            planned(fault(name, mode, **{field: True}))
         else:
-            assert f"expected {told} for a fault of" in refused(fault(name, mode, **{told: True}))
+            assert f"expected {field} for a fault of" in refused(fault(name, mode, **{field: True}))
     none_such = [f"{name}.nowhere", f"{name}.", f"{name}.-1", f"{name} ", f"{name}.1.2"]
     none_such += [name] if target.each_group or target.places else [f"{name}.0"]
     for part in none_such:

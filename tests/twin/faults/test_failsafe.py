@@ -214,11 +214,11 @@ def test_the_command_says_why_and_keeps_it_all(tmp_path, capsys):
     arguments = ["simulate", "nutation", "--hardware", "electronics", "--plant.engine", "lagrangian"]
     arguments += ["--watchdog.edge-margin-rad", "1.3", "--telemetry", str(path)]
     assert cli.main([*arguments, "--json"]) == 1
-    told = capsys.readouterr()
-    summary = json.loads(told.out)
+    printed = capsys.readouterr()
+    summary = json.loads(printed.out)
     assert summary["status"] == "failsafe"
     assert summary["reason"] == Reason.EDGE.text
-    assert f"failsafe, {Reason.EDGE.text}" in told.err
+    assert f"failsafe, {Reason.EDGE.text}" in printed.err
     table = read_parquet(path)[0]
     assert np.isfinite(table.values).all()
     assert table["failsafe_reason"][-1] == Reason.EDGE
@@ -229,11 +229,11 @@ def test_after_its_end_a_session_goes_no_further_and_a_restored_one_goes_on():
     changes = {"fault": [fault("pot.alpha", "offset", 0.2)]}
     with Session(scenario(**changes)) as session, Session(scenario(**changes)) as other:
         session.advance(110)
-        kept = session.snapshot()
+        snapshot = session.snapshot()
         rest = session.advance(500)
         assert session.status == "failsafe"
         assert len(session.advance(10)) == 0
-        other.restore(kept)
+        other.restore(snapshot)
         assert other.advance(500).values.tobytes() == rest.values.tobytes()
         assert other.reason == Reason.JUMP
 
@@ -306,9 +306,9 @@ def test_a_study_tells_of_its_failsafe_rows_and_exits_1(tmp_path, capsys):
     command = ["sweep", str(source), "--out", str(tmp_path / "out")]
     assert cli.main([*command, "--json"]) == 1
     printed = capsys.readouterr()
-    found = json.loads(printed.out)
-    assert (found["rows"], found["failed"]) == (2, 1)
-    assert found["summary"]["afsm"]["statuses"] == {"completed": 1, "failsafe": 1}
+    report = json.loads(printed.out)
+    assert (report["rows"], report["failed"]) == (2, 1)
+    assert report["summary"]["afsm"]["statuses"] == {"completed": 1, "failsafe": 1}
     assert printed.err.startswith("spheretwin: sweep: 1 of 2 rows failed, the first with key ")
     assert printed.err.endswith(f": failsafe, {Reason.JUMP.text}\n")
     assert printed.err.count("\n") == 1

@@ -81,13 +81,13 @@ def test_a_shorted_coil_carries_what_its_emf_drives():
     assert len(before) == 1
     middle = amid(table["q_rad"], table["qdot_rad_s"], before["qdot_rad_s"])
     emf = emfs(*middle, actuator)[:, 4]
-    found = solve_ivp(
+    solution = solve_ivp(
         lambda t, i: (-R_OHM * i - emf[min(int(t / STEP_S), 199)]) / L_H,
         (0, 0.2), [start], method="RK45", max_step=STEP_S / 5, rtol=1e-10, atol=1e-12,
         dense_output=True,
     )  # fmt: skip
     within = np.linspace(0, STEP_S, 101)
-    means = [np.trapezoid(found.sol(tick * STEP_S + within)[0], within) / STEP_S for tick in range(200)]
+    means = [np.trapezoid(solution.sol(tick * STEP_S + within)[0], within) / STEP_S for tick in range(200)]
     # The solver steps over the corners of the EMF, the trapezoids are 1e-4 of a decay within the first step.
     np.testing.assert_allclose(table["current_A"][:, 4], means, rtol=0, atol=2e-4 * np.abs(means).max())
     assert np.abs(means[100:]).max() > 0.01
@@ -175,9 +175,9 @@ def test_a_low_supply_limits_the_ramp(share):
         def slope(t, i, target=target, e=e):
             return (np.clip(R_OHM * i + stiffness * (target - i) + e, down, up) - R_OHM * i - e) / L_H
 
-        found = solve_ivp(slope, (0, STEP_S), [0.0], method="RK45", max_step=1e-6, rtol=1e-9, atol=1e-9)
+        solution = solve_ivp(slope, (0, STEP_S), [0.0], method="RK45", max_step=1e-6, rtol=1e-9, atol=1e-9)
         # Steps of 1 µs over the corner where the limit is left: 1e-4 of the currents.
-        assert ends[group] == pytest.approx(found.y[0, -1], abs=1e-4 * 8)
+        assert ends[group] == pytest.approx(solution.y[0, -1], abs=1e-4 * 8)
         limited += row["voltage_limited"][0, group] > 0
     assert limited > 5
 

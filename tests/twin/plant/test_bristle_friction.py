@@ -4,7 +4,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 from numba.core.runtime import _nrt_python, rtsys
 
@@ -105,17 +105,18 @@ def order(steps, errors):
 # Rest
 
 
-@pytest.mark.parametrize("engine", list(ROTORS))
-def test_a_hinge_at_half_of_the_break_away_torque_rests_for_ten_minutes(actuator, engine):
+# A step of MuJoCo takes six times as long, and the elements are the same.
+@pytest.mark.parametrize(("engine", "minutes"), [("lagrangian", 10), ("mujoco", 2)])
+def test_a_hinge_at_half_of_the_break_away_torque_rests_for_minutes(actuator, engine, minutes):
     # Within 1 s, so that nothing overshoots.
-    rise = np.minimum(STEP_s * np.arange(round(600 / STEP_s)), 1.0)
+    rise = np.minimum(STEP_s * np.arange(round(60 * minutes / STEP_s)), 1.0)
     load = 0.5 * BREAK_AWAY_Nm * np.outer(rise, [1.0, -1.0, 1.0])
     bristles = elements(actuator)
     q, qdot, _ = motion(ROTORS[engine](actuator), bristles, load, TILTED, every=round(1 / STEP_s))
     # The elastic motion decays with 1 / (0.3 · 42 rad/s) = 0.08 s, by exp(-25) from 1 to 3 s. Rounding of q,
-    # 1e-16 in each of 1.2 million steps, is all that is left: it adds up to 1e-10 rad at most. The
-    # requirement is 1e-6 rad.
-    assert np.ptp(q[3:], axis=0).max() < 1e-10
+    # 1e-16 in each of 120,000 steps a minute, is all that is left: it adds up to 1e-11 rad a minute at most.
+    # The requirement is 1e-6 rad in ten minutes.
+    assert np.ptp(q[3:], axis=0).max() < 1e-11 * minutes
     assert np.abs(qdot[3:]).max() < 1e-9
     # The deflection is that of the springs, and both engines are at the same place.
     np.testing.assert_allclose(q[-1] - TILTED, load[-1] / STIFFNESS_Nm_rad, rtol=1e-9)
@@ -295,6 +296,21 @@ three = st.tuples(finite, finite, finite).map(np.array)
 exponent = st.floats(0, 1)
 
 
+# The iteration cycles between two branches, and then converges slowly.
+@example(
+    pose=np.array([0.0, 1.0, 1.0]),
+    direction=np.array([0.0, 0.5, 1.0]),
+    deflection=[np.zeros(3), np.zeros(3), np.array([0.0, 0.125, 0.0])],
+    ratio=3.0,
+    range_=-6.0,
+    damping=0.0,
+    stribeck=0.0,
+    levels=(0.0, 0.59375, 1.0),
+    step_=-3.0,
+    speed=-1.75,
+    ahead=np.zeros(3),
+    slips=False,
+)
 @given(
     three,
     three,

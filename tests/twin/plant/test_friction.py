@@ -233,10 +233,10 @@ def test_a_free_motion_is_that_under_mujoco_s_own_damping(actuator, engine):
     errors = []
     for step_s in STEPS_s:
         if engine == "mujoco":
-            found = by_mujoco(step_s, 0.0, viscous_friction(actuator, step_s))
+            result = by_mujoco(step_s, 0.0, viscous_friction(actuator, step_s))
         else:
-            found = by_lagrangian(actuator, step_s)
-        errors.append(np.abs(found - expected).max())
+            result = by_lagrangian(actuator, step_s)
+        errors.append(np.abs(result - expected).max())
     # Split symmetrically around the rotor's step: second order.
     assert errors[-1] < 1e-6, errors
     assert 1.95 < order(STEPS_s, errors) < 2.05, errors
@@ -262,7 +262,7 @@ def repeated(count, friction, q, qdot, torque):
 
 
 @pytest.mark.parametrize(
-    ("coulomb", "viscous", "smoothing", "told"),
+    ("coulomb", "viscous", "smoothing", "message"),
     [
         ([0, -1e-3, 0], NONE, 1e-3, r"expected coulomb_Nm of three finite .* received \[0, -0.001, 0\]"),
         (NONE, [0, np.nan, 0], 1e-3, "expected viscous_Nm_s of three finite"),
@@ -271,6 +271,6 @@ def repeated(count, friction, q, qdot, torque):
         (NONE, NONE, np.inf, "smoothing_rate_rad_s of at least 1e-12, received inf"),
     ],
 )
-def test_coefficients_that_are_none_are_refused(actuator, coulomb, viscous, smoothing, told):
-    with pytest.raises(InputError, match=told):
+def test_coefficients_that_are_none_are_refused(actuator, coulomb, viscous, smoothing, message):
+    with pytest.raises(InputError, match=message):
         friction(coulomb, viscous, smoothing, actuator.inertia, STEP_S)

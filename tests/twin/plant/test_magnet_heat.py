@@ -11,10 +11,10 @@ from spheretwin import simulate
 from spheretwin.electronics.coil import advance_temperature
 from spheretwin.electronics.drive_chain import drive_chain
 from spheretwin.electronics.drive_section import ResolvedDrive
-from spheretwin.metrics import PlannedRun
 from spheretwin.models.actuator import load
 from spheretwin.models.base.errors import InputError
 from spheretwin.plant.magnet_heat import ThermalSection, advance_heat, magnet_heat, update_gain
+from spheretwin.reduction import PlannedRun
 from spheretwin.run import Figures
 from spheretwin.session import Session
 

@@ -92,8 +92,8 @@ def test_inertia_of_the_rotor_upright_is_the_sum_of_its_parts(actuator, shipped)
     expected[1, 1] += inner[1]
     # The moments of a ring about axes on which it does not turn have no effect upright. Rounding, and the
     # model's own rings of 1e-15.
-    found = upright(chain_of(shipped, section, modelling_error=0.2))
-    np.testing.assert_allclose(found, expected, rtol=0, atol=1e-14)
+    result = upright(chain_of(shipped, section, modelling_error=0.2))
+    np.testing.assert_allclose(result, expected, rtol=0, atol=1e-14)
 
 
 def test_hinges_stand_where_the_fields_say(shipped):
@@ -321,9 +321,9 @@ def test_a_change_during_the_run_acts_and_a_snapshot_restores_it():
     with Session(scenarios.load("hold", {"plant.engine": "lagrangian"})) as session:
         session.advance(10)
         session.set("plant.mass.centre_m", [2e-3, 0.0, 0.0])
-        kept = session.snapshot()
+        snapshot = session.snapshot()
         first = session.advance(50).values.copy()
-        session.restore(kept)
+        session.restore(snapshot)
         np.testing.assert_array_equal(session.advance(50).values, first)
         assert np.abs(first).max() > 0
 

@@ -146,9 +146,9 @@ def test_a_session_goes_on_from_a_snapshot_bit_for_bit(written, case):
     law = Law("constant", constant_torque, TORQUE_Q, np.zeros(0))
     with Session(scenario_of(written(case.edits)), law) as session:
         session.advance(50)
-        kept = session.snapshot()
+        snapshot = session.snapshot()
         first = session.advance(100).values.copy()
-        session.restore(kept)
+        session.restore(snapshot)
         np.testing.assert_array_equal(session.advance(100).values, first)
 
 
@@ -195,8 +195,8 @@ def test_mass_properties_and_hinges_of_a_file_act_in_both_engines(written, edits
 
 def test_the_shipped_model_and_its_scene_hold_nothing_beyond_a_free_rotor():
     for path in (actuators.MJCF_PATH, actuators.FOLDER / "scene.xml"):
-        kept = mjcf.read(path)
-        for model in (kept.described, kept.loaded, kept.bare):
+        original = mjcf.read(path)
+        for model in (original.described, original.loaded, original.bare):
             assert mjcf.beyond_a_free_rotor(model) == []
 
 
@@ -232,19 +232,19 @@ def test_friction_of_a_hinge_holds_what_pushes_less(written, frictionloss, angle
 @pytest.mark.parametrize("edits", models.INERTIAS.values(), ids=models.INERTIAS)
 def test_inertia_from_geoms_is_the_rotor_s(written, edits):
     path = written(edits)
-    found = actuators.load(path)
+    result = actuators.load(path)
     model = mujoco.MjModel.from_xml_path(str(path))
     data, M = mujoco.MjData(model), np.empty((3, 3))
     mujoco.mj_forward(model, data)
     for column, unit in zip(M, np.eye(3), strict=True):
         mujoco.mj_mulM(model, data, column, unit)
     # At the first pose M is diagonal, with the rotor's inertias; the rings add 1e-12 of them.
-    np.testing.assert_allclose(np.diag(found.inertia), M, rtol=1e-11, atol=1e-17)
+    np.testing.assert_allclose(np.diag(result.inertia), M, rtol=1e-11, atol=1e-17)
     assert len(set(np.round(np.diag(M), 9))) == (1 if "sphere" in edits[0][1][:24] else 3)
     # Where axes were turned back, sums are taken in another order; 0.2 s blow that up a little.
     np.testing.assert_allclose(ours(path, CONSTANT), stock(path, CONSTANT), rtol=0, atol=1e-12)
     assert mjcf.beyond_a_free_rotor(mjcf.read(path).loaded) == []
-    equations = LagrangianRotor(found, STEP_S).start(POSE, RATES)
+    equations = LagrangianRotor(result, STEP_S).start(POSE, RATES)
     equations.torque_q[:] = TORQUE_Q
     for _ in CONSTANT:
         lagrangian_step(equations)

@@ -54,12 +54,12 @@ OF_A_LAW = [name for name in NAMES if name.startswith("controller")]
 
 @pytest.mark.parametrize(("law", "names"), [("pd", NAMES), ("afsm_eso", OF_A_LAW)], ids=["pd", "afsm_eso"])
 def test_overrides(law, names):
-    told = set()
+    messages = set()
     for name in names:
         for value in VALUES:
-            told.add(message(scenarios.load, "hold", {"controller.law": law, name: value}))
-    assert len(told) > 3 * len(names)  # most values do not fit most fields
-    for line in told - {None}:
+            messages.add(message(scenarios.load, "hold", {"controller.law": law, name: value}))
+    assert len(messages) > 3 * len(names)  # most values do not fit most fields
+    for line in messages - {None}:
         assert not FORBIDDEN.search(line), line
         assert not line.isspace()
 
@@ -77,26 +77,26 @@ def test_flags(value):
 
 def test_changes_of_a_run():
     scenario = scenarios.load("hold")
-    told = {message(with_change, scenario, name, value) for name in NAMES for value in VALUES}
-    assert len(told) > 500
-    for line in told - {None}:
+    fields = {message(with_change, scenario, name, value) for name in NAMES for value in VALUES}
+    assert len(fields) > 500
+    for line in fields - {None}:
         assert not FORBIDDEN.search(line), line
 
 
 def test_studies():
-    told = set()
+    messages = set()
     for value in VALUES:
         for name in studies.Study.model_fields:
-            told.add(message(studies.made, {"name": "a", "scenario": "hold", name: value}, "mine"))
+            messages.add(message(studies.made, {"name": "a", "scenario": "hold", name: value}, "mine"))
         for name in Optimise.model_fields:
             fields = {"name": "a", "scenario": "hold", "optimise": {name: value}}
-            told.add(message(studies.made, fields, "mine"))
+            messages.add(message(studies.made, fields, "mine"))
         for name in ("field", "kind", "zip", "values", "low", "high", "count", "mean"):
             for kind in ("values", "linspace", "logspace", "uniform", "normal"):
                 axis = {"field": "duration", "kind": kind, name: value}
-                told.add(message(studies.made, {"name": "a", "scenario": "hold", "axis": [axis]}, "mine"))
-    assert len(told) > 150
-    for line in told - {None}:
+                messages.add(message(studies.made, {"name": "a", "scenario": "hold", "axis": [axis]}, "mine"))
+    assert len(messages) > 150
+    for line in messages - {None}:
         assert not FORBIDDEN.search(line), line
 
 
@@ -194,3 +194,18 @@ def test_shown_ends_whatever_it_is_given():
         deep = [deep]
     for value in (circle, deep, list(range(10**6)), np.zeros((1000, 1000)), {i: i for i in range(10**5)}):
         assert len(shown(value)) <= 120
+
+
+@pytest.mark.parametrize(
+    ("field", "value"),
+    [
+        ("plant.coulomb_Nm", 1.0),
+        ("plant.coulomb_Nm", [1.0, 2.0]),
+        ("plant.coulomb_Nm", [1.0, 2.0, 3.0, 4.0]),
+        ("trajectory.angle_rad", [0.1]),
+        ("controller.stiffness", [1.0, 2.0]),
+    ],
+)
+def test_a_list_of_another_length_names_how_many_numbers_it_has(field, value):
+    with pytest.raises(InputError, match=rf"{field}: expected three numbers, received "):
+        scenarios.load("hold", {"controller.law": "pid", field: value})

@@ -16,7 +16,7 @@ PATHS = ("plant.mjcf", "plant.torque_curve", "nominal.torque_curve")
 
 
 def test_shipped_scenarios_load_under_their_names():
-    assert reading.shipped() == ["hold", "nutation", "sinusoid", "tilt"]
+    assert reading.shipped() == ["bench", "hold", "nutation", "sinusoid", "tilt", "ventusff"]
     for name in reading.shipped():
         assert scenarios.load(name).name == name
 
@@ -125,7 +125,7 @@ def test_bad_input_is_told_in_one_line(overrides, parts):
 @pytest.mark.parametrize(
     ("source", "text", "part"),
     [
-        ("spiral", None, "hold, nutation, sinusoid, tilt"),
+        ("spiral", None, "bench, hold, nutation, sinusoid, tilt, ventusff"),
         ("missing.toml", None, "missing.toml"),
         ("broken.toml", "duration = = 2", "TOML"),
         ("empty.toml", "", "trajectory"),

@@ -50,9 +50,9 @@ def test_read_again_it_is_the_same(tmp_path, name, changes):
 
 def test_a_file_says_what_a_user_would_and_no_more():
     scenario = scenarios.load("sinusoid", {"controller.law": "pd", "hardware": "electronics"})
-    told = as_toml(scenario)
-    assert len(told.splitlines()) < 25
-    assert "supply_V" not in told  # the named set says it
+    text = as_toml(scenario)
+    assert len(text.splitlines()) < 25
+    assert "supply_V" not in text  # the named set says it
     assert as_command(scenario) == (
         "spheretwin simulate sinusoid --hardware electronics --controller.law pd --estimator.kind kalman"
     )
@@ -60,7 +60,7 @@ def test_a_file_says_what_a_user_would_and_no_more():
 
 def test_a_field_without_a_value_that_the_named_set_gives_one_is_told_beside_the_others():
     scenario = scenarios.load("sinusoid", {"hardware": "electronics", "drive.supply_V": None})
-    told = as_toml(scenario)
-    assert 'hardware = "ideal"' in told
-    assert "supply_V" not in told
-    assert "dac_bits" in told
+    text = as_toml(scenario)
+    assert 'hardware = "ideal"' in text
+    assert "supply_V" not in text
+    assert "dac_bits" in text

@@ -72,6 +72,12 @@ def test_a_latin_hypercube_has_one_point_in_each_stratum_of_each_axis(samples):
         assert sorted(axis) == list(range(samples))
 
 
+@pytest.mark.parametrize("samples", [1, 8, 1000])
+def test_a_latin_hypercube_is_scipy_s(samples):
+    expected = qmc.LatinHypercube(3, rng=np.random.default_rng([5, STAGE])).random(samples)
+    np.testing.assert_array_equal(points("latin_hypercube", samples, 5), expected)
+
+
 @pytest.mark.parametrize("samples", [1, 8, 13])
 def test_sobol_is_scipy_s(samples):
     generator = np.random.default_rng([5, STAGE])
@@ -94,7 +100,7 @@ def test_another_seed_draws_other_points(design):
 
 
 @pytest.mark.parametrize(
-    ("axis", "told"),
+    ("axis", "message"),
     [
         ({"kind": "values", "values": []}, "axis.0.values: expected one value at least"),
         ({"kind": "linspace", "first": 0, "last": 1, "count": 0}, "axis.0.count: expected a number greater"),
@@ -114,9 +120,9 @@ def test_another_seed_draws_other_points(design):
         ({"kind": "uniform", "low": 0, "high": 1, "zip": "a"}, "expected no zip of what is drawn"),
     ],
 )
-def test_what_makes_no_axis_is_refused_in_one_line(axis, told):
+def test_what_makes_no_axis_is_refused_in_one_line(axis, message):
     samples = 3 if axis["kind"] in ("uniform", "normal") else None
     with pytest.raises(InputError) as refusal:
         study({"field": FIELD, **axis}, samples=samples)
-    assert told in str(refusal.value)
+    assert message in str(refusal.value)
     assert "\n" not in str(refusal.value)

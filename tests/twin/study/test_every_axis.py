@@ -19,11 +19,11 @@ KINDS = {kind.model_fields["kind"].default: kind for kind in (get_args(UNION) or
 
 def fields(kind):
     """Fields of an axis of a kind: those without a default rise, one by one."""
-    told = {"field": "disturbance.load", "kind": kind}
+    given_fields = {"field": "disturbance.load", "kind": kind}
     for place, (name, field) in enumerate(KINDS[kind].model_fields.items()):
-        if name not in told and field.is_required():
-            told[name] = {float: 0.1 * (1 + place), int: 3}.get(field.annotation, [0.25, 0.5])
-    return told
+        if name not in given_fields and field.is_required():
+            given_fields[name] = {float: 0.1 * (1 + place), int: 3}.get(field.annotation, [0.25, 0.5])
+    return given_fields
 
 
 def grid(kind, **others):
@@ -48,8 +48,8 @@ def test_its_values_are_its_own_and_the_same_each_time(kind):
 @pytest.mark.parametrize("kind", [kind for kind in KINDS if issubclass(KINDS[kind], DrawnAxis)])
 @given(st.lists(st.floats(1e-12, 1 - 1e-12), min_size=2, max_size=20))
 def test_what_is_drawn_rises_with_what_it_is_drawn_by(kind, uniform):
-    told = {name: value for name, value in fields(kind).items() if name != "kind"}
-    drawn = KINDS[kind](**told).quantile(np.sort(uniform))
+    given_fields = {name: value for name, value in fields(kind).items() if name != "kind"}
+    drawn = KINDS[kind](**given_fields).quantile(np.sort(uniform))
     assert np.all(np.isfinite(drawn))
     # The inverse of a distribution: where two numbers are next to each other, rounding is all there is.
     assert np.all(np.diff(drawn) >= -1e-12 * np.abs(drawn).max())

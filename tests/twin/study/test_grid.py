@@ -86,7 +86,7 @@ def test_a_study_of_many_millions_is_counted_not_listed():
 
 
 @pytest.mark.parametrize(
-    ("axes", "told"),
+    ("axes", "message"),
     [
         ([values("disturbance.load", 1.0, 2.0, 1.0)], "expected different values of disturbance.load"),
         ([values("disturbance.load", 1.0, 1)], "expected different values of disturbance.load"),
@@ -104,10 +104,10 @@ def test_a_study_of_many_millions_is_counted_not_listed():
         ),
     ],
 )
-def test_rows_that_are_the_same_or_without_end_are_refused(axes, told):
+def test_rows_that_are_the_same_or_without_end_are_refused(axes, message):
     with pytest.raises(InputError) as refusal:
         Grid(study(*axes))
-    assert told in str(refusal.value)
+    assert message in str(refusal.value)
 
 
 def test_values_of_a_zip_may_repeat_where_their_rows_do_not():

@@ -47,6 +47,16 @@ def test_scenarios_are_the_same(values):
         assert ours.model_dump_json() == theirs.model_dump_json()
 
 
+def test_scenarios_share_the_sections_without_a_gap():
+    template = template_of(fields(), GAPS, "sinusoid")
+    first, second = template.scenario(SOME), template.scenario((4, *SOME[1:]))
+    assert first.seed == 3
+    assert second.seed == 4
+    assert first.controller is second.controller
+    assert first.trajectory is second.trajectory
+    assert first.plant is not second.plant
+
+
 @pytest.mark.parametrize(
     ("place", "value"),
     [(0, -1), (0, 0.5), (1, 2**300), (1, -1.0), (2, math.inf), (3, math.nan), (4, 0), (4, -math.inf)],

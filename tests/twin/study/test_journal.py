@@ -24,23 +24,23 @@ def result(number):
 def path(tmp_path):
     """A journal of six rows, written in another order than theirs."""
     path = tmp_path / journal.NAME
-    with Journal(path, "d", 6) as kept:
+    with Journal(path, "d", 6) as writer:
         for row in (ROWS[3], ROWS[0], ROWS[5], ROWS[1], ROWS[2], ROWS[4]):
-            kept.add(row, result(row.number))
+            writer.add(row, result(row.number))
     return path
 
 
 def held(path, digest="d"):
-    with Journal(path, digest, 6) as kept:
-        return dict(kept.results()), kept.torn, kept.damaged
+    with Journal(path, digest, 6) as reader:
+        return dict(reader.results()), reader.torn, reader.damaged
 
 
 def test_results_come_in_the_order_of_the_study(path):
-    told, torn, damaged = held(path)
-    assert (list(told), torn, damaged) == (list(range(6)), False, 0)
-    assert told == {number: result(number) for number in range(6)}
-    with Journal(path, "d", 6) as kept:
-        assert (kept.done(2), kept.done()) == (2, 6)
+    results, torn, damaged = held(path)
+    assert (list(results), torn, damaged) == (list(range(6)), False, 0)
+    assert results == {number: result(number) for number in range(6)}
+    with Journal(path, "d", 6) as writer:
+        assert (writer.done(2), writer.done()) == (2, 6)
 
 
 def test_a_journal_torn_anywhere_keeps_the_lines_before(path):
@@ -48,13 +48,13 @@ def test_a_journal_torn_anywhere_keeps_the_lines_before(path):
     ends = [place + 1 for place, byte in enumerate(whole) if byte == ord("\n")]
     for length in range(len(whole) + 1):
         path.write_bytes(whole[:length])
-        told, torn, damaged = held(path)
+        results, torn, damaged = held(path)
         lines = sum(end <= length for end in ends)
-        assert len(told) == max(lines - 1, 0)
+        assert len(results) == max(lines - 1, 0)
         assert torn == (length > ends[0] and length not in ends)
         assert damaged == 0
-        kept = whole[: ends[lines - 1]] if lines else whole[: ends[0]]
-        assert path.read_bytes() == kept
+        remaining = whole[: ends[lines - 1]] if lines else whole[: ends[0]]
+        assert path.read_bytes() == remaining
 
 
 def test_a_line_damaged_in_the_middle_loses_itself_alone(path):
@@ -65,8 +65,8 @@ def test_a_line_damaged_in_the_middle_loses_itself_alone(path):
         changed = bytearray(whole)
         changed[begin + place] ^= 1
         path.write_bytes(changed)
-        told, torn, damaged = held(path)
-        assert list(told) == [1, 2, 3, 4, 5]
+        results, torn, damaged = held(path)
+        assert list(results) == [1, 2, 3, 4, 5]
         # A bit may turn a sign into the end of a line: two damaged ones.
         assert (torn, damaged) == (False, 1 + (changed[begin + place] == ord("\n")))
         assert path.read_bytes() == changed
@@ -156,11 +156,11 @@ def test_a_second_writer_is_refused(path):
 
 
 def test_a_full_disk_is_told_and_what_was_finished_is_kept(path):
-    with Journal(path, "d", 6) as kept:
+    with Journal(path, "d", 6) as writer:
         before = path.read_bytes()
-        kept._file = Full(kept._file, 20)
+        writer._file = Full(writer._file, 20)
         with pytest.raises(SpheretwinError) as failure:
-            kept.add(ROWS[0], result(0))
+            writer.add(ROWS[0], result(0))
         assert "No space left on device; the rows before are kept" in str(failure.value)
     assert path.read_bytes() == before
 
@@ -183,10 +183,10 @@ def test_of_rows_that_there_may_be_none_takes_memory(tmp_path):
     import tracemalloc
 
     tracemalloc.start()
-    with Journal(tmp_path / journal.NAME, "d", 10**8) as kept:
+    with Journal(tmp_path / journal.NAME, "d", 10**8) as writer:
         peak = tracemalloc.get_traced_memory()[1]
-        kept.add(ROWS[5], result(5))
-        assert kept.done(10) == 1
+        writer.add(ROWS[5], result(5))
+        assert writer.done(10) == 1
     tracemalloc.stop()
     # Addresses are all that is taken before a row is finished: eight bytes a row, none of them written.
     assert peak < 8 * 10**8 + 10**6

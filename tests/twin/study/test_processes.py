@@ -71,10 +71,10 @@ def test_kill_loses_no_finished_row(tmp_path, command, whole, capfd, threads):
     process = begun([*command, "--threads", threads], folder)
     process.send_signal(signal.SIGKILL)
     process.communicate()
-    kept = journal_lines(folder) - 1
-    assert 4 <= kept < len(LOADS)
+    finished = journal_lines(folder) - 1
+    assert 4 <= finished < len(LOADS)
     assert not (folder / "table.parquet").exists()
-    assert gone_on_with(command, folder, whole, capfd)["resumed"] == kept
+    assert gone_on_with(command, folder, whole, capfd)["resumed"] == finished
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
@@ -86,11 +86,13 @@ def test_an_interruption_finishes_the_rows_in_flight_and_writes_the_table(
     process.send_signal(number)
     out, err = process.communicate(timeout=PATIENCE_S)
     assert process.returncode == cli.FAILED
-    told = json.loads(out)
-    assert 4 <= told["rows"] == journal_lines(folder) - 1 == len(rows_of(folder)) < told["of"] == len(LOADS)
-    assert f"interrupted after {told['rows']} of 60 rows; the same command continues from there" in err
+    report = json.loads(out)
+    assert (
+        4 <= report["rows"] == journal_lines(folder) - 1 == len(rows_of(folder)) < report["of"] == len(LOADS)
+    )
+    assert f"interrupted after {report['rows']} of 60 rows; the same command continues from there" in err
     assert "Traceback" not in err
-    assert gone_on_with(command, folder, whole, capfd)["resumed"] == told["rows"]
+    assert gone_on_with(command, folder, whole, capfd)["resumed"] == report["rows"]
 
 
 def test_a_second_process_is_refused_and_the_first_goes_on(tmp_path, command, whole, capfd):
@@ -121,6 +123,6 @@ def test_where_files_may_not_grow_the_study_ends_in_one_line_and_loses_nothing(
     assert done.stderr.startswith("spheretwin: study: ")
     assert done.stderr.endswith("could not be written, File too large; the rows before are kept\n")
     assert done.stderr.count("\n") == 1
-    kept = journal_lines(folder) - 1
-    assert 2 < kept < len(LOADS)
-    assert gone_on_with(command, folder, whole, capfd)["resumed"] == kept
+    finished = journal_lines(folder) - 1
+    assert 2 < finished < len(LOADS)
+    assert gone_on_with(command, folder, whole, capfd)["resumed"] == finished

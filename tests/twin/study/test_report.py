@@ -26,7 +26,7 @@ def made(count, figures, axes, laws=("pd",), lost=()):
     """Rows of a study that never ran."""
     statuses = np.full(count, "completed", dtype=object)
     statuses[list(lost)] = "left_workspace"
-    told = {
+    fields = {
         "name": "made",
         "description": "It was made.",
         "axis": [{"field": f, "kind": "values"} for f in axes],
@@ -34,7 +34,7 @@ def made(count, figures, axes, laws=("pd",), lost=()):
     texts = np.full(count, "", dtype=object)
     named = np.array([laws[place % len(laws)] for place in range(count)], dtype=object)
     keys = np.array([f"{place:016x}" for place in range(count)], dtype=object)
-    return Rows(told, np.arange(count), keys, named, statuses, texts, axes, figures)
+    return Rows(fields, np.arange(count), keys, named, statuses, texts, axes, figures)
 
 
 @given(st.lists(LISTS, max_size=8))
@@ -50,11 +50,11 @@ def test_the_summary_is_numpy_s_over_the_completed_rows_of_each_law():
     values_ = np.random.default_rng(0).normal(size=40)
     values_[6] = np.nan
     rows = made(40, {"max_abs_error_rad": values_}, {}, ("pd", "afsm"), lost=(0, 2, 3))
-    told = summary(rows)
-    assert told["pd"]["statuses"] == {"left_workspace": 2, "completed": 18}
+    summaries = summary(rows)
+    assert summaries["pd"]["statuses"] == {"left_workspace": 2, "completed": 18}
     of_pd = [values_[place] for place in range(4, 40, 2) if place != 6]
     low, median, high = np.percentile(of_pd, [2.5, 50, 97.5])
-    assert told["pd"]["max_abs_error_rad"] == {"median": median, "range_95": [low, high]}
+    assert summaries["pd"]["max_abs_error_rad"] == {"median": median, "range_95": [low, high]}
     lost = made(2, {"max_abs_error_rad": np.ones(2)}, {}, lost=(0, 1))
     assert summary(lost)["pd"]["max_abs_error_rad"] == {"median": None, "range_95": None}
 
@@ -155,14 +155,15 @@ def test_the_page_counts_rows_that_remain_and_rows_that_were_not_requested(
 
 def test_the_page_tells_of_a_study(tmp_path):
     chosen = loads(axis=[*LOADS, values("plant.payload_kg", 0.0, -1.0)])
-    told = found(chosen, tmp_path)
+    reported = found(chosen, tmp_path)
     rows = read(tmp_path / "table.parquet")
     markdown, html = report.write(tmp_path, rows, summary(rows), (48, 48), "my study.toml")
     text = markdown.read_text()
     assert "48 of 48 rows: 24 completed, 24 refused." in text
     assert "afsm, surface_slope = [60.0, 60.0, 60.0]" in text
     worst = max(
-        (row for row in told if row["status"] == "completed"), key=lambda row: max(row["max_abs_error_rad"])
+        (row for row in reported if row["status"] == "completed"),
+        key=lambda row: max(row["max_abs_error_rad"]),
     )
     assert f"| {worst['row']} | `{worst['key']}` |" in text
     assert "payload_kg: expected a number greater than or equal to 0, received -1.0 | 12 |" in text

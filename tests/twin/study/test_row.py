@@ -112,7 +112,7 @@ def test_none_is_a_value(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("listed", "held"),
+    ("listed", "expected_type"),
     [
         ([0.5, 1.0], "double"),
         ([1, 2], "int64"),
@@ -121,12 +121,12 @@ def test_none_is_a_value(tmp_path):
         ([1, 2**70], "string"),
     ],
 )
-def test_columns_are_of_the_values_kind(tmp_path, listed, held):
+def test_columns_are_of_the_values_kind(tmp_path, listed, expected_type):
     rows = found(study(values("disturbance.load", *listed)), tmp_path)
-    kept = parquet.read_schema(tmp_path / "table.parquet").field("disturbance.load").type
-    assert str(kept) == held
+    column_type = parquet.read_schema(tmp_path / "table.parquet").field("disturbance.load").type
+    assert str(column_type) == expected_type
     texts = [each if isinstance(each, str) else json.dumps(each) for each in listed]
-    assert [row["disturbance.load"] for row in rows] == (texts if held == "string" else listed)
+    assert [row["disturbance.load"] for row in rows] == (texts if expected_type == "string" else listed)
 
 
 def test_a_law_of_one_s_own_and_figures_of_one_s_own_are_found_beside_the_study(tmp_path, mine, monkeypatch):
@@ -205,8 +205,8 @@ def test_telemetry_of_chosen_rows_is_kept(tmp_path):
     rows = found(chosen, tmp_path, threads=2)
     assert telemetry(tmp_path) == sorted(f"{rows[number]['key']}.parquet" for number in (2, 3))
     path = tmp_path / "telemetry" / f"{rows[3]['key']}.parquet"
-    kept = read_parquet(path)[0]
-    assert np.abs(kept["error_rad"]).max(axis=0).tolist() == rows[3]["max_abs_error_rad"]
+    stored = read_parquet(path)[0]
+    assert np.abs(stored["error_rad"]).max(axis=0).tolist() == rows[3]["max_abs_error_rad"]
     assert cli.main(["simulate", "--replay", str(path), "--telemetry", str(tmp_path / "again.parquet")]) == 0
     assert (tmp_path / "again.parquet").read_bytes() == path.read_bytes()
 
@@ -248,8 +248,8 @@ def test_the_command_of_a_law_has_no_gain_of_the_scenario_s(tmp_path, capsys):
     (row,) = Grid(chosen)
     _, *words = shlex.split(Rows(chosen).command(row))
     assert cli.main([*words, "--json"]) == cli.DONE
-    told = json.loads(capsys.readouterr().out)["scenario"]["controller"]
-    assert (told["law"], told["period_s"]) == ("pd", 0.002)
+    report = json.loads(capsys.readouterr().out)["scenario"]["controller"]
+    assert (report["law"], report["period_s"]) == ("pd", 0.002)
 
 
 def test_a_refused_row_alone_tells_why_and_its_command_is_refused_alike(capsys, tmp_path):

@@ -31,27 +31,45 @@ def test_threads_change_no_byte(whole, tmp_path, threads):
 
 def stopped(folder, threads):
     """What was found, and told, of a study that is stopped after its second row."""
-    told = []
+    messages = []
     done = run(
         loads(),
         folder,
         threads=threads,
-        done=lambda rows, of: told.append((rows, of)),
-        stop_requested=lambda: len(told) > 2,
+        done=lambda rows, of: messages.append((rows, of)),
+        stop_requested=lambda: len(messages) > 2,
     )
-    return done, told
+    return done, messages
 
 
 @pytest.mark.parametrize("threads", [1, 2])
 def test_a_study_that_is_stopped_goes_on_to_the_same_table(whole, tmp_path, threads):
     counts = [0]
     while counts[-1] < 24:
-        done, told = stopped(tmp_path, threads)
-        assert told == [(rows, 24) for rows in range(counts[-1], done.rows + 1)]
+        done, progress = stopped(tmp_path, threads)
+        assert progress == [(rows, 24) for rows in range(counts[-1], done.rows + 1)]
         assert len(rows_of(tmp_path)) == done.rows > counts[-1] == done.resumed
         counts.append(done.rows)
     assert len(counts) > 3
     assert table(tmp_path) == table(whole)
+
+
+@pytest.mark.parametrize("threads", [1, 2])
+def test_a_study_over_laws_and_hardware_is_the_same_in_pieces(tmp_path, threads):
+    """Rows of several kinds, which share no set-up, one after the other in one process."""
+    laws = [{"law": "pd"}, {"law": "afsm"}, {"law": "pid"}]
+    kinds = study(values("hardware", "ideal", "electronics"), values("disturbance.load", 0.5, 2.0), law=laws)
+    found(kinds, tmp_path / "whole")
+    for limit in (3, 8, None):
+        found(kinds, tmp_path / "pieces", threads=threads, limit=limit)
+    assert table(tmp_path / "pieces") == table(tmp_path / "whole")
+    # Rows with telemetry have sensors that other rows do not need.
+    with_telemetry = found(kinds.model_copy(update={"telemetry": (6, 8)}), tmp_path / "telemetry")
+    assert with_telemetry == rows_of(tmp_path / "whole")
+    alone = Rows(kinds)
+    for row, of_table in zip(Grid(kinds), rows_of(tmp_path / "whole"), strict=True):
+        figures = alone.run(row).figures
+        assert figures == {name: of_table[name] for name in figures}
 
 
 def test_a_limit_runs_the_first_rows_and_drops_no_finished_one(whole, tmp_path):
@@ -120,11 +138,11 @@ def test_plants_that_differ_end_the_study_and_keep_its_rows(tmp_path, monkeypatc
     first = int(told_of[1])
     assert first == min(wrong)
     assert "fast = false runs it on MuJoCo alone" in str(failure.value)
-    told = {row["row"] for row in rows_of(tmp_path)}
-    assert told.isdisjoint(wrong)
+    fields = {row["row"] for row in rows_of(tmp_path)}
+    assert fields.isdisjoint(wrong)
     # What had been handed out behind it is finished, no more.
-    assert set(range(first)) <= told
-    assert max(told | wrong) <= first + AHEAD
+    assert set(range(first)) <= fields
+    assert max(fields | wrong) <= first + AHEAD
 
 
 @pytest.mark.parametrize("share", [0.019, 0.021])

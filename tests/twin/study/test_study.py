@@ -43,7 +43,7 @@ def refusal(action):
 
 
 @pytest.mark.parametrize(
-    ("axes", "others", "told"),
+    ("axes", "others", "message"),
     [
         (
             [values("disturbance.laod", 1.0)],
@@ -97,8 +97,8 @@ def refusal(action):
         ([], {"colour": "red"}, "colour"),
     ],
 )
-def test_what_cannot_be_run_is_refused_before_the_first_row(tmp_path, axes, others, told):
-    assert told in refusal(lambda: run(study(*axes, **others), tmp_path))
+def test_what_cannot_be_run_is_refused_before_the_first_row(tmp_path, axes, others, message):
+    assert message in refusal(lambda: run(study(*axes, **others), tmp_path))
     assert not (tmp_path / "journal.jsonl").exists()
 
 
@@ -115,7 +115,7 @@ def test_some_values_out_of_range_are_rows_all_of_them_are_a_refusal(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("text", "told"),
+    ("text", "message"),
     [
         ("name = ", "expected valid TOML"),
         ("", "name: expected"),
@@ -124,10 +124,10 @@ def test_some_values_out_of_range_are_rows_all_of_them_are_a_refusal(tmp_path):
         ("a" * 10 + "[" * 2000, "expected valid TOML"),
     ],
 )
-def test_files_that_are_no_study_are_refused(tmp_path, text, told):
+def test_files_that_are_no_study_are_refused(tmp_path, text, message):
     path = tmp_path / "study.toml"
     path.write_text(text)
-    assert told in refusal(lambda: run(str(path), tmp_path / "out"))
+    assert message in refusal(lambda: run(str(path), tmp_path / "out"))
 
 
 @pytest.mark.parametrize("source", ["papr", "nothing.toml", "nothing", "a\0.toml"])

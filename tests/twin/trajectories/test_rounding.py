@@ -103,8 +103,8 @@ def test_tilt_s_corners_are_parabolas_about_them():
         )  # ulp of t / half
         np.testing.assert_array_equal(samples[:, 2], np.sign(jump) * a)
     t = np.linspace(0, 8, 8001)
-    beside = (np.abs(t[:, None] - [2.0, 4.0, 6.0]) > half).all(axis=1) & (t > 2.42 * rate / a)
-    assert tilt.sample(t)[beside].tobytes() == sharp.sample(t)[beside].tobytes()
+    straight = (np.abs(t[:, None] - [2.0, 4.0, 6.0]) > half).all(axis=1) & (t > 2.42 * rate / a)
+    assert tilt.sample(t)[straight].tobytes() == sharp.sample(t)[straight].tobytes()
 
 
 def test_a_step_becomes_the_quickest_move_from_rest_to_rest():

@@ -22,12 +22,12 @@ def test_it_is_sampled_as_it_is():
 
 
 def test_what_it_does_with_its_arrays_later_changes_nothing():
-    kept = np.zeros((2, 3, 3))
+    buffer = np.zeros((2, 3, 3))
 
     def sample(t):
-        kept[:] = t[0]
+        buffer[:] = t[0]
         t[:] = -1.0
-        return kept[: len(t)]
+        return buffer[: len(t)]
 
     own, t = checked(Own(sample)), np.array([1.0, 2.0])
     first = own.sample(t)

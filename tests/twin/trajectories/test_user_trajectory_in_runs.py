@@ -58,12 +58,12 @@ def test_changes_beside_it_leave_it_in_force():
 def test_a_snapshot_goes_on_along_it_and_not_along_another():
     with Session(scenario(), trajectory=Spiral()) as session, Session(scenario()) as plain:
         session.advance(70)
-        kept = session.snapshot()
+        snapshot = session.snapshot()
         ahead = session.advance(80).values.tobytes()
-        session.restore(kept)
+        session.restore(snapshot)
         assert session.advance(80).values.tobytes() == ahead
         with pytest.raises(InputError, match="with the trajectory of this session, received one with Spiral"):
-            plain.restore(kept)
+            plain.restore(snapshot)
 
 
 def test_its_telemetry_says_so_and_cannot_be_replayed(tmp_path, capsys):

@@ -124,25 +124,25 @@ def test_minimum_jerk_has_the_known_peaks(tmp_path):
 
 def test_a_run_tells_its_peaks(tmp_path, capsys):
     file = written(tmp_path / "one.csv", T[:2], [[0, 0, 0], [0.1, -0.4, 0.0]])
-    told = "largest rate 1 rad/s (β at 0.875 s), largest acceleration 4.106 rad/s² (β at 0.6585 s)"
+    message = "largest rate 1 rad/s (β at 0.875 s), largest acceleration 4.106 rad/s² (β at 0.6585 s)"
     scenario = tmp_path / "mine.toml"
     scenario.write_text('duration = 0.01\n[trajectory]\nshape = "waypoints"\nfile = "one.csv"\n')
     assert cli.main(["simulate", str(scenario), "--json"]) == 0
-    assert json.loads(capsys.readouterr().out)["notes"] == [f"waypoints {file}: {told}"]
+    assert json.loads(capsys.readouterr().out)["notes"] == [f"waypoints {file}: {message}"]
     assert cli.main(["simulate", str(scenario)]) == 0
-    assert f"waypoints {file}: {told}\n" in capsys.readouterr().out
+    assert f"waypoints {file}: {message}\n" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize("between", KINDS)
 def test_limits_are_kept_or_told(file, between):
     rate, acceleration = Waypoints(file=file, between=between).peaks()
-    kept = Waypoints(
+    within_limits = Waypoints(
         file=file,
         between=between,
         largest_rate_rad_s=rate.value,
         largest_acceleration_rad_s2=acceleration.value,
     )
-    assert kept.peaks() == (rate, acceleration)
+    assert within_limits.peaks() == (rate, acceleration)
     for field, peak, words in (
         ("largest_rate_rad_s", rate, "largest rate of 1 rad/s, received"),
         ("largest_acceleration_rad_s2", acceleration, "largest acceleration of 1 rad/s², received"),

@@ -46,6 +46,25 @@ def test_an_error_of_the_second_half_is_always_drawn():
     assert seen(values).limit(ERROR, least=0.1) > 40.0
 
 
+@pytest.mark.parametrize(
+    ("corner", "late", "sign"),
+    [
+        ("RightTop", True, 1.0),
+        ("LeftTop", False, 1.0),
+        ("RightBottom", True, -1.0),
+        ("LeftBottom", False, -1.0),
+    ],
+)
+def test_a_legend_stands_where_the_lines_are_not(corner, late, sign):
+    """Lines reach into all quarters of the plot but one."""
+    empty = (T_s > T_s[-1] / 2) == late
+    far = np.full(len(T_s), 0.8)
+    towards, away = np.where(empty, 0.0, far), far
+    high, low = (towards, -away) if sign > 0 else (away, -towards)
+    of = Extents(T_s, {"error": low[:, None]}, {"error": high[:, None]}, None)
+    assert of.emptiest_corner((-1.0, 1.0), ERROR) == corner
+
+
 def test_noise_looks_small():
     of = seen(np.full(len(T_s), 1e-6))
     assert of.limit(ERROR, least=0.1) >= 0.1
@@ -89,8 +108,8 @@ def test_a_range_around_anything_has_two_labels(low, width, least):
     # Sums of numbers up to 1e3.
     assert first <= low + width / 2 - reach + 1e-9
     assert last >= low + width / 2 + reach - 1e-9
-    found = ticks(first, last)
-    assert len(found) >= 2
+    result = ticks(first, last)
+    assert len(result) >= 2
     # A step is up to ten times the eighth part of the range, and one or two are added with their room.
     assert last - first <= (2 * 10 / LABELLED + 1.2) * 2 * reach * 1.1
 

@@ -69,21 +69,21 @@ def run(request, tmp_path_factory):
 
 def columns(path, store=None, below=""):
     """Every value of every component, by entity and component."""
-    found = {}
+    results = {}
     for chunk in RrdReader(path).stream(store=store):
         if not chunk.entity_path.startswith(below):
             continue
         batch = chunk.to_record_batch()
         for name in batch.schema.names:
             if ":" in name:
-                found.setdefault((chunk.entity_path, name), []).extend(batch.column(name).to_pylist())
-    return found
+                results.setdefault((chunk.entity_path, name), []).extend(batch.column(name).to_pylist())
+    return results
 
 
 def layouts(path):
     """Layouts of a recording, a brief one of its beginning first."""
-    found = [columns(path, store) for store in RrdReader(path).blueprints()]
-    return sorted(found, key=len)
+    results = [columns(path, store) for store in RrdReader(path).blueprints()]
+    return sorted(results, key=len)
 
 
 def contents(layout):
@@ -107,8 +107,14 @@ def container_names(layout):
     }
 
 
+# States that have a lane only if they change.
+LANES = ("/failsafe_reason", "/fault")
+
+
 def exists(wanted, entities):
     below = wanted.removesuffix("/**").removeprefix("+ ")
+    if below in LANES:
+        return True
     return any(entity == below or entity.startswith(f"{below}/") for entity in entities)
 
 
@@ -123,16 +129,16 @@ def test_views_show_only_what_the_recording_holds(run):
 
 def fields(path):
     """Fields of structs, nested ones with a dot before them, by entity and component."""
-    found = {}
+    results = {}
     for chunk in RrdReader(path).stream():
         batch = chunk.to_record_batch()
         for name in batch.schema.names:
             if name.startswith((VALUES, STYLES)):
                 for field in batch.schema.field(name).type.value_type:
                     looks = field.type if name.startswith(STYLES) else []
-                    there = found.setdefault((chunk.entity_path, name), set())
+                    there = results.setdefault((chunk.entity_path, name), set())
                     there |= {f".{field.name}[]", *(f".{field.name}.{look.name}[]" for look in looks)}
-    return found
+    return results
 
 
 def test_what_draws_a_signal_finds_its_values_and_its_looks(run):
@@ -167,13 +173,13 @@ def test_the_whole_layout_has_every_view_in_a_tab(run):
     path, _ = run
     whole = layouts(path)[-1]
     names = container_names(whole)
-    found = [
+    results = [
         tuple(names.get(part) for part in each)
         for (_, name), values in whole.items()
         for each in values
         if name == "ContainerBlueprint:contents"
     ]
-    assert VIEW_NAMES in found
+    assert VIEW_NAMES in results
 
 
 def test_the_names_of_views_are_those_of_the_registry():
@@ -199,14 +205,18 @@ def test_the_chosen_view_is_open(view, tmp_path, monkeypatch):
 def test_an_early_end_is_marked_in_plots_and_states(tmp_path):
     path, status = recorded(tmp_path / "run.rrd", *RUNS["failed"])
     assert status == "left_workspace"
-    found = {**columns(path, below="/ended"), **columns(path, below="/states")}
-    heights = np.array(found["/ended", "Scalars:scalars"])
+    results = {**columns(path, below="/ended"), **columns(path, below="/run")}
+    heights = np.array(results["/ended", "Scalars:scalars"])
     assert np.all(heights[0] < -1e4)
     assert np.all(heights[-1] > 1e4)
     whole = layouts(path)[-1]
     shown = [each for each in contents(whole) if each == "/ended"]
     assert len(shown) > 10
-    assert found["/states/run", "StateChange:state"] == [["running"], ["left workspace"], ["left workspace"]]
+    assert results["/run", "StateChange:state"] == [
+        ["running"],
+        ["left workspace"],
+        ["left workspace"],
+    ]
     completed, _ = recorded(tmp_path / "whole.rrd", "hold", {})
     assert columns(completed, below="/ended") == {}
 

@@ -82,7 +82,7 @@ def panels(path):
         key: [value for column in parts for value in column.to_pylist()]
         for key, parts in max(stores, key=len).items()
     }
-    found = []
+    results = []
     for (view, name), values in layout.items():
         if name != "ViewBlueprint:class_identifier" or values[-1] != ["TimeSeries"]:
             continue
@@ -95,7 +95,7 @@ def panels(path):
             if entity.startswith(f"{view}/ViewContents/overrides/")
             and component == "VisualizerInstruction:component_map"
         ]
-        found.append(
+        results.append(
             Panel(
                 (layout.get((view, "ViewBlueprint:display_name")) or [[""]])[-1][0],
                 (layout.get((f"{view}/ScalarAxis", "ScalarAxis:range")) or [[None]])[-1][0],
@@ -106,7 +106,7 @@ def panels(path):
                 lines,
             )
         )
-    return found
+    return results
 
 
 def _panel_line(entity, mappings, layout, path):

@@ -73,7 +73,7 @@ def test_no_damage_ends_the_process_or_says_more_than_a_line(tmp_path):
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
     lines = done.stderr.splitlines()
-    told = [[line for line in lines if str(path) in line] for path in paths]
-    for of_file in told:
+    messages = [[line for line in lines if str(path) in line] for path in paths]
+    for of_file in messages:
         assert (of_file[-1].split()[0], len(of_file)) in {("0", 1), ("2", 2)}
-    assert sum(map(len, told)) == len(lines)
+    assert sum(map(len, messages)) == len(lines)

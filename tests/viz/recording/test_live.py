@@ -137,14 +137,14 @@ def test_a_killed_run_leaves_no_server():
 
 def marked(mark):
     """Processes that have a variable in their environment."""
-    found = []
+    results = []
     for process in Path("/proc").glob("[0-9]*"):
         try:
             if mark.encode() in (process / "environ").read_bytes() and process.name != str(os.getpid()):
-                found.append((process / "cmdline").read_bytes())
+                results.append((process / "cmdline").read_bytes())
         except OSError:  # it has ended, or is another's
             continue
-    return found
+    return results
 
 
 @needs_a_browser

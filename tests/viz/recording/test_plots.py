@@ -52,12 +52,12 @@ ROWS = 400
 def test_bins_are_the_same_whatever_the_chunks(seed, cuts, immediate):
     values = np.random.default_rng(seed).normal(size=(ROWS, 2))
     t_s = TICK_s * np.arange(ROWS)
-    bins, found = TimeBins(25.0, immediate=immediate), []
+    bins, results = TimeBins(25.0, immediate=immediate), []
     for first, last in zip([0, *sorted(cuts)], [*sorted(cuts), ROWS], strict=True):
-        found.append(bins.add(t_s[first:last], values[first:last]))
-    found.append(bins.flush())
+        results.append(bins.add(t_s[first:last], values[first:last]))
+    results.append(bins.flush())
     assert bins.flush() is None
-    parts = [each for each in found if each]
+    parts = [each for each in results if each]
     expected = spans(t_s, 25.0)
     for name, of in (("low", np.min), ("high", np.max)):
         drawn = np.concatenate([getattr(each, name) for each in parts])
@@ -92,7 +92,7 @@ LIMIT_SIGNALS = (
 
 def slow_spells(t_s, levels):
     """A slow copy: at each tick, what of the ticks of its spell so far held back most."""
-    told, changes, level = 0, [], 0
+    reported_s, changes, level = 0, [], 0
     for tick in range(len(t_s)):
         ahead = (levels > 0) & (t_s >= t_s[tick])
         behind = (levels > 0) & (t_s < t_s[tick])
@@ -102,9 +102,9 @@ def slow_spells(t_s, levels):
             level = max(level, levels[tick])
         elif following - last > QUIET_S and t_s[-1] - last > QUIET_S:
             level = 0
-        if level != told:
+        if level != reported_s:
             changes.append((t_s[tick], LEVELS[level]))
-            told = level
+            reported_s = level
     return changes
 
 
@@ -117,10 +117,10 @@ def test_times_at_a_limit_are_logged_once_for_any_chunks(limited, cuts):
         levels[tick : tick + 3] = np.maximum(levels[tick : tick + 3], level)
     table["voltage_limited"][levels == 1, 1] = 0.3
     table["allocation_scale"][levels == 2] = 0.5
-    spells, found = LimitSpells(), []
+    spells, results = LimitSpells(), []
     for first, last in zip([0, *sorted(cuts)], [*sorted(cuts), 300], strict=True):
-        found += spells.of(table.rows(first, last))
-    assert found == slow_spells(table["t_s"], levels)
+        results += spells.of(table.rows(first, last))
+    assert results == slow_spells(table["t_s"], levels)
 
 
 def test_the_tracker_keeps_all_bounds_in_bounded_memory():
@@ -142,7 +142,11 @@ def test_the_headline_says_what_was_run_how_it_ended_and_how_good_it_was(run):
     for chunk in RrdReader(path).stream().filter(content=f"/{SUMMARY}"):
         batch = chunk.to_record_batch()
         text = batch.column("TextDocument:text").to_pylist()[-1][0]
-    headline, figures = text.split("  \n")
+    headline, figures, chosen = text.split("  \n")
+    assert chosen == (
+        "chosen: trajectory.shape nutation · estimator.kind ideal · duration 2.6 · plant.engine lagrangian ·"
+        " plant.modelling_torque_Nm 0.002, 0.001, 0.001 · disturbance.random_bound_Nm 0.05"
+    )
     assert (
         headline
         == "**✔ COMPLETED · nutation under afsm · modelling error m = 0.2 · load L = 2 · ideal hardware**"
@@ -195,7 +199,7 @@ def test_the_headline_names_each_fault_its_start_and_its_detection(facts_with_fa
     summary = Summary(facts_with_faults)
     for first, last in zip([0, *sorted(cuts)], [*sorted(cuts), 100], strict=True):
         summary.add(table.rows(first, last), np.zeros(last - first))
-    headline, reason, _, faults = summary.ended(Status.FAILSAFE).split("  \n")
+    headline, reason, _, faults, chosen = summary.ended(Status.FAILSAFE).split("  \n")
     assert headline.startswith("**✗ FAILSAFE · hold")
     assert reason == "**failsafe at 0.099 s of 3 s: a coil is too hot**"
     assert faults == (
@@ -203,3 +207,6 @@ def test_the_headline_names_each_fault_its_start_and_its_detection(facts_with_fa
         " not detected;"
         " 1 of 3 planned faults did not start"
     )
+    assert chosen.startswith("chosen: trajectory.shape hold · ")
+    for stated in ("fault.", "controller.law", "hardware", "disturbance.load"):
+        assert stated not in chosen

@@ -250,13 +250,13 @@ def test_every_recording_is_an_application_of_its_own(tmp_path):
         recorded(path := tmp_path / f"{name}.rrd", **changes)
         return RrdReader(path).recordings()[0].application_id
 
-    found = [
+    results = [
         application("a", duration=0.02),
         application("b", duration=0.02),
         application("c", duration=0.02, **{"controller.law": "pd"}),
     ]
-    assert len(set(found)) == 3
-    assert all(set(each) <= set("abcdefghijklmnopqrstuvwxyz0123456789-") for each in found)
+    assert len(set(results)) == 3
+    assert all(set(each) <= set("abcdefghijklmnopqrstuvwxyz0123456789-") for each in results)
 
 
 def test_texts_have_escapes_for_characters_that_the_viewer_cannot_draw(tmp_path):

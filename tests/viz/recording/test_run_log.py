@@ -33,10 +33,10 @@ def test_every_status_ends_a_log(status):
 
 def test_a_lost_rank_is_an_event_of_its_own():
     t_s = np.arange(6) * 1.0
-    found = Events().of(rows(t_s, [1.0, 0.5, 0.0, 1.0, 0.0, 0.5]))
-    assert [event[0] for event in found] == [1.0, 2.0, 4.0, 5.0]
-    assert ["rank lost" in event[2] for event in found] == [False, True, True, False]
-    assert ["current limit" in event[2] for event in found] == [True, False, False, True]
+    result = Events().of(rows(t_s, [1.0, 0.5, 0.0, 1.0, 0.0, 0.5]))
+    assert [event[0] for event in result] == [1.0, 2.0, 4.0, 5.0]
+    assert ["rank lost" in event[2] for event in result] == [False, True, True, False]
+    assert ["current limit" in event[2] for event in result] == [True, False, False, True]
 
 
 def test_a_time_at_the_limit_is_one_event():
@@ -45,12 +45,12 @@ def test_a_time_at_the_limit_is_one_event():
     scale[100:200:3] = 0.5  # chatters at the limit
     scale[200 + round(1000 * QUIET_S) :] = 0.25
     events = Events()
-    found = []
+    results = []
     for first, last in ((0, 150), (150, 400), (400, 1000)):  # a chunk ends amid each
-        found += events.of(rows(t_s[first:last], scale[first:last]))
-    assert [event[0] for event in found] == [pytest.approx(0.1), pytest.approx(0.3)]
-    assert {event[1] for event in found} == {Level.WARN}
-    assert "50 %" in found[0][2]
+        results += events.of(rows(t_s[first:last], scale[first:last]))
+    assert [event[0] for event in results] == [pytest.approx(0.1), pytest.approx(0.3)]
+    assert {event[1] for event in results} == {Level.WARN}
+    assert "50 %" in results[0][2]
 
 
 def slow_messages(t_s, scale):
@@ -78,10 +78,10 @@ def test_limits_are_reported_once_for_any_chunks(limited, cuts):
     t_s, scale = TICK_s * np.arange(TICKS), np.ones(TICKS)
     for tick, value in limited:
         scale[tick] = value
-    events, found = Events(), []
+    events, results = Events(), []
     for first, last in zip([0, *sorted(cuts)], [*sorted(cuts), TICKS], strict=True):
-        found += events.of(rows(t_s[first:last], scale[first:last]))
+        results += events.of(rows(t_s[first:last], scale[first:last]))
     expected = slow_messages(t_s, scale)
-    assert [t_s for t_s, _, _ in found] == [t_s for t_s, _ in expected]
-    assert all(text in found[i][2] for i, (_, text) in enumerate(expected))
+    assert [t_s for t_s, _, _ in results] == [t_s for t_s, _ in expected]
+    assert all(text in results[i][2] for i, (_, text) in enumerate(expected))
     assert events.end(Status.COMPLETED)[0] == t_s[-1]

@@ -34,11 +34,11 @@ def table(values):
 
 
 def lanes(whole, cuts):
-    changes, found = StateChanges(), {}
+    changes, result = StateChanges(), {}
     for first, last in zip([0, *cuts], [*cuts, len(whole)], strict=True):
         for lane in changes.of(whole.rows(first, last)):
-            found.setdefault(lane.entity, []).extend(zip(lane.t_s.tolist(), lane.states, strict=True))
-    return found
+            result.setdefault(lane.entity, []).extend(zip(lane.t_s.tolist(), lane.states, strict=True))
+    return result
 
 
 @given(
@@ -50,12 +50,12 @@ def lanes(whole, cuts):
 def test_each_change_is_logged_once_for_any_chunks(values, cuts):
     whole = table(np.array(values, dtype=np.float64))
     expected = {}
-    for column, entity in enumerate(("states/part/first-one", "states/part/second", "states/alone")):
+    for column, entity in enumerate(("part/first-one", "part/second", "alone")):
         names, before = ("on", "off") if column == 2 else SIGNALS[1].states, 0
         for tick, row in enumerate(values):
             if row[column] != before:
-                told = (whole["t_s"][tick], names[row[column]])
-                expected.setdefault(entity, []).append(told)
+                change = (whole["t_s"][tick], names[row[column]])
+                expected.setdefault(entity, []).append(change)
                 before = row[column]
     assert lanes(whole, sorted(cuts)) == expected
 
@@ -85,8 +85,8 @@ def test_a_recording_has_a_lane_for_what_fails_and_a_line_in_its_log(tmp_path):
         batch = chunk.to_record_batch()
         for name in batch.schema.names:
             if name.endswith("StateChange:state"):
-                told = [row[0] for row in batch.column(name).to_pylist()]
-                states.setdefault(chunk.entity_path.removeprefix("/states/"), []).extend(told)
+                messages = [row[0] for row in batch.column(name).to_pylist()]
+                states.setdefault(chunk.entity_path.removeprefix("/"), []).extend(messages)
             if name.endswith("TextLog:text"):
                 lines += [row[0] for row in batch.column(name).to_pylist()]
     assert states == {

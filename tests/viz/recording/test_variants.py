@@ -87,9 +87,9 @@ def test_the_layout_of_each_number_of_groups_is_one_of_its_own():
 
 def titles(blueprint):
     """Names of all views."""
-    waiting, found = [blueprint.root_container], []
+    waiting, results = [blueprint.root_container], []
     while waiting:
         part = waiting.pop()
         waiting += getattr(part, "contents", ()) if isinstance(part, rrb.Container) else ()
-        found.append(part.name)
-    return found
+        results.append(part.name)
+    return results

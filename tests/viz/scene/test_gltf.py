@@ -19,20 +19,20 @@ def read_back(contents):
 
 def test_every_mesh_is_read_back_as_it_was_written():
     for piece in read_meshes(actuators.MJCF_PATH).others.values():
-        found = read_back(gltf.binary(piece.positions, piece.triangles))
-        np.testing.assert_array_equal(found.vertices, piece.positions.astype(np.float32))
-        np.testing.assert_array_equal(found.faces, piece.triangles)
+        result = read_back(gltf.binary(piece.positions, piece.triangles))
+        np.testing.assert_array_equal(result.vertices, piece.positions.astype(np.float32))
+        np.testing.assert_array_equal(result.faces, piece.triangles)
         # Files of tenths of a micrometre, in single precision; a mesh turned inside out has less than none.
-        assert found.volume > 0
+        assert result.volume > 0
 
 
 @pytest.mark.parametrize("count", [0xFFFF, 0x10000 + 2])
 def test_meshes_of_more_vertices_than_two_bytes_count_are_whole(count):
     positions = np.random.default_rng(0).normal(size=(count, 3))
     triangles = np.array([[0, 1, count - 1], [count - 3, count - 2, count - 1]])
-    found = read_back(gltf.binary(positions, triangles))
-    np.testing.assert_array_equal(found.vertices, positions.astype(np.float32))
-    np.testing.assert_array_equal(found.faces, triangles)
+    result = read_back(gltf.binary(positions, triangles))
+    np.testing.assert_array_equal(result.vertices, positions.astype(np.float32))
+    np.testing.assert_array_equal(result.faces, triangles)
 
 
 def test_what_is_fixed_in_three_dimensions_takes_half_a_megabyte(tmp_path):

@@ -142,11 +142,11 @@ def test_coils_stand_where_the_model_puts_them_and_fill_their_numbers(actuator):
     np.testing.assert_allclose(centres, actuator.coil.distance_m * actuator.coil_axes, atol=1e-7)
     height = np.einsum("cvi,ci->cv", coils, actuator.coil_axes) - actuator.coil.distance_m
     distance = np.linalg.norm(np.cross(coils, actuator.coil_axes[:, None]), axis=2)
-    for found, ends in (
+    for result, ends in (
         (height, (-actuator.coil.length_m / 2, actuator.coil.length_m / 2)),
         (distance, (actuator.coil.inner_radius_m, actuator.coil.outer_radius_m)),
     ):
-        np.testing.assert_allclose(np.sort(found, axis=1)[:, [0, -1]], np.tile(ends, (36, 1)), atol=1e-7)
+        np.testing.assert_allclose(np.sort(result, axis=1)[:, [0, -1]], np.tile(ends, (36, 1)), atol=1e-7)
 
 
 def test_faces_and_normals_of_a_coil_point_outward(actuator):

@@ -71,14 +71,14 @@ def test_steps_end_at_their_whole(capsys):
 def test_parts_are_counted_as_they_begin(capsys):
     follow_parts()
     lines = re.split(r"[\r\n]+", ESCAPES.sub("", capsys.readouterr().err))
-    told = [
+    messages = [
         (line.split(" ━")[0].split(" ╸")[0], int(re.search(r"(\d+)%", line)[1]))
         for line in lines
         if "%" in line
     ]
     # The last to begin has half the parts behind it, and is not done.
-    assert told[-1] == ("closed loop", 50)
-    assert all(share >= 0 for _, share in told)
+    assert messages[-1] == ("closed loop", 50)
+    assert all(share >= 0 for _, share in messages)
 
 
 @pytest.mark.usefixtures("watched")

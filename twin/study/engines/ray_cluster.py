@@ -23,6 +23,7 @@ from collections.abc import Generator, Iterator
 from typing import Any
 
 from spheretwin.models.base.errors import InputError, SpheretwinError, shown, without_breaks
+from spheretwin.models.base.extras import missing
 from spheretwin.study.engines import ray_worker, threads
 from spheretwin.study.engines.engine import Batches, Engine, Order
 from spheretwin.study.grid import Row
@@ -186,10 +187,7 @@ def _ray(local: bool) -> Any:
     try:
         import ray
     except ImportError:
-        raise InputError(
-            "sweep: expected the extra `spheretwin[cluster]` for the engine ray,"
-            " received an installation without Ray"
-        ) from None
+        raise missing("sweep", "Ray", "cluster", "for the engine ray") from None
     return ray
 
 

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from spheretwin.models.base.errors import InputError
+from spheretwin.models.base.extras import missing
 from spheretwin.study import optimise as objectives
 from spheretwin.study.optimise import Gain, Optimise
 from spheretwin.study.tuning.gains import numbers, start_of
@@ -42,10 +42,7 @@ def optuna() -> ModuleType:
     try:
         import optuna
     except ImportError:
-        raise InputError(
-            "study: expected the extra `spheretwin[tune]` to look for gains,"
-            " received an installation without optuna"
-        ) from None
+        raise missing("study", "optuna", "tune", "to look for gains") from None
     return optuna
 
 

@@ -53,8 +53,8 @@ def started(source, folder, *options):
 
 def goes_on_locally(source, folder, before):
     """Run the first rows of a study that was stopped: its results are kept, and the others are added."""
-    found = runner.run(str(source), folder / "out", limit=LIMIT)
-    assert found.resumed >= 10
+    result = runner.run(str(source), folder / "out", limit=LIMIT)
+    assert result.resumed >= 10
     assert (folder / "out" / journal.NAME).read_bytes().startswith(before)
     runner.run(str(source), folder / "local", limit=LIMIT)
     assert rows_of(folder / "out")[:LIMIT] == rows_of(folder / "local")

@@ -61,14 +61,14 @@ def test_a_node_that_is_killed_half_way_loses_nothing(study, machines, wanted, t
             machines.remove_node(node, allow_graceful=False)
 
     try:
-        found = run(study, tmp_path / "study", machines, done=kill)
+        result = run(study, tmp_path / "study", machines, done=kill)
     finally:
         machines.add_node(num_cpus=1)
     assert killed
     assert killed[0] < ROWS
     assert lost
-    assert (found.rows, found.resumed) == (ROWS, 0)
-    assert 0 < found.startup_s < found.wall_s
+    assert (result.rows, result.resumed) == (ROWS, 0)
+    assert 0 < result.startup_s < result.wall_s
     lines = (tmp_path / "study" / journal.NAME).read_text().splitlines()
     assert len(lines) == 1 + ROWS  # its head, and each row once
     assert same_table(tmp_path / "study", wanted)
@@ -115,23 +115,23 @@ def test_a_node_with_other_sources_is_refused_in_one_line(study, machines, wante
     finally:
         machines.remove_node(other)
     assert "\n" not in str(refusal.value)
-    kept, of_local = (
+    of_driver, of_local = (
         (folder / journal.NAME).read_text().splitlines() for folder in (tmp_path / "out", wanted)
     )
-    assert set(kept) <= set(of_local)
+    assert set(of_driver) <= set(of_local)
 
 
 def test_an_address_where_nobody_answers_loses_nothing(study, machines, wanted, tmp_path):
     runner.run(study, tmp_path, limit=20)
-    kept = (tmp_path / journal.NAME).read_bytes()
+    stored = (tmp_path / journal.NAME).read_bytes()
     with socket.socket() as unused:
         unused.bind(("127.0.0.1", 0))
         address = f"127.0.0.1:{unused.getsockname()[1]}"
         with pytest.raises(InputError, match=f"at {address}, received no answer"):
             runner.run(study, tmp_path, engine="ray", address=address)
-    assert (tmp_path / journal.NAME).read_bytes() == kept
-    found = run(study, tmp_path, machines)
-    assert (found.rows, found.resumed) == (ROWS, 20)
+    assert (tmp_path / journal.NAME).read_bytes() == stored
+    result = run(study, tmp_path, machines)
+    assert (result.rows, result.resumed) == (ROWS, 20)
     assert same_table(tmp_path, wanted)
 
 
@@ -141,8 +141,8 @@ def test_a_cluster_that_is_lost_is_told_of_in_one_line(machines, tmp_path):
     source.write_text(LONG_STUDY)
     going = started(source, tmp_path / "out", "--threads", "1", "--address", machines.address)
     machines.head_node.kill_gcs_server(check_alive=False)
-    told = going.communicate()[1]
+    stderr = going.communicate()[1]
     assert going.returncode == 1
-    (line,) = told.splitlines()
+    (line,) = stderr.splitlines()
     assert "expected the cluster to stay, received no answer from it any more" in line
     goes_on_locally(source, tmp_path, (tmp_path / "out" / journal.NAME).read_bytes())

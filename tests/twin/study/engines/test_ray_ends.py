@@ -12,9 +12,9 @@ def test_a_cluster_of_its_own_is_interrupted_and_the_study_goes_on(tmp_path):
     source.write_text(LONG_STUDY)
     going = started(source, tmp_path / "out", "--threads", "1")
     os.killpg(going.pid, signal.SIGINT)  # as a terminal does it, to all that it runs
-    told = going.communicate()[1]
+    stderr = going.communicate()[1]
     assert going.returncode == 1
-    assert "the same command continues from there" in told
-    assert "Traceback" not in told
+    assert "the same command continues from there" in stderr
+    assert "Traceback" not in stderr
     before = (tmp_path / "out" / journal.NAME).read_bytes()
     goes_on_locally(source, tmp_path, before)

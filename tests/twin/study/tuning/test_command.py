@@ -10,6 +10,7 @@ import pytest
 from spheretwin import cli
 from spheretwin.cli import sweep
 from spheretwin.models.base.errors import InputError
+from spheretwin.models.base.extras import install_command
 from spheretwin.study import report as study_report
 from spheretwin.study.optimise import Objective
 from spheretwin.study.tuning import report
@@ -80,14 +81,14 @@ def test_json_stands_alone_and_files_are_written(small, tmp_path, capsys):
     assert cli.main(arguments) == cli.DONE
     out, err = capsys.readouterr()
     assert err == ""
-    told = json.loads(out)
-    assert (told["trials"], told["of"], told["resumed"]) == (16, 16, 0)
-    assert list(told["laws"]) == ["pd", "pid"]
+    reported = json.loads(out)
+    assert (reported["trials"], reported["of"], reported["resumed"]) == (16, 16, 0)
+    assert list(reported["laws"]) == ["pd", "pid"]
     files = {path.name for path in (tmp_path / "out").iterdir()}
     pages = {"tuning.md", "tuning.html", "gains.json"}
     assert files == {"trials.jsonl", "trials.parquet", "trials.svg", "front.svg"} | pages
-    table = parquet.read_table(told["table"]).to_pylist()
-    for law, of_law in told["laws"].items():
+    table = parquet.read_table(reported["table"]).to_pylist()
+    for law, of_law in reported["laws"].items():
         assert sum(of_law["ended"].values()) == 8
         assert of_law["start"]["gains"]["controller.stiffness"] == 100.0
         rows = {row["trial"]: row for row in table if row["law"] == law}
@@ -152,12 +153,12 @@ def test_the_best_within_each_limit_is_written_and_printed(tmp_path, capsys):
     arguments = ["sweep", str(path), "--optimise", "--out", str(tmp_path / "out"), "--threads", "2"]
     assert cli.main(arguments) == cli.DONE
     printed = capsys.readouterr().out
-    found = json.loads((tmp_path / "out" / "gains.json").read_text())["laws"]["pd"]
+    reported = json.loads((tmp_path / "out" / "gains.json").read_text())["laws"]["pd"]
     # No damping within the range is as little as 0.01 of slowness.
-    assert [each["limit"] for each in found] == [0.7, 9.0]
+    assert [each["limit"] for each in reported] == [0.7, 9.0]
     table = parquet.read_table(tmp_path / "out" / "trials.parquet").to_pylist()
     assert len(table) == 12 + 3 * 4
-    for each in found:
+    for each in reported:
         completed = [row for row in table if row["ended"] == "completed"]
         within = [row for row in completed if row["worst slowness"] <= each["limit"]]
         best = min(within, key=lambda row: row["worst miss"])
@@ -169,7 +170,7 @@ def test_the_best_within_each_limit_is_written_and_printed(tmp_path, capsys):
     assert "chosen: 0.01, 0.7, 9." in text
     assert "about 300" in text
     assert "500, or off" in text
-    some_off = any(each["gains"]["controller.damping"] is None for each in found)
+    some_off = any(each["gains"]["controller.damping"] is None for each in reported)
     assert some_off == ("off" in printed)
 
 
@@ -222,9 +223,9 @@ def test_the_command_that_is_told_runs_the_gains(small, tmp_path, capsys):
     reference = str(tmp_path / "figures.py:miss")
     more = [] if reference in words else ["--metric", reference]
     assert cli.main([*words[1:], *more, "--json"]) == cli.DONE
-    told = json.loads(capsys.readouterr().out)
+    reported = json.loads(capsys.readouterr().out)
     row = parquet.read_table(tmp_path / "out" / "trials.parquet").to_pylist()[best["trial"]]
-    assert told["miss"] == row["worst miss, each row"][0]
+    assert reported["miss"] == row["worst miss, each row"][0]
 
 
 def test_people_get_the_start_the_front_and_where_all_is(small, tmp_path, capsys, monkeypatch):
@@ -241,7 +242,10 @@ def test_without_matplotlib_there_are_trials_and_a_word(small, tmp_path, capsys,
     assert cli.main(["sweep", small, "--optimise", "--json", "--out", str(tmp_path / "out")]) == cli.DONE
     out, err = capsys.readouterr()
     assert json.loads(out)["trials"] == 16
-    assert err == "spheretwin: sweep: no figures without the extra `spheretwin[plots]`\n"
+    assert (
+        err
+        == f"spheretwin: sweep: no figures were drawn: {install_command('plots')} installs what they need\n"
+    )
     assert list((tmp_path / "out").glob("*.svg")) == []
     assert "![" not in (tmp_path / "out" / "tuning.md").read_text(encoding="utf-8")
 
@@ -250,26 +254,25 @@ def test_what_is_interrupted_exits_1_and_goes_on(small, tmp_path, capsys, monkey
     tune = sweep.tune
 
     def interrupted(*arguments, done, **more):
-        def told(trials, of):
+        def printed_report(trials, of):
             if trials == 4:
                 signal.raise_signal(signal.SIGINT)
             done(trials, of)
 
-        return tune(*arguments, done=told, **more)
+        return tune(*arguments, done=printed_report, **more)
 
     arguments = ["sweep", small, "--optimise", "--json", "--out", str(tmp_path / "out"), "--threads", "1"]
     with monkeypatch.context() as patch:
         patch.setattr(sweep, "tune", interrupted)
         assert cli.main(arguments) == cli.FAILED
     out, err = capsys.readouterr()
-    found = json.loads(out)["trials"]
-    assert 4 <= found < 16
-    told = (
-        f"spheretwin: sweep: interrupted after {found} of 16 trials; the same command continues from there\n"
+    trials = json.loads(out)["trials"]
+    assert 4 <= trials < 16
+    assert err == (
+        f"spheretwin: sweep: interrupted after {trials} of 16 trials; the same command continues from there\n"
     )
-    assert err == told
     assert cli.main(arguments) == cli.DONE
-    assert json.loads(capsys.readouterr().out)["resumed"] == found
+    assert json.loads(capsys.readouterr().out)["resumed"] == trials
 
 
 BAD = {
@@ -284,11 +287,11 @@ BAD = {
 @pytest.mark.parametrize("case", BAD)
 def test_what_cannot_be_is_refused_in_a_line(case, capsys, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    arguments, told = BAD[case]
+    arguments, message = BAD[case]
     assert cli.main(["sweep", *arguments]) == cli.BAD_INPUT
     out, err = capsys.readouterr()
     assert out == ""
-    assert told in err
+    assert message in err
     assert err.count("\n") == 1
     assert list(tmp_path.iterdir()) == []
 

@@ -81,10 +81,10 @@ BAD_GAINS = {
 
 @pytest.mark.parametrize("case", BAD_GAINS)
 def test_a_gain_that_is_none_is_refused_in_a_line(tmp_path, case):
-    bad, told = BAD_GAINS[case]
+    bad, message = BAD_GAINS[case]
     with pytest.raises(InputError) as refusal:
         study(tmp_path, gains=(bad,))
-    assert told in str(refusal.value)
+    assert message in str(refusal.value)
     assert "\n" not in str(refusal.value)
 
 
@@ -112,10 +112,10 @@ BAD_OBJECTIVES = {
 
 @pytest.mark.parametrize("case", BAD_OBJECTIVES)
 def test_objectives_that_are_none_are_refused_in_a_line(tmp_path, case):
-    bad, told = BAD_OBJECTIVES[case]
+    bad, message = BAD_OBJECTIVES[case]
     with pytest.raises(InputError) as refusal:
         study(tmp_path, objectives=bad)
-    assert told in str(refusal.value)
+    assert message in str(refusal.value)
     assert "\n" not in str(refusal.value)
 
 
@@ -181,9 +181,9 @@ BAD_STUDIES = {
 
 @pytest.mark.parametrize("case", BAD_STUDIES)
 def test_what_cannot_be_tuned_is_refused_in_a_line_before_a_trial(tmp_path, case):
-    make, told = BAD_STUDIES[case]
+    make, message = BAD_STUDIES[case]
     with pytest.raises(InputError) as refusal:
         tune(make(tmp_path), tmp_path / "out")
-    assert told in str(refusal.value)
+    assert message in str(refusal.value)
     assert "\n" not in str(refusal.value)
     assert not (tmp_path / "out").exists()

@@ -32,26 +32,28 @@ LOCAL = {"sampler": "local", "draws": 10, "perturbations": 14}
 def test_wherever_a_process_was_killed_it_is_gone_on_as_if_it_had_not_been(tmp_path, sampler):
     noisy = study(tmp_path, **TWO, **sampler)
     tune(noisy, tmp_path, trials=TRIALS, threads=1)
-    whole, kept = table(tmp_path), b"".join(lines(tmp_path))
+    whole, journal_bytes = table(tmp_path), b"".join(lines(tmp_path))
     # Between two lines, within one, and behind one but for its end.
-    ends = [round(len(kept) * share) for share in (0.001, 0.02, 0.11, 0.37, 0.53, 0.71, 0.83, 0.93, 0.99)]
-    ends += [kept.index(b"\n", end) + more for end in ends[:-1] for more in (0, 1)]
+    ends = [
+        round(len(journal_bytes) * share) for share in (0.001, 0.02, 0.11, 0.37, 0.53, 0.71, 0.83, 0.93, 0.99)
+    ]
+    ends += [journal_bytes.index(b"\n", end) + more for end in ends[:-1] for more in (0, 1)]
     for place, end in enumerate(ends):
         folder = tmp_path / str(place)
         folder.mkdir()
-        (folder / JOURNAL).write_bytes(kept[:end])
-        found = tune(noisy, folder, trials=TRIALS, threads=2)
-        assert found.resumed < TRIALS
-        assert found.trials == found.of == TRIALS
+        (folder / JOURNAL).write_bytes(journal_bytes[:end])
+        result = tune(noisy, folder, trials=TRIALS, threads=2)
+        assert result.resumed < TRIALS
+        assert result.trials == result.of == TRIALS
         assert table(folder) == whole
 
 
 def test_every_cut_within_one_batch_is_gone_on_with(tmp_path):
     noisy = study(tmp_path, **TWO)
     tune(noisy, tmp_path, trials=16, threads=1)
-    whole, kept = table(tmp_path), lines(tmp_path)
-    for count in range(len(kept) - 30, len(kept)):
-        (tmp_path / JOURNAL).write_bytes(b"".join(kept[:count]))
+    whole, journal_lines = table(tmp_path), lines(tmp_path)
+    for count in range(len(journal_lines) - 30, len(journal_lines)):
+        (tmp_path / JOURNAL).write_bytes(b"".join(journal_lines[:count]))
         tune(noisy, tmp_path, trials=16, threads=1)
         assert table(tmp_path) == whole
 
@@ -73,29 +75,29 @@ def test_a_killed_process_loses_no_trial_that_it_told_of(tmp_path):
     fields = {**noisy.model_dump(mode="json"), "optimise": noisy.optimise.model_dump(mode="json")}
     arguments = [sys.executable, "-c", KILLED, json.dumps(fields), str(tmp_path / "killed")]
     with subprocess.Popen(arguments, stdout=subprocess.PIPE, text=True) as process:
-        told = 0
-        while told < 9:
+        reported = 0
+        while reported < 9:
             line = process.stdout.readline().strip()
-            told = int(line) if line.isdecimal() else told
+            reported = int(line) if line.isdecimal() else reported
         # Another process is kept out as long as this one lives.
         with pytest.raises(InputError, match=r"one process at a time, received .*which another one writes"):
             tune(noisy, tmp_path / "killed", trials=TRIALS)
         os.kill(process.pid, signal.SIGKILL)
-    found = tune(noisy, tmp_path / "killed", trials=TRIALS)
-    assert found.resumed >= 9
-    kept = found.laws[0].trials[:TRIALS]
-    assert kept == tune(noisy, tmp_path / "once", trials=TRIALS).laws[0].trials
+    result = tune(noisy, tmp_path / "killed", trials=TRIALS)
+    assert result.resumed >= 9
+    trials = result.laws[0].trials[:TRIALS]
+    assert trials == tune(noisy, tmp_path / "once", trials=TRIALS).laws[0].trials
 
 
 def test_what_is_stopped_goes_on(tmp_path):
     noisy = study(tmp_path, **TWO, fresh=3)
     asked = iter(range(10**9))
-    found = tune(noisy, tmp_path, trials=TRIALS, threads=1, stop_requested=lambda: next(asked) > 20)
-    assert 0 < found.trials < found.of == TRIALS
-    told = []
-    again = tune(noisy, tmp_path, trials=TRIALS, threads=1, done=lambda done, of: told.append((done, of)))
-    assert again.resumed == found.trials
-    assert told == [(done, TRIALS) for done in range(found.trials, TRIALS + 1)]
+    result = tune(noisy, tmp_path, trials=TRIALS, threads=1, stop_requested=lambda: next(asked) > 20)
+    assert 0 < result.trials < result.of == TRIALS
+    messages = []
+    again = tune(noisy, tmp_path, trials=TRIALS, threads=1, done=lambda done, of: messages.append((done, of)))
+    assert again.resumed == result.trials
+    assert messages == [(done, TRIALS) for done in range(result.trials, TRIALS + 1)]
     once = tune(noisy, tmp_path / "once", trials=TRIALS, threads=1)
     assert table(tmp_path) == table(tmp_path / "once")
     assert again.laws == once.laws
@@ -106,8 +108,8 @@ def test_what_is_finished_is_not_run_again(tmp_path, monkeypatch):
     tune(noisy, tmp_path, trials=8)
     before = (tmp_path / JOURNAL).read_bytes()
     monkeypatch.setattr("spheretwin.study.tuning.trials.run_trial", None)
-    found = tune(noisy, tmp_path, trials=8)
-    assert (found.trials, found.resumed) == (8, 8)
+    result = tune(noisy, tmp_path, trials=8)
+    assert (result.trials, result.resumed) == (8, 8)
     assert (tmp_path / JOURNAL).read_bytes() == before
 
 
@@ -161,24 +163,26 @@ def test_a_full_disk_loses_no_trial(tmp_path, monkeypatch):
         patch.setattr(journal, "_opened", lambda path: Full(opened(path), 2000))
         with pytest.raises(SpheretwinError, match="could not be written, No space left on device"):
             tune(noisy, tmp_path, trials=TRIALS)
-    found = tune(noisy, tmp_path, trials=TRIALS)
-    assert found.resumed > 3
-    assert found.laws[0].trials == tune(noisy, tmp_path / "once", trials=TRIALS).laws[0].trials
+    result = tune(noisy, tmp_path, trials=TRIALS)
+    assert result.resumed > 3
+    assert result.laws[0].trials == tune(noisy, tmp_path / "once", trials=TRIALS).laws[0].trials
 
 
 def test_a_damaged_line_is_run_again(tmp_path):
     noisy = study(tmp_path, **TWO)
     tune(noisy, tmp_path, trials=TRIALS)
-    whole, kept = table(tmp_path), lines(tmp_path)
-    kept[5] = kept[5].replace(b"e", b"f", 1)
-    (tmp_path / JOURNAL).write_bytes(b"".join(kept))
+    whole, journal_lines = table(tmp_path), lines(tmp_path)
+    journal_lines[5] = journal_lines[5].replace(b"e", b"f", 1)
+    (tmp_path / JOURNAL).write_bytes(b"".join(journal_lines))
     assert tune(noisy, tmp_path, trials=TRIALS).resumed == TRIALS - 1
     assert table(tmp_path) == whole
 
 
 def test_without_optuna_the_extra_is_named(tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "optuna", None)
-    with pytest.raises(InputError, match=r"expected the extra `spheretwin\[tune\]` to look for gains"):
+    with pytest.raises(
+        InputError, match="expected optuna to look for gains, which the extra tune installs: "
+    ):
         tune(study(tmp_path, **TWO), tmp_path / "out", trials=4)
 
 

@@ -18,7 +18,7 @@ class Taken(NamedTuple):
         return Taken(self.wall_s / parts, self.cores_s / parts)
 
 
-class Told:
+class Report:
     def __init__(self, as_json: bool) -> None:
         self._as_json = as_json
         self._found: dict[str, list[dict[str, object]]] = {

@@ -1,0 +1,73 @@
+"""Commands that install an extra: each kind of installation has its own."""
+
+import json
+import sys
+from importlib.metadata import distribution
+
+import pytest
+
+from spheretwin.models.base import extras
+from spheretwin.models.base.errors import InputError
+
+
+class Installed:
+    """Metadata of an installation."""
+
+    def __init__(self, url=None, editable=True):
+        self.facts = json.dumps({"url": url, "dir_info": {"editable": editable}}) if url else None
+
+    def read_text(self, name):
+        assert name == "direct_url.json"
+        return self.facts
+
+
+def installed(monkeypatch, metadata, *, pip):
+    monkeypatch.setattr(extras, "distribution", lambda name: metadata)
+    monkeypatch.setattr(extras, "find_spec", lambda name: object() if pip else None)
+
+
+def test_a_clone_that_make_has_set_up_names_its_target(monkeypatch, tmp_path):
+    (tmp_path / "uv.lock").touch()
+    monkeypatch.setattr(sys, "prefix", str(tmp_path / ".venv"))
+    installed(monkeypatch, Installed(tmp_path.as_uri()), pip=False)
+    assert extras.install_command("bench", "plots") == f"make -C {tmp_path} extras EXTRAS='bench plots'"
+
+
+def test_an_environment_with_pip_uses_its_own_python(monkeypatch, tmp_path):
+    installed(monkeypatch, Installed(), pip=True)
+    assert extras.install_command("rl") == f"{sys.executable} -m pip install 'spheretwin[rl]'"
+    installed(monkeypatch, Installed(tmp_path.as_uri()), pip=True)
+    assert extras.install_command("rl") == f"{sys.executable} -m pip install -e '{tmp_path}[rl]'"
+
+
+def test_an_environment_without_pip_uses_uv(monkeypatch):
+    installed(monkeypatch, Installed(), pip=False)
+    assert extras.install_command("rl") == f"uv pip install --python {sys.executable} 'spheretwin[rl]'"
+
+
+def test_every_extra_of_the_package_has_a_purpose():
+    named = set(distribution("spheretwin").metadata.get_all("Provides-Extra"))
+    assert set(extras.PURPOSES) == named
+
+
+@pytest.mark.parametrize("extra", extras.PURPOSES)
+def test_missing_packages_are_those_of_the_extra(extra, monkeypatch):
+    monkeypatch.setattr(extras, "_is_installed", lambda name: False)
+    names = extras.missing_packages(extra)
+    assert names
+    required = [
+        line
+        for line in distribution("spheretwin").requires
+        if f'extra == "{extra}"' in line.replace("'", '"')
+    ]
+    assert len(names) == len(required)
+    assert all(line.startswith(name) for name, line in zip(names, required, strict=True))
+
+
+def test_the_error_names_package_extra_and_command():
+    error = extras.missing("bench", "viser", "bench")
+    assert isinstance(error, InputError)
+    assert (
+        str(error)
+        == f"bench: expected viser, which the extra bench installs: {extras.install_command('bench')}"
+    )
