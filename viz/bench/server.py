@@ -131,7 +131,7 @@ class _ConnectionGuard(servers.serve):
         arguments: ServerArguments,
     ) -> None:
         port = listening.getsockname()[1]
-        self._access, self._control = access, control
+        self._listening, self._access, self._control = listening, access, control
         self._select = arguments.select_subprotocol
         self._hosts = {f"{name}:{port}" for name in (HOST, "localhost")}
         self._title, self._answers, self._serve_file = title, answers, arguments.process_request
@@ -151,6 +151,14 @@ class _ConnectionGuard(servers.serve):
             logger=_SILENT,
             server_header=None,
         )
+
+    async def __aexit__(self, *exception: Any) -> None:
+        """Accept no socket any more, then close: asyncio 3.11 leaves one open that it accepts meanwhile."""
+        with contextlib.suppress(NotImplementedError):  # loops of Windows
+            asyncio.get_running_loop().remove_reader(self._listening)
+        for _ in range(2):  # in two turns an accepted socket has its transport, and that its connection
+            await asyncio.sleep(0)
+        await super().__aexit__(*exception)
 
     def _counted(self, handler: Any) -> Any:
         async def counted(connection: Any) -> None:

@@ -1,5 +1,7 @@
 """Server of the bench's page: admission of clients."""
 
+import asyncio
+import gc
 import socket
 from urllib.parse import urlsplit
 
@@ -9,7 +11,9 @@ from websockets.exceptions import InvalidStatus
 
 from spheretwin.models.base.errors import InputError
 from spheretwin.viz.bench import server
+from spheretwin.viz.bench.access import Access
 from spheretwin.viz.bench.connections import CONTROL
+from spheretwin.viz.bench.viser_internals import ServerArguments
 from tests.viz.bench import fake
 from tests.viz.bench.clients import CAMERA, PROTOCOL, cookie, get, is_alive, port, raw_get, socket_to
 from tests.waiting import PATIENCE_S
@@ -125,3 +129,24 @@ def test_a_cookie_is_hidden_from_scripts_and_from_other_sites(page):
     attributes = headers["Set-Cookie"].split("; ")[1:]
     assert attributes == ["HttpOnly", "SameSite=Strict", "Path=/"]
     assert headers["Cache-Control"] == "no-store"
+
+
+@pytest.mark.parametrize("turns", range(6))
+def test_a_socket_accepted_while_the_server_closes_is_closed(turns):
+    """A browser opens spare sockets at any time, also when the server no longer looks for them."""
+    listening = server.listen(0)
+    visitor = socket.socket()
+
+    async def visited():
+        nothing = ServerArguments(None, None, None, None)
+        access = Access(listening.getsockname()[1])
+        async with server._ConnectionGuard(listening, "bench", access, lambda *_: None, {}, nothing):
+            visitor.connect(listening.getsockname())
+            for _ in range(turns):
+                await asyncio.sleep(0)
+
+    loop = asyncio.new_event_loop()  # asyncio.run would end what is left
+    with visitor:
+        loop.run_until_complete(visited())
+        loop.close()
+        gc.collect()  # warnings are errors, and a socket that was left open gives one
