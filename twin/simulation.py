@@ -152,7 +152,7 @@ def follow(
         _apply_due(session, ticks, pending, sinks)
         last = min(session.tick + chunk, ticks, *(change.tick for change in pending[:1]))
         rows = _advance(session, last, log)
-        lines = messages.of(rows)
+        lines = messages.of(rows) if sinks else []
         for sink in sinks:
             sink.write(rows)
             for t_s, text in lines:
