@@ -176,6 +176,25 @@ def test_the_same_runs_give_the_same_bytes(files, drawn_into, tmp_path):
         assert (tmp_path / name).read_bytes() == (drawn_into / name).read_bytes(), name
 
 
+def test_figures_of_an_earlier_review_are_replaced_and_other_files_stay(files, tmp_path):
+    assert cli.main(["review", str(files[0]), "--figures", str(tmp_path), "--figure-format", "png"]) == 0
+    assert (tmp_path / "sliding.svg").exists()
+    assert (tmp_path / "events.png").exists()
+    # Without sliding variables the new review has a figure less.
+    (runs := tmp_path / "runs").mkdir()
+    pid, _ = written(runs, "pid", duration=0.1, **{"controller.law": "pid"})
+    (notes := tmp_path / "notes.svg").write_text("of the user's", encoding="utf-8")
+    assert cli.main(["review", str(pid), "--figures", str(tmp_path)]) == 0
+    left = {path.name for path in tmp_path.iterdir() if path.is_file()}
+    figures = {f"{name}.svg" for name in NAMES if name != "sliding"}
+    assert left == {comparison.PAGE, notes.name, *figures}
+    # A folder without a page is no earlier review: the files in it are the user's.
+    (tmp_path / comparison.PAGE).unlink()
+    (other := tmp_path / "sliding.svg").write_text("of the user's", encoding="utf-8")
+    assert cli.main(["review", str(pid), "--figures", str(tmp_path)]) == 0
+    assert other.read_text(encoding="utf-8") == "of the user's"
+
+
 def test_one_run_alone_and_a_long_one_by_its_extremes(files, tmp_path, monkeypatch):
     from spheretwin.viz.pages import interactive
 
