@@ -17,6 +17,7 @@ from spheretwin.analysis.run_summary import amplitudes, peaks
 from spheretwin.metrics import BAND_rad
 from spheretwin.models.actuator import MJCF_PATH, Actuator
 from spheretwin.models.base.errors import InputError, shortened, shown, without_breaks
+from spheretwin.models.base.user_code import short_names
 from spheretwin.models.telemetry.run_record import RunFacts
 from spheretwin.models.telemetry.status import Event, Status
 from spheretwin.models.telemetry.table import Table
@@ -35,7 +36,8 @@ LONGEST_STEM = 40
 def labels(runs: Sequence[Reviewed], longest: int = 10**6) -> list[str]:
     """Return a label for each run: number, file, law, and the differing fields that fit.
 
-    A file that has the name of its law is named once.
+    A file that has the name of its law is named once. A law in a file has the name of that file, with folders
+    only if two files share it.
 
     Parameters
     ----------
@@ -49,9 +51,10 @@ def labels(runs: Sequence[Reviewed], longest: int = 10**6) -> list[str]:
         if name != "law"
     ][:MOST_DIFFERENCES]
     run_labels = []
-    for place, run in enumerate(runs, start=1):
+    laws = short_names([_law(run) for run in runs])
+    for place, (run, law) in enumerate(zip(runs, laws, strict=True), start=1):
         parts = [f"{name} {shortened(values[place - 1], LONGEST_VALUE)}" for name, values in differences]
-        stem, law = shortened(run.path.stem, LONGEST_VALUE), _law(run)
+        stem = shortened(run.path.stem, LONGEST_VALUE)
         label = f"{place} {stem}" if stem == law else f"{place} {stem}: {law}"
         for part in parts:
             if len(label) + len(part) + 2 > longest:
