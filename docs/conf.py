@@ -4,6 +4,8 @@ import sys
 from importlib.metadata import version as version_of
 from pathlib import Path
 
+from sphinx.application import Sphinx
+
 HERE = Path(__file__).parent
 sys.path.insert(0, str(HERE))
 
@@ -38,6 +40,12 @@ html_copy_source = False
 html_show_sourcelink = False
 
 
-def setup(app: object) -> None:
-    """Write the pages that follow from the sources."""
-    generate.write_pages(HERE / "reference" / "generated")
+def setup(app: Sphinx) -> None:
+    """Write the pages that follow from the sources; links to those sources lead to the pages."""
+    generate.write_pages(generate.ROOT / generate.GENERATED)
+    app.connect("source-read", lead_to_pages)
+
+
+def lead_to_pages(app: Sphinx, page: str, source: list[str]) -> None:
+    """Replace the links of a page before it is parsed, which checks them."""
+    source[0] = generate.on_site(page, source[0])
