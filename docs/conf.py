@@ -4,7 +4,9 @@ import sys
 from importlib.metadata import version as version_of
 from pathlib import Path
 
+import jupyter_client
 from sphinx.application import Sphinx
+from traitlets import default
 
 HERE = Path(__file__).parent
 sys.path.insert(0, str(HERE))
@@ -38,6 +40,20 @@ html_static_path = ["_static"]
 html_css_files = ["site.css"]
 html_copy_source = False
 html_show_sourcelink = False
+
+
+class EncryptedKernels(jupyter_client.AsyncKernelManager):
+    """Kernels of the executed pages: keys encrypt what they exchange over TCP.
+
+    IPython warns of kernels without them, and nbclient takes the class from here, without settings.
+    """
+
+    @default("transport_encryption")
+    def _encrypt(self) -> str:
+        return "auto"
+
+
+jupyter_client.AsyncKernelManager = EncryptedKernels
 
 
 def setup(app: Sphinx) -> None:
