@@ -11,7 +11,6 @@ SYNC = $(UV) sync --quiet --frozen --no-default-groups --python $(PYTHON)
 
 demo: .venv/demo ## run the nutation under AFSM and leave a recording and its telemetry
 	$(BIN)/spheretwin simulate nutation --record nutation.rrd --telemetry nutation.parquet
-	@echo "here:      $(BIN)/rerun nutation.rrd"
 
 # Tests of one file stay together: they share results. The order of the files is that of tests/conftest.py.
 # Bytecode is written: hundreds of processes would compile the sources again. The processes share the cores: threads

@@ -4,6 +4,10 @@ import sys
 from importlib.metadata import version as version_of
 from pathlib import Path
 
+import jupyter_client
+from sphinx.application import Sphinx
+from traitlets import default
+
 HERE = Path(__file__).parent
 sys.path.insert(0, str(HERE))
 
@@ -38,6 +42,26 @@ html_copy_source = False
 html_show_sourcelink = False
 
 
-def setup(app: object) -> None:
-    """Write the pages that follow from the sources."""
-    generate.write_pages(HERE / "reference" / "generated")
+class EncryptedKernels(jupyter_client.AsyncKernelManager):
+    """Kernels of the executed pages: keys encrypt what they exchange over TCP.
+
+    IPython warns of kernels without them, and nbclient takes the class from here, without settings.
+    """
+
+    @default("transport_encryption")
+    def _encrypt(self) -> str:
+        return "auto"
+
+
+jupyter_client.AsyncKernelManager = EncryptedKernels
+
+
+def setup(app: Sphinx) -> None:
+    """Write the pages that follow from the sources; links to those sources lead to the pages."""
+    generate.write_pages(generate.ROOT / generate.GENERATED)
+    app.connect("source-read", lead_to_pages)
+
+
+def lead_to_pages(app: Sphinx, page: str, source: list[str]) -> None:
+    """Replace the links of a page before it is parsed, which checks them."""
+    source[0] = generate.on_site(page, source[0])

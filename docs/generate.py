@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import argparse
 import importlib
+import importlib.util
 import inspect
 import os
 import re
@@ -62,10 +63,25 @@ DOCSTRINGS = {
 }
 """Derivations that stand in the docstrings of modules: title and module of the page."""
 
+SOURCES = {
+    "models/telemetry/signals.py": "telemetry_columns",
+    "models/telemetry/status.py": "statuses",
+    "twin/cli/__init__.py": "commands",
+    "twin/faults/targets.py": "fault_modes",
+    "twin/metrics.py": "metrics",
+    "twin/scenario/hardware.py": "hardware",
+    "twin/scenario/sections.py": "scenario_fields",
+    "control/laws/__init__.py": "laws",
+}
+"""Sources of tables, and their pages on the site."""
+
 TOP_LEVEL = "run"
 """Heading of the fields outside any section."""
 
 HELP_WIDTH = "96"
+
+GENERATED = "docs/reference/generated"
+"""Folder of the pages."""
 
 
 def write_pages(folder: Path) -> None:
@@ -305,6 +321,44 @@ def docstring(title: str, module: str) -> str:
     return _page([f"# {title}", "", f"The documentation of the module {path}.", "", text])
 
 
+def pages_of_files() -> dict[str, str]:
+    """Return the pages that follow from a file of the repository, by that file."""
+    derived = {_file_of(module): name for name, (_, module) in DOCSTRINGS.items()}
+    return {**READMES, **SOURCES, **derived}
+
+
+def _file_of(module: str) -> str:
+    spec = importlib.util.find_spec(module)
+    assert spec
+    assert spec.origin
+    return Path(spec.origin).relative_to(ROOT).as_posix()
+
+
+def on_site(page: str, text: str) -> str:
+    """Return a page of ``docs`` for the site: a link to a file with a page of its own leads to that page.
+
+    In the sources such a link leads to the file: the page exists on the site alone.
+
+    Parameters
+    ----------
+    page : str
+        Path below ``docs``.
+    text : str
+        Its Markdown.
+    """
+    folder, pages = (Path("docs") / page).parent, pages_of_files()
+
+    def replaced(match: re.Match[str]) -> str:
+        target, mark, anchor = match["target"].partition("#")
+        file = os.path.normpath(folder / target).replace(os.sep, "/")
+        if match["image"] or "://" in target or file not in pages:
+            return match[0]
+        path = os.path.relpath(f"{GENERATED}/{pages[file]}.md", folder).replace(os.sep, "/")
+        return f"[{match['text']}]({path}{mark}{anchor})"
+
+    return _LINK.sub(replaced, text)
+
+
 _LINK = re.compile(r"(?P<image>!?)\[(?P<text>[^\]]*)\]\((?P<target>[^)\s]+)\)")
 
 
@@ -365,4 +419,4 @@ def _page(lines: Iterable[str]) -> str:
 
 
 if __name__ == "__main__":
-    write_pages(ROOT / "docs" / "reference" / "generated")
+    write_pages(ROOT / GENERATED)

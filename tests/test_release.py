@@ -25,6 +25,13 @@ def test_the_recipe_has_the_dependencies_of_the_package():
     assert recipe == needed
 
 
+def test_the_demo_prints_the_command_that_opens_its_recording_once():
+    """The command of the package prints it, with the place of the viewer."""
+    recipe = re.search(r"^demo:.*\n((?:\t.*\n)+)", (ROOT / "Makefile").read_text(), re.MULTILINE)[1]
+    assert "--record nutation.rrd" in recipe
+    assert "echo" not in recipe
+
+
 def test_make_has_every_target_that_documents_name():
     targets = set(re.findall(r"^([a-z-]+):", (ROOT / "Makefile").read_text(), re.MULTILINE))
     pages = [*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md"), *(ROOT / ".github").rglob("*.yml")]

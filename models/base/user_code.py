@@ -9,7 +9,7 @@ import re
 import sys
 import threading
 import traceback
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from functools import lru_cache
 from pathlib import Path
 from types import ModuleType
@@ -28,6 +28,33 @@ def is_reference(text: object) -> bool:
 def file_of(reference: str) -> str:
     """Return the file of a reference."""
     return reference.rpartition(":")[0]
+
+
+def short_names(texts: Sequence[str]) -> list[str]:
+    """Return short names of references: file name and object, with as many folders as tell two files apart.
+
+    Parameters
+    ----------
+    texts : sequence of str
+        References, in which one file may be written in several ways, and other names, which stay.
+    """
+    parts = {
+        text: Path(os.path.abspath(os.path.expanduser(file_of(text)))).parts
+        for text in texts
+        if is_reference(text)
+    }
+
+    def name(text: str, depth: int) -> str:
+        return "/".join(parts[text][-depth:]) + ":" + text.rpartition(":")[2]
+
+    def short(text: str) -> str:
+        others = [other for other in parts if parts[other] != parts[text]]
+        for depth in range(1, len(parts[text])):
+            if all(name(text, depth) != name(other, depth) for other in others):
+                return name(text, depth)
+        return text
+
+    return [short(text) if text in parts else text for text in texts]
 
 
 def load_function(reference: str, what: str) -> Callable[..., Any]:

@@ -221,11 +221,12 @@ def _best_currents(surveyed: TorqueSurvey) -> Check:
     least_norm, best = reached.least_norm_Nm, reached.best_Nm
     return Check(
         name="best_currents",
-        compares="torque by least-norm currents over that by the best ones, two computations",
+        compares="largest ratio of the torque by least-norm currents to that by the best currents at a pose",
         states=len(best),
         value=float(np.max(least_norm[best > 0] / best[best > 0], initial=0.0)),
         bound=1.0 + ROUNDING,
-        why="least-norm currents are among all currents; rounding is allowed for",
+        why="least-norm currents within the limit are among those that the best are chosen of, by another"
+        " computation; rounding is allowed for",
     )
 
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import json
 import re
+import shlex
 import zlib
 from collections.abc import Iterable, Sequence
 from pathlib import Path
@@ -202,9 +203,29 @@ def damaged(path: Path, place: str) -> InputError:
 
 
 def unreadable(path: Path, error: BaseException, expected: str) -> InputError:
-    """Return the error for a file that another library could not read."""
+    """Return the error for a file that another library could not read.
+
+    A recording in place of telemetry is named as such: it can be converted.
+    """
+    if _is_recording(path):
+        return InputError(
+            f"file {path}: expected {expected}, received a recording;"
+            f" `spheretwin review {shlex.quote(str(path))} --export FILE.parquet` writes its telemetry,"
+            " and `simulate` with --telemetry that of a new run"
+        )
     reason = shortened(without_breaks(error), LONGEST_WORD)
     return InputError(f"file {path}: expected {expected}, {reason}")
+
+
+def _is_recording(path: Path) -> bool:
+    """Return True if a file has the name of a recording, and begins as one in any version of its format."""
+    if path.suffix != ".rrd":
+        return False
+    try:
+        with path.open("rb") as file:
+            return file.read(3) == b"RRF"
+    except OSError:
+        return False
 
 
 def _sign(path: Path) -> None:

@@ -153,12 +153,13 @@ def read_parquet(path: Path, *, rows: bool = True) -> tuple[Table, dict[str, str
         metadata = _texts(arrow.schema.metadata)
     except KeyError as error:
         raise InputError(
-            f"telemetry {path}: expected a Parquet file of a run, received a column without its {error}"
+            f"telemetry {path}: expected a telemetry file (.parquet) of a run,"
+            f" received a column without its {error}"
         ) from None
     except UnicodeDecodeError:
         raise InputError(f"telemetry {path}: expected metadata as text, received other bytes") from None
     except (OSError, pa.ArrowException) as error:
-        raise checksums.unreadable(path, error, "a Parquet file of a run") from None
+        raise checksums.unreadable(path, error, "a telemetry file (.parquet) of a run") from None
     names = [signal.name for signal in signals]
     if twice := sorted({name for name in names if names.count(name) > 1}):
         raise InputError(f"telemetry {path}: expected each column once, received {', '.join(twice)} twice")

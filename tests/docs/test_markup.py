@@ -3,6 +3,7 @@
 import re
 import sys
 from itertools import pairwise
+from urllib.parse import unquote
 
 import pytest
 from markdown_it import MarkdownIt
@@ -53,6 +54,29 @@ def test_every_picture_and_link_has_a_text(name):
         assert (
             "axes_of(" not in content or "def axes_of" in content or re.search(r"^ +alt: .\w", content, re.M)
         )
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
+def test_every_link_leads_to_a_file_of_the_repository(page):
+    """Also where the sources are read: pages that `make docs` generates are not there."""
+    for token in tokens_of(page.read_text(encoding="utf-8")):
+        target = token.attrs.get({"link_open": "href", "image": "src"}.get(token.type, ""), "")
+        path = target.partition("#")[0]
+        if path and "://" not in target and not target.startswith("mailto:"):
+            assert "generated" not in path.split("/"), target
+            assert (page.parent / unquote(path)).exists(), target
+
+
+def test_on_the_site_links_to_sources_lead_to_their_pages():
+    pages = generate.pages_of_files()
+    assert all((ROOT / path).is_file() for path in pages)
+    assert len(set(pages.values())) == len(pages)
+    text = "[fields](../../twin/scenario/sections.py#x), [law](../../control/laws/afsm_eso.py), [b](b.md)"
+    assert generate.on_site("how-to/a.md", text) == (
+        "[fields](../reference/generated/scenario_fields.md#x), [law](../reference/generated/afsm_eso.md),"
+        " [b](b.md)"
+    )
+    assert generate.on_site("reference/a.md", "[m](../../models/README.md)") == "[m](generated/actuator.md)"
 
 
 def test_every_clip_has_a_picture_in_its_place():

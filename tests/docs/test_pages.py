@@ -33,6 +33,16 @@ def test_the_runner_knows_the_language_of_each_block(page):
     assert opening <= LANGUAGES, "a block in another language would not run"
 
 
+def test_the_tutorials_are_typed_in_a_folder_that_git_ignores():
+    """Snippets write recordings, figures and laws: in the root of a clone they would be untracked files."""
+    enter = "mkdir -p work && cd work"
+    assert "/work/" in (ROOT / ".gitignore").read_text(encoding="utf-8").splitlines()
+    for page in ("README.md", "docs/tutorials/index.md", "docs/tutorials/first_run.md"):
+        assert enter in (ROOT / page).read_text(encoding="utf-8"), page
+    first = (ROOT / "docs" / "tutorials" / "first_run.md").read_text(encoding="utf-8")
+    assert first.index(enter) < first.index("spheretwin simulate")
+
+
 def test_an_example_of_a_docstring_that_prints_something_else_is_noticed(tmp_path):
     module = tmp_path / "module.py"
     module.write_text('"""Module.\n\n>>> 1 + 1\n3\n"""\n')

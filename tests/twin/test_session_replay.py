@@ -114,9 +114,9 @@ def test_what_holds_no_run_is_refused_on_one_line(tmp_path, capsys):
         run.write_parquet(path := tmp_path / "odd.parquet", {**known, "ticks": "10", name: text})
         assert "replay" in refused(path, capsys), (name, text)
     pyarrow.parquet.write_table(pa.table({"a": [1.0]}), foreign := tmp_path / "foreign.parquet")
-    assert "expected a Parquet file of a run" in refused(foreign, capsys)
+    assert "expected a telemetry file (.parquet) of a run" in refused(foreign, capsys)
     (text := tmp_path / "text.parquet").write_text("no parquet")
-    assert "expected a Parquet file of a run" in refused(text, capsys)
+    assert "expected a telemetry file (.parquet) of a run" in refused(text, capsys)
     assert "missing.parquet" in refused(tmp_path / "missing.parquet", capsys)
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import shlex
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from itertools import groupby
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -16,7 +16,8 @@ from spheretwin.analysis.review import LONGEST_VALUE, common_conditions, scenari
 from spheretwin.analysis.run_summary import amplitudes, peaks
 from spheretwin.metrics import BAND_rad
 from spheretwin.models.actuator import MJCF_PATH, Actuator
-from spheretwin.models.base.errors import InputError, shortened, shown
+from spheretwin.models.base.errors import InputError, shortened, shown, without_breaks
+from spheretwin.models.base.user_code import short_names
 from spheretwin.models.telemetry.run_record import RunFacts
 from spheretwin.models.telemetry.status import Event, Status
 from spheretwin.models.telemetry.table import Table
@@ -35,7 +36,8 @@ LONGEST_STEM = 40
 def labels(runs: Sequence[Reviewed], longest: int = 10**6) -> list[str]:
     """Return a label for each run: number, file, law, and the differing fields that fit.
 
-    A file that has the name of its law is named once.
+    A file that has the name of its law is named once. A law in a file has the name of that file, with folders
+    only if two files share it.
 
     Parameters
     ----------
@@ -49,9 +51,10 @@ def labels(runs: Sequence[Reviewed], longest: int = 10**6) -> list[str]:
         if name != "law"
     ][:MOST_DIFFERENCES]
     run_labels = []
-    for place, run in enumerate(runs, start=1):
+    laws = short_names([_law(run) for run in runs])
+    for place, (run, law) in enumerate(zip(runs, laws, strict=True), start=1):
         parts = [f"{name} {shortened(values[place - 1], LONGEST_VALUE)}" for name, values in differences]
-        stem, law = shortened(run.path.stem, LONGEST_VALUE), _law(run)
+        stem = shortened(run.path.stem, LONGEST_VALUE)
         label = f"{place} {stem}" if stem == law else f"{place} {stem}: {law}"
         for part in parts:
             if len(label) + len(part) + 2 > longest:
@@ -229,11 +232,16 @@ TITLES = {
 }
 """Title of the figure of each group of quantities."""
 
+FIGURES = (*TITLES, "currents", "spectra", "events")
+"""Names of all figures; a run without a quantity has no figure of it."""
+
 
 def write_figures(
     runs: Sequence[Reviewed], figures: Sequence[dict[str, Any]], into: Path, figure_format: str = "svg"
 ) -> Path:
     """Write figures and page into a folder; returns the page's path.
+
+    They replace those of an earlier review there, also the figures that only the earlier one had.
 
     Parameters
     ----------
@@ -258,9 +266,10 @@ def write_figures(
     spectra = [_spectra(run) for run in runs]
     conditions = common_conditions([run.record.scenario for run in runs])
     title = drawn_runs[0].label if len(runs) == 1 else f"{len(runs)} runs: {conditions}"
+    earlier = _figure_files(into) if (into / PAGE).exists() else set()
     with np.errstate(all="ignore"):  # what damage leaves of numbers may be of any size
         drawings = _drawings(drawn_runs, leading, quantities, spectra, conditions)
-        markdown.save_drawings(into, drawings, figure_format)
+        saved = markdown.save_drawings(into, drawings, figure_format)
         over_time = interactive.over_time(drawn_runs, leading, quantities)
     below = _below(runs, drawn_runs, figures)
     above = [
@@ -277,7 +286,26 @@ def write_figures(
         "\n".join(above),
         "\n".join([below, "", *markdown.foot(f"spheretwin review {names} --figures DIR")]),
     )
-    return markdown.save_text(into / PAGE, content)
+    page = markdown.save_text(into / PAGE, content)
+    _remove(earlier.difference(saved))
+    return page
+
+
+def _figure_files(folder: Path) -> set[Path]:
+    """Return the files of a folder that have the names of figures."""
+    paths = (folder / f"{name}.{kind}" for name in FIGURES for kind in markdown.FIGURE_KINDS)
+    return {path for path in paths if path.is_file()}
+
+
+def _remove(paths: Iterable[Path]) -> None:
+    for path in paths:
+        try:
+            path.unlink(missing_ok=True)
+        except OSError as error:
+            raise InputError(
+                f"review {path}: expected a figure of an earlier review that can be removed,"
+                f" {without_breaks(error)}"
+            ) from None
 
 
 def check_figures(into: Path) -> None:

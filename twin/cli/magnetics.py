@@ -330,6 +330,7 @@ def run_map(options: argparse.Namespace) -> bool:
     else:
         for table in magnetics.workspace_tables(verdict):
             runs.print_rows(*table, 1)
+        terminal_console().print(magnetics.MAP_TERMS)
         print_checks("magnetics map", verdict.checks, options.verbose)
         runs.print_written(written)
     return report_broken("magnetics map", verdict.checks)

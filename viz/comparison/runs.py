@@ -116,6 +116,48 @@ class PlotRange(NamedTuple):
     high: float
     outside: tuple[Outside, ...]
 
+    def outside_lines(self) -> list[str]:
+        """Return lines that state the values outside, two runs on each; none if all values are within."""
+        texts = [item.text() for item in self.outside]
+        if not texts:
+            return []
+        lines = [", ".join(texts[first : first + 2]) for first in range(0, len(texts), 2)]
+        return ("outside of the axis: " + ",\n".join(lines)).splitlines()
+
+
+DECADES = 6
+"""Decades of a logarithmic axis at most: smaller errors are rounding errors."""
+
+
+class LogarithmicRange(NamedTuple):
+    """Range of a plot with a logarithmic axis."""
+
+    low: float
+    high: float
+    is_cut: bool
+    """True if values are below the axis."""
+
+    def outside_lines(self) -> list[str]:
+        """Return the line that states that values are below the axis; none if all are within."""
+        return [f"values below {self.low:.1g} are below the axis"] if self.is_cut else []
+
+
+def logarithmic_range(of_runs: Sequence[Array]) -> LogarithmicRange:
+    """Return the range of all positive values, at most `DECADES`.
+
+    Parameters
+    ----------
+    of_runs : sequence of arrays
+        Values of each run.
+    """
+    values = np.concatenate([*map(np.ravel, of_runs), [np.nan]])
+    values = values[np.isfinite(values) & (values > 0)]
+    if not len(values):
+        return LogarithmicRange(0.1, 1.0, is_cut=False)
+    high, least = 1.5 * float(values.max()), float(values.min())
+    low = max(least / 1.5, high / 10**DECADES)
+    return LogarithmicRange(low, high, least < low)
+
 
 def quantity_range(quantity: Quantity, runs: Sequence[ComparedRun], leading: Sequence[int]) -> PlotRange:
     """Return the range of a quantity: its own limits, or that of the settled runs and all references.

@@ -14,7 +14,14 @@ from matplotlib.figure import Figure
 from spheretwin.models.telemetry.signals import ANGLES
 from spheretwin.models.telemetry.status import Level
 from spheretwin.models.telemetry.table import Table
-from spheretwin.viz.comparison.runs import ComparedRun, PlotRange, Spectrum, quantity_range
+from spheretwin.viz.comparison.runs import (
+    ComparedRun,
+    LogarithmicRange,
+    PlotRange,
+    Spectrum,
+    logarithmic_range,
+    quantity_range,
+)
 from spheretwin.viz.decimation import mean_and_deviation, octave_maxima
 from spheretwin.viz.figures.style import (
     AXES,
@@ -164,7 +171,7 @@ def over_time(
         if logarithmic:
             panel.set_yscale("log")
             of_runs = [np.where(values > 0, values, np.nan) for values in of_runs]
-            limits = _logarithmic_range(panel, of_runs)
+            limits = _stated_range(panel, logarithmic_range(of_runs))
         else:
             limits = _stated_range(panel, quantity_range(quantity, runs, leading))
         for run, of_run, values in zip(runs, run_styles(runs), of_runs, strict=True):
@@ -185,31 +192,11 @@ def over_time(
     return figure
 
 
-def _stated_range(panel: Axes, of_quantity: PlotRange) -> tuple[float, float]:
+def _stated_range(panel: Axes, limits: PlotRange | LogarithmicRange) -> tuple[float, float]:
     """Return the range of a panel, and state in its title the values outside."""
-    low, high, outside = of_quantity
-    if outside:
-        texts = [item.text() for item in outside]
-        lines = [", ".join(texts[first : first + 2]) for first in range(0, len(texts), 2)]
-        panel.set_title("outside of the axis: " + ",\n".join(lines), fontsize="x-small", loc="right")
-    return low, high
-
-
-DECADES = 6
-"""Decades of a logarithmic axis at most: smaller errors are rounding errors."""
-
-
-def _logarithmic_range(panel: Axes, of_runs: Sequence[Array]) -> tuple[float, float]:
-    """Return the range of all positive values, at most `DECADES`, and state in the title what is below."""
-    values = np.concatenate([*of_runs, [np.nan]])
-    values = values[np.isfinite(values)]
-    if not len(values):
-        return 0.1, 1.0
-    high = 1.5 * float(values.max())
-    low = max(float(values.min()) / 1.5, high / 10**DECADES)
-    if values.min() < low:
-        panel.set_title(f"values below {low:.1g} are below the axis", fontsize="x-small", loc="right")
-    return low, high
+    if lines := limits.outside_lines():
+        panel.set_title("\n".join(lines), fontsize="x-small", loc="right")
+    return limits.low, limits.high
 
 
 def _mark_end(panel: Axes, run: ComparedRun, values: Array, limits: tuple[float, float], colour: str) -> None:

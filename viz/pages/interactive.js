@@ -14,15 +14,20 @@ for (const button of document.querySelectorAll("[data-run]")) {
     }
   });
 }
+// Axes that can be logarithmic, with range and note of that scale; a note states what is outside.
 const scale = document.getElementById("logarithmic"), plot = plots[0], axes = plot.layout.meta;
-const ranges = axes.map((axis) => [...plot.layout[axis].range]);
-scale.addEventListener("click", async () => {
+const notes = (plot.layout.annotations ?? []).map((annotation) => annotation.name);
+const linear = axes.map(({axis}) => ({range: [...plot.layout[axis].range],
+  note: plot.layout.annotations[notes.indexOf(axis)]?.text}));
+scale.addEventListener("click", () => {
   const on = scale.getAttribute("aria-pressed") === "false";
   scale.setAttribute("aria-pressed", on);
-  for (const [i, axis] of axes.entries()) {
-    const linear = {[`${axis}.type`]: "linear", [`${axis}.range`]: [...ranges[i]]};
-    await Plotly.relayout(plot, on ? {[`${axis}.type`]: "log", [`${axis}.autorange`]: true} : linear);
-    const [low, high] = plot.layout[axis].range;
-    if (on) await Plotly.relayout(plot, {[`${axis}.range`]: [Math.max(low, high - 4), high]});
+  const changes = {};
+  for (const [i, {axis, range, note}] of axes.entries()) {
+    changes[`${axis}.type`] = on ? "log" : "linear";
+    changes[`${axis}.range`] = on ? [...range] : [...linear[i].range];
+    const place = notes.indexOf(axis);
+    if (place >= 0) changes[`annotations[${place}].text`] = on ? note : linear[i].note;
   }
+  Plotly.relayout(plot, changes);
 });

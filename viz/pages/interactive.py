@@ -11,7 +11,7 @@ import plotly.graph_objects as plotly
 from plotly.offline import get_plotlyjs
 
 from spheretwin.models.telemetry.signals import ANGLES
-from spheretwin.viz.comparison.runs import ComparedRun, Spectrum, quantity_range
+from spheretwin.viz.comparison.runs import ComparedRun, Spectrum, logarithmic_range, quantity_range
 from spheretwin.viz.decimation import envelope, mean_and_deviation, octave_maxima
 from spheretwin.viz.pages import markdown
 from spheretwin.viz.quantities import Array, Quantity
@@ -82,7 +82,7 @@ def _switches(runs: Sequence[ComparedRun]) -> str:
 
 FAINT, INK, REFERENCE_COLOUR = "#e3e6ea", "#30343a", "#9aa1ab"
 
-HEIGHT_px, GAP_px, MARGIN_px = 150, 26, 46
+HEIGHT_px, GAP_px, MARGIN_px, NOTE_px = 150, 26, 46, 14
 
 
 class PlotPanel(NamedTuple):
@@ -95,6 +95,8 @@ class PlotPanel(NamedTuple):
     """Properties of its vertical axis besides those of all panels."""
     height: float = 1.0
     """Height relative to an ordinary panel."""
+    note: Sequence[str] = ()
+    """Lines between title and panel: the values that its axis leaves out."""
 
 
 def stacked(panels: Sequence[PlotPanel], x: str, **axis: Any) -> plotly.Figure:
@@ -108,21 +110,27 @@ def stacked(panels: Sequence[PlotPanel], x: str, **axis: Any) -> plotly.Figure:
     **axis
         Properties of the axis besides the common ones.
     """
-    inner_px = sum(panel.height * HEIGHT_px + GAP_px for panel in panels)
+    inner_px = sum(panel.height * HEIGHT_px + GAP_px + NOTE_px * len(panel.note) for panel in panels)
     figure, top = plotly.Figure(), 1.0
-    for place, panel in enumerate(panels, start=1):
-        number = "" if place == 1 else f"{place}"
+    for place, panel in enumerate(panels):
+        name = _axis(place)
+        note_px = NOTE_px * len(panel.note)
+        top -= note_px / inner_px
         bottom = top - panel.height * HEIGHT_px / inner_px
         looks = {"gridcolor": FAINT, "zerolinecolor": FAINT, "linecolor": INK, "tickfont_size": 11}
-        figure.layout[f"yaxis{number}"] = {"domain": (max(bottom, 0.0), top), **looks, **panel.axis}
+        figure.layout[name] = {"domain": (max(bottom, 0.0), top), **looks, **panel.axis}
         for trace in panel.traces:
-            trace.update(xaxis="x", yaxis=f"y{number}")
+            trace.update(xaxis="x", yaxis=_anchor(place))
             figure.add_trace(trace)
-        figure.add_annotation(text=f"<b>{panel.title}</b>", xref="paper", yref="paper", x=0, y=top,
-                              xanchor="left", yanchor="bottom", showarrow=False, font_size=12)  # fmt: skip
+        above = {"xref": "paper", "yref": "paper", "y": top, "yanchor": "bottom", "showarrow": False}
+        left = {"x": 0, "xanchor": "left"}
+        shift = {"yshift": note_px} if panel.note else {}
+        figure.add_annotation(text=f"<b>{panel.title}</b>", font_size=12, **above, **left, **shift)
+        if panel.note:
+            note = {"text": "<br>".join(panel.note), "align": "left", "font_size": 10, **left}
+            figure.add_annotation(name=name, **above, **note)
         top = bottom - GAP_px / inner_px
     spikes = {"showspikes": True, "spikemode": "across", "spikesnap": "cursor", "spikethickness": 1}
-    last = "" if len(panels) == 1 else f"{len(panels)}"
     figure.update_layout(
         template="none",
         height=inner_px + 2 * MARGIN_px,
@@ -132,10 +140,20 @@ def stacked(panels: Sequence[PlotPanel], x: str, **axis: Any) -> plotly.Figure:
         hovermode="x",
         hoversubplots="axis",
         hoverlabel={"font_size": 11, "namelength": 0},
-        xaxis={"title": {"text": x}, "anchor": f"y{last}", "gridcolor": FAINT, **spikes, **axis,
-               "spikecolor": INK, "spikedash": "dot", "linecolor": INK, "zeroline": False},
+        xaxis={"title": {"text": x}, "anchor": _anchor(len(panels) - 1), "gridcolor": FAINT, **spikes,
+               **axis, "spikecolor": INK, "spikedash": "dot", "linecolor": INK, "zeroline": False},
     )  # fmt: skip
     return figure
+
+
+def _axis(place: int) -> str:
+    """Return the name of the vertical axis of a panel, by its place from 0."""
+    return f"yaxis{place + 1}" if place else "yaxis"
+
+
+def _anchor(place: int) -> str:
+    """Return how traces and the other axis name that axis."""
+    return _axis(place).replace("axis", "")
 
 
 MOST_NUMBERS = 130_000
@@ -163,7 +181,8 @@ def over_time(
     """
     most = int(np.clip(points_per_line(runs, leading, quantities), FEWEST_POINTS, MOST_POINTS))
     colours = run_colours([run.law for run in runs])
-    panels = []
+    panels: list[PlotPanel] = []
+    logarithmic: list[dict[str, Any]] = []
     for quantity in quantities:
         reference_lines = [
             trace
@@ -185,17 +204,25 @@ def over_time(
         ]
         for trace in reference_lines:
             trace.hoverinfo, trace.hovertemplate = "skip", None
-        axis = {"range": quantity_range(quantity, runs, leading)[:2]}
-        panels.append(PlotPanel(_text(quantity.heading), [*reference_lines, *lines], axis))
+        limits = quantity_range(quantity, runs, leading)
+        axis, note = {"range": (limits.low, limits.high)}, limits.outside_lines()
+        if quantity.group == "whole":
+            other = logarithmic_range(of_runs)
+            note, other_note = _of_same_length(note, other.outside_lines())
+            ends = np.log10([other.low, other.high]).tolist()
+            logarithmic.append({"axis": _axis(len(panels)), "range": ends, "note": "<br>".join(other_note)})
+        panels.append(PlotPanel(_text(quantity.heading), [*reference_lines, *lines], axis, note=note))
     panels += _currents(runs)
     panels.append(_events(runs, colours))
     figure = stacked(panels, "time [s]")
-    figure.layout.meta = [
-        f"yaxis{'' if place == 1 else place}"
-        for place, quantity in enumerate(quantities, start=1)
-        if quantity.group == "whole"
-    ]
+    figure.layout.meta = logarithmic
     return figure
+
+
+def _of_same_length(*notes: Sequence[str]) -> list[list[str]]:
+    """Return notes with as many lines each: the panel has the space of the longest."""
+    most = max(map(len, notes))
+    return [[*lines, *[" "] * (most - len(lines))] for lines in notes]
 
 
 def points_per_line(

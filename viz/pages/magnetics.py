@@ -17,7 +17,7 @@ from spheretwin.viz.pages.markdown import Drawing, write_page
 ROW_STRIDE = 3
 
 FIGURE_NAMES = {
-    "least_norm": ("least norm", "least_norm_Nm", "N·m"),
+    "least_norm": ("least-norm", "least_norm_Nm", "N·m"),
     "best": ("best", "best_Nm", "N·m"),
     "singular_value": ("least σ", "singular_value_Nm_per_A", "N·m/A"),
 }
@@ -25,12 +25,20 @@ FIGURE_NAMES = {
 TITLES = {"check": "Check of the magnetic model", "map": "Torque capability over the workspace"}
 CURVE_HEAD = ("figure", "value")
 FIELD_HEAD = ("tilt", "poses", "median error", "largest", "of largest torque", "half the points")
-TILT_HEAD = (
-    "tilt", "least norm", "median of it", "best currents", "median of it", "least σ, N·m/A", "condition",
-    "copper, W/(N·m)²",
-)  # fmt: skip
-TILT_FORMATS = ("{:g}°", "{:.3f}", "{:.3f}", "{:.3f}", "{:.3f}", "{:.4f}", "{:.2f}", "{:.0f}")
-POSE_HEAD = ("quantity", "worst", "tilt, °", "α, °", "β, °", "γ, °", "direction")
+# Two tables: in one, a terminal of 80 columns breaks the headings.
+TORQUE_HEAD = ("tilt", "least-norm, worst", "least-norm, median", "best, worst", "best, median")
+TORQUE_FORMATS = ("{:g}°", "{:.3f}", "{:.3f}", "{:.3f}", "{:.3f}")
+MATRIX_HEAD = ("tilt", "least σ, N·m/A", "condition number", "copper loss, W/(N·m)²")
+MATRIX_FORMATS = ("{:g}°", "{:.4f}", "{:.2f}", "{:.0f}")
+POSE_HEAD = ("quantity", "worst", "tilt, °", "α, β, γ, °", "direction")
+
+MAP_TERMS = (
+    "least-norm: currents of least norm, those of the default allocation; best: the currents within the limit"
+    " that give most torque, those of the bounded allocation. The torque is that of the worst direction."
+    " σ: singular value of the torque matrix. Check best_currents: largest ratio of the least-norm torque to"
+    " the best torque at a pose; a ratio above 1 is an error of the computation."
+)
+"""Meaning of the headings of the torque map."""
 
 TitledTable = tuple[str, Sequence[str], Sequence[Sequence[str]]]
 """Title, headings and rows; the first column is words."""
@@ -89,18 +97,19 @@ def sources_text(verdict: FieldVerdict) -> str:
 
 
 def workspace_tables(verdict: WorkspaceVerdict) -> list[TitledTable]:
-    """Return the torque capability by tilt, and the weakest poses."""
-    rows = [
-        [form.format(value) for form, value in zip(TILT_FORMATS, tilt, strict=True)]
-        for i, tilt in enumerate(verdict.by_tilt)
-        if i % ROW_STRIDE == 0 or i == len(verdict.by_tilt) - 1
+    """Return torque by tilt, torque matrix by tilt, and the weakest poses."""
+    tilts = [
+        tilt for i, tilt in enumerate(verdict.by_tilt) if i % ROW_STRIDE == 0 or i == len(verdict.by_tilt) - 1
     ]
+    torques = [_cells(TORQUE_FORMATS, tilt[:5]) for tilt in tilts]
+    matrices = [_cells(MATRIX_FORMATS, (tilt.tilt_deg, *tilt[5:])) for tilt in tilts]
     title = (
         f"torque in every direction at {verdict.current_limit_A:g} A, N·m:"
         f" worst and median of {verdict.poses} poses"
     )
     return [
-        (title, TILT_HEAD, rows),
+        (title, TORQUE_HEAD, torques),
+        ("torque matrix and copper loss in the worst of these poses", MATRIX_HEAD, matrices),
         ("weakest poses", POSE_HEAD, [_weak_row(pose) for pose in verdict.weakest]),
     ]
 
@@ -161,6 +170,7 @@ def write_map(
         f" direction; the best currents give at least {best_Nm:.3f} N·m."
     )
     sections = [line for table in workspace_tables(verdict) for line in _section(*table)]
+    sections += [MAP_TERMS, ""]
     return _write(folder, "map", lead, verdict, sections, _maps(surveyed), command, figure_format)
 
 
@@ -211,8 +221,13 @@ def _section(title: str, head: Sequence[str], rows: Sequence[Sequence[str]]) -> 
 
 def _weak_row(pose: WeakPose) -> tuple[str, ...]:
     name, key, unit = FIGURE_NAMES[pose.figure]
-    angles = (_tenths(angle) for angle in (pose.tilt_deg, *pose.q_deg))
-    return name, f"{getattr(pose, key):.3g} {unit}", *angles, direction_text(pose.direction)
+    angles = " ".join(map(_tenths, pose.q_deg))
+    worst = f"{getattr(pose, key):.3g} {unit}"
+    return name, worst, _tenths(pose.tilt_deg), angles, direction_text(pose.direction)
+
+
+def _cells(forms: Sequence[str], values: Sequence[float]) -> list[str]:
+    return [form.format(value) for form, value in zip(forms, values, strict=True)]
 
 
 def _peak(peak: CurvePeak) -> str:

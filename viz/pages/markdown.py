@@ -252,8 +252,12 @@ def foot(command: str) -> list[str]:
     return ["---", "", f"Created by `{command}` with {used}.", ""]
 
 
-def save_drawings(folder: Path, drawings: Iterable[Drawing], figure_format: str = "svg") -> None:
-    """Write figures into a folder that exists: as SVG and in a given format.
+FIGURE_KINDS = ("svg", "pdf", "png")
+"""Endings of the files of figures."""
+
+
+def save_drawings(folder: Path, drawings: Iterable[Drawing], figure_format: str = "svg") -> list[Path]:
+    """Write figures into a folder that exists, as SVG and in a given format; return the written files.
 
     Parameters
     ----------
@@ -267,6 +271,7 @@ def save_drawings(folder: Path, drawings: Iterable[Drawing], figure_format: str 
     InputError
         A file cannot be written there.
     """
+    written = []
     for drawing in drawings:
         from spheretwin.viz.figures import style  # without figures, matplotlib may be absent
 
@@ -275,6 +280,8 @@ def save_drawings(folder: Path, drawings: Iterable[Drawing], figure_format: str 
                 style.fit_width(drawing.figure, style.PAPER_WIDTHS_in[kind])
             path = (folder / drawing.file).with_suffix(f".{kind.partition('-')[0]}")
             style.save(drawing.figure, path, drawing.caption)
+            written.append(path)
+    return written
 
 
 def save_text(path: Path, text: str) -> Path:

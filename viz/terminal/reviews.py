@@ -54,6 +54,8 @@ class _FigureRow(NamedTuple):
     key: str
     unit: str
     each_axis: bool = False
+    signed: bool = False
+    """True if values of either sign occur: a value near zero is then no scale for a percentage."""
 
 
 def _figure_rows(band_rad: float) -> tuple[_FigureRow, ...]:
@@ -66,7 +68,7 @@ def _figure_rows(band_rad: float) -> tuple[_FigureRow, ...]:
         _FigureRow("rms torque", "rms_torque_Nm", "N·m"),
         _FigureRow("variation of the commands", "current_variation_A_s", "A/s"),
         _FigureRow("copper loss", "copper_loss_J", "J"),
-        _FigureRow("work on the rotor", "mechanical_work_J", "J"),
+        _FigureRow("work on the rotor", "mechanical_work_J", "J", signed=True),
         _FigureRow("energy", "energy_J", "J"),
     )
 
@@ -206,7 +208,7 @@ def differences(runs: Sequence[dict[str, Any]], band_rad: float) -> Iterator[lis
         for place, axis in enumerate(ANGLES) if row.each_axis else ((None, ""),):
             values = [_entry(run[row.key], place) for run in runs]
             cells = [_figure(values[0], row.unit)]
-            cells += [_with_difference(values[0], value, row.unit) for value in values[1:]]
+            cells += [_with_difference(values[0], value, row) for value in values[1:]]
             yield [f"{row.label} {axis}".strip(), *cells]
 
 
@@ -226,34 +228,41 @@ LARGEST_PERCENT = 1000
 """A larger change is written as a factor."""
 
 
-def _with_difference(first: float | None, value: float | None, unit: str) -> str:
+def _with_difference(first: float | None, value: float | None, row: _FigureRow) -> str:
     """Return a figure, and below it the difference from the first, absolute and relative."""
     if first is None or value is None:
-        return _figure(value, unit)
+        return _figure(value, row.unit)
     if (difference := value - first) == 0:
         return "the same"
-    sign = "+" if difference > 0 else "-"
-    return f"{_figure(value, unit)}\n{sign}{_size(abs(difference), unit)}{_relative(first, value)}"
+    relative = _relative(first, value, signed=row.signed)
+    return f"{_figure(value, row.unit)}\n{_change(difference, row.unit)}{relative}"
 
 
-def _size(value: float, unit: str) -> str:
-    """Return the size of a difference; also one that is negligible as a figure has its digits."""
+def _change(difference: float, unit: str) -> str:
+    """Return a difference with its sign; also one that is negligible as a figure has its digits."""
+    sign, size = "+" if difference > 0 else "-", abs(difference)
     if unit == "1":
-        return f"{_digits(100 * value)} %"
+        return f"{sign}{_digits(100 * size)} %"
     if unit == "rad":
-        return f"{_digits(1e3 * value)} ({_digits(math.degrees(value))}°)"
-    return f"{_digits(value)} {unit}"
+        return f"{sign}{_digits(1e3 * size)} ({sign}{_digits(math.degrees(size))}°)"
+    return f"{sign}{_digits(size)} {unit}"
 
 
 def _digits(value: float) -> str:
     return three_digits(value) if value >= tables.LEAST or not math.isfinite(value) else f"{value:.2e}"
 
 
-def _relative(first: float, value: float) -> str:
-    """Return the change in percent, a large one as a factor; nothing if it has no meaning."""
+def _relative(first: float, value: float, *, signed: bool) -> str:
+    """Return the change in percent, a large one as a factor; nothing if it has no meaning.
+
+    A signed quantity has it only if the change is at most the first value: a smaller value is too close to
+    zero to be a scale. The percentage has the sign of the difference.
+    """
     if first == 0 or value / first < 0 or not math.isfinite(value / first):
         return ""
-    change_percent = 100 * (value / first - 1)
+    change_percent = 100 * (value - first) / abs(first)
+    if signed and abs(change_percent) > 100:
+        return ""
     if change_percent > LARGEST_PERCENT:
         return f", {three_digits(value / first)} times"
     sign = "+" if change_percent > 0 else "-"

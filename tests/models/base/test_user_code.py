@@ -6,7 +6,7 @@ import time
 import pytest
 
 from spheretwin.models.base.errors import InputError
-from spheretwin.models.base.user_code import load_function
+from spheretwin.models.base.user_code import load_function, short_names
 
 
 @pytest.fixture
@@ -23,6 +23,19 @@ def test_a_path_from_home_is_found(file, monkeypatch):
     monkeypatch.setenv("HOME", str(file.parent))
     monkeypatch.setenv("USERPROFILE", str(file.parent))
     assert load_function("~/mine.py:double", "law")(1) == 2
+
+
+def test_short_names_have_the_file_alone_and_folders_only_where_two_files_share_it(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    absolute = f"{tmp_path}/laws/mine.py:Mine"
+    assert short_names(["pd", "./laws/mine.py:Mine", absolute]) == ["pd", "mine.py:Mine", "mine.py:Mine"]
+    assert short_names([absolute, "laws/mine.py:Other"]) == ["mine.py:Mine", "mine.py:Other"]
+    assert short_names([absolute, "old/laws/mine.py:Mine", "last/mine.py:Mine", "b/other.py:Mine"]) == [
+        f"{tmp_path.name}/laws/mine.py:Mine",
+        "old/laws/mine.py:Mine",
+        "last/mine.py:Mine",
+        "other.py:Mine",
+    ]
 
 
 def test_an_edit_within_the_second_is_seen_and_nothing_is_left_beside_the_file(file):

@@ -92,7 +92,7 @@ def test_every_byte_of_a_file_is_checked(table, tmp_path):
         damaged = bytearray(content)
         damaged[place] ^= 1 << place % 8  # another bit of each byte
         path.write_bytes(damaged)
-        with pytest.raises(InputError, match=r"the file is damaged|expected a Parquet file of a run"):
+        with pytest.raises(InputError, match=r"the file is damaged|expected a telemetry file"):
             read_parquet(path)
 
 
@@ -113,7 +113,7 @@ def test_unwritable_place_and_foreign_file_are_bad_input(table, tmp_path):
     with pytest.raises(InputError, match="writable"):
         table.write_parquet(tmp_path / "missing" / "run.parquet", {})
     (foreign := tmp_path / "foreign.parquet").write_text("no parquet")
-    with pytest.raises(InputError, match="expected a Parquet file"):
+    with pytest.raises(InputError, match="expected a telemetry file"):
         read_parquet(foreign)
 
 

@@ -144,9 +144,9 @@ def test_every_bit_of_the_footer_counts(files, tmp_path):
     size = int.from_bytes(content[-8:-4], "little") + 8
     for bit, footer in flips(content[-size:], 300):
         path.write_bytes(content[:-size] + footer)
-        with pytest.raises(InputError, match=r"the footer|expected a Parquet file"):
+        with pytest.raises(InputError, match=r"the footer|expected a telemetry file"):
             replay.read(path)
-        with pytest.raises(InputError, match=r"the footer|expected a Parquet file"):
+        with pytest.raises(InputError, match=r"the footer|expected a telemetry file"):
             recovery.recover(path, tmp_path / "out.parquet")
         assert not (tmp_path / "out.parquet").exists(), f"bit {bit}"
 

@@ -1,6 +1,10 @@
 """Fields in which scenarios differ, with their values; conditions on which they agree."""
 
+from dataclasses import replace
+
+from spheretwin.analysis.comparison import labels
 from spheretwin.analysis.review import common_conditions, scenario_differences
+from tests.twin.analysis.runs import made_of, named
 
 SCENARIO = {
     "name": "tilt",
@@ -81,3 +85,18 @@ def test_values_have_all_digits_and_words_as_they_are():
     texts = ["0.100000001", "1e-07", "3", "true", "null", "pd", "none", "[1, 2]"]
     pairs = [scenario_differences([{"x": value}, {"x": "other"}]) for value in values]
     assert pairs == [[("x", [text, "other"])] for text in texts]
+
+
+def test_labels_name_a_law_in_a_file_by_file_and_class(tmp_path):
+    run = made_of([[0.0, 0.0]])
+    runs = [
+        replace(
+            named(run, tmp_path / f"{name}.parquet"),
+            record=replace(run.record, scenario=but(controller={"law": law})),
+        )
+        for name, law in (
+            ("pd", "pd"), ("first", "./laws/mine.py:Mine"), ("second", f"{tmp_path}/new/mine.py:Mine"),
+        )
+    ]  # fmt: skip
+    assert labels(runs) == ["1 pd", "2 first: laws/mine.py:Mine", "3 second: new/mine.py:Mine"]
+    assert labels(runs[:2])[1] == "2 first: mine.py:Mine"

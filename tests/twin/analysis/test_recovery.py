@@ -54,6 +54,14 @@ def test_an_export_of_a_recording_is_reviewed_and_replayed(files, tmp_path):
     assert np.array_equal(read(replayed).table.values, telemetry.table.values, equal_nan=True)
 
 
+def test_a_recording_in_place_of_telemetry_is_named_with_the_way_to_convert_it(files, capsys):
+    _, recording = files
+    assert cli.main(["simulate", "--replay", str(recording)]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert "expected a telemetry file (.parquet) of a run, received a recording" in line
+    assert f"`spheretwin review {recording} --export FILE.parquet` writes its telemetry" in line
+
+
 def test_only_lines_that_are_changes_are_taken():
     lines = ["the run is complete", "coil.07 open", "a set to", "law set to pd", "not a name set to 1"]
     log = [(0.001 * tick, Level.INFO, text) for tick, text in enumerate(lines)]

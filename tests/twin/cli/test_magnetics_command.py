@@ -13,7 +13,7 @@ from spheretwin.models.base.extras import install_command
 from spheretwin.models.design import curve_check, direct_summation, torque_map
 from spheretwin.models.design import field_check as field_verdict
 from spheretwin.models.torque_curve import TorqueCurve
-from spheretwin.viz.pages import markdown
+from spheretwin.viz.pages import magnetics, markdown
 from tests.models.design.quadrature import sample_coarsely, sum_coarsely
 
 ASSETS = str(actuators.FOLDER / "assets")
@@ -276,7 +276,8 @@ def test_map_prints_tables_and_writes_a_page(capsys, tmp_path, actuator):
     assert "Number of checks: 2. **No bound is exceeded.**" in summary
     headings = [line for line in text.splitlines() if line.startswith("## ")]
     assert [heading.split(" at ")[0] for heading in headings] == [
-        "## Figures", "## Torque in every direction", "## Weakest poses", "## Checks",
+        "## Figures", "## Torque in every direction",
+        "## Torque matrix and copper loss in the worst of these poses", "## Weakest poses", "## Checks",
     ]  # fmt: skip
     first = verdict.by_tilt[0]
     assert (
@@ -286,6 +287,22 @@ def test_map_prints_tables_and_writes_a_page(capsys, tmp_path, actuator):
     html = (folder / pages[1]).read_text(encoding="utf-8")
     assert html.count("<svg") == 2
     assert ">tilt of the shaft, degrees</text>" in html
+
+
+def test_headings_of_a_map_are_complete_in_80_columns_and_explained(capsys, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "80")
+    code, out, _ = here(capsys, "map", "--largest-tilt", 10)
+    assert code == 0
+    lines = out.splitlines()
+    assert max(map(len, lines)) <= 80
+    for head in (magnetics.TORQUE_HEAD, magnetics.MATRIX_HEAD, magnetics.POSE_HEAD):
+        (line,) = [line for line in lines if line.startswith("| ") and all(name in line for name in head)]
+        # The row before it is empty and the one after it is the rule: the heading is one line.
+        place = lines.index(line)
+        assert (lines[place - 1].strip(), lines[place + 1][:2]) == ("", "|-")
+    text = " ".join(out.split())
+    assert magnetics.MAP_TERMS in text
+    assert "best_currents" in magnetics.MAP_TERMS
 
 
 def test_page_of_a_map_names_a_need_that_is_not_met(capsys, tmp_path):

@@ -45,11 +45,13 @@ def piped(monkeypatch):
     monkeypatch.setenv("COLUMNS", "80")
 
 
-def cell(key, value):
-    """Second cell of the row of a figure, if the second run has this value."""
-    rows = {label: cells for label, *cells in differences([RUN, {**RUN, key: value}], 0.01)}
+def cell(key, value, first=None):
+    """Second cell of the row of a figure, if the second run, and the first, has this value."""
+    reference = RUN if first is None else {**RUN, key: first}
+    rows = {label: cells for label, *cells in differences([reference, {**RUN, key: value}], 0.01)}
     labels = {
         "max_abs_current_A": "largest current",
+        "copper_loss_J": "copper loss",
         "saturated_fraction": "share of ticks at the limit",
         "mechanical_work_J": "work on the rotor",
         "max_abs_error_rad": "largest α",
@@ -64,14 +66,31 @@ def cell(key, value):
         ("max_abs_current_A", 2.0 - 4e-7, "2.00 A\n-4.00e-07 A, -2.00e-05 %"),
         ("max_abs_current_A", 2.5, "2.50 A\n+0.500 A, +25.0 %"),
         ("max_abs_current_A", None, "–"),
-        ("mechanical_work_J", 7.671, "7.67 J\n+7.67 J, 7670 times"),
+        ("copper_loss_J", 400.0, "400 J\n+396 J, 100 times"),
+        ("mechanical_work_J", 7.671, "7.67 J\n+7.67 J"),
         ("mechanical_work_J", -0.05, "-0.0500 J\n-0.0510 J"),
         ("saturated_fraction", 0.01, "1.00 %\n+0.0400 %, +4.17 %"),
-        ("max_abs_error_rad", [0.015, 0.02, 0.01], "15.0 (0.859°)\n-15.0 (0.859°), -50.0 %"),
+        ("max_abs_error_rad", [0.015, 0.02, 0.01], "15.0 (0.859°)\n-15.0 (-0.859°), -50.0 %"),
     ],
 )
 def test_differences_have_sizes_that_can_be_read(key, value, text):
     assert cell(key, value) == text
+
+
+@pytest.mark.parametrize(
+    ("first", "value", "text"),
+    [
+        (-0.5, -0.375, "+0.125 J, +25.0 %"),
+        (-0.5, -0.625, "-0.125 J, -25.0 %"),
+        (0.5, 1.0, "+0.500 J, +100 %"),
+        (0.25, 0.75, "+0.500 J"),  # the first is smaller than the difference
+        (-0.25, -1.0, "-0.750 J"),
+        (0.25, -0.25, "-0.500 J"),
+        (0.0, 0.5, "+0.500 J"),
+    ],
+)
+def test_a_signed_quantity_has_a_percentage_of_a_reference_that_is_not_near_zero(first, value, text):
+    assert cell("mechanical_work_J", value, first).splitlines()[1] == text
 
 
 def test_shares_are_percent_and_the_band_of_the_settling_time_is_stated():
