@@ -31,8 +31,8 @@ benchmark: setup ## print the speed ratios and the bars of studies, hold the all
 	$(BIN)/python tests/benchmarks/allocation.py
 	$(BIN)/python tests/benchmarks/deadlines.py
 
-peers: .venv-peers/installed ## hold JAX, MJX, Drake and plain NumPy against ours, and print the times of all
-	.venv-peers/bin/python tests/benchmarks/peers/compare.py
+peers: .venv-peers/installed ## compare JAX, MJX, Drake and plain NumPy with ours, and print the times of all
+	PYTHONPATH=tests/benchmarks .venv-peers/bin/python tests/benchmarks/peers/compare.py
 
 reproduce: setup ## run all that the paper shows, over 20 seeds, and leave a page in reproduced/
 	$(BIN)/spheretwin reproduce all --out reproduced

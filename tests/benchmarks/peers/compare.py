@@ -1,9 +1,10 @@
-"""The closed loop as the best peers would have it: ``python tests/benchmarks/peers/compare.py [--json]``.
+"""Comparison of the closed loop with the best peers: ``make peers``.
 
-Each peer is held against ours first: one that computes something else is none. Then all are timed in turn,
-several times, and the fastest of each counts. A peer is handed all that can be made ready: it is compiled,
-its reference and disturbance are arrays in place. Ours is whole: a run is `simulate` with its telemetry, a
-row all that a study does for it, from its values to the table. Of many rows both keep the same two figures.
+Each peer must first agree with ours: one that computes something else is no peer. Then all are timed in
+turn, several times, and the fastest of each counts. For a peer everything is prepared: it is compiled, and
+its reference and disturbance are arrays. Ours is complete: a run is `simulate` with its telemetry, a row
+is everything that a study does for it, from its values to the table. Of many rows both keep the same two
+figures.
 """
 
 import argparse
@@ -13,33 +14,29 @@ import time
 from collections.abc import Callable
 from contextlib import redirect_stdout
 from functools import partial
-from pathlib import Path
 
 import numpy as np
 import ours
+from measuring import fastest, seconds_of
 from problem import problem
-from ratios import fastest, seconds_of
-from report import Report, Taken
+from report import Report, Times
 
 from spheretwin.simulation import simulate
-
-sys.path.insert(0, str(Path(__file__).parents[1]))
-
 
 # Ours over the best of JAX, a row.
 AT_MOST = 0.7
 
-# Where a law is smooth only rounding parts two runs, as it does our own two plants.
+# Under a smooth law two runs differ by rounding alone, as those of our own two plants do.
 SAME_rad, SAME_A = 1e-9, 1e-6
-# NumPy takes f_t as linear between samples 0.25 degrees apart: 1e-4 of the peak, as much of the largest
-# current (2.6 A), and of an angle what currents that are wrong by that do within a control period.
+# NumPy interpolates f_t linearly between samples 0.25 degrees apart: an error of 1e-4 of the peak, as much of
+# the largest current (2.6 A), and of an angle the effect of this error of the currents in a control period.
 LINEAR_rad, LINEAR_A = 1e-5, 1e-3
-# Of each row's figures, relative. Under AFSM signs of s may be decided by rounding, as between our plants.
+# Of each row's figures, relative. Under AFSM rounding may decide signs of s, as between our plants.
 SAME_FIGURES = {"pd": 1e-9, "afsm": 5e-3}
 
 ROWS, MJX_ROWS = 1024, 256
 
-# Rows of a batch, and whether each core has one of its own or XLA all cores for one.
+# Rows of a batch, and whether each core has its own batch; otherwise XLA uses all cores for one.
 BATCHES = ((256, False), (1024, False), (256, True), (512, True))
 MJX_BATCHES = ((128, True),)
 
@@ -55,17 +52,17 @@ def main() -> int:
     if rows:
         lagrangian, mjx = peer(report, "jax_lagrangian"), peer(report, "mjx_rotor")
         rotors = [(lagrangian, ROWS, BATCHES), *([(mjx, MJX_ROWS, MJX_BATCHES)] if mjx else [])]
-        hold_traces(report, rows, [rotor for rotor, *_ in rotors])
+        compare_traces(report, rows, [rotor for rotor, *_ in rotors])
         many_rows(report, "pd", rows, rotors)
         many_rows(report, "afsm", rows, rotors[:1])
     passed = report.finished()
-    return 0 if passed and rows else 1  # without JAX the bar is not held
+    return 0 if passed and rows else 1  # without JAX the bound is not checked
 
 
 def peer(report: Report, name: str):
-    """Module of a peer; None where what it is written in is not installed."""
+    """Return the module of a peer; None if its library is not installed."""
     try:
-        with redirect_stdout(sys.stderr):  # libraries tell there what they do without
+        with redirect_stdout(sys.stderr):  # libraries print what they lack
             return importlib.import_module(name)
     except ImportError as error:
         report.not_installed(name, error)
@@ -73,30 +70,30 @@ def peer(report: Report, name: str):
 
 
 def single_runs(report: Report) -> None:
-    """Peers that run one row at a time."""
+    """Compare with peers that run one row at a time."""
     report.head("One run at a time, PD: time of a simulated second, of cores, and over ours")
     scenario, lagrangian = ours.scenario("pd"), ours.scenario("pd", "lagrangian")
     numbers, telemetry = problem(scenario), simulate(scenario).telemetry
     work = {"ours": partial(simulate, scenario), "ours, on the Lagrangian": partial(simulate, lagrangian)}
     for module in filter(None, (peer(report, "plain_mujoco"), peer(report, "drake_plant"))):
-        hold_trace(report, module.NAME, module.run(numbers), telemetry, (LINEAR_rad, LINEAR_A))
+        compare_trace(report, module.NAME, module.run(numbers), telemetry, (LINEAR_rad, LINEAR_A))
         work[module.NAME] = partial(module.run, numbers)
-    taken = timed(work)
-    for name, each in taken.items():
-        report.time(name, each.of(scenario.duration), taken["ours"].of(scenario.duration))
+    times = timed(work)
+    for name, each in times.items():
+        report.time(name, each.of(scenario.duration), times["ours"].of(scenario.duration))
 
 
-def hold_traces(report: Report, rows, rotors) -> None:
-    """Hold one run of each kind of rotor against ours."""
+def compare_traces(report: Report, rows, rotors) -> None:
+    """Compare one run of each kind of rotor with ours."""
     report.head("Many rows at once: are they the same?")
     scenario = ours.scenario("pd")
     numbers, telemetry = problem(scenario), simulate(scenario).telemetry
     for rotor in rotors:
-        hold_trace(report, rotor.NAME, rows.trace(numbers, rotor.Rotor), telemetry, (SAME_rad, SAME_A))
+        compare_trace(report, rotor.NAME, rows.trace(numbers, rotor.Rotor), telemetry, (SAME_rad, SAME_A))
 
 
-def hold_trace(report: Report, name: str, trace, telemetry, bounds) -> None:
-    """Hold angles and currents of a whole run against ours; one of another length is not the same."""
+def compare_trace(report: Report, name: str, trace, telemetry, bounds) -> None:
+    """Compare angles and currents of a complete run with ours; a run of another length differs."""
     units = {"q_rad": "rad", "current_A": "A"}
     for (column, unit), theirs, bound in zip(units.items(), trace, bounds, strict=True):
         same = theirs.shape == telemetry[column].shape
@@ -105,18 +102,18 @@ def hold_trace(report: Report, name: str, trace, telemetry, bounds) -> None:
 
 
 def many_rows(report: Report, law: str, rows, rotors) -> None:
-    """Peers that run many rows at once, and the bar."""
+    """Compare with peers that run many rows at once, and check the bound."""
     study = ours.study(law, ROWS)
-    figures, numbers = ours.carried_out(study), ours.problems(study)
-    mine, prepared = "ours, a study's rows", "ours, rows made ready as a peer's are"
-    work = {mine: partial(ours.carried_out, study), prepared: ours.Prepared(study)}
+    figures, numbers = ours.run_rows(study), ours.problems(study)
+    mine, prepared = "ours, a study's rows", "ours, prepared rows, as a peer's"
+    work = {mine: partial(ours.run_rows, study), prepared: ours.Prepared(study)}
     count, compile_s = dict.fromkeys(work, ROWS), dict.fromkeys(work)
     for rotor, most, batches in rotors:
         for batch, on_each_core in batches:
             name = f"{rotor.NAME}, {batch} rows {'on each core' if on_each_core else 'at once'}"
-            work[name] = ready = rows.Rows(numbers[:most], rotor.Rotor, batch, on_each_core)
-            hold_figures(report, f"{name}, {law}", ready(), figures, SAME_FIGURES[law])
-            count[name], compile_s[name] = most, ready.compile_s
+            work[name] = prepared_rows = rows.Rows(numbers[:most], rotor.Rotor, batch, on_each_core)
+            compare_figures(report, f"{name}, {law}", prepared_rows(), figures, SAME_FIGURES[law])
+            count[name], compile_s[name] = most, prepared_rows.compile_s
     report.head(f"{ROWS} rows of a second on all cores, {law}: time of a row, of cores, and over ours")
     of_row = {name: each.of(count[name]) for name, each in timed(work).items()}
     for name, each in of_row.items():
@@ -128,24 +125,24 @@ def many_rows(report: Report, law: str, rows, rotors) -> None:
         report.ratio(f"the same, time of cores, {law}", of_row[name].cores_s / least)
 
 
-def timed(work: dict[str, Callable[[], object]]) -> dict[str, Taken]:
-    """Least time of each, on the clock and of cores, over some rounds in turn."""
+def timed(work: dict[str, Callable[[], object]]) -> dict[str, Times]:
+    """Return the least time of each, of the clock and of cores, over some rounds in turn."""
     cores = {name: [] for name in work}
 
     def measured(name: str) -> float:
         if isinstance(work[name], ours.Prepared):
-            work[name].make_ready()
+            work[name].prepare()
         before = time.process_time()
         seconds = seconds_of(work[name])
         cores[name].append(time.process_time() - before)
         return seconds
 
     wall = fastest({name: partial(measured, name) for name in work}, ROUNDS)
-    return {name: Taken(wall[name], min(cores[name])) for name in work}
+    return {name: Times(wall[name], min(cores[name])) for name in work}
 
 
-def hold_figures(report: Report, name: str, theirs, figures, bound: float) -> None:
-    """Hold the figures of all rows against those of the study."""
+def compare_figures(report: Report, name: str, theirs, figures, bound: float) -> None:
+    """Compare the figures of all rows with those of the study."""
     apart = [
         np.abs(getattr(theirs, figure) / known[: len(getattr(theirs, figure))] - 1)
         for figure, known in figures.items()

@@ -1,16 +1,14 @@
-"""The loop in Drake: a multibody plant in C++, law and magnetics a system in Python.
+"""The loop in Drake: a multibody plant in C++, with law and magnetics as a system in Python.
 
-The system has one event a physics step, whose result is held in its state: its outputs are computed once a
-step and not once for each evaluation of the integrator. Drake has no Runge-Kutta method of order four; the
-one of order three takes three evaluations a step, and agrees as well.
+The system has one event in each physics step and stores its result: its output is computed once in each
+step, not once for each evaluation of the integrator. Drake has no Runge-Kutta method of order four; the one
+of order three takes three evaluations in each step, and agrees as well.
 """
 
 import numpy as np
 import plain
 from problem import Problem
-from pydrake.common.value import Value
-from pydrake.multibody.math import SpatialForce
-from pydrake.multibody.plant import ExternallyAppliedSpatialForce, MultibodyPlant
+from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import RevoluteJoint, SpatialInertia, UnitInertia
 from pydrake.systems.analysis import ApplySimulatorConfig, Simulator, SimulatorConfig
 from pydrake.systems.framework import DiagramBuilder, LeafSystem
@@ -19,35 +17,29 @@ NAME = "Drake, its plant and a Python law"
 
 INTEGRATOR = "runge_kutta3"
 
-# Torques act about the joint centre, where the rotor's centre of mass is: its mass enters nothing.
+# Torques act about the joint centre, where the rotor has its centre of mass: its mass has no effect.
 MASS_kg = 1.0
 
 
 class Controller(LeafSystem):
-    """Law, allocation, drive and magnetics: from pose and rates to what acts on the rotor."""
+    """Law, allocation, drive and magnetics: from pose and rates to the torque on the hinges."""
 
-    def __init__(self, problem: Problem, rotor) -> None:
+    def __init__(self, problem: Problem) -> None:
         super().__init__()
-        self._problem, self._rotor = problem, rotor
+        self._problem = problem
         self._law = plain.PlainPd(problem.law["stiffness"], problem.law["damping"], problem.nominal_inertia)
         self._step = 0
         self._command = self._current = np.zeros(problem.magnetics.group_axes.shape[1])
-        self._torque_S, self._hinges = np.zeros(3), np.zeros(3)
+        self._torque_q = np.zeros(3)
         self.q_rad, self.current_A = [], []
         self._state = self.DeclareVectorInputPort("state", 6)
-        # Whatever is held is Python's own; the state that Drake sees says only that it has changed.
-        held_torque = self.DeclareDiscreteState(1)
-        after_a_step = {self.discrete_state_ticket(held_torque)}
-        self.DeclareAbstractOutputPort(
-            "torque_S",
-            lambda: Value([ExternallyAppliedSpatialForce()]),
-            self._write_torque,
-            prerequisites_of_calc=after_a_step,
-        )
+        # The stored values are attributes of Python; the state that Drake sees only says that they changed.
+        stored = self.DeclareDiscreteState(1)
+        after_a_step = {self.discrete_state_ticket(stored)}
         self.DeclareVectorOutputPort(
             "torque_q",
             3,
-            lambda context, output: output.SetFromVector(self._hinges),
+            lambda context, output: output.SetFromVector(self._torque_q),
             prerequisites_of_calc=after_a_step,
         )
         self.DeclarePeriodicDiscreteUpdateEvent(problem.step_s, 0.0, self._advance)
@@ -60,35 +52,29 @@ class Controller(LeafSystem):
             return
         state = self._state.Eval(context)
         q, qdot = state[:3], state[3:]
-        R_SR, E = plain.rotation(q)
-        G = plain.torque_matrix(R_SR, problem.actuator)
         if substep == 0:
+            R_SR, E = plain.rotation(q)
             torque_q = self._law(problem.reference[tick], q, qdot)
+            G = plain.torque_matrix(R_SR, problem.actuator)
             self._command = plain.allocated(G, E, torque_q, drive.current_limit_A)
-            self._hinges = -problem.disturbance[tick]
         distance = self._current - self._command
         mean = self._command + drive.mean_share * distance
         self._current = self._command + drive.decay * distance
-        self._torque_S = G @ mean
+        R_SR, E = plain.rotation(q + 0.5 * problem.step_s * qdot)  # in the middle of the step
+        torque_S = plain.torque_matrix(R_SR, problem.actuator) @ mean
+        self._torque_q = E.T @ torque_S - problem.disturbance[tick]
         if substep == 0:
             self.q_rad.append(q.copy())
             self.current_A.append(mean)
         self._step += 1
 
-    def _write_torque(self, context, output) -> None:
-        force = ExternallyAppliedSpatialForce()
-        force.body_index = self._rotor
-        force.F_Bq_W = SpatialForce(tau=self._torque_S, f=np.zeros(3))
-        output.set_value([force])
-
 
 def run(problem: Problem) -> tuple[np.ndarray, np.ndarray]:
-    """Angles (ticks, 3) and currents (ticks, 18), the first step's of each tick."""
+    """Return angles (ticks, 3) and currents (ticks, 18) of the first step of each tick."""
     builder = DiagramBuilder()
     plant = builder.AddSystem(_plant(problem))
-    controller = builder.AddSystem(Controller(problem, plant.GetBodyByName("rotor").index()))
+    controller = builder.AddSystem(Controller(problem))
     builder.Connect(plant.get_state_output_port(), controller.GetInputPort("state"))
-    builder.Connect(controller.GetOutputPort("torque_S"), plant.get_applied_spatial_force_input_port())
     builder.Connect(controller.GetOutputPort("torque_q"), plant.get_applied_generalized_force_input_port())
     simulator = Simulator(builder.Build())
     config = SimulatorConfig(

@@ -1,4 +1,4 @@
-"""The rotor in JAX: the equations of motion under Runge-Kutta steps of order four, on scalars."""
+"""The rotor in JAX: the equations of motion with Runge-Kutta steps of order four, on scalars."""
 
 from jax_loop import turns
 from problem import Problem
@@ -16,19 +16,19 @@ class Rotor:
         still = 0.0 * inertia[0]
         return q, (still,) * 3, tuple(inertia)
 
-    def pose(self, moving):
-        return moving[0], moving[1]
+    def pose(self, state):
+        return state[0], state[1]
 
-    def step(self, moving, torque_S, torque_q):
-        """One step; both torques are held over it, the Cartesian one in the stator frame."""
-        h, (q1, v1, inertia) = self._step_s, moving
-        a1 = acceleration(q1, v1, torque_S, torque_q, inertia)
+    def step(self, state, torque_q):
+        """One step with a constant torque on the hinges."""
+        h, (q1, v1, inertia) = self._step_s, state
+        a1 = acceleration(q1, v1, torque_q, inertia)
         q2, v2 = moved(q1, 0.5 * h, v1), moved(v1, 0.5 * h, a1)
-        a2 = acceleration(q2, v2, torque_S, torque_q, inertia)
+        a2 = acceleration(q2, v2, torque_q, inertia)
         q3, v3 = moved(q1, 0.5 * h, v2), moved(v1, 0.5 * h, a2)
-        a3 = acceleration(q3, v3, torque_S, torque_q, inertia)
+        a3 = acceleration(q3, v3, torque_q, inertia)
         q4, v4 = moved(q1, h, v3), moved(v1, h, a3)
-        a4 = acceleration(q4, v4, torque_S, torque_q, inertia)
+        a4 = acceleration(q4, v4, torque_q, inertia)
         return moved(q1, h, mean(v1, v2, v3, v4)), moved(v1, h, mean(a1, a2, a3, a4)), inertia
 
 
@@ -40,16 +40,16 @@ def mean(*stages):
     return tuple((a + 2 * b + 2 * c + d) / 6 for a, b, c, d in zip(*stages, strict=True))
 
 
-def acceleration(q, qdot, torque_S, torque_q, inertia):
+def acceleration(q, qdot, torque_q, inertia):
     """``M**-1 (torque - C qdot)``, C in Christoffel form, M eliminated from its last row upward."""
-    ca, sa, cb, sb, cg, sg = turns(q)
+    _, _, cb, sb, cg, sg = turns(q)
     (J1, J2, J3), (alpha_rate, beta_rate, gamma_rate) = inertia, qdot
     D = J1 - J2
     D_double = D * cb * (cg**2 - sg**2)
     D_product = D * sg * cg
     tilt = (J3 - J1 * cg**2 - J2 * sg**2) * sb * cb
     plus, minus = 0.5 * (D_double + J3 * cb), 0.5 * (D_double - J3 * cb)
-    # Products of two rates that stand in C twice are taken once.
+    # Products of two rates that occur twice in C are computed once.
     coriolis = (
         2 * alpha_rate * (tilt * beta_rate - D_product * cb**2 * gamma_rate)
         - D_product * sb * beta_rate**2
@@ -57,11 +57,7 @@ def acceleration(q, qdot, torque_S, torque_q, inertia):
         -tilt * alpha_rate**2 + 2 * gamma_rate * (minus * alpha_rate + D_product * beta_rate),
         D_product * (cb**2 * alpha_rate**2 - beta_rate**2) - 2 * minus * alpha_rate * beta_rate,
     )
-    net = (
-        torque_q[0] + torque_S[0] - coriolis[0],
-        torque_q[1] + ca * torque_S[1] + sa * torque_S[2] - coriolis[1],
-        torque_q[2] + sb * torque_S[0] + cb * (ca * torque_S[2] - sa * torque_S[1]) - coriolis[2],
-    )
+    net = tuple(torque - other for torque, other in zip(torque_q, coriolis, strict=True))
     M_alpha, M_beta = (J1 * cg**2 + J2 * sg**2) * cb**2 + J3 * sb**2, J1 * sg**2 + J2 * cg**2
     alpha_beta, alpha_gamma = D_product * cb, J3 * sb
     to_beta, to_gamma = alpha_beta / M_beta, alpha_gamma / J3

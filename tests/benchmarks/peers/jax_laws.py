@@ -30,7 +30,7 @@ class Pd:
 
 
 class Estimates(NamedTuple):
-    """What AFSM has learnt."""
+    """Estimates of AFSM."""
 
     theta: Any  # (3, 75)
     xi: Any  # (3,)
@@ -56,12 +56,12 @@ class Afsm:
         fuzzy = jnp.sum(theta * regressor, axis=1)
         v = fuzzy - jnp.sign(s) * (xi + zeta * bound) - gains["reaching_gain"] * s
         grown = self._period_s * jnp.abs(s)
-        learnt = Estimates(
+        adapted = Estimates(
             theta - (gains["fuzzy_rate"] * self._period_s * s)[:, None] * regressor,
             xi + gains["switching_rate"] * grown,
             zeta + gains["bound_rate"] * grown * bound,
         )
-        return tuple(self._inertia * v), learnt
+        return tuple(self._inertia * v), adapted
 
 
 def memberships(x):

@@ -1,9 +1,9 @@
-"""The closed loop in JAX, one row of it: law, allocation, drive and torque matrix, about any rotor.
+"""The closed loop in JAX, one row of it: law, allocation, drive and torque matrix, with any rotor.
 
-Jitted and vmapped by those who call it. Written for the speed of XLA on a CPU, each choice by measurement:
-poses and torques are tuples of scalars, which it fuses; the sum over the pole lines is a matrix product, as
-a plain sum would be fused with the look-up and look everything up once for each of its three rows; of a run
-only the figures are kept.
+Its callers jit and vmap it. It is written for the speed of XLA on a CPU, each choice by measurement: poses
+and torques are tuples of scalars, which XLA fuses; the sum over the pole lines is a matrix product, as XLA
+fuses a plain sum with the look-up and then repeats the look-up for each of the three rows; of a run only the
+figures are returned.
 """
 
 from typing import Any, NamedTuple
@@ -21,14 +21,14 @@ CENTRE = KNEE * WIDE_PER_UNIT + (1 - KNEE) * NARROW_PER_UNIT
 
 
 class Figures(NamedTuple):
-    """What is kept of a row."""
+    """Figures of a row."""
 
     max_abs_error_rad: Any  # (3,)
     rms_error_rad: Any  # (3,)
 
 
 class Trace(NamedTuple):
-    """What shows that the row is the right one."""
+    """Trace of a row, for the comparison with ours."""
 
     q_rad: Any  # (ticks, 3)
     current_A: Any  # (ticks, 18), mean over the physics step that begins at the tick
@@ -50,29 +50,30 @@ def turns(q) -> Turns:
 
 
 def closed_loop(problem: Problem, law, rotor, traced: bool = False):
-    """A row as a function of what comes from outside and of the rotor's inertia: `Figures`, or a `Trace`."""
+    """Return a row as a function of reference, disturbance and inertia: `Figures` or a `Trace`."""
     drive, torque_matrix = problem.drive, torque_matrix_of(problem)
 
-    def tick(carry, outside):
-        moving, memory, current, worst, squares = carry
-        reference, disturbance = outside
-        q, qdot = rotor.pose(moving)
+    def tick(carry, inputs):
+        state, memory, current, worst, squares = carry
+        reference, disturbance = inputs
+        q, qdot = rotor.pose(state)
         error = tuple(q[axis] - reference[0, axis] for axis in range(3))
         error_rate = tuple(qdot[axis] - reference[1, axis] for axis in range(3))
         torque, memory = law.step(memory, error, error_rate, q, qdot)
-        hinges = tuple(-disturbance[axis] for axis in range(3))
+        at = turns(q)
+        command = allocated(torque_matrix(at), cartesian(at, torque), drive.current_limit_A)
         for substep in range(problem.substeps):
-            G = torque_matrix(rotor.pose(moving)[0])
-            if substep == 0:
-                command = allocated(G, cartesian(turns(q), torque), drive.current_limit_A)
+            before, rate = rotor.pose(state)
+            middle = turns(tuple(a + 0.5 * problem.step_s * v for a, v in zip(before, rate, strict=True)))
             mean = command + drive.mean_share * (current - command)
             if substep == 0:
                 traces = Trace(jnp.stack(q), mean) if traced else None
             current = command + drive.decay * (current - command)
-            moving = rotor.step(moving, tuple(jnp.sum(row * mean) for row in G), hinges)
+            torque_q = on_hinges(middle, tuple(jnp.sum(row * mean) for row in torque_matrix(middle)))
+            state = rotor.step(state, tuple(torque_q[axis] - disturbance[axis] for axis in range(3)))
         worst = tuple(jnp.maximum(most, jnp.abs(each)) for most, each in zip(worst, error, strict=True))
         squares = tuple(total + each**2 for total, each in zip(squares, error, strict=True))
-        return (moving, memory, current, worst, squares), traces
+        return (state, memory, current, worst, squares), traces
 
     def row(reference, disturbance, inertia):
         nothing = 0.0 * inertia[0]
@@ -92,13 +93,19 @@ def cartesian(at: Turns, torque_q):
     return torque_q[0], at.ca * torque_q[1] - at.sa * in_plane, at.sa * torque_q[1] + at.ca * in_plane
 
 
-def torque_matrix_of(problem: Problem):
-    """Rows of the torque matrix (18,) each, by the product's own table and pole lines."""
-    lines, weights, axes, table = (np.asarray(part) for part in problem.magnetics)
-    cubics = jnp.asarray(table)
+def on_hinges(at: Turns, torque_S):
+    """``E^T torque_S``."""
+    x, y, z = torque_S
+    return x, at.ca * y + at.sa * z, at.sb * x + at.cb * (at.ca * z - at.sa * y)
 
-    def torque_matrix(q):
-        at = turns(q)
+
+def torque_matrix_of(problem: Problem):
+    """Return a function for the rows of the torque matrix, (18,) each, by our table and pole lines."""
+    magnetics = problem.magnetics
+    lines, weights, axes = magnetics.line_axes, magnetics.line_weights, magnetics.group_axes
+    cubics = jnp.asarray(magnetics.table)
+
+    def torque_matrix(at):
         R = (
             (at.cb * at.cg, -at.cb * at.sg, at.sb),
             (at.ca * at.sg + at.sa * at.sb * at.cg, at.ca * at.cg - at.sa * at.sb * at.sg, -at.sa * at.cb),

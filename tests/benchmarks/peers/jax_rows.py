@@ -1,4 +1,4 @@
-"""Many rows in JAX: jitted and vmapped, in batches, in one call after the other or one on each core."""
+"""Many rows in JAX: jitted and vmapped, in batches, one call after the other or one on each core."""
 
 import os
 import time
@@ -15,7 +15,7 @@ CORES = os.cpu_count() or 1
 
 
 def trace(problem: Problem, rotor_kind) -> Trace:
-    """One run, as arrays."""
+    """Return one run as arrays."""
     row = _row(problem, rotor_kind, traced=True)
     trajectory = jax.jit(row)(problem.reference, problem.disturbance, problem.inertia)
     return Trace(*map(np.asarray, trajectory))
@@ -24,8 +24,7 @@ def trace(problem: Problem, rotor_kind) -> Trace:
 class Rows:
     """Rows of one law that differ in inertia and disturbance, compiled for batches of one size.
 
-    Where each core has a batch of its own, XLA is told to leave the other cores alone; otherwise it may use
-    them all as it likes.
+    If each core has its own batch, XLA uses one core for each; otherwise it may use all of them.
     """
 
     def __init__(self, problems: Sequence[Problem], rotor_kind, batch: int, on_each_core: bool) -> None:

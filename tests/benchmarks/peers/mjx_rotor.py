@@ -1,4 +1,4 @@
-"""The rotor in MJX: MuJoCo's own model as XLA computes it."""
+"""The rotor in MJX: the model of MuJoCo, computed by XLA."""
 
 import jax.numpy as jnp
 from mujoco import mjx
@@ -8,7 +8,7 @@ NAME = "MJX"
 
 
 class Rotor:
-    """Of the model that the product steps; only pose and rates go from step to step."""
+    """Rotor of the product's model; only pose and rates pass from step to step."""
 
     def __init__(self, problem: Problem) -> None:
         rotor = bare_rotor(problem)
@@ -19,17 +19,16 @@ class Rotor:
         still = 0.0 * inertia[0]
         return q, (still,) * 3, inertia
 
-    def pose(self, moving):
-        return moving[0], moving[1]
+    def pose(self, state):
+        return state[0], state[1]
 
-    def step(self, moving, torque_S, torque_q):
-        q, qdot, inertia = moving
+    def step(self, state, torque_q):
+        q, qdot, inertia = state
         model = self._model.replace(body_inertia=self._model.body_inertia.at[self._rotor].set(inertia))
         data = self._data.replace(
             qpos=jnp.stack(q),
             qvel=jnp.stack(qdot),
             qfrc_applied=jnp.stack(torque_q),
-            xfrc_applied=self._data.xfrc_applied.at[self._rotor, 3:].set(jnp.stack(torque_S)),
         )
         after = mjx.step(model, data)
         return tuple(after.qpos), tuple(after.qvel), inertia

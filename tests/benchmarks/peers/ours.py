@@ -1,4 +1,4 @@
-"""What the peers are measured against: a run, and the rows of a study."""
+"""Our side of the comparison: a run, and the rows of a study."""
 
 import os
 import tempfile
@@ -31,7 +31,7 @@ def scenario(law: str, engine: str = "mujoco") -> Scenario:
 
 
 def study(law: str, rows: int) -> Study:
-    """Rows of a second that differ in the modelling error and, by their seeds, in the random torque."""
+    """Return a study of rows that differ in modelling error and, by their seeds, in random torque."""
     fields = {
         "name": "peers",
         "scenario": SCENARIO,
@@ -45,13 +45,13 @@ def study(law: str, rows: int) -> Study:
 
 
 def problems(chosen: Study) -> list[Problem]:
-    """The same rows as a peer is handed them."""
+    """Return the same rows in the form for a peer."""
     rows = row.Rows(chosen)
     return [problem(rows.scenario(each)) for each in grid.Grid(chosen)]
 
 
-def carried_out(chosen: Study) -> dict[str, np.ndarray]:
-    """Run a study, whole: journal, figures, table. Returns the figures, (rows, 3) each."""
+def run_rows(chosen: Study) -> dict[str, np.ndarray]:
+    """Run a complete study with journal, figures and table; return the figures, (rows, 3) each."""
     with tempfile.TemporaryDirectory() as folder:
         runner.run(chosen, Path(folder))
         table = parquet.read_table(Path(folder) / "table.parquet", columns=list(FIGURES))
@@ -59,25 +59,25 @@ def carried_out(chosen: Study) -> dict[str, np.ndarray]:
 
 
 class Prepared:
-    """The rows of a study as a peer has them: all made ready, and of each run the same figures kept."""
+    """Rows of a study as a peer has them: all prepared, with the same figures of each run."""
 
     def __init__(self, chosen: Study) -> None:
         self._rows, self._grid = row.Rows(chosen), grid.Grid(chosen)
 
-    def make_ready(self) -> None:
-        """Build the session of every row, and have its reference and disturbance in place."""
+    def prepare(self) -> None:
+        """Build the session of every row with its reference and disturbance."""
         self._sessions = [self._rows.session(self._rows.scenario(each)) for each in self._grid]
         for session in self._sessions:
             session.check_horizon(1)
             session._inputs.rows(0, 1)
 
     def __call__(self) -> None:
-        """Run them over all cores."""
+        """Run them on all cores."""
         with ThreadPoolExecutor(os.cpu_count()) as pool:
-            list(pool.map(_flown, self._sessions))
+            list(pool.map(_figures_of, self._sessions))
 
 
-def _flown(session: Session) -> dict[str, object]:
+def _figures_of(session: Session) -> dict[str, object]:
     planned = PlannedRun(session.initial_scenario, session.actuator, session.initial_scenario.ticks)
     metrics = {name: METRICS[name](planned) for name in FIGURES}
     table = session.advance(session.initial_scenario.ticks)

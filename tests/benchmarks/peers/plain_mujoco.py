@@ -8,7 +8,7 @@ NAME = "NumPy and MuJoCo, a Python loop"
 
 
 def run(problem: Problem) -> tuple[np.ndarray, np.ndarray]:
-    """Angles (ticks, 3) and currents (ticks, 18), the first step's of each tick."""
+    """Return angles (ticks, 3) and currents (ticks, 18) of the first step of each tick."""
     rotor = bare_rotor(problem)
     rotor.start(problem.reference[0, 0], np.zeros(3))
     law = plain.PlainPd(problem.law["stiffness"], problem.law["damping"], problem.nominal_inertia)

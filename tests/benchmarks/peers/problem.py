@@ -1,4 +1,4 @@
-"""What every peer is handed: the closed loop of the nutation as numbers, none of the product's code."""
+"""The closed loop of the nutation as numbers for the peers, without code of the product."""
 
 from typing import NamedTuple
 
@@ -32,7 +32,7 @@ class Problem(NamedTuple):
 
 
 def problem(scenario: Scenario) -> Problem:
-    """Numbers of a scenario that has no more than the nutation has."""
+    """Return the numbers of a scenario that has no part beyond those of the nutation."""
     actuator, plant, period_s = actuators.load(), scenario.plant, scenario.controller.period_s
     t = period_s * np.arange(scenario.ticks)
     draws = np.random.default_rng(scenario.seed).random(len(t))
@@ -60,6 +60,6 @@ def problem(scenario: Scenario) -> Problem:
 
 
 def bare_rotor(problem: Problem) -> MujocoRotor:
-    """The rotor in MuJoCo, as the product sets it up."""
+    """Return the rotor in MuJoCo as the product sets it up."""
     modelling_error = problem.inertia[0] / problem.nominal_inertia[0] - 1
     return MujocoRotor(mjcf.read(actuators.MJCF_PATH), problem.step_s, "RK4", modelling_error, 0.0)
