@@ -67,7 +67,8 @@ def fill_defaults(
     plant = _with(
         ResolvedPlant,
         section,
-        initial_rad=section.initial_rad or _first_pose(trajectory or scenario.trajectory),
+        initial_rad=section.initial_rad
+        or (_first_pose(trajectory) if trajectory else _shipped_first_pose(scenario.trajectory)),
         gravity_m_s2=_gravity(section, files.model),
         group_gain=section.group_gain or (1.0,) * len(actuator.groups),
         end_stops=section.end_stops.model_copy(update={"on": bool(section.end_stops.on)}),
@@ -215,6 +216,10 @@ def recorded_value(value: Any) -> Any:
 
 def _first_pose(trajectory: Sampled) -> Triple:
     return tuple(trajectory.sample(np.zeros(1))[0, 0].tolist())
+
+
+_shipped_first_pose = reused(_first_pose)
+"""A trajectory of this package does not change: the rows of a study share one."""
 
 
 def _gravity(section: PlantSection, model: Mjcf) -> float | None:

@@ -10,7 +10,6 @@ from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
-import numpy as np
 from problem import Problem
 
 from spheretwin.models.magnetics import KNEE, NARROW_PER_UNIT, WIDE_PER_UNIT
