@@ -27,7 +27,7 @@ class FaultRecord:
     end_s: float | None = None
     """End; None while the fault continues."""
     detection: str = "not detected"
-    """Whether the controller knows the fault, and how long after its start."""
+    """Report to the controller, or detection by it with the delay."""
 
     def text(self) -> str:
         """Return part, mode, times and detection on one line."""

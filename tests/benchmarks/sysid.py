@@ -56,7 +56,7 @@ class Peer:
         self.weighted, self.free = way != WAYS[0], way == WAYS[2]
         self.starts = np.array(self.shooting._starts)  # of the shadow, as long as nothing is solved
         self.parameters = sysid.ParameterDict()
-        for parameter, value in zip(self.problem.wanted, self.problem.initial, strict=True):
+        for parameter, value in zip(self.problem.requested, self.problem.initial, strict=True):
             self.parameters.add(sysid.Parameter(parameter.name, value, *BOUNDS[parameter.kind.name]))
         if self.free:
             zero, bound = np.zeros(self.starts.size), np.tile(START_BOUNDS, len(self.starts))
@@ -96,7 +96,7 @@ class Peer:
             logging.warning = warning
         residuals = self.residual(result.x, outcome)[0]
         _, half = sysid.calculate_intervals([one.ravel() for one in residuals], result.jac)
-        count = len(self.problem.wanted)
+        count = len(self.problem.requested)
         values, half = result.x[:count], half[:count]
         return values, np.array([values - half, values + half]), messages
 
@@ -116,11 +116,11 @@ class Peer:
         return sysid.TimeSeries(times, angles, sysid.TimeSeries.compute_all_sensor_mapping(self.model))
 
     def _roll_out(self, *, control_signal, param_dicts, initial_states, **_):
-        number, count = self.numbers[id(control_signal[0])], len(self.problem.wanted)
+        number, count = self.numbers[id(control_signal[0])], len(self.problem.requested)
         # Rounding takes its steps below a bound by 1e-20.
         vectors = [np.clip(one.as_vector(), *self.parameters.get_bounds()) for one in param_dicts]
         window = self.shooting.windows[number]
-        setups = [window.machine.setup(self.problem.wanted, vector[:count]) for vector in vectors]
+        setups = [window.machine.setup(self.problem.requested, vector[:count]) for vector in vectors]
         starts = np.array([state[1:7] for state in initial_states])
         if self.free:
             starts += [vector[count:].reshape(-1, 6)[number] for vector in vectors]

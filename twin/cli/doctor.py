@@ -35,7 +35,7 @@ class Finding(NamedTuple):
     value: str
     ok: bool
     advice: str = ""
-    """What to do, for which purpose; empty if nothing is missing."""
+    """Advice with its purpose; empty if nothing is missing."""
 
 
 def declare(parser: Parser) -> None:

@@ -77,7 +77,7 @@ MASS = MassSection(
 
 
 class States(NamedTuple):
-    """Where the dynamics are compared; one row a state."""
+    """States at which the dynamics are compared; one row for each."""
 
     q: Array  # (n, 3) rad
     qdot: Array  # (n, 3) rad/s
@@ -87,7 +87,7 @@ class States(NamedTuple):
 
 
 class Answers(NamedTuple):
-    """What an engine says at these states."""
+    """Dynamics of an engine at these states."""
 
     R: Array  # (n, 3, 3)
     M: Array  # (n, 3, 3) kg·m²

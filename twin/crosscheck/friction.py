@@ -176,7 +176,7 @@ def _stopping_time(way: str, name: str, bearing: Bearing) -> Check:
 
 
 def _late_s(way: str, hinge: Hinge, to_rad_s: float) -> float:
-    """How much later than under ideal friction the hinge has slowed down to a rate."""
+    """Return the delay of the hinge at a rate, compared with ideal friction."""
     if way == OURS:
         lacking = _lacking_rad_s(hinge, START_rad_s) - _lacking_rad_s(hinge, to_rad_s)
         error = STEP_s * min(0.5 * hinge.stage_loss_rad_s() / to_rad_s, 2.0)
@@ -208,7 +208,7 @@ def _stopping_angle(way: str, name: str, bearing: Bearing) -> Check:
 
 
 def _far_rad(way: str, hinge: Hinge) -> float:
-    """How much farther than under ideal friction the hinge turns until it rests."""
+    """Return the additional angle of the hinge until it rests, compared with ideal friction."""
     if way == OURS:
         v, smoothing = START_rad_s, hinge.smoothing_rad_s
         # The integral of √(v² + smoothing²) - v over the rate.

@@ -303,7 +303,7 @@ def slope_Nm_s(hinge: Hinge) -> float:
 
 
 def inertia_torque_Nm(hinge: Hinge, rates_rad_s: Array | float) -> Array:
-    """How far a ramp gets above what holds the hinge until the hinge has gained a rate."""
+    """Return the torque of a ramp beyond the static friction when the hinge has reached a rate."""
     above: Array = np.sqrt(2 * hinge.inertia_kgm2 * slope_Nm_s(hinge) * np.asarray(rates_rad_s))
     return above
 

@@ -1,4 +1,4 @@
-"""What the Lagrangian has to satisfy by itself: skew symmetry, and the paper's coupling terms."""
+"""Identities of the Lagrangian model: skew symmetry, and the paper's coupling terms."""
 
 from __future__ import annotations
 

@@ -67,7 +67,7 @@ class Design(NamedTuple):
 
     @property
     def narrower(self) -> dict[str, float]:
-        """How many times narrower the interval of each parameter is than with the nutation."""
+        """Width of the interval of each parameter with the nutation over that with this motion."""
         return {name: self.reference[name] / value for name, value in self.deviations.items()}
 
 

@@ -52,7 +52,7 @@ class Stated(NamedTuple):
 
 
 class Machine(NamedTuple):
-    """What the scenario states of the machine that was logged."""
+    """Statements of the scenario about the logged machine."""
 
     parameters: Parameters
     """Plant, without what is drawn from a seed."""

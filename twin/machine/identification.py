@@ -160,9 +160,9 @@ def identifiability(log: Log, scenario: str, changes: Mapping[str, Any] | None =
     alone = np.diag(information) * problem.sizes**2 >= _WORST
     lines = []
     for can, verb in ((True, "determines"), (False, "does not determine")):
-        chosen = [one for one, known in zip(problem.wanted, alone, strict=True) if known == can]
+        chosen = [one for one, known in zip(problem.requested, alone, strict=True) if known == can]
         if chosen:
-            lines.append(f"each alone, the log {verb} {', '.join(short_names(chosen, problem.wanted))}")
+            lines.append(f"each alone, the log {verb} {', '.join(short_names(chosen, problem.requested))}")
     return (*lines, *(one.why for one in problem.refusals(problem.initial)))
 
 
@@ -185,15 +185,15 @@ class Problem:
         self.settings = settings = settings or IdentifySettings()
         machines = [Machine(scenario, {**changes, **log.conditions}) for log in logs]
         self._machines, self.machine = machines, machines[0]
-        self.wanted = selected(names, self.machine.model.actuator)
-        if not self.wanted:
+        self.requested = selected(names, self.machine.model.actuator)
+        if not self.requested:
             raise InputError("identification: expected at least one parameter, received none")
         prior = priors(self.machine) if settings.nuisance else {}
-        nuisance = [parameter for parameter in prior if parameter not in self.wanted]
-        self.parameters: list[Parameter] = [*self.wanted, *nuisance]
+        nuisance = [parameter for parameter in prior if parameter not in self.requested]
+        self.parameters: list[Parameter] = [*self.requested, *nuisance]
         self.initial = np.array([self.machine.nominal(parameter) for parameter in self.parameters])
-        # A wanted parameter has no prior: its interval comes from the data alone.
-        self.deviations = np.array([*[np.inf] * len(self.wanted), *[prior[one] for one in nuisance]])
+        # A requested parameter has no prior: its interval comes from the data alone.
+        self.deviations = np.array([*[np.inf] * len(self.requested), *[prior[one] for one in nuisance]])
         self.least = np.array([parameter.kind.least for parameter in self.parameters])
         self.sizes = np.array([parameter.kind.size for parameter in self.parameters])
         train, held_out = _split(logs, machines, settings)
@@ -201,9 +201,9 @@ class Problem:
         self.held_out = Shooting(held_out, self.parameters)
 
     def refusals(self, values: Array) -> tuple[Refusal, ...]:
-        """Return the combinations of wanted parameters that no data determine at some values."""
+        """Return the combinations of requested parameters that no data determine at some values."""
         information, _ = self.normal(values)
-        combinations = unidentifiable(information * np.outer(self.sizes, self.sizes), self.wanted)
+        combinations = unidentifiable(information * np.outer(self.sizes, self.sizes), self.requested)
         return combinations or self._without_reference()
 
     def _without_reference(self) -> tuple[Refusal, ...]:
@@ -211,25 +211,25 @@ class Problem:
 
         A cable or gimbal rings of the scenario would be one in the model, but nobody has measured them.
         """
-        kinds = {one.kind.name for one in self.wanted}
+        kinds = {one.kind.name for one in self.requested}
         is_payload_known = "plant.payload_kg" not in kinds and any(
             machine.model.scenario.plant.payload_kg for machine in self._machines
         )
         if is_payload_known or not kinds.issuperset({"torque_scale", "plant.modelling_error"}):
             return ()
-        together = [one for one in self.wanted if one.kind.name in TELLING]
-        return (_refusal(together, self.wanted),)
+        together = [one for one in self.requested if one.kind.name in TELLING]
+        return (_refusal(together, self.requested),)
 
     def information(self) -> tuple[Array, list[str]]:
-        """Return the information of the training windows on the wanted parameters, and their names.
+        """Return the information of the training windows on the requested parameters, and their names.
 
         Nuisance parameters are eliminated; without any information, a parameter has that of its size times
         1000.
         """
         information, _ = self.normal(self.initial)
         known = information + np.diag((1e3 * self.sizes) ** -2.0)
-        covariance = np.linalg.inv(known)[: len(self.wanted), : len(self.wanted)]
-        return np.linalg.inv(covariance), [parameter.name for parameter in self.wanted]
+        covariance = np.linalg.inv(known)[: len(self.requested), : len(self.requested)]
+        return np.linalg.inv(covariance), [parameter.name for parameter in self.requested]
 
     def solve(self, report: Callable[[int, int], object]) -> tuple[Array, Array, list[Part]]:
         """Return the best values, their information, and the windows; `report` is that of `identify`."""
@@ -289,7 +289,7 @@ class Problem:
         improvement = 1 - np.sqrt(after.chi2 / before.chi2)
         reasons = list(self._reasons(after, improvement))
         cost = Cost(self._cost, self.normal, values, self._cost(values), self.least)
-        fields = self.machine.fields(self.wanted, values[: len(self.wanted)].tolist())
+        fields = self.machine.fields(self.requested, values[: len(self.requested)].tolist())
         return Identified(
             accepted=not reasons,
             parameters={
@@ -298,16 +298,16 @@ class Problem:
                     interval(cost, covariance, i),
                     self.parameters[i].kind.unit,
                 )
-                for i in range(len(self.wanted))
+                for i in range(len(self.requested))
             },
             refused=(),
-            correlations=tuple(_correlations(covariance, self.wanted)),
+            correlations=tuple(_correlations(covariance, self.requested)),
             train=_fit(train, self.train),
             held_out=after,
             held_out_before=before,
             improvement=float(improvement),
             reasons=tuple(reasons),
-            covariance=covariance[: len(self.wanted), : len(self.wanted)],
+            covariance=covariance[: len(self.requested), : len(self.requested)],
             fields=fields,
         )
 
@@ -362,19 +362,19 @@ _WORST, _SHARE = 1.0, 0.2
 _LEFT = 1e-5
 
 
-def unidentifiable(information: Array, wanted: Sequence[Parameter]) -> tuple[Refusal, ...]:
+def unidentifiable(information: Array, requested: Sequence[Parameter]) -> tuple[Refusal, ...]:
     """Return the combinations of parameters that data do not determine.
 
     Parameters
     ----------
     information : (p, p) array
-        Of the parameters in units of their sizes; wanted ones first.
-    wanted : sequence of Parameter
+        Of the parameters in units of their sizes; requested ones first.
+    requested : sequence of Parameter
     """
     values, directions = np.linalg.eigh(information)
     together: list[set[int]] = []
     for value, direction in zip(values, directions.T, strict=True):
-        share = np.abs(direction[: len(wanted)])
+        share = np.abs(direction[: len(requested)])
         least = max(_WORST, _LEFT * float(direction**2 @ np.diag(information)))
         if value >= least or share.max() < _SHARE:
             continue
@@ -382,11 +382,11 @@ def unidentifiable(information: Array, wanted: Sequence[Parameter]) -> tuple[Ref
         named = {int(place) for place in np.flatnonzero(share >= _SHARE * share.max())}
         named = named.union(*(others for others in together if others & named))
         together = [others for others in together if not others & named] + [named]
-    return tuple(_refusal([wanted[place] for place in sorted(places)], wanted) for places in together)
+    return tuple(_refusal([requested[place] for place in sorted(places)], requested) for places in together)
 
 
-def _refusal(parameters: Sequence[Parameter], wanted: Sequence[Parameter]) -> Refusal:
-    return Refusal(tuple(one.name for one in parameters), _why(short_names(parameters, wanted)))
+def _refusal(parameters: Sequence[Parameter], requested: Sequence[Parameter]) -> Refusal:
+    return Refusal(tuple(one.name for one in parameters), _why(short_names(parameters, requested)))
 
 
 def _why(names: Sequence[str]) -> str:
@@ -403,12 +403,12 @@ def _why(names: Sequence[str]) -> str:
 _CORRELATED = 0.95
 
 
-def _correlations(covariance: Array, wanted: Sequence[Parameter]) -> list[str]:
-    count = len(wanted)
+def _correlations(covariance: Array, requested: Sequence[Parameter]) -> list[str]:
+    count = len(requested)
     deviation = np.sqrt(np.diag(covariance))[:count]
     correlation = covariance[:count, :count] / np.outer(deviation, deviation)
     return [
-        f"{wanted[i].name} and {wanted[j].name} are hardly distinguished in these data"
+        f"{requested[i].name} and {requested[j].name} are hardly distinguished in these data"
         f" (correlation {correlation[i, j]:+.3f})"
         for i in range(count)
         for j in range(i)

@@ -30,7 +30,7 @@ class Kind(NamedTuple):
     size: float
     """Size of a change that matters, in the unit: a parameter is identified if its deviation is smaller."""
     members: str
-    """What has one: ``one``, ``hinges``, ``groups``, ``poles``, or ``harmonics`` of a residual."""
+    """Owner: ``one``, ``hinges``, ``groups``, ``poles``, or ``harmonics`` of a residual."""
     meaning: str
     least: float = -inf
 

@@ -47,7 +47,7 @@ NOMINAL: dict[str, Any] = {
     "drive.dac_bits": 0,
     "drive.amplifier_offset_V": 0.0,
 }
-"""What is known of the machine; the values to identify are those of the data sheet."""
+"""Known properties of the machine; the values to identify are those of the data sheet."""
 
 WANTED = ("torque_scale", "plant.modelling_error", "plant.coulomb_Nm")
 PAYLOADS_kg = (0.0, 0.1)
@@ -83,7 +83,7 @@ class WorkflowSettings(BaseModel):
 
 
 class Played(NamedTuple):
-    """What a run of the hidden machine left."""
+    """Log and true motion of a run of the hidden machine."""
 
     log: Log
     q_rad: Array

@@ -52,7 +52,7 @@ class StateFilter(NamedTuple):
 
 
 class Estimates(NamedTuple):
-    """What the filter writes for each row."""
+    """Results of the filter for each row."""
 
     mean: Array  # (n, 9 or 12)
     deviation: Array  # (n, 9 or 12)
