@@ -11,7 +11,8 @@ from traitlets import default
 HERE = Path(__file__).parent
 sys.path.insert(0, str(HERE))
 
-import generate  # noqa: E402  (it stands next to this file)
+# generate.py is in this folder, which Sphinx does not put on the path: the line above must come first.
+import generate  # noqa: E402
 
 project = "spheretwin"
 author = "The spheretwin authors"

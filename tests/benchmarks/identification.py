@@ -14,22 +14,10 @@ import numpy as np
 import spheretwin
 from spheretwin.machine import IdentifySettings, Log, identify
 from spheretwin.machine.intervals import Z95
+from spheretwin.machine.workflow import CALIBRATED
 
 SCENARIO, PAYLOADS_kg = "sinusoid", (0.0, 0.1)
-KNOWN = {
-    "hardware": "electronics",
-    "controller.law": "pid",
-    "duration": 4.0,
-    "disturbance.load": 0.0,
-    "disturbance.random_bound_Nm": 0.0,
-    "plant.modelling_error": 0.0,
-    "plant.modelling_torque_Nm": [0.0, 0.0, 0.0],
-    "sensors.potentiometer.nonlinearity_rad": 0.0,
-    "sensors.adc.offset_V": 0.0,
-    "sensors.adc.gain_error": 0.0,
-    "drive.dac_bits": 0,
-    "drive.amplifier_offset_V": 0.0,
-}
+KNOWN = {**CALIBRATED, "controller.law": "pid", "duration": 4.0}
 WANTED = ("torque_scale", "plant.modelling_error", "plant.coulomb_Nm", "plant.viscous_Nm_s")
 
 

@@ -26,6 +26,7 @@ def exists(module, name):
     except ModuleNotFoundError as error:
         if error.name.startswith(("spheretwin", "tests")):
             return False
+        # A module of ours that needs a package of its own, as that for training: its names cannot be listed.
         pytest.skip(f"{error.name} is not installed")
 
 

@@ -188,14 +188,14 @@ def test_nor_does_a_change_during_the_run():
 
 
 def test_friction_that_is_not_known_is_not_fed_forward():
-    def fed(**changes):
+    def feed_forward_Nm(**changes):
         scenario = scenarios.load("tilt", WHOLE | {"detector.detect": False} | changes)
         return simulate(scenario).telemetry["feed_forward_Nm"]
 
-    known, stiff = fed(), fed(**{"plant.coulomb_Nm": [5e-3] * 3})
+    known, stiff = feed_forward_Nm(), feed_forward_Nm(**{"plant.coulomb_Nm": [5e-3] * 3})
     assert np.abs(known).max() > 1e-3
     np.testing.assert_array_equal(stiff, known)
-    assert not np.array_equal(fed(**{"nominal.coulomb_Nm": [5e-3] * 3}), known)
+    assert not np.array_equal(feed_forward_Nm(**{"nominal.coulomb_Nm": [5e-3] * 3}), known)
 
 
 def test_the_controller_knows_nothing_of_what_the_robustness_study_draws():

@@ -25,7 +25,7 @@ def in_turn(rows, start):
     return total
 
 
-def fed(kind, signal, rows, size, session_scenario, ticks=1000):
+def metric_of(kind, signal, rows, size, session_scenario, ticks=1000):
     """A metric that has processed rows in chunks of a size."""
     metric = kind(PlannedRun(session_scenario, actuators.load(), ticks))
     for first in range(0, len(rows), size):
@@ -34,7 +34,7 @@ def fed(kind, signal, rows, size, session_scenario, ticks=1000):
 
 
 def value(kind, column, size, session_scenario):
-    return fed(kind, Signal(column, "1", 3, "values"), ROWS, size, session_scenario).value()
+    return metric_of(kind, Signal(column, "1", 3, "values"), ROWS, size, session_scenario).value()
 
 
 @pytest.fixture(scope="module")
@@ -51,7 +51,9 @@ def test_pieces_are_separate_sums(size, planned, scenario):
     signal = Signal("error_rad", "rad", 3, "values")
     for kind, first in ((metrics.RmsError, 0), (metrics.TailRmsError, of_tail)):
         expected = np.sqrt(sums[first:].sum(axis=0) / (len(ROWS) - starts[first]))
-        np.testing.assert_array_equal(fed(kind, signal, ROWS, size, scenario, planned).value(), expected)
+        np.testing.assert_array_equal(
+            metric_of(kind, signal, ROWS, size, scenario, planned).value(), expected
+        )
 
 
 @SIZES

@@ -28,7 +28,7 @@ def test_runs_on_threads_are_those_made_one_after_the_other():
     assert len(set(serial)) == 36
 
 
-class Held:
+class BlockingLaw:
     """A plain Python law that stays within its call until it is let go."""
 
     def __init__(self):
@@ -40,11 +40,11 @@ class Held:
             self.entered.set()
             assert self.go.wait(30)
 
-        return Law("held", step, [], [])
+        return Law("blocking", step, [], [])
 
 
 def test_a_second_thread_is_refused_while_the_first_is_at_work():
-    blocked = Held()
+    blocked = BlockingLaw()
     busy = session(blocked.law(), name="hold")
     with ThreadPoolExecutor(1) as pool:
         advancing = pool.submit(busy.advance, 20)

@@ -32,24 +32,25 @@ from spheretwin.session import Session
 Array = NDArray[np.float64]
 
 SCENARIO = "sinusoid"
-NOMINAL: dict[str, Any] = {
-    "plant.engine": "mujoco",
+CALIBRATED: dict[str, Any] = {
     "hardware": "electronics",
-    "controller.law": "pid",
     "disturbance.load": 0.0,
     "disturbance.random_bound_Nm": 0.0,
     "plant.modelling_error": 0.0,
     "plant.modelling_torque_Nm": [0.0, 0.0, 0.0],
-    # Calibrated sensors and converters: their errors would be nuisance parameters, and minutes of computing.
+    # Errors of sensors and converters would be nuisance parameters, and minutes of computing.
     "sensors.potentiometer.nonlinearity_rad": 0.0,
     "sensors.adc.offset_V": 0.0,
     "sensors.adc.gain_error": 0.0,
     "drive.dac_bits": 0,
     "drive.amplifier_offset_V": 0.0,
 }
+"""Machine with calibrated sensors and converters, without load and modelling error."""
+
+NOMINAL: dict[str, Any] = {**CALIBRATED, "plant.engine": "mujoco", "controller.law": "pid"}
 """Known properties of the machine; the values to identify are those of the data sheet."""
 
-WANTED = ("torque_scale", "plant.modelling_error", "plant.coulomb_Nm")
+REQUESTED = ("torque_scale", "plant.modelling_error", "plant.coulomb_Nm")
 PAYLOADS_kg = (0.0, 0.1)
 OTHER_PAYLOAD_kg = 0.05
 """Of the log that judges the twin."""
@@ -175,7 +176,7 @@ def run_workflow(
     settings = settings or WorkflowSettings()
     nominal = Machine(SCENARIO, NOMINAL)
     true = hidden_machine(settings.seed)
-    designed = design(SCENARIO, WANTED, NOMINAL, settings.design, track)
+    designed = design(SCENARIO, REQUESTED, NOMINAL, settings.design, track)
     motion = {"trajectory.shape": "multisine", "trajectory.components": _components(designed)}
     hidden = {**NOMINAL, **_fields(true)}
     logs = [
@@ -183,15 +184,15 @@ def run_workflow(
         for place, payload_kg in enumerate(settings.design.payloads_kg)
     ]
     judge = _play(hidden, OTHER_PAYLOAD_kg, settings.judged_s, settings.seed + len(logs))
-    identified = identify([one.log for one in logs], SCENARIO, WANTED, NOMINAL)
+    identified = identify([one.log for one in logs], SCENARIO, REQUESTED, NOMINAL)
     twin = {**NOMINAL, **identified.fields}
     return Workflow(
         true=true,
-        nominal={one.name: nominal.nominal(one) for one in selected(WANTED, nominal.model.actuator)},
+        nominal={one.name: nominal.nominal(one) for one in selected(REQUESTED, nominal.model.actuator)},
         design=designed,
         logs=(*logs, judge),
         verdicts=tuple(check(one.log, scenarios.load(SCENARIO, NOMINAL)) for one in (*logs, judge)),
-        without_payload=identify(logs[0].log, SCENARIO, WANTED, NOMINAL),
+        without_payload=identify(logs[0].log, SCENARIO, REQUESTED, NOMINAL),
         identified=identified,
         before=_judge(judge.log, NOMINAL, None),
         after=_judge(judge.log, twin, identified.uncertainty),

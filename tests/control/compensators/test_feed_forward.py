@@ -27,7 +27,7 @@ ROTOR = NominalRotor(INERTIA, COULOMB, VISCOUS)
 numbers = st.lists(st.floats(-3, 3), min_size=3, max_size=3).map(np.array)
 
 
-def fed(reference, **shares):
+def torque_of(reference, **shares):
     feed = feed_forward(FeedForwardSection(**shares), ROTOR, 1e-3, 0.0)
     compute_feed_forward(feed, np.array(reference))
     return feed.torque_q
@@ -44,9 +44,9 @@ def test_at_a_steady_rate_it_cancels_the_plant_s_friction(q, v):
     # In half a step the rate changes by k h / 2J, a share of 1e-6 at most, and those it is coupled to; what
     # is lost of the rates, 1e-16 of them, is over h a torque of up to 1e-10 N·m.
     np.testing.assert_allclose(2 * mean, torque, rtol=0, atol=3e-6 * np.abs(COULOMB).max() + 1e-9)
-    np.testing.assert_allclose(fed([q, v, 0 * v], friction=(1.0,) * 3), -torque, rtol=1e-11, atol=1e-14)
+    np.testing.assert_allclose(torque_of([q, v, 0 * v], friction=(1.0,) * 3), -torque, rtol=1e-11, atol=1e-14)
     for smoothing in (1e-6, 0.1):
-        left = fed([q, v, 0 * v], friction=(1.0,) * 3, smoothing_rad_s=smoothing) + torque
+        left = torque_of([q, v, 0 * v], friction=(1.0,) * 3, smoothing_rad_s=smoothing) + torque
         # c (1 - |v| / √(v² + s²)) of either.
         short = [1 - np.abs(v) / np.sqrt(v**2 + s**2) for s in (0.01, smoothing)]
         assert (np.abs(left) <= COULOMB * np.abs(short[0] - short[1]) * (1 + 1e-9) + 1e-13).all()
@@ -58,7 +58,7 @@ def test_inertia_is_the_inverse_dynamics_of_the_nominal_model(q, v, a):
     torque = inertia_matrix(q, INERTIA) @ a + coriolis_matrix(q, v, INERTIA) @ v
     share = np.array([0.5, 1.0, 1.2])
     # A dozen products of 1e-2 N·m.
-    np.testing.assert_allclose(fed([q, v, a], inertia=tuple(share)), share * torque, rtol=0, atol=1e-16)
+    np.testing.assert_allclose(torque_of([q, v, a], inertia=tuple(share)), share * torque, rtol=0, atol=1e-16)
 
 
 HANDED = (Signal("accounted_Nm", "N·m", 3, "torque of the last period, as told", ANGLES),)

@@ -12,9 +12,10 @@ from numba.core import ccallback, compiler, dispatcher, event, lowering
 from numba.core.runtime import rtsys
 
 from spheretwin.models.base import mujoco_library, numba_internals
-from spheretwin.models.base.compiled import COMPILES, allocation_free, compilable, compiled
+from spheretwin.models.base.compiled import allocation_free, compilable, compiled
 from spheretwin.models.base.errors import EngineError
 from spheretwin.models.base.numba_internals import NO_ALLOCATION
+from tests.requirements import needs_compiled_functions
 
 NUMBA = [
     (compiler.CompileResult, "_rebuild"),
@@ -33,11 +34,7 @@ def test_numba_has_the_private_names(owner, name):
     assert hasattr(owner, name), f"numba {numba.__version__} has no {owner}.{name}: see numba_internals.py"
 
 
-# With NUMBA_DISABLE_JIT functions stay plain Python: numba's internals are not used then.
-needs_compiler = pytest.mark.skipif(not COMPILES, reason="NUMBA_DISABLE_JIT: no function is compiled")
-
-
-@needs_compiler
+@needs_compiled_functions
 def test_the_option_nrt_switches_allocation_off():
     @compiled
     def allocate():
@@ -73,7 +70,7 @@ def sum_of_larger(pair, other, count):
     return total
 
 
-@needs_compiler
+@needs_compiled_functions
 def test_a_tuple_that_is_assigned_once_is_a_value(monkeypatch):
     values = set()
 
@@ -93,7 +90,7 @@ def test_a_tuple_that_is_assigned_once_is_a_value(monkeypatch):
     )
 
 
-@needs_compiler
+@needs_compiled_functions
 def test_a_compiled_function_reads_the_cache_of_this_package(monkeypatch):
     @compiled
     def double(x):
@@ -156,7 +153,7 @@ def test_a_copied_model_is_owned_by_python():
     assert copy.nbody == model.nbody
 
 
-@needs_compiler
+@needs_compiled_functions
 def test_compiled_code_reads_a_tuple_from_memory():
     pair = Pair(np.arange(3.0), np.arange(4.0))
 
@@ -169,7 +166,7 @@ def test_compiled_code_reads_a_tuple_from_memory():
     assert read.ctypes(ctypes.c_void_p(memory.ctypes.data)) == 2 + 30 + 750 + 3000
 
 
-@needs_compiler
+@needs_compiled_functions
 def test_an_inlined_implementation_has_no_machine_code():
     """Numba reports each function that it compiles: here only the caller."""
     compiled_functions = []

@@ -71,7 +71,7 @@ def test_a_file_that_has_changed_meanwhile_is_not_read_in_the_loop(tmp_path, mon
         assert bench.state().law == f"{file}:Mine"
 
 
-class Held:
+class BlockingWork:
     """Work that waits until it is let go, and returns something that is closed."""
 
     def __init__(self):
@@ -86,7 +86,7 @@ class Held:
 
 
 def test_a_preparation_that_is_too_late_is_refused_and_its_result_closed():
-    work = Held()
+    work = BlockingWork()
     prepared = Preparation("load", work, limit_s=0.05)
     with pytest.raises(InputError, match=r"expected load to be prepared within 0\.05 s, received nothing"):
         prepared.result()
@@ -97,7 +97,7 @@ def test_a_preparation_that_is_too_late_is_refused_and_its_result_closed():
 
 
 def test_a_preparation_in_time_gives_its_result_or_its_error():
-    work = Held()
+    work = BlockingWork()
     work.go.set()
     assert Preparation("load", work).result() is work
     assert not work.closed.is_set()

@@ -1,6 +1,5 @@
 """CasADi functions of the plant next to the compiled ones, at random states."""
 
-import shutil
 import subprocess
 import sys
 
@@ -12,6 +11,7 @@ from spheretwin import casadi, plant
 from spheretwin.models import lagrangian
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.kinematics import rate_jacobian
+from tests.requirements import C_COMPILER, needs_c_compiler
 
 STATES = 60
 LOADED = {"plant.coulomb_Nm": [0.01, 0.02, 0.03], "plant.viscous_Nm_s": [0.001, 0.002, 0.003]}
@@ -74,12 +74,12 @@ def test_the_derivative_of_the_torque_matrix_is_that_of_its_cubics(parameters):
         np.testing.assert_allclose(np.array(slope(pose))[:, axis], numeric, rtol=0, atol=2e-4)
 
 
-@pytest.mark.skipif(not shutil.which("cc"), reason="no C compiler")
+@needs_c_compiler
 def test_casadi_generates_c_code_that_agrees(parameters, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     function = casadi.dynamics(parameters)
     function.generate("plant.c")
-    subprocess.run(["cc", "-shared", "-fPIC", "-O1", "plant.c", "-o", "plant.so", "-lm"], check=True)
+    subprocess.run([*C_COMPILER, "-shared", "-fPIC", "-O1", "plant.c", "-o", "plant.so", "-lm"], check=True)
     compiled = ca.external("f", f"{tmp_path}/plant.so")
     x, u = np.array([0.3, -0.2, 0.4, 1.0, 2.0, -1.0]), np.linspace(-2, 2, 18)
     p = casadi.parameter_vector(parameters)

@@ -1,6 +1,5 @@
 """Completion: words from the parsers and the models, and a script for bash that works."""
 
-import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -11,6 +10,7 @@ from spheretwin import cli
 from spheretwin.cli.completion import SCRIPTS, words
 from spheretwin.control.laws import LAWS
 from spheretwin.scenario import reading
+from tests.requirements import needs_shell
 
 
 @pytest.mark.parametrize(
@@ -34,7 +34,7 @@ def test_words(typed, expected):
     assert words([typed] if isinstance(typed, str) else typed) == expected
 
 
-@pytest.mark.skipif(not shutil.which("bash"), reason="no bash")
+@needs_shell("bash")
 def test_bash_completes_a_verb():
     script = (
         f"{SCRIPTS['bash']}\nCOMP_WORDS=(spheretwin sim) COMP_CWORD=1\n_spheretwin\necho ${{COMPREPLY[@]}}"
@@ -44,8 +44,6 @@ def test_bash_completes_a_verb():
     assert done.stdout.split() == ["simulate"]
 
 
-@pytest.mark.parametrize("shell", ["zsh", "fish"])
+@pytest.mark.parametrize("shell", [pytest.param(name, marks=needs_shell(name)) for name in ("zsh", "fish")])
 def test_the_scripts_of_other_shells_have_valid_syntax(shell):
-    if not shutil.which(shell):
-        pytest.skip(f"no {shell}")
     subprocess.run([shell, "-n"], input=SCRIPTS[shell], text=True, check=True)

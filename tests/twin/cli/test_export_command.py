@@ -8,6 +8,7 @@ import pytest
 from spheretwin import cli
 from spheretwin.cli import completion
 from spheretwin.export import compiler, fmu
+from tests.requirements import needs_c_compiler
 
 TWIN = """format = 1
 scenario = "hold"
@@ -104,9 +105,8 @@ def test_targets_need_the_extra_and_a_known_name(folder, capsys, monkeypatch):
     assert "expected FMI 3 for aarch64-linux" in capsys.readouterr().err
 
 
+@needs_c_compiler
 def test_an_error_of_the_compiler_is_one_line_and_leaves_no_file(folder, capsys, monkeypatch):
-    if compiler.host_compiler() is None:
-        pytest.skip("there is no C compiler")
     monkeypatch.setattr(fmu, "PLANT_SOURCES", ("st_plant.c", "st_example.c"))  # needs the controller's files
     assert cli.main(["export", "fmu", "hold"]) == 1
     printed = capsys.readouterr().err

@@ -11,6 +11,7 @@ import pytest
 
 from spheretwin import cli
 from spheretwin.models.telemetry.table import read_parquet
+from tests.requirements import needs_posix
 from tests.waiting import PATIENCE_S
 
 
@@ -63,7 +64,7 @@ def test_both_verbs_write_their_files_in_real_time(tmp_path, capsys):
     assert np.any(truth["current_A"])
 
 
-@pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
+@needs_posix
 def test_an_interrupted_machine_says_so():
     with machine() as process:
         port_of(process)

@@ -4,15 +4,12 @@ import ctypes
 import subprocess
 
 import numpy as np
-import pytest
 
 from spheretwin.export.c_library import write_c
-from spheretwin.export.compiler import host_compiler
 from spheretwin.export.controller_code import controller_code
 from spheretwin.export.plant_code import plant_code
+from tests.requirements import C_COMPILER
 
-COMPILER = host_compiler()
-needs_compiler = pytest.mark.skipif(COMPILER is None, reason="there is no C compiler")
 WARNINGS = ["-std=c99", "-pedantic", "-Wall", "-Wextra", "-Wconversion", "-Wshadow", "-Werror"]
 SANITIZERS = ["-g", "-O1", "-fsanitize=address,undefined", "-fno-sanitize-recover=all"]
 
@@ -20,7 +17,7 @@ SANITIZERS = ["-g", "-O1", "-fsanitize=address,undefined", "-fno-sanitize-recove
 def compiled(folder, sources, name, *flags):
     """Path of a library or a program; no warning is accepted."""
     made = folder / name
-    command = [*COMPILER, *WARNINGS, *flags, "-o", made, *(folder / source for source in sources), "-lm"]
+    command = [*C_COMPILER, *WARNINGS, *flags, "-o", made, *(folder / source for source in sources), "-lm"]
     done = subprocess.run(list(map(str, command)), capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
     return made

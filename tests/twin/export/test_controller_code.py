@@ -6,7 +6,8 @@ import pytest
 import spheretwin as st
 from spheretwin.export.controller_code import controller_code
 from spheretwin.models.base.errors import InputError
-from tests.twin.export.generated import CController, needs_compiler
+from tests.requirements import needs_c_compiler
+from tests.twin.export.generated import CController
 
 RUN = {
     "plant.engine": "lagrangian",
@@ -45,7 +46,7 @@ def replayed(controller, reference, angle, rate):
     return np.array(shares), np.array(commands)
 
 
-@needs_compiler
+@needs_c_compiler
 @pytest.mark.parametrize("case", CASES)
 def test_commands_are_those_of_the_recorded_run(case, tmp_path):
     changes = RUN | CASES[case]
@@ -58,7 +59,7 @@ def test_commands_are_those_of_the_recorded_run(case, tmp_path):
     np.testing.assert_allclose(shares, share, atol=1e-9)
 
 
-@needs_compiler
+@needs_c_compiler
 @pytest.mark.parametrize("case", CASES)
 def test_single_precision_is_within_its_bound(case, tmp_path):
     changes = RUN | CASES[case] | {"nominal.current_limit_A": 8.0}
@@ -73,7 +74,7 @@ def test_single_precision_is_within_its_bound(case, tmp_path):
     assert np.quantile(np.abs(commands - command).max(axis=1), share) < bound
 
 
-@needs_compiler
+@needs_c_compiler
 def test_invalid_angles_give_no_commands_and_no_lasting_harm(tmp_path):
     controller = CController(tmp_path, "nutation", RUN | CASES["robust"])
     reference = np.zeros((3, 3))
@@ -86,7 +87,7 @@ def test_invalid_angles_give_no_commands_and_no_lasting_harm(tmp_path):
     assert 0.1 < np.abs(command).max() <= 1
 
 
-@needs_compiler
+@needs_c_compiler
 def test_a_start_erases_the_memory(tmp_path):
     controller = CController(tmp_path, "nutation", RUN | CASES["afsm"])
     generator = np.random.default_rng(0)

@@ -17,7 +17,8 @@ from spheretwin.export import fmu as fmus
 from spheretwin.export.fmu import plant_files, write_fmu
 from spheretwin.export.plant_code import plant_code
 from spheretwin.models.base.errors import InputError
-from tests.twin.export.generated import COMPILER, SANITIZERS, WARNINGS, compiled, needs_compiler
+from tests.requirements import C_COMPILER, needs_c_compiler
+from tests.twin.export.generated import SANITIZERS, WARNINGS, compiled
 
 CHANGES = {
     "plant.coulomb_Nm": [2e-3] * 3,
@@ -64,7 +65,7 @@ def test_fmpy_finds_no_problem(fmi, kind, files):
     with zipfile.ZipFile(files[fmi, kind]) as archive:
         entries = archive.namelist()
     assert {"sources/st_plant.c", f"sources/fmi{fmi}.c", "sources/st_plant_tables.h"} <= set(entries)
-    assert any(entry.startswith("binaries/") for entry in entries) == bool(COMPILER)
+    assert any(entry.startswith("binaries/") for entry in entries) == bool(C_COMPILER)
 
 
 def test_values_have_the_order_of_the_description(model, files):
@@ -77,7 +78,7 @@ def test_values_have_the_order_of_the_description(model, files):
     assert references == list(range(len(references)))
 
 
-@needs_compiler
+@needs_c_compiler
 @pytest.mark.parametrize("fmi", [2, 3])
 def test_co_simulation_is_simulate(fmi, model, files):
     changes = CHANGES | {"plant.engine": "lagrangian", "duration": 0.5}
@@ -89,7 +90,7 @@ def test_co_simulation_is_simulate(fmi, model, files):
     assert np.ptp(run["q_rad"], axis=0).max() > 0.5
 
 
-@needs_compiler
+@needs_c_compiler
 @pytest.mark.parametrize("fmi", [2, 3])
 def test_model_exchange_is_the_limit_of_small_steps(fmi, tmp_path):
     # Smooth friction without Coulomb's term: the steps then converge as their square.
@@ -168,7 +169,7 @@ def instance(request, files, tmp_path):
 ANGLES = ("q_rad.alpha", "q_rad.beta", "q_rad.gamma", "current_A[2]", "winding_degC[2]")
 
 
-@needs_compiler
+@needs_c_compiler
 def test_a_saved_state_continues_with_the_same_bits(instance):
     instance.initialise()
     instance.set("current_command_A[2]", 1.5)
@@ -194,7 +195,7 @@ def test_a_saved_state_continues_with_the_same_bits(instance):
         (fmu.freeFMUstate if instance.fmi == "2" else fmu.freeFMUState)(each)
 
 
-@needs_compiler
+@needs_c_compiler
 def test_parameters_can_be_changed_while_it_runs(instance):
     instance.initialise()
     instance.set("current_command_A[2]", 1.5)
@@ -210,7 +211,7 @@ def test_parameters_can_be_changed_while_it_runs(instance):
     assert np.abs(before).max() > 0.1
 
 
-@needs_compiler
+@needs_c_compiler
 def test_leaving_the_range_requests_the_end(instance):
     instance.initialise()
     instance.set("disturbance_Nm.alpha", -5.0)
@@ -229,7 +230,7 @@ def test_leaving_the_range_requests_the_end(instance):
     assert abs(instance.get("q_rad.alpha")[0]) > np.radians(80)
 
 
-@needs_compiler
+@needs_c_compiler
 @pytest.mark.parametrize("fmi", [2, 3])
 def test_directional_derivatives_are_those_of_the_derivatives(fmi, files, tmp_path):
     made = Instance(files[fmi, "model-exchange"], tmp_path, "model-exchange")
@@ -263,14 +264,14 @@ def test_directional_derivatives_are_those_of_the_derivatives(fmi, files, tmp_pa
     fmu.freeInstance()
 
 
-@needs_compiler
+@needs_c_compiler
 @pytest.mark.parametrize("fmi", [2, 3])
 def test_the_declarations_are_those_of_the_standard(fmi, model, files, tmp_path):
     with zipfile.ZipFile(files[fmi, "co-simulation"]) as archive:
         archive.extractall(tmp_path)
     headers = Path(fmpy.__file__).parent / "c-code"
     for flags in ([], ["-DST_STANDARD_HEADERS", f"-I{headers}"]):
-        command = [*COMPILER, *WARNINGS, *flags, "-c", f"fmi{fmi}.c", "-o", f"{len(flags)}.o"]
+        command = [*C_COMPILER, *WARNINGS, *flags, "-c", f"fmi{fmi}.c", "-o", f"{len(flags)}.o"]
         done = subprocess.run(command, cwd=tmp_path / "sources", capture_output=True, text=True)
         assert done.returncode == 0, done.stderr
     if shutil.which("nm"):
@@ -285,7 +286,7 @@ def test_the_declarations_are_those_of_the_standard(fmi, model, files, tmp_path)
         assert required <= defined
 
 
-@needs_compiler
+@needs_c_compiler
 @pytest.mark.parametrize("fmi", [2, 3])
 def test_the_interface_runs_under_sanitizers(fmi, files, tmp_path):
     with zipfile.ZipFile(files[fmi, "model-exchange"]) as archive:

@@ -11,7 +11,8 @@ from spheretwin.export.c_library import write_c
 from spheretwin.export.controller_code import controller_code
 from spheretwin.export.plant_code import plant_code
 from spheretwin.models.base.errors import InputError
-from tests.twin.export.generated import SANITIZERS, CPlant, compiled, needs_compiler
+from tests.requirements import needs_c_compiler
+from tests.twin.export.generated import SANITIZERS, CPlant, compiled
 
 FRICTION = {"plant.coulomb_Nm": [2e-3] * 3, "plant.viscous_Nm_s": [1e-4] * 3, "plant.payload_kg": 0.05}
 PROTOTYPE = {
@@ -34,7 +35,7 @@ def random_motion(generator):
     return generator.uniform(-0.5, 0.5, 3), generator.uniform(-5, 5, 3)
 
 
-@needs_compiler
+@needs_c_compiler
 def test_steps_are_those_of_the_plant_step(machine):
     c_plant, parameters = machine
     generator = np.random.default_rng(0)
@@ -54,7 +55,7 @@ def test_steps_are_those_of_the_plant_step(machine):
     np.testing.assert_allclose(c_plant.x[:6], np.concatenate(state), atol=2e-13)
 
 
-@needs_compiler
+@needs_c_compiler
 def test_directional_derivatives_are_exact(machine):
     c_plant, _ = machine
     generator = np.random.default_rng(1)
@@ -74,7 +75,7 @@ def test_directional_derivatives_are_exact(machine):
         np.testing.assert_allclose(exact[:6], difference[:6], rtol=1e-6, atol=1e-5)
 
 
-@needs_compiler
+@needs_c_compiler
 def test_a_run_is_that_of_simulate(tmp_path):
     changes = {**FRICTION, "disturbance.load": 1.0, "plant.engine": "lagrangian", "duration": 1.0}
     run = st.simulate("nutation", changes).telemetry
@@ -101,7 +102,7 @@ HEAT = {
 }
 
 
-@needs_compiler
+@needs_c_compiler
 @pytest.mark.uncompiled
 @pytest.mark.parametrize(
     ("inputs", "drive"),
@@ -132,7 +133,7 @@ def test_currents_and_temperatures_are_those_of_simulate(inputs, drive, tmp_path
     assert np.abs(run["q_rad"] - run["q_rad"][0]).max() > 1e-3
 
 
-@needs_compiler
+@needs_c_compiler
 def test_leaving_the_range_and_diverging_end_a_step(tmp_path):
     c_plant = CPlant(tmp_path, "nutation", {})
     push = np.concatenate([np.zeros(18), [-1.0, 0.0, 0.0]])
@@ -145,7 +146,7 @@ def test_leaving_the_range_and_diverging_end_a_step(tmp_path):
     assert c_plant.advance(np.full(21, np.nan), 1e-3)[0] == 2
 
 
-@needs_compiler
+@needs_c_compiler
 def test_a_step_that_is_no_multiple_is_divided_evenly(tmp_path):
     c_plant = CPlant(tmp_path, "nutation", FRICTION)
     u = np.concatenate([np.linspace(-1, 1, 18), np.zeros(3)])
@@ -157,7 +158,7 @@ def test_a_step_that_is_no_multiple_is_divided_evenly(tmp_path):
     np.testing.assert_allclose(reached, c_plant.x, rtol=1e-14, atol=1e-18)
 
 
-@needs_compiler
+@needs_c_compiler
 @pytest.mark.parametrize(
     "changes",
     [

@@ -11,25 +11,13 @@ from spheretwin.machine.identification import unidentifiable
 from spheretwin.machine.parameters import KINDS, Machine, members, selected, sensor_angles
 from spheretwin.machine.twin_file import draw_fields, read_twin, write_twin
 from spheretwin.machine.windows import Shooting, Window, windows_of
+from spheretwin.machine.workflow import CALIBRATED
 from spheretwin.models import actuator
 from spheretwin.models.base.errors import InputError
 from spheretwin.plant_model import parameters
 
 SCENARIO = "sinusoid"
-KNOWN = {
-    "hardware": "electronics",
-    "duration": 1.6,
-    "disturbance.load": 0.0,
-    "disturbance.random_bound_Nm": 0.0,
-    "plant.modelling_error": 0.0,
-    "plant.modelling_torque_Nm": [0.0, 0.0, 0.0],
-    # Calibrated sensors and converters: without nuisance parameters an identification takes a second.
-    "sensors.potentiometer.nonlinearity_rad": 0.0,
-    "sensors.adc.offset_V": 0.0,
-    "sensors.adc.gain_error": 0.0,
-    "drive.dac_bits": 0,
-    "drive.amplifier_offset_V": 0.0,
-}
+KNOWN = {**CALIBRATED, "duration": 1.6}
 TRUE = {
     "plant.modelling_error": 0.06,
     "plant.coulomb_Nm": [3e-3, 2.5e-3, 1.5e-3],

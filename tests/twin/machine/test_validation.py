@@ -45,14 +45,14 @@ def test_errors_of_identified_values_are_no_structure(log):
     """Friction that is wrong by one standard deviation of the twin; a known value counts as exact."""
     wrong = {**KNOWN, "plant.coulomb_Nm": [1e-3, 2e-3, 2e-3]}
 
-    def found(deviation_Nm):
+    def structure_of(deviation_Nm):
         uncertainty = Uncertainty(("plant.coulomb_Nm.0",), np.array([[deviation_Nm**2]]))
         return validate(log, SCENARIO, wrong, uncertainty=uncertainty).structure
 
-    assert not found(1e-3)
+    assert not structure_of(1e-3)
     exact = {one.what: one.deviations for one in validate(log, SCENARIO, wrong).structure}
     # 1e-12 N·m is 1e-8 of the deviation that the noise gives, of which the variance has the square.
-    assert {one.what: one.deviations for one in found(1e-12)} == pytest.approx(exact, rel=1e-9)
+    assert {one.what: one.deviations for one in structure_of(1e-12)} == pytest.approx(exact, rel=1e-9)
 
 
 def test_bins_hold_every_row_with_the_mean_and_rms_of_their_residuals(log):

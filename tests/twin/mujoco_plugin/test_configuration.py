@@ -9,9 +9,9 @@ import pytest
 from spheretwin import mujoco_plugin, scenario
 from spheretwin.models import actuator as actuators
 from spheretwin.models import magnetics
-from spheretwin.models.base.compiled import COMPILES
+from tests.requirements import needs_compiled_functions
 
-pytestmark = pytest.mark.skipif(not COMPILES, reason="NUMBA_DISABLE_JIT: a plugin needs compiled functions")
+pytestmark = needs_compiled_functions
 
 TEXT = mujoco_plugin.EXAMPLE.read_text().replace('"actuator.xml"', f'"{actuators.MJCF_PATH}"')
 SECOND = Path(scenario.__file__).parent / "shipped" / "ventusff"

@@ -12,11 +12,11 @@ from mujoco import batch, rollout, viewer
 
 from spheretwin import mujoco_plugin, plant
 from spheretwin.models import kinematics, magnetics
-from spheretwin.models.base.compiled import COMPILES
 from spheretwin.mujoco_plugin import registration
 from spheretwin.simulation import simulate
+from tests.requirements import needs_compiled_functions
 
-pytestmark = pytest.mark.skipif(not COMPILES, reason="NUMBA_DISABLE_JIT: a plugin needs compiled functions")
+pytestmark = needs_compiled_functions
 
 TICKS, SIMULATIONS = 40, 6
 

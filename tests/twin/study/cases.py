@@ -38,8 +38,8 @@ def rows_of(folder):
     return parquet.read_table(folder / "table.parquet").to_pylist()
 
 
-def found(a_study, folder, **options):
-    """Rows of a study that is run."""
+def run_rows(a_study, folder, **options):
+    """Run a study; return the rows of its table."""
     run(a_study, folder, **{"threads": 1, **options})
     return rows_of(folder)
 

@@ -11,7 +11,7 @@ from spheretwin.study import journal
 from spheretwin.study.grid import Grid, Row
 from spheretwin.study.journal import Journal
 from spheretwin.study.row import Result
-from tests.twin.study.cases import Full, found, loads, study, table, values
+from tests.twin.study.cases import Full, loads, run_rows, study, table, values
 
 ROWS = [Row(number, f"{number:016x}", number, {}, None, 0) for number in range(6)]
 
@@ -73,13 +73,13 @@ def test_a_line_damaged_in_the_middle_loses_itself_alone(path):
 
 
 def test_a_row_whose_line_was_damaged_is_run_again_and_the_table_is_the_same(tmp_path):
-    whole = found(loads(), tmp_path / "a")
+    whole = run_rows(loads(), tmp_path / "a")
     path = tmp_path / "a" / journal.NAME
     before = table(tmp_path / "a")
     lines = path.read_bytes().splitlines(keepends=True)
     lines[5] = lines[5].replace(b"completed", b"cmopleted")
     path.write_bytes(b"".join(lines))
-    assert found(loads(), tmp_path / "a") == whole
+    assert run_rows(loads(), tmp_path / "a") == whole
     assert table(tmp_path / "a") == before
     assert path.read_bytes().startswith(b"".join(lines))
     assert len(path.read_bytes().splitlines()) == len(lines) + 1
@@ -117,26 +117,26 @@ def test_the_journal_of_another_study_is_refused_and_left_as_it_is(path):
     ],
 )
 def test_whatever_changes_a_figure_makes_another_study(tmp_path, other):
-    found(loads(), tmp_path, limit=1)
+    run_rows(loads(), tmp_path, limit=1)
     before = table(tmp_path)
     with pytest.raises(InputError, match="received one of others"):
-        found(loads(**other), tmp_path)
+        run_rows(loads(**other), tmp_path)
     assert table(tmp_path) == before
 
 
 def test_other_words_about_it_make_no_other_study(tmp_path):
-    found(loads(), tmp_path, limit=2)
-    assert len(found(loads(description="another"), tmp_path, limit=2)) == 2
+    run_rows(loads(), tmp_path, limit=2)
+    assert len(run_rows(loads(description="another"), tmp_path, limit=2)) == 2
 
 
 def test_an_edited_file_of_the_user_s_makes_another_study(tmp_path):
     mine = tmp_path / "mine.py"
     mine.write_text("def ticks(run): return len(run.telemetry)")
     chosen = study(metrics=[f"{mine}:ticks"])
-    assert found(chosen, tmp_path / "out")[0]["ticks"] == 20
+    assert run_rows(chosen, tmp_path / "out")[0]["ticks"] == 20
     mine.write_text("def ticks(run): return 2 * len(run.telemetry)")
     with pytest.raises(InputError, match="received one of others"):
-        found(chosen, tmp_path / "out")
+        run_rows(chosen, tmp_path / "out")
 
 
 def test_a_second_writer_is_refused(path):
@@ -166,16 +166,16 @@ def test_a_full_disk_is_told_and_what_was_finished_is_kept(path):
 
 
 def test_a_full_disk_ends_a_study_which_goes_on_when_there_is_room(tmp_path, monkeypatch):
-    whole = found(loads(), tmp_path / "whole")
+    whole = run_rows(loads(), tmp_path / "whole")
     opened = journal._opened
     monkeypatch.setattr(journal, "_opened", lambda path: Full(opened(path), 3000))
     with pytest.raises(SpheretwinError, match="No space left"):
-        found(loads(), tmp_path / "full")
+        run_rows(loads(), tmp_path / "full")
     monkeypatch.setattr(journal, "_opened", opened)
     lines = (tmp_path / "full" / journal.NAME).read_bytes().splitlines()
     assert 2 < len(lines) < 1 + len(whole)
     assert {json.loads(line)[0] for line in lines[1:]} < {row["row"] for row in whole}
-    assert found(loads(), tmp_path / "full") == whole
+    assert run_rows(loads(), tmp_path / "full") == whole
     assert table(tmp_path / "full") == table(tmp_path / "whole")
 
 

@@ -9,7 +9,7 @@ import sys
 import pytest
 
 from spheretwin import cli
-from tests.twin.study.cases import found, rows_of, study, table, values
+from tests.twin.study.cases import rows_of, run_rows, study, table, values
 from tests.waiting import PATIENCE_S, wait_for
 
 PROGRAM = [sys.executable, "-m", "spheretwin"]
@@ -35,7 +35,7 @@ def command(tmp_path):
 @pytest.fixture(scope="module")
 def whole(tmp_path_factory):
     folder = tmp_path_factory.mktemp("whole")
-    found(MANY, folder)
+    run_rows(MANY, folder)
     return folder
 
 

@@ -17,7 +17,7 @@ from spheretwin.scenario.sections import Scenario
 from spheretwin.study import report
 from spheretwin.study.report import drawings
 from spheretwin.study.statistics import Rows, largest, ranked, read, strongest, summary
-from tests.twin.study.cases import LOADS, found, loads, study, values
+from tests.twin.study.cases import LOADS, loads, run_rows, study, values
 
 LISTS = st.none() | st.lists(st.none() | st.floats(-9, 9), min_size=1, max_size=3)
 
@@ -155,7 +155,7 @@ def test_the_page_counts_rows_that_remain_and_rows_that_were_not_requested(
 
 def test_the_page_tells_of_a_study(tmp_path):
     chosen = loads(axis=[*LOADS, values("plant.payload_kg", 0.0, -1.0)])
-    reported = found(chosen, tmp_path)
+    reported = run_rows(chosen, tmp_path)
     rows = read(tmp_path / "table.parquet")
     markdown, html = report.write(tmp_path, rows, summary(rows), (48, 48), "my study.toml")
     text = markdown.read_text()
@@ -176,7 +176,7 @@ def test_the_page_tells_of_a_study(tmp_path):
 
 def test_the_same_table_gives_the_same_page(tmp_path):
     for name in ("a", "b"):
-        found(loads(), tmp_path / name)
+        run_rows(loads(), tmp_path / name)
         rows = read(tmp_path / name / "table.parquet")
         report.write(tmp_path / name, rows, summary(rows), (24, 24), "short")
     for path in (tmp_path / "a").glob("report*"):
@@ -184,14 +184,14 @@ def test_the_same_table_gives_the_same_page(tmp_path):
 
 
 def test_a_study_of_one_row_has_a_page(tmp_path):
-    found(study(), tmp_path)
+    run_rows(study(), tmp_path)
     rows = read(tmp_path / "table.parquet")
     report.write(tmp_path, rows, summary(rows), (1, 1), "short")
     assert "Only the seed differs." in (tmp_path / "report.md").read_text()
 
 
 def test_a_damaged_table_is_refused_with_its_place(tmp_path):
-    found(loads(), tmp_path)
+    run_rows(loads(), tmp_path)
     path = tmp_path / "table.parquet"
     content, whole = path.read_bytes(), read(path)
     assert len(whole.numbers) == 24

@@ -18,7 +18,7 @@ from spheretwin.simulation import simulate
 from spheretwin.study.grid import Grid
 from spheretwin.study.row import Rows
 from spheretwin.study.study import load
-from tests.twin.study.cases import LOADS, found, loads, study, telemetry, values
+from tests.twin.study.cases import LOADS, loads, run_rows, study, telemetry, values
 
 FAULTS = (
     [],
@@ -94,19 +94,19 @@ def test_an_entry_of_a_list_leaves_the_others():
 
 
 def test_faults_are_an_axis(tmp_path):
-    rows = found(study(values("fault", *FAULTS)), tmp_path)
+    rows = run_rows(study(values("fault", *FAULTS)), tmp_path)
     assert [json.loads(row["fault"]) for row in rows] == list(FAULTS)
     assert [row["status"] for row in rows] == ["completed"] * 3
     assert len({tuple(row["rms_error_rad"]) for row in rows}) == 3
 
 
 def test_a_column_of_numbers_is_empty_where_the_value_is_none(tmp_path):
-    rows = found(study(values("plant.gravity_m_s2", None, 1.62)), tmp_path)
+    rows = run_rows(study(values("plant.gravity_m_s2", None, 1.62)), tmp_path)
     assert [row["plant.gravity_m_s2"] for row in rows] == [None, 1.62]
 
 
 def test_none_is_a_value(tmp_path):
-    rows = found(study(values("nominal.inertia_kg_m2", None, [3e-4, 3e-4, 3e-4])), tmp_path)
+    rows = run_rows(study(values("nominal.inertia_kg_m2", None, [3e-4, 3e-4, 3e-4])), tmp_path)
     assert [row["nominal.inertia_kg_m2"] for row in rows] == [None, "[0.0003, 0.0003, 0.0003]"]
     assert [row["error"] for row in rows] == [None, None]
 
@@ -122,7 +122,7 @@ def test_none_is_a_value(tmp_path):
     ],
 )
 def test_columns_are_of_the_values_kind(tmp_path, listed, expected_type):
-    rows = found(study(values("disturbance.load", *listed)), tmp_path)
+    rows = run_rows(study(values("disturbance.load", *listed)), tmp_path)
     column_type = parquet.read_schema(tmp_path / "table.parquet").field("disturbance.load").type
     assert str(column_type) == expected_type
     texts = [each if isinstance(each, str) else json.dumps(each) for each in listed]
@@ -142,7 +142,7 @@ def test_a_law_of_one_s_own_and_figures_of_one_s_own_are_found_beside_the_study(
         '[[axis]]\nfield = "disturbance.load"\nkind = "values"\nvalues = [0.0, 1.0]\n'
     )
     out = tmp_path / "out"
-    rows = found(load(str(tmp_path / "sub" / "study.toml")), out)
+    rows = run_rows(load(str(tmp_path / "sub" / "study.toml")), out)
     assert [row["law"] for row in rows] == ["../mine.py:step", "pd"] * 2
     assert [json.loads(row["ends"]) for row in rows] == [{"status": "completed"}] * 4
     assert all(row["pull"] > 0 for row in rows)
@@ -150,10 +150,10 @@ def test_a_law_of_one_s_own_and_figures_of_one_s_own_are_found_beside_the_study(
     # From another folder it is the same study, and its journal is gone on with.
     for folder, name in ((tmp_path, "sub/study.toml"), (tmp_path / "sub", "study.toml")):
         monkeypatch.chdir(folder)
-        found(load(name), out)
+        run_rows(load(name), out)
         assert (out / "table.parquet").read_bytes() == before
     monkeypatch.setenv("HOME", str(tmp_path))
-    found(load("~/sub/study.toml"), out)
+    run_rows(load("~/sub/study.toml"), out)
     assert (out / "table.parquet").read_bytes() == before
 
 
@@ -167,14 +167,14 @@ def test_files_among_the_values_are_found_beside_the_study(tmp_path):
         fields={"duration": 0.05, "trajectory": {"shape": "waypoints", "file": "a.csv"}},
         folder=str(tmp_path),
     )
-    rows = found(chosen, tmp_path / "out")
+    rows = run_rows(chosen, tmp_path / "out")
     assert [(row["trajectory.file"], row["error"]) for row in rows] == [("a.csv", None), ("b.csv", None)]
     assert rows[0]["max_abs_error_rad"] != rows[1]["max_abs_error_rad"]
 
 
 def test_a_figure_that_fails_leaves_the_others_of_its_row(tmp_path, mine):
     metrics = ["rms_error_rad", f"{mine}:fails", f"{mine}:squares"]
-    rows = found(study(values("disturbance.load", 0.0, 1.0), metrics=metrics), tmp_path)
+    rows = run_rows(study(values("disturbance.load", 0.0, 1.0), metrics=metrics), tmp_path)
     assert [(row["status"], row["fails"]) for row in rows] == [("completed", 1.0), ("completed", None)]
     assert rows[1]["error"] == "metric fails: expected a figure, it raised ValueError: too much"
     assert len(rows[1]["rms_error_rad"]) == 3
@@ -186,7 +186,7 @@ def test_a_law_that_raises_is_a_row_with_its_error(tmp_path):
     (tmp_path / "bad.py").write_text(
         "def step(t, reference, measurement, parameters, state, torque):\n    raise ValueError('no more')\n"
     )
-    rows = found(study(law=[{"law": f"{tmp_path}/bad.py:step"}, {"law": "pd"}]), tmp_path / "out")
+    rows = run_rows(study(law=[{"law": f"{tmp_path}/bad.py:step"}, {"law": "pd"}]), tmp_path / "out")
     assert rows[0]["error"] is not None
     assert "no more" in rows[0]["error"]
     assert (rows[1]["status"], rows[1]["error"]) == ("completed", None)
@@ -194,7 +194,7 @@ def test_a_law_that_raises_is_a_row_with_its_error(tmp_path):
 
 def test_all_figures_are_those_of_the_run(tmp_path):
     chosen = loads()
-    rows = found(chosen, tmp_path)
+    rows = run_rows(chosen, tmp_path)
     for row, of_row in list(zip(rows, scenarios(chosen), strict=True))[::7]:
         alone = figures_of(simulate(of_row))
         assert {name: row[name] for name in METRICS} == alone
@@ -202,7 +202,7 @@ def test_all_figures_are_those_of_the_run(tmp_path):
 
 def test_telemetry_of_chosen_rows_is_kept(tmp_path):
     chosen = loads(telemetry=[2, 3])
-    rows = found(chosen, tmp_path, threads=2)
+    rows = run_rows(chosen, tmp_path, threads=2)
     assert telemetry(tmp_path) == sorted(f"{rows[number]['key']}.parquet" for number in (2, 3))
     path = tmp_path / "telemetry" / f"{rows[3]['key']}.parquet"
     stored = read_parquet(path)[0]
@@ -226,7 +226,7 @@ def test_a_row_alone_and_its_printed_command_give_the_same_figures(tmp_path, cap
     a_study = loads(**fields)
     source.write_text(_toml(json.loads(a_study.model_dump_json(exclude_none=True))))
     assert load(str(source)).model_dump() == a_study.model_dump()
-    for row in found(a_study, tmp_path)[-2:]:
+    for row in run_rows(a_study, tmp_path)[-2:]:
         assert cli.main(["sweep", str(source), "--row", row["key"], "--json"]) == cli.DONE
         alone = json.loads(capsys.readouterr().out)
         program, *words = shlex.split(alone["command"])
@@ -288,7 +288,7 @@ def test_each_row_has_the_model_file_of_its_scenario(tmp_path):
     text = actuators.MJCF_PATH.read_text().replace('meshdir="', f'meshdir="{actuators.FOLDER}/')
     heavy.write_text(re.sub(r'diaginertia="2(\S+) 2(\S+) 2(\S+)"', r'diaginertia="3\1 3\2 3\3"', text))
     chosen = study(values("plant.mjcf", str(actuators.MJCF_PATH), str(heavy)), fields={"duration": 0.05})
-    rows = found(chosen, tmp_path / "out")
+    rows = run_rows(chosen, tmp_path / "out")
     shipped, changed = scenarios(chosen)
     alone = [figures_of(simulate(each))["rms_error_rad"] for each in (shipped, changed)]
     assert [row["rms_error_rad"] for row in rows] == alone

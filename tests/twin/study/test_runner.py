@@ -12,25 +12,25 @@ from spheretwin.study.engines.threads import AHEAD
 from spheretwin.study.grid import Grid
 from spheretwin.study.row import Rows
 from spheretwin.study.runner import run
-from tests.twin.study.cases import SHORT, found, loads, rows_of, study, table, values
+from tests.twin.study.cases import SHORT, loads, rows_of, run_rows, study, table, values
 
 
 @pytest.fixture(scope="module")
 def whole(tmp_path_factory):
     """Folder of a study that was run at once on one thread."""
     folder = tmp_path_factory.mktemp("whole")
-    found(loads(), folder)
+    run_rows(loads(), folder)
     return folder
 
 
 @pytest.mark.parametrize("threads", [2, 64])
 def test_threads_change_no_byte(whole, tmp_path, threads):
-    found(loads(), tmp_path, threads=threads)
+    run_rows(loads(), tmp_path, threads=threads)
     assert table(tmp_path) == table(whole)
 
 
 def stopped(folder, threads):
-    """What was found, and told, of a study that is stopped after its second row."""
+    """What was run_rows, and told, of a study that is stopped after its second row."""
     messages = []
     done = run(
         loads(),
@@ -59,12 +59,12 @@ def test_a_study_over_laws_and_hardware_is_the_same_in_pieces(tmp_path, threads)
     """Rows of several kinds, which share no set-up, one after the other in one process."""
     laws = [{"law": "pd"}, {"law": "afsm"}, {"law": "pid"}]
     kinds = study(values("hardware", "ideal", "electronics"), values("disturbance.load", 0.5, 2.0), law=laws)
-    found(kinds, tmp_path / "whole")
+    run_rows(kinds, tmp_path / "whole")
     for limit in (3, 8, None):
-        found(kinds, tmp_path / "pieces", threads=threads, limit=limit)
+        run_rows(kinds, tmp_path / "pieces", threads=threads, limit=limit)
     assert table(tmp_path / "pieces") == table(tmp_path / "whole")
     # Rows with telemetry have sensors that other rows do not need.
-    with_telemetry = found(kinds.model_copy(update={"telemetry": (6, 8)}), tmp_path / "telemetry")
+    with_telemetry = run_rows(kinds.model_copy(update={"telemetry": (6, 8)}), tmp_path / "telemetry")
     assert with_telemetry == rows_of(tmp_path / "whole")
     alone = Rows(kinds)
     for row, of_table in zip(Grid(kinds), rows_of(tmp_path / "whole"), strict=True):
@@ -73,11 +73,11 @@ def test_a_study_over_laws_and_hardware_is_the_same_in_pieces(tmp_path, threads)
 
 
 def test_a_limit_runs_the_first_rows_and_drops_no_finished_one(whole, tmp_path):
-    assert found(loads(), tmp_path, limit=5) == rows_of(whole)[:5]
+    assert run_rows(loads(), tmp_path, limit=5) == rows_of(whole)[:5]
     done = run(loads(), tmp_path, limit=3)
     assert (done.rows, done.of, done.study_rows, done.resumed) == (5, 5, 24, 5)
     assert rows_of(tmp_path) == rows_of(whole)[:5]
-    found(loads(), tmp_path)
+    run_rows(loads(), tmp_path)
     assert table(tmp_path) == table(whole)
     done = run(loads(), tmp_path, limit=5)
     assert (done.rows, done.of, done.study_rows, done.resumed) == (24, 24, 24, 24)
@@ -85,7 +85,7 @@ def test_a_limit_runs_the_first_rows_and_drops_no_finished_one(whole, tmp_path):
 
 
 def test_rows_behind_a_limit_stay_where_rows_before_it_are_missing(whole, tmp_path):
-    found(loads(), tmp_path)
+    run_rows(loads(), tmp_path)
     journal = tmp_path / "journal.jsonl"
     head, *lines = journal.read_bytes().splitlines(keepends=True)
     # Rows 3, 4 and 5 are left.
@@ -99,11 +99,11 @@ def test_rows_behind_a_limit_stay_where_rows_before_it_are_missing(whole, tmp_pa
 
 def test_a_table_in_many_batches_has_the_same_rows(whole, tmp_path, monkeypatch):
     monkeypatch.setattr(tables, "BATCH_ROWS", 5)
-    assert found(loads(), tmp_path) == rows_of(whole)
+    assert run_rows(loads(), tmp_path) == rows_of(whole)
 
 
 def test_a_row_that_is_refused_is_a_row_with_its_error(tmp_path):
-    rows = found(study(values("plant.payload_kg", 0.0, -1.0, 0.01)), tmp_path)
+    rows = run_rows(study(values("plant.payload_kg", 0.0, -1.0, 0.01)), tmp_path)
     assert [row["status"] for row in rows] == ["completed", "refused", "completed"]
     assert "plant.payload_kg: expected a number greater than or equal to 0, received -1.0" in rows[1]["error"]
     assert rows[1]["rms_error_rad"] is rows[0]["error"] is None
@@ -112,7 +112,7 @@ def test_a_row_that_is_refused_is_a_row_with_its_error(tmp_path):
 def test_a_run_that_ends_early_is_a_row_with_what_it_gave(tmp_path):
     stuck = [{"target": "encoder.gamma", "mode": "dropout", "start_s": 0.01}]
     chosen = study(values("watchdog.on", True), fields={"duration": 0.3, "fault": stuck}, fast=False)
-    (row,) = found(chosen, tmp_path)
+    (row,) = run_rows(chosen, tmp_path)
     assert (row["status"], row["reason"], row["error"]) == ("failsafe", "no fresh measurement", None)
     assert row["watchdog.on"] is True
     assert len(row["rms_error_rad"]) == 3
@@ -130,7 +130,7 @@ def test_plants_that_differ_end_the_study_and_keep_its_rows(tmp_path, monkeypatc
     monkeypatch.setattr(agreement, "_rms", elsewhere)
     monkeypatch.setattr(agreement, "EVERY", 5)
     with pytest.raises(SpheretwinError) as failure:
-        found(loads(), tmp_path)
+        run_rows(loads(), tmp_path)
     wrong = {number for number, _ in checked if number > 0}  # rows that had been handed out have their turn
     both = [(number, engine) for number in (0, *wrong) for engine in ("lagrangian", "mujoco")]
     assert sorted(checked) == sorted(both)
@@ -164,7 +164,7 @@ def test_the_bound_of_the_plants_is_a_bound(tmp_path, monkeypatch, share):
 
 
 def test_the_rows_are_the_same_on_both_plants_within_the_bound(tmp_path):
-    fast, slow = (found(loads(fast=fast), tmp_path / str(fast)) for fast in (True, False))
+    fast, slow = (run_rows(loads(fast=fast), tmp_path / str(fast)) for fast in (True, False))
     for ours, theirs in zip(fast, slow, strict=True):
         assert ours["key"] == theirs["key"]
         assert ours["rms_error_rad"] == pytest.approx(theirs["rms_error_rad"], rel=agreement.BOUND)
@@ -184,10 +184,10 @@ def test_a_plant_that_is_named_is_kept(tmp_path):
 def test_a_folder_that_cannot_be_had_is_refused(tmp_path):
     (tmp_path / "file").write_text("")
     with pytest.raises(InputError, match="expected a writable folder"):
-        found(study(), tmp_path / "file")
+        run_rows(study(), tmp_path / "file")
     (tmp_path / "journal.jsonl").mkdir()
     with pytest.raises(InputError, match="expected a folder for its journal"):
-        found(study(), tmp_path)
+        run_rows(study(), tmp_path)
 
 
 def test_a_failure_of_the_table_hides_no_other(tmp_path, monkeypatch):
@@ -199,10 +199,10 @@ def test_a_failure_of_the_table_hides_no_other(tmp_path, monkeypatch):
 
     monkeypatch.setattr(tables, "write", fails)
     with pytest.raises(SpheretwinError, match="table"):
-        found(study(), tmp_path / "a")
+        run_rows(study(), tmp_path / "a")
     monkeypatch.setattr(agreement, "check", differs)
     with pytest.raises(SpheretwinError, match="plants"):
-        found(study(), tmp_path / "b")
+        run_rows(study(), tmp_path / "b")
 
 
 @pytest.mark.parametrize("field", [{"plant.engine": "lagrangian"}, {"plant.integrator": "Euler"}], ids=str)

@@ -8,7 +8,7 @@ from spheretwin.study.grid import Grid
 from spheretwin.study.row import Rows
 from spheretwin.study.runner import run
 from spheretwin.study.study import load, shipped
-from tests.twin.study.cases import LOADS, found, study, values
+from tests.twin.study.cases import LOADS, run_rows, study, values
 
 PD = [{"law": "pd"}]
 
@@ -109,7 +109,7 @@ def test_a_figure_may_not_have_the_name_of_a_column(tmp_path):
 
 
 def test_some_values_out_of_range_are_rows_all_of_them_are_a_refusal(tmp_path):
-    assert len(found(study(values("plant.payload_kg", -1.0, 0.0)), tmp_path / "a")) == 2
+    assert len(run_rows(study(values("plant.payload_kg", -1.0, 0.0)), tmp_path / "a")) == 2
     chosen = study(values("plant.payload_kg", -1.0, -2.0))
     assert "received none among 2; the first: scenario" in refusal(lambda: run(chosen, tmp_path / "b"))
 

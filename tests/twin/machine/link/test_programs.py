@@ -2,7 +2,6 @@
 
 import contextlib
 import json
-import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -14,20 +13,20 @@ from spheretwin import cli, simulation
 from spheretwin import scenario as scenarios
 from spheretwin.bench import Bench
 from spheretwin.models.telemetry.table import read_parquet
+from tests.requirements import C_COMPILER, needs_c_compiler, needs_posix
 from tests.waiting import PATIENCE_S
 
-COMPILER = shutil.which("cc") or shutil.which("gcc") or shutil.which("clang")
 HERE, ROOT = Path(__file__).parent, Path(__file__).parents[4]
 CURVE = ROOT / "models" / "torque_curve.csv"
 EXAMPLE = ROOT / "twin" / "machine" / "link" / "examples" / "pid_controller.c"
 
-pytestmark = pytest.mark.skipif(not COMPILER or sys.platform == "win32", reason="no C compiler with POSIX")
+pytestmark = [needs_c_compiler, needs_posix]
 
 
 def built(source, folder):
     program = folder / source.stem
     options = ["-std=c99", "-O2", "-Wall", "-Wextra", "-pedantic", "-Werror"]
-    subprocess.run([COMPILER, *options, "-o", program, source, "-lm"], check=True)
+    subprocess.run([*C_COMPILER, *options, "-o", program, source, "-lm"], check=True)
     return program
 
 

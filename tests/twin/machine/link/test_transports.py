@@ -10,6 +10,7 @@ import pytest
 
 from spheretwin.machine.link.transports import Stream, Udp, open_transport
 from spheretwin.models.base.errors import InputError, SpheretwinError
+from tests.requirements import needs_pseudo_terminal
 
 SOON_s = 30.0  # a bound of a hang: everything is local
 
@@ -65,7 +66,7 @@ def test_nobody_at_the_address_is_silence():
             assert end.receive(0.01) == b""
 
 
-@pytest.mark.skipif(not hasattr(os, "openpty"), reason="no pseudo-terminals")
+@needs_pseudo_terminal
 def test_a_serial_line_carries_bytes_of_any_value():
     ours, theirs = os.openpty()
     everything = bytes(range(256))
