@@ -288,8 +288,10 @@ class Disturbance(BaseModel):
         (n, 3) array, N·m
             Generalised torque, subtracted in (1); not finite if a growing envelope overflows.
         """
-        bound = np.full(3, self.random_bound_Nm)
-        torque = self.load * LOAD_UNIT_Nm + random_torque(t, draws.paper, bound, self.gamma_envelope)
+        torque = np.full((len(t), 3), self.load * LOAD_UNIT_Nm)
+        if self.random_bound_Nm:
+            bound = np.full(3, self.random_bound_Nm)
+            torque += random_torque(t, draws.paper, bound, self.gamma_envelope)
         for place, term in enumerate(self.terms):
             torque += term.sample(t, partial(draws.of_term, place))
         return torque

@@ -22,6 +22,7 @@ from spheretwin.models.base.compiled import for_types_of
 from spheretwin.models.base.errors import LawError
 from spheretwin.models.base.numba_internals import Dispatcher, callback_errors
 from spheretwin.models.base.state import check_length, restore_state, save_state, transfer_state
+from spheretwin.models.base.turns import outside_turn
 from spheretwin.models.telemetry.signals import width
 from spheretwin.plant.rotor import Rotor
 from spheretwin.scenario.changes import StateChange
@@ -183,7 +184,8 @@ class Runtime:
     def _run(self, inputs: loops.Inputs, log: NDArray[np.float64]) -> tuple[int, int]:
         """Run the loop and store the first exception of a compiled law."""
         if not self._may_raise:
-            done = self.loop(inputs, *self._parts, log)
+            with outside_turn:
+                done = self.loop(inputs, *self._parts, log)
             self._connection.raise_error()
             return done
         raised: list[BaseException] = []
@@ -192,7 +194,7 @@ class Runtime:
             raised.append(error)
             self._controller.torque_q[:] = np.nan  # the law may have written part of a torque
 
-        with callback_errors(receive):
+        with outside_turn, callback_errors(receive):
             ticks, code = self.loop(inputs, *self._parts, log)
         self._connection.raise_error()
         if raised and self.law_error is None:

@@ -19,6 +19,7 @@ from spheretwin.models.base.numba_internals import (
     TupleCompiler,
     c_callback,
     cached,
+    fingerprint_of_types,
     inline_overload,
 )
 
@@ -87,33 +88,13 @@ def for_types_of(function: Any, *arguments: Any) -> Callable[..., Any]:
     """
     if not isinstance(function, Dispatcher):
         return uncompiled(function)
-    key = function, *_kinds_of(arguments)
+    key = function, fingerprint_of_types(arguments)
     if key not in _ENTRIES:
         _ENTRIES[key] = function.compile(tuple(map(numba.typeof, arguments)))
     return _ENTRIES[key]
 
 
-# Numba's type check of a hundred arrays in nested tuples takes half of the start-up time of a session.
-_ENTRIES: dict[tuple[Any, ...], Callable[..., Any]] = {}
-
-
-# C-contiguous, Fortran-contiguous, aligned, writeable: the flags of NumPy that a type depends on.
-_TYPE_FLAGS = 0x0001 | 0x0002 | 0x0100 | 0x0400
-
-
-def _kinds_of(values: tuple[Any, ...]) -> list[Any]:
-    """Return a key of numba's types of values: types, each with what its numba type depends on."""
-    kinds: list[Any] = []
-    rest = list(values)
-    while rest:  # no recursion: a session has 350 values in nested tuples
-        value = rest.pop()
-        kinds.append(type(value))
-        if isinstance(value, np.ndarray):
-            kinds += (value.dtype, value.ndim, value.flags.num & _TYPE_FLAGS)
-        elif isinstance(value, tuple):
-            kinds.append(len(value))
-            rest += value
-    return kinds
+_ENTRIES: dict[tuple[Any, bytes], Callable[..., Any]] = {}
 
 
 def uncompiled(function: Callable[..., Any]) -> Callable[..., Any]:

@@ -21,6 +21,9 @@ refused, or the loop is slower.
 blocks use a place in memory, and LLVM spends most of the compile time on copies of tuples of many arrays.
 Consequence: the loop compiles two to three times as long.
 
+*Fingerprint of types* (`_dispatcher.compute_fingerprint`). Reason: numba's type of the hundred arrays of a
+loop takes half of the start-up time of a session. Consequence: an exception at the first loop.
+
 *Callbacks with bounds checks and exceptions* (`CFunc`, `Dispatcher`, the text of `sys.unraisablehook`).
 Reason: numba checks bounds only in the outermost function, and drops the exceptions of callbacks.
 Consequence: an exception of a law is printed, and the run ends as diverged.
@@ -45,7 +48,7 @@ from typing import Any
 import llvmlite.binding
 import numpy as np
 from llvmlite import ir
-from numba import njit, typeof, types
+from numba import _dispatcher, njit, typeof, types
 from numba.core import cgutils
 from numba.core import ir as numba_ir
 from numba.core.analysis import compute_cfg_from_blocks, compute_use_defs, must_use_alloca
@@ -155,6 +158,21 @@ def _enclosed(function: Callable[..., Any]) -> list[Any]:
         else:
             identities.append(dumps(cell.cell_contents))
     return identities
+
+
+def fingerprint_of_types(values: tuple[Any, ...]) -> bytes:
+    """Return a key of numba's types of values: values with one key have one type.
+
+    Numba itself looks up the type of an argument by it. It has the names of a named tuple's class and fields,
+    and no two classes of this package share both.
+
+    Raises
+    ------
+    NotImplementedError
+        A value is no number, array or tuple of them.
+    """
+    key: bytes = _dispatcher.compute_fingerprint(values)
+    return key
 
 
 def cached(dispatcher: Any, function: Callable[..., Any]) -> Any:

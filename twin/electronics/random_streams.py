@@ -10,6 +10,7 @@ bits of which each number is a hash of the state. NumPy guarantees both algorith
 
 from __future__ import annotations
 
+from contextlib import AbstractContextManager, nullcontext
 from functools import cache
 from hashlib import blake2b
 from math import sqrt
@@ -18,7 +19,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from spheretwin.models.base.compiled import allocation_free, high_product, inlined, rounding_each
+from spheretwin.models.base.compiled import COMPILES, allocation_free, high_product, inlined, rounding_each
 
 # Of SeedSequence: multipliers and starts of its hashes, on words of 32 bits.
 _WORD = np.uint64(0xFFFFFFFF)
@@ -77,9 +78,14 @@ def uniforms(seed: int, name: str, channels: int, count: int) -> NDArray[np.floa
     """
     drawn = np.empty((channels, count))
     entropy = np.array([*_words(seed), *_words(stream_key(name)), 0], dtype=np.uint64)
-    with np.errstate(over="ignore"):  # uncompiled: the overflow of products is intended
+    with _overflowing():
         _draw(entropy, np.empty(_POOL, dtype=np.uint64), np.empty(2 * _POOL, dtype=np.uint64), drawn)
     return drawn
+
+
+def _overflowing() -> AbstractContextManager[None]:
+    """Return a context in which products may overflow, as intended; compiled code does not report it."""
+    return nullcontext() if COMPILES else np.errstate(over="ignore")
 
 
 def errors(seed: int, name: str, channels: int, count: int) -> NDArray[np.float64]:
@@ -230,7 +236,7 @@ def _fill_normal(entropy: NDArray[np.uint64], first: int, rows: NDArray[np.float
     ticks, width = rows.shape
     pairs, with_sine = 2 * -(-width // NUMBERS_PER_COUNT), 2 * ((width + 1) // NUMBERS_PER_COUNT)
     uniform, angle = np.empty((2, pairs, ticks))
-    with np.errstate(over="ignore"):  # uncompiled: the overflow of products is intended
+    with _overflowing():
         _fill_pairs(entropy, np.empty((2, _POOL), np.uint64), np.uint64(first), uniform, angle)
     logarithm, sine = np.log1p(uniform, out=uniform), np.sin(angle[:with_sine])
     _transform(logarithm, np.cos(angle, out=angle), sine, rows)

@@ -18,6 +18,7 @@ from spheretwin.models.base.errors import (
     exception_text,
     shown,
 )
+from spheretwin.models.base.turns import outside_turn
 from spheretwin.models.base.user_code import is_reference
 from spheretwin.models.telemetry.parquet import TelemetryFile
 from spheretwin.models.telemetry.table import TelemetryBuffer
@@ -223,7 +224,8 @@ class Rows:
         complaints: list[str] = []
         if buffer:
             run = Run(session.initial_scenario, status, buffer.table, session.loop_s, session.actuator)
-            own, complaints = own_values(self._own, run)
+            with outside_turn:
+                own, complaints = own_values(self._own, run)
             figures |= own
         reason = session.reason.text if session.reason else None
         return Result(str(status), reason, "; ".join(complaints) or None, figures)

@@ -1,6 +1,11 @@
 """Private APIs of numba and MuJoCo exist and do what this package needs; a failure names the API."""
 
+import contextlib
 import ctypes
+import importlib
+import pkgutil
+import sys
+from collections import Counter
 from typing import NamedTuple
 
 import mujoco
@@ -11,7 +16,8 @@ from numba import types
 from numba.core import ccallback, compiler, dispatcher, event, lowering
 from numba.core.runtime import rtsys
 
-from spheretwin.models.base import mujoco_library, numba_internals
+import spheretwin
+from spheretwin.models.base import cache, mujoco_library, numba_internals
 from spheretwin.models.base.compiled import allocation_free, compilable, compiled
 from spheretwin.models.base.errors import EngineError
 from spheretwin.models.base.numba_internals import NO_ALLOCATION
@@ -167,8 +173,9 @@ def test_compiled_code_reads_a_tuple_from_memory():
 
 
 @needs_compiled_functions
-def test_an_inlined_implementation_has_no_machine_code():
+def test_an_inlined_implementation_has_no_machine_code(monkeypatch):
     """Numba reports each function that it compiles: here only the caller."""
+    monkeypatch.setattr(cache, "load_entry", lambda name: None)
     compiled_functions = []
 
     class Listener(event.Listener):
@@ -189,3 +196,49 @@ def test_an_inlined_implementation_has_no_machine_code():
     with event.install_listener("numba:compile", Listener()):
         assert caller(3.0) == 7.0
     assert compiled_functions == ["caller"]
+
+
+class Other(NamedTuple):
+    first: np.ndarray
+    second: np.ndarray
+
+
+def test_values_with_one_fingerprint_have_one_type():
+    one, two = np.zeros(3), np.zeros((3, 3))
+    locked = np.zeros(3)
+    locked.flags.writeable = False
+    unaligned = np.zeros(25, dtype=np.uint8)[1:].view(np.float64)
+    scalars = (1, 1.0, True, None, np.int64(1), (), (1,), (1, 1), (1.0,))
+    values = [
+        *(Pair(array, one) for array in (one, two, two.T, two[:, 0], locked, unaligned)),
+        *(Pair(one.astype(kind), one) for kind in (np.int64, np.float32, np.bool_, np.uint64)),
+        *(Pair(each, one) for each in scalars),
+        *(Other(one, one), (one, one), (Pair(one, one),), (Pair(one, one), Pair(one, one))),
+    ]
+    by_key = {}
+    for value in values:
+        by_key.setdefault(fingerprint(value), set()).add(numba.typeof(value))
+    assert all(len(kinds) == 1 for kinds in by_key.values())
+    assert fingerprint(Pair(np.ones(5), np.ones(7))) == fingerprint(values[0])
+
+
+def fingerprint(*values):
+    return numba_internals.fingerprint_of_types(values)
+
+
+def test_no_two_named_tuples_of_the_package_have_one_fingerprint():
+    modules = [name for name in sys.modules if name.startswith("spheretwin.")]
+    for found in pkgutil.walk_packages(spheretwin.__path__, "spheretwin."):
+        if found.name not in modules and not found.name.endswith("__main__"):
+            with contextlib.suppress(ImportError):  # of a library that is not installed
+                importlib.import_module(found.name)
+    classes = {
+        each
+        for name, module in list(sys.modules.items())
+        if name.startswith("spheretwin.")
+        for each in vars(module).values()
+        if isinstance(each, type) and issubclass(each, tuple) and hasattr(each, "_fields")
+    }
+    assert len(classes) > 200
+    names = Counter((each.__name__, each._fields) for each in classes)
+    assert [name for name, count in names.items() if count > 1] == []

@@ -8,6 +8,7 @@ from collections.abc import Callable, Generator, Iterable
 from queue import SimpleQueue
 from typing import TypeVar
 
+from spheretwin.models.base.turns import outside_turn, turn
 from spheretwin.study.engines.engine import Engine, Order
 from spheretwin.study.grid import Row
 from spheretwin.study.row import Result
@@ -28,7 +29,7 @@ def run_each(
     """Yield each item with its result, in the order in which they finish.
 
     Each thread takes the next item by itself: a dispatcher would need a tenth of the time of a run of a
-    millisecond, and Python runs in one thread at a time.
+    millisecond. One thread at a time runs Python, the others run their compiled loops (`models.base.turns`).
 
     Parameters
     ----------
@@ -53,7 +54,9 @@ def run_each(
     def run_items() -> None:
         try:
             while (item := next_item()) is not None:
-                results.put((item, work(item)))
+                with turn():
+                    result = work(item)
+                results.put((item, result))
         except BaseException as error:  # the caller raises it
             results.put(error)
         results.put(None)
@@ -65,7 +68,8 @@ def run_each(
     running = count
     try:
         while running:
-            result = results.get()
+            with outside_turn:  # of a caller that is itself such work
+                result = results.get()
             if isinstance(result, BaseException):
                 raise result
             if result is None:
@@ -78,8 +82,9 @@ def run_each(
     finally:
         stopped.set()
         room.release(count)
-        for thread in crew:
-            thread.join()
+        with outside_turn:
+            for thread in crew:
+                thread.join()
 
 
 def run(order: Order) -> Generator[tuple[Row, Result | None]]:
