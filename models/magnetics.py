@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from spheretwin.models.actuator import Actuator, CoilGeometry, Magnet
 from spheretwin.models.base.cache import cached_array
-from spheretwin.models.base.compiled import allocation_free, inlined, part_of_its_caller
+from spheretwin.models.base.compiled import allocation_free, inlined
 from spheretwin.models.base.errors import InputError, distinct_texts, one_line
 from spheretwin.models.kinematics import rotation_rows
 from spheretwin.models.torque_curve import TorqueCurve
@@ -312,7 +312,7 @@ def cached_matrix(model: TorqueModel) -> CachedMatrix:
     return CachedMatrix(np.full(3, np.nan), np.empty((3, model.group_axes.shape[1])), scratch_of(model))
 
 
-@part_of_its_caller
+@inlined
 def update_cached_matrix(q: NDArray[np.float64], model: TorqueModel, cached: CachedMatrix) -> None:
     """Compute the torque matrix at a pose, unless it is the cached pose.
 

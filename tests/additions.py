@@ -83,7 +83,7 @@ class Kick(DisturbanceTerm):
     "telemetry column": Addition(
         "",
         """
-@part_of_its_caller
+@inlined
 def write_largest(row, controller, sensors, plant):
     row[0] = 0.0
     for j in range(plant.current.shape[0]):
@@ -333,7 +333,7 @@ def turn(stage, measurement, noise):
 
 from spheretwin.electronics.stages import pass_line
 from spheretwin.electronics.stages import FaultLine, fault_line
-from spheretwin.models.base.compiled import part_of_its_caller
+from spheretwin.models.base.compiled import inlined
 
 
 class FilterSection(DriveStage):
@@ -362,7 +362,7 @@ class Filter(NamedTuple):
     line: FaultLine
 
 
-@part_of_its_caller
+@inlined
 def attenuate(stage, setpoint, draws):
     for j in range(setpoint.shape[0]):
         setpoint[j] *= stage.gain

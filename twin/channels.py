@@ -353,22 +353,28 @@ CHANNELS: tuple[Channel, ...] = (
 
 def _chain(channels: tuple[Channel, ...], place: int = 0) -> Any:
     """Return one compiled function that writes the columns of all channels, without a loop over functions."""
-    if not channels:
-        return _nothing
-    write, others = channels[0].write, _chain(channels[1:], place + 1)
+    if len(channels) == 1:
+        return _if_logged(channels[0].write, place)
+    half = len(channels) // 2  # halves: each level of the chain is copied into the one above
+    write, write_others = _chain(channels[:half], place), _chain(channels[half:], place + half)
 
     @part_of_its_caller
-    def write_and_continue(row: Any, offsets: Any, controller: Any, sensors: Any, plant: Any) -> None:
+    def write_all(row: Any, offsets: Any, controller: Any, sensors: Any, plant: Any) -> None:
+        write(row, offsets, controller, sensors, plant)
+        write_others(row, offsets, controller, sensors, plant)
+
+    return write_all
+
+
+def _if_logged(write: Any, place: int) -> Any:
+    """Return a compiled function that writes the columns of one channel, if a run has them."""
+
+    @part_of_its_caller
+    def write_if_logged(row: Any, offsets: Any, controller: Any, sensors: Any, plant: Any) -> None:
         if offsets[place] >= 0:
             write(row[offsets[place] :], controller, sensors, plant)
-        others(row, offsets, controller, sensors, plant)
 
-    return write_and_continue
-
-
-@part_of_its_caller
-def _nothing(row: Any, offsets: Any, controller: Any, sensors: Any, plant: Any) -> None:
-    pass
+    return write_if_logged
 
 
 write_channels = _chain(CHANNELS)

@@ -18,7 +18,7 @@ from spheretwin.models.base.numba_internals import (
     Dispatcher,
     TupleCompiler,
     c_callback,
-    cached,
+    compiled_function,
     fingerprint_of_types,
     inline_overload,
 )
@@ -28,7 +28,8 @@ F = TypeVar("F", bound=Callable[..., Any])
 COMPILES = not numba.config.DISABLE_JIT
 """Whether functions are compiled; ``NUMBA_DISABLE_JIT=1`` runs them as plain Python, for debugging."""
 
-_OPTIONS: dict[str, Any] = {"error_model": "numpy", "fastmath": {"contract"}}
+# Without a second conversion of the arguments, for functions that are passed as values: ours go by address.
+_OPTIONS: dict[str, Any] = {"error_model": "numpy", "fastmath": {"contract"}, "no_cfunc_wrapper": True}
 _ALLOCATION_FREE = {**NO_ALLOCATION, "pipeline_class": TupleCompiler}
 
 # Attribute of a plain function with its compiled callbacks: they refer to it, and must not outlive it.
@@ -63,21 +64,23 @@ def rounding_each(function: F) -> F:
     return _compiled(function, **_ALLOCATION_FREE, fastmath=False)
 
 
-def part_of_its_caller(function: F) -> F:
-    """Compile a function, as `allocation_free` does, into each compiled function that calls it.
-
-    For functions that are called once per tick or step with tuples of many arrays: passing an array copies
-    seven numbers, a quarter of the loop's own time.
-    """
-    return _compiled(function, **_ALLOCATION_FREE, inline="always")
-
-
 def inlined(function: F) -> F:
-    """Compile a formula on scalars, as `allocation_free` does, always into its caller.
+    """Compile a function, as `allocation_free` does, always into its caller, after its own optimisation.
 
-    A loop in which a call is left is not vectorised.
+    A call copies seven numbers for each array of a tuple, and a loop in which a call is left is not
+    vectorised.
     """
     return _compiled(function, **_ALLOCATION_FREE, forceinline=True)
+
+
+def part_of_its_caller(function: F) -> F:
+    """Copy a function into its caller before the caller is compiled.
+
+    For chains of functions that get the same tuples of many arrays: the caller compiles in less time than
+    with `inlined`. Its loops are slower, because the optimiser sees them only in the midst of a large
+    function.
+    """
+    return _compiled(function, **_ALLOCATION_FREE, inline="always")
 
 
 def for_types_of(function: Any, *arguments: Any) -> Callable[..., Any]:
@@ -185,7 +188,7 @@ def _compiled(function: F, **more: Any) -> F:
         return function
     return cast(
         "F",
-        cached(numba.njit(nogil=True, **{**_OPTIONS, **more})(function), function),
+        compiled_function(function, nogil=True, **{**_OPTIONS, **more}),
     )
 
 

@@ -4,6 +4,10 @@
 `_cache`). Reason: numba's cache tracks one file of sources, and a damaged entry is an error at every call.
 Consequence of a change: a function is compiled in every process, or an exception at its first call.
 
+*Functions for compiled callers* (`CPUDispatcher`, its `_compiler`, `overloads` and `add_overload`). Reason:
+numba compiles the conversion of Python arguments of every function, a fifth of the compile time of a loop.
+Consequence: a loop compiles longer, or a function is compiled at every call.
+
 *Inlined implementations without machine code* (`make_overload_template`, `_get_jit_decorator`,
 `_can_compile`). Reason: numba compiles an implementation completely, then inlines it and drops the code, a
 tenth of the compile time of a loop. Consequence: the loop does not compile, or takes longer.
@@ -54,14 +58,16 @@ from numba.core import ir as numba_ir
 from numba.core.analysis import compute_cfg_from_blocks, compute_use_defs, must_use_alloca
 from numba.core.caching import NullCache
 from numba.core.ccallback import CFunc
-from numba.core.compiler import CompilerBase, CompileResult, DefaultPassBuilder
+from numba.core.compiler import Compiler, CompilerBase, CompileResult, DefaultPassBuilder
+from numba.core.compiler_lock import global_compiler_lock
 from numba.core.compiler_machinery import PassManager, register_pass
 from numba.core.dispatcher import Dispatcher as Dispatcher  # the class of compiled functions
 from numba.core.errors import NumbaWarning
 from numba.core.lowering import Lower
-from numba.core.registry import cpu_target
+from numba.core.registry import CPUDispatcher, cpu_target
 from numba.core.runtime import rtsys
 from numba.core.serialize import dumps
+from numba.core.sigutils import normalize_signature
 from numba.core.typed_passes import NativeLowering
 from numba.core.typing.templates import infer, infer_global, make_overload_template
 from numba.cpython import hashing
@@ -76,7 +82,7 @@ from spheretwin.models.base import cache, compilation
 _REGISTERED = hashing, function_type
 
 
-NO_ALLOCATION = {"_nrt": False}
+NO_ALLOCATION: dict[str, Any] = {"_nrt": False}
 """Options of a compiled function that creates no array: it counts no references."""
 
 
@@ -138,7 +144,8 @@ class MachineCode(NullCache):
         """Return the name of an entry: function, then a digest of function, signature and processor."""
         line = self._function.__code__.co_firstlineno
         enclosed = _enclosed(self._function)
-        key = repr((self._name, line, enclosed, self._kind, str(sig), codegen.magic_tuple()))
+        for_caller = _NESTING.depth > 0
+        key = repr((self._name, line, enclosed, self._kind, for_caller, str(sig), codegen.magic_tuple()))
         readable = re.sub(r"\W+", "-", self._name.removeprefix("spheretwin."))[:60]
         return f"{readable}-{hashlib.sha256(key.encode()).hexdigest()[:24]}"
 
@@ -175,10 +182,71 @@ def fingerprint_of_types(values: tuple[Any, ...]) -> bytes:
     return key
 
 
-def cached(dispatcher: Any, function: Callable[..., Any]) -> Any:
-    """Return a compiled function with a cache, as its `enable_caching` does with numba's own."""
-    dispatcher._cache = MachineCode(function, "function")
-    return dispatcher
+class _Nesting(threading.local):
+    """Number of functions that a thread compiles for compiled callers, one inside the other."""
+
+    depth = 0
+
+
+_NESTING = _Nesting()
+
+
+class CompiledFunction(CPUDispatcher):
+    """Compiled function that Python can call after the first call from Python.
+
+    For a compiled caller it is compiled without the conversion of its arguments, which takes longer to
+    compile than most functions; the first call from Python compiles it again, with the conversion.
+    """
+
+    def get_call_template(self, args: Any, kws: Any) -> Any:
+        """Compile the function for a compiled caller; return its signature."""
+        _NESTING.depth += 1
+        try:
+            return super().get_call_template(args, kws)
+        finally:
+            _NESTING.depth -= 1
+
+    def compile(self, sig: Any) -> Any:
+        """Compile the function for a signature; return what Python calls."""
+        with global_compiler_lock:
+            arguments, is_part = tuple(normalize_signature(sig)[0]), _NESTING.depth > 0
+            known = self.overloads.get(arguments)
+            if known is not None and not is_part and not _is_callable(known):
+                del self.overloads[arguments]
+            self._compiler.targetoptions = {**self.targetoptions, "no_cpython_wrapper": is_part}
+            return super().compile(sig)
+
+    def add_overload(self, cres: CompileResult) -> None:
+        """Add the machine code of a signature; calls from Python find only what Python can call."""
+        if _is_callable(cres):
+            super().add_overload(cres)
+        else:
+            self.overloads[tuple(cres.signature.args)] = cres
+
+
+def _is_callable(result: CompileResult) -> bool:
+    """True if Python can call the machine code of a function."""
+    wrapper = result.fndesc.llvm_cpython_wrapper_name
+    return bool(result.library.get_pointer_to_function(wrapper))
+
+
+def compiled_function(
+    function: Callable[..., Any], *, pipeline_class: type[CompilerBase] = Compiler, **options: Any
+) -> CompiledFunction:
+    """Return a compiled function with a cache.
+
+    Parameters
+    ----------
+    function : callable
+        A plain function of this package.
+    pipeline_class : type
+        Compiler.
+    **options
+        Of `numba.njit`.
+    """
+    own = CompiledFunction(function, {}, {"nopython": True, "boundscheck": None, **options}, pipeline_class)
+    own._cache = MachineCode(function, "function")
+    return own
 
 
 class _TupleLower(Lower):
@@ -347,7 +415,7 @@ def _write(address: int, value: Any) -> None:
     _store(address, value)
 
 
-_compiled_write: Any = cached(njit(**NO_ALLOCATION)(_write), _write)
+_compiled_write: Any = compiled_function(_write, **NO_ALLOCATION)
 
 
 def in_memory(value: Any) -> NDArray[np.uint8]:

@@ -34,7 +34,7 @@ from pydantic import Field, model_validator
 from spheretwin.electronics.coil import OPEN, GroupCoils, Relaxation, relaxation
 from spheretwin.electronics.random_streams import UNIFORM, errors
 from spheretwin.electronics.stages import DriveSetup, DriveStage, FaultLine, fault_line
-from spheretwin.models.base.compiled import allocation_free, part_of_its_caller
+from spheretwin.models.base.compiled import allocation_free, inlined
 
 # No motion of the rotor induces as much; the bound keeps squares of currents finite.
 LARGEST_EMF_V = 1e9
@@ -146,7 +146,7 @@ def amplifier(
     )
 
 
-@part_of_its_caller
+@inlined
 def with_supply(amplifier: Amplifier, more_V: float) -> Amplifier:
     """Return amplifiers with a supply that is higher by `more_V`; without a swing below their drops."""
     if more_V == 0.0:
@@ -168,7 +168,7 @@ def zero_flow(groups: int) -> Flow:
     return Flow(*np.zeros((len(Flow._fields), groups)))
 
 
-@part_of_its_caller
+@inlined
 def reset_sums(flow: Flow) -> None:
     """Reset the sums at the start of a control period."""
     for j in range(flow.copper_J.shape[0]):
@@ -185,7 +185,7 @@ class Phase(NamedTuple):
     work_J: float
 
 
-@part_of_its_caller
+@inlined
 def drive_coils(
     amplifier: Amplifier,
     coil: GroupCoils,
@@ -238,7 +238,7 @@ def drive_coils(
             flow.current_limited_s[j] += h
 
 
-@part_of_its_caller
+@inlined
 def _phase(
     shares: Relaxation, duration: float, start: float, last: float, volts: float, last_volts: float
 ) -> Phase:
@@ -263,7 +263,7 @@ def _phase(
     )
 
 
-@allocation_free
+@inlined
 def _within_limits(
     amplifier: Amplifier, inductance_H: float, R: float, e: float, target: float, start: float
 ) -> tuple[Phase, float]:
@@ -302,7 +302,7 @@ def _within_limits(
     return passed, limited
 
 
-@allocation_free
+@inlined
 def _time_to_zero(start: float, last: float, time_constant: float, longest: float) -> float:
     """Return the time at which a relaxation from `start` towards `last` is 0, at most `longest`.
 
@@ -315,13 +315,13 @@ def _time_to_zero(start: float, last: float, time_constant: float, longest: floa
     return longest
 
 
-@allocation_free
+@inlined
 def _at_limit(passed: Phase, limit: float, last: float, x: float, duration: float) -> Phase:
     """Add a phase of x time constants L/R at a voltage limit to the preceding phases."""
     return _added(passed, _phase(relaxation(x), duration, passed.current_A, last, limit, limit))
 
 
-@part_of_its_caller
+@inlined
 def _added(passed: Phase, more: Phase) -> Phase:
     """Return two phases as one."""
     return Phase(

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field
 
-from spheretwin.models.base.compiled import allocation_free, part_of_its_caller
+from spheretwin.models.base.compiled import allocation_free, inlined
 
 # Terms -(-x)**n / (n + 1)! and (-x)**n (2**n - 2) / (n + 1)!, without (-x)**n and with the sign of the first;
 # up to x = 1/4, the omitted terms are beyond the last digit.
@@ -42,7 +42,7 @@ class Relaxation(NamedTuple):
     """Mean of ``(1 - exp(-s))**2``."""
 
 
-@allocation_free
+@inlined
 def relaxation(x: float) -> Relaxation:
     """Return the shares for a time of x time constants, x >= 0."""
     if x < SERIES_TO:
@@ -63,7 +63,7 @@ def relaxation(x: float) -> Relaxation:
     )
 
 
-@allocation_free
+@inlined
 def _series(x: float) -> tuple[float, float]:
     """Return ``1 - (1 - exp(-x)) / x`` and the mean of ``(1 - exp(-s))**2``, for small x."""
     mean, settled_settled = 0.0, 0.0
@@ -173,7 +173,7 @@ def group_coils(
     return coils
 
 
-@part_of_its_caller
+@inlined
 def update_resistance(coil: GroupCoils) -> None:
     """Update the resistances: ``R = R20 (1 + a (T - 20 °C))`` at the present temperatures."""
     for j in range(coil.resistance_ohm.shape[0]):
@@ -181,7 +181,7 @@ def update_resistance(coil: GroupCoils) -> None:
         coil.resistance_ohm[j] = coil.cold_resistance_ohm * (1.0 + coil.resistance_per_K * rise)
 
 
-@part_of_its_caller
+@inlined
 def advance_temperature(coil: GroupCoils, copper_J: NDArray[np.float64]) -> None:
     """Advance temperature and resistance by one control period, exactly for the mean power in it.
 
@@ -199,7 +199,7 @@ def advance_temperature(coil: GroupCoils, copper_J: NDArray[np.float64]) -> None
     update_resistance(coil)
 
 
-@part_of_its_caller
+@inlined
 def is_overheated(coil: GroupCoils) -> bool:
     """True if the temperature of a group has reached the shutdown limit or is not a number."""
     for j in range(coil.temperature_degC.shape[0]):
@@ -208,7 +208,7 @@ def is_overheated(coil: GroupCoils) -> bool:
     return False
 
 
-@part_of_its_caller
+@inlined
 def back_emf(
     torque_matrix: NDArray[np.float64],
     gain: NDArray[np.float64],

@@ -35,7 +35,7 @@ from spheretwin.electronics.stages import (
     through,
 )
 from spheretwin.electronics.transducers import CHANNELS
-from spheretwin.models.base.compiled import allocation_free, part_of_its_caller
+from spheretwin.models.base.compiled import inlined
 from spheretwin.models.base.state import push
 
 HARMONICS = 3
@@ -99,7 +99,7 @@ class DacStage(NamedTuple):
     line: FaultLine  # of the setpoint, A
 
 
-@part_of_its_caller
+@inlined
 def convert_command(stage: DacStage, setpoint: NDArray[np.float64], draws: NDArray[np.float64]) -> None:
     """Convert a command (n,), A, in place."""
     convert(stage.dac, setpoint, setpoint)
@@ -143,7 +143,7 @@ def dac(section: DacSection, transconductance_A_V: float, groups: int, seed: int
     )
 
 
-@allocation_free
+@inlined
 def convert(dac: Dac, command: NDArray[np.float64], setpoint: NDArray[np.float64]) -> None:
     """Convert a command.
 
@@ -171,7 +171,7 @@ def convert(dac: Dac, command: NDArray[np.float64], setpoint: NDArray[np.float64
         setpoint[j] = dac.transconductance_A_V * volts
 
 
-@allocation_free
+@inlined
 def _inl(amplitudes: NDArray[np.float64], place: float) -> float:
     """Return ``sum(a_n sin(p) sin(n p))`` with cos(p) the position of a code, -1 to 1.
 
@@ -300,7 +300,7 @@ class Adcs(NamedTuple):
         return self.line, self.delay_ticks
 
 
-@allocation_free
+@inlined
 def pass_adcs(stage: Adcs, measurement: NDArray[np.float64], noise: TickNoise) -> None:
     """Replace α and β by the angles, rad, that the controller computes from the converted voltages."""
     for channel in range(CHANNELS):
@@ -313,7 +313,7 @@ def pass_adcs(stage: Adcs, measurement: NDArray[np.float64], noise: TickNoise) -
         measurement[0, channel] = _delayed(stage, channel, angle)
 
 
-@allocation_free
+@inlined
 def _delayed(stage: Adcs, channel: int, angle: float) -> float:
     """Store an angle and return the one delayed by a fault, or the first angle."""
     history = stage.delayed_rad
@@ -352,7 +352,7 @@ def adc(section: AdcSection, shares: NDArray[np.float64]) -> Adc:
     )
 
 
-@allocation_free
+@inlined
 def converted(
     adc: Adc, held_V: float, noise_V: float, draws: NDArray[np.float64], first: int, stride: int
 ) -> float:
@@ -382,7 +382,7 @@ def converted(
     return total / conversions if conversions else nan
 
 
-@allocation_free
+@inlined
 def _code_voltage(adc: Adc, input_V: float) -> float:
     volts = adc.gain * input_V + adc.offset_V
     if adc.step_V == 0:

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field
 
-from spheretwin.models.base.compiled import part_of_its_caller
+from spheretwin.models.base.compiled import inlined
 from spheretwin.models.base.state import push
 
 # Clock times are decimal fractions: a delay is a multiple of a step only up to rounding.
@@ -71,14 +71,14 @@ def delay(section: DelaySection, step_s: float, substeps: int, groups: int) -> D
     return Delay(np.zeros((commands, groups)), steps, substeps)
 
 
-@part_of_its_caller
+@inlined
 def latch(delay: Delay, command: NDArray[np.float64]) -> None:
     """Store the command (n,), A, that was computed from the sample of this control tick."""
     for j in range(command.shape[0]):
         push(delay.history, j, command[j])
 
 
-@part_of_its_caller
+@inlined
 def due(delay: Delay, substep: int, out: NDArray[np.float64]) -> None:
     """Write the active command at a physics step of the period.
 

@@ -14,7 +14,7 @@ from spheretwin.electronics import drive_chain as chain
 from spheretwin.electronics.coil import CurrentLag, advance_lag, current_lag
 from spheretwin.electronics.drive_chain import DriveChain, DriveFaults, drive_chain
 from spheretwin.electronics.drive_section import ResolvedDrive
-from spheretwin.models.base.compiled import implements, part_of_its_caller
+from spheretwin.models.base.compiled import implements, inlined
 
 
 class LagDrive(NamedTuple):
@@ -23,24 +23,24 @@ class LagDrive(NamedTuple):
     lag: CurrentLag
 
 
-@part_of_its_caller
+@inlined
 def _lag_begin(drive: Any, command: Any) -> None:
     pass
 
 
-@part_of_its_caller
+@inlined
 def _lag_advance(
     drive: Any, command: Any, substep: Any, q: Any, qdot: Any, G: Any, gain: Any, current: Any, mean: Any
 ) -> None:
     advance_lag(drive.lag, command, current, mean)
 
 
-@part_of_its_caller
+@inlined
 def _lag_end(drive: Any) -> bool:
     return True
 
 
-@part_of_its_caller
+@inlined
 def _lag_write_telemetry(drive: Any, row: Any) -> None:
     pass
 

@@ -50,7 +50,7 @@ from spheretwin.electronics.coil_coupling import (
 from spheretwin.electronics.delay import Delay, delay, due, latch
 from spheretwin.electronics.drive_section import STAGES, ResolvedDrive
 from spheretwin.electronics.stages import DriveSetup, FaultLine, chained, fault_line, through
-from spheretwin.models.base.compiled import allocation_free, implements, part_of_its_caller
+from spheretwin.models.base.compiled import allocation_free, implements, inlined
 from spheretwin.models.base.state import transfer_state
 from spheretwin.models.kinematics import angular_velocity
 
@@ -188,7 +188,7 @@ def drive_chain(
     return chain
 
 
-@part_of_its_caller
+@inlined
 def begin(chain: DriveChain, command: Array) -> None:
     """Accept the commands of a control period from the output of the controller, and reset the sums."""
     setpoint, output, period = chain.setpoint, chain.output, chain.period
@@ -211,7 +211,7 @@ def begin(chain: DriveChain, command: Array) -> None:
             period[OPEN_SHORT] = 1.0
 
 
-@part_of_its_caller
+@inlined
 def advance(
     chain: DriveChain,
     command: Array,
@@ -254,7 +254,7 @@ def advance(
         _add_supply_charge(chain, setpoint, mean)
 
 
-@part_of_its_caller
+@inlined
 def _advance_groups(
     chain: DriveChain,
     amplifier: Amplifier,
@@ -276,7 +276,7 @@ def _advance_groups(
         _advance_open_short_groups(chain, amplifier.step_s, current, mean)
 
 
-@part_of_its_caller
+@inlined
 def _advance_uncoupled_groups(
     coupling: None, chain: DriveChain, setpoint: Array, any_open_short: bool, current: Array, mean: Array
 ) -> None:
@@ -337,7 +337,7 @@ def _compiled_advance_all(
     return call
 
 
-@part_of_its_caller
+@inlined
 def update_setpoint(chain: DriveChain, substep: int) -> None:
     """Compute the setpoint of the amplifiers for a physics step."""
     setpoint, fixed, output = chain.setpoint, chain.delay, chain.output
@@ -352,7 +352,7 @@ def update_setpoint(chain: DriveChain, substep: int) -> None:
     _advance(chain.stages, setpoint, chain.draws)
 
 
-@part_of_its_caller
+@inlined
 def _add_supply_charge(chain: DriveChain, setpoint: Array, mean: Array) -> None:
     """Add the charge that the amplifiers draw from the supply in a physics step."""
     amplifier, period = chain.amplifier, chain.period
@@ -365,7 +365,7 @@ def _add_supply_charge(chain: DriveChain, setpoint: Array, mean: Array) -> None:
         period[DRAWN_As] += abs(drawn) * amplifier.step_s
 
 
-@part_of_its_caller
+@inlined
 def _save_groups(chain: DriveChain, current: Array) -> None:
     """Save currents and sums of all groups at the start of the step."""
     flow, before = chain.flow, chain.before
@@ -374,7 +374,7 @@ def _save_groups(chain: DriveChain, current: Array) -> None:
         before[3, j], before[4, j] = flow.voltage_limited_s[j], flow.current_limited_s[j]
 
 
-@part_of_its_caller
+@inlined
 def _restore_group(chain: DriveChain, j: int, current: Array) -> None:
     """Restore current and sums of a group to the start of the step."""
     flow, before = chain.flow, chain.before
@@ -382,7 +382,7 @@ def _restore_group(chain: DriveChain, j: int, current: Array) -> None:
     flow.voltage_limited_s[j], flow.current_limited_s[j] = before[3, j], before[4, j]
 
 
-@part_of_its_caller
+@inlined
 def _advance_open_short_groups(chain: DriveChain, step_s: float, current: Array, mean: Array) -> None:
     """Restore the open and shorted groups to the start of the step, and advance them without amplifiers."""
     for j in range(current.shape[0]):
@@ -392,14 +392,14 @@ def _advance_open_short_groups(chain: DriveChain, step_s: float, current: Array,
             advance_open_short(contact, chain.coil, j, step_s, chain.emf[j], current, mean, chain.flow)
 
 
-@part_of_its_caller
+@inlined
 def _contact(chain: DriveChain, group: int) -> int:
     """Return the connection of a group: a brake shorts all groups that are not open."""
     contact = chain.coil.contact[group]
     return SHORTED if contact != OPEN and chain.output.halt[0] == BRAKED else contact
 
 
-@part_of_its_caller
+@inlined
 def end(chain: DriveChain) -> bool:
     """End a control period: advance the temperatures; return True if no coil is too hot."""
     if chain.supplied:
@@ -408,7 +408,7 @@ def end(chain: DriveChain) -> bool:
     return True
 
 
-@part_of_its_caller
+@inlined
 def write_telemetry(chain: DriveChain, row: Array) -> None:
     """Write power, losses, temperatures and limits of the control period into the beginning of `row`."""
     flow, period_s, groups = chain.flow, chain.coil.period_s, chain.emf.shape[0]

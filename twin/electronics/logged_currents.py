@@ -7,12 +7,12 @@ from math import exp
 import numpy as np
 from numpy.typing import NDArray
 
-from spheretwin.models.base.compiled import allocation_free
+from spheretwin.models.base.compiled import inlined
 
 Array = NDArray[np.float64]
 
 
-@allocation_free
+@inlined
 def mean_currents(
     sample_s: Array,
     sample_A: Array,
@@ -75,7 +75,7 @@ def mean_currents(
             mean_A[k, j] /= end - start
 
 
-@allocation_free
+@inlined
 def _add_piece(
     sample_s: Array,
     sample_A: Array,

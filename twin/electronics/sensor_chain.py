@@ -23,7 +23,7 @@ from spheretwin.electronics.transducers import (
     EncoderSection,
     PotentiometerSection,
 )
-from spheretwin.models.base.compiled import allocation_free, part_of_its_caller
+from spheretwin.models.base.compiled import inlined
 from spheretwin.trajectories.rounding import CONFIG, Triple
 
 
@@ -166,7 +166,7 @@ def sensor_sheet(sensors: SensorsSection) -> dict[str, Any]:
     }
 
 
-@part_of_its_caller
+@inlined
 def write_telemetry(chain: SensorChain, row: Array) -> None:
     """Write the errors of the angles that are states of the sensors into the beginning of `row`, rad."""
     tracks, encoder = chain.stages[_POTENTIOMETER], chain.stages[_ENCODER]
@@ -175,7 +175,7 @@ def write_telemetry(chain: SensorChain, row: Array) -> None:
     row[2] = encoder.counter[0] * (2 * np.pi / encoder.counts_per_turn) if encoder.starts_with_error else 0.0
 
 
-@allocation_free
+@inlined
 def sense(chain: SensorChain, q: Array, qdot: Array, noise: Array, measurement: Array) -> bool:
     """Write measured angles (rad) and true rates (rad/s) into the first rows of `measurement` (3, 3).
 

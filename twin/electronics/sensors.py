@@ -21,7 +21,7 @@ from spheretwin.electronics.sensor_chain import (
     noise_streams,
     sensor_chain,
 )
-from spheretwin.models.base.compiled import implements, part_of_its_caller
+from spheretwin.models.base.compiled import implements, inlined
 
 
 class IdealSensors(NamedTuple):
@@ -30,7 +30,7 @@ class IdealSensors(NamedTuple):
     rows: int  # of a measurement that the sensors write
 
 
-@part_of_its_caller
+@inlined
 def _sense_ideal(sensors: Any, q: Any, qdot: Any, noise: Any, measurement: Any) -> bool:
     finite = True
     for i in range(3):
@@ -74,7 +74,7 @@ def sense(sensors: Sensors, q: NDArray, qdot: NDArray, noise: NDArray, measureme
     return bool(_SENSE[type(sensors)](sensors, q, qdot, noise, measurement))
 
 
-@part_of_its_caller
+@inlined
 def _write_nothing(sensors: Any, row: Any) -> None:
     pass
 

@@ -11,11 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel
 
-from spheretwin.models.base.compiled import allocation_free, part_of_its_caller
+from spheretwin.models.base.compiled import inlined
 from spheretwin.trajectories.rounding import CONFIG
 
 
-@part_of_its_caller
+@inlined
 def pass_nothing(stages: Any, values: Any, draws: Any) -> None:
     """Leave the values as they are."""
 
@@ -35,7 +35,7 @@ def chained(functions: Sequence[Any], place: int = 0) -> Any:
         return pass_nothing
     function, others = functions[place], chained(functions, place + 1)
 
-    @part_of_its_caller
+    @inlined
     def pass_and_continue(stages: Any, values: Any, draws: Any) -> None:
         stage = stages[place]
         if stage.on:
@@ -79,7 +79,7 @@ def fault_line(channels: int, last: float = nan) -> FaultLine:
     return FaultLine(table)
 
 
-@allocation_free
+@inlined
 def through(line: FaultLine, channel: int, value: float, draws: NDArray[np.float64]) -> float:
     """Return the value of a channel after its fault line, and store it.
 
@@ -204,7 +204,7 @@ class DriveStage(BaseModel):
         return pass_line
 
 
-@part_of_its_caller
+@inlined
 def pass_line(stage: Any, setpoint: NDArray, draws: NDArray) -> None:
     """Pass the setpoint of each group, A, through the fault line of a stage."""
     for j in range(stage.line.table.shape[0]):

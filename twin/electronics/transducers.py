@@ -11,7 +11,7 @@ from pydantic import BaseModel, Field, model_validator
 
 from spheretwin.electronics.random_streams import NORMAL, PHASE, REVERSAL, SMOOTH, UNIFORM, errors, uniforms
 from spheretwin.electronics.stages import FaultLine, SensorSetup, SensorStage, TickNoise, fault_line, through
-from spheretwin.models.base.compiled import allocation_free
+from spheretwin.models.base.compiled import allocation_free, inlined
 from spheretwin.trajectories.rounding import CONFIG
 
 CHANNELS = 2
@@ -140,7 +140,7 @@ class Potentiometers(NamedTuple):
         return self.line, self.play
 
 
-@allocation_free
+@inlined
 def pass_potentiometers(stage: Potentiometers, measurement: NDArray[np.float64], noise: TickNoise) -> None:
     """Replace α and β by the angles, rad, of the voltages of the wipers."""
     for channel in range(CHANNELS):
@@ -152,7 +152,7 @@ def pass_potentiometers(stage: Potentiometers, measurement: NDArray[np.float64],
         measurement[0, channel] = through(stage.line, channel, angle, noise.faults)
 
 
-@allocation_free
+@inlined
 def wiper_angle(stage: Potentiometers, channel: int, angle_rad: float, draws: NDArray[np.float64]) -> float:
     """Return the angle of a wiper (rad) at an angle of its joint (rad), and store it; NaN stays NaN.
 
@@ -211,7 +211,7 @@ def potentiometer(section: PotentiometerSection, shares: NDArray[np.float64]) ->
     )
 
 
-@allocation_free
+@inlined
 def wiper_voltage(potentiometer: Potentiometer, angle_rad: float) -> float:
     """Return the voltage of the wiper (V), without its noise, at an angle of the joint (rad).
 
@@ -331,7 +331,7 @@ class Encoder(NamedTuple):
         return self.line, self.counter
 
 
-@allocation_free
+@inlined
 def pass_encoder(encoder: Encoder, measurement: NDArray[np.float64], noise: TickNoise) -> None:
     """Count γ, rad, after eccentricity and fault line."""
     angle_rad = measurement[0, 2]
@@ -353,7 +353,7 @@ def update_reference(encoder: Encoder, count: float) -> None:
     encoder.counter[1] = floor(turns)
 
 
-@allocation_free
+@inlined
 def counted(encoder: Encoder, angle_rad: float) -> float:
     """Return the angle (rad) of the count nearest to an angle (rad); ties go to the even count.
 
@@ -388,7 +388,7 @@ class CurrentSensors(NamedTuple):
     measured_A: NDArray[np.float64]  # (n,) at the last control tick
 
 
-@allocation_free
+@inlined
 def sense_currents(sensors: CurrentSensors, current: NDArray[np.float64], draws: NDArray[np.float64]) -> None:
     """Measure the group currents at a control tick.
 

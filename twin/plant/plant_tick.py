@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from spheretwin.electronics.drive import DriveModel, advance_currents, begin, end
 from spheretwin.electronics.transducers import CurrentSensors
-from spheretwin.models.base.compiled import copy_into, implements, part_of_its_caller
+from spheretwin.models.base.compiled import copy_into, implements, inlined
 from spheretwin.models.joint_chain import JointChain, torque_on_hinges, update_ideal_motion
 from spheretwin.models.magnetics import TorqueModel, fill_torque_matrix, rotor_torque
 from spheretwin.plant import lagrangian_rotor, mujoco_rotor
@@ -103,7 +103,7 @@ class PlantOutput(NamedTuple):
     torque_S: NDArray[np.float64]  # (3,) N·m, in the first physics step
 
 
-@part_of_its_caller
+@inlined
 def plant_tick(
     plant: Plant, command: NDArray[np.float64], disturbance: NDArray[np.float64], output: PlantOutput
 ) -> int:
@@ -190,7 +190,7 @@ def plant_tick(
     return GOING
 
 
-@part_of_its_caller
+@inlined
 def log_mean_current(current: NDArray[np.float64], substep: int, mean: NDArray[np.float64]) -> None:
     """Update the mean (n,) over the physics steps of a control period with step number `substep`."""
     share = 1.0 / (substep + 1)

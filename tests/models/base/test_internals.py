@@ -29,6 +29,8 @@ NUMBA = [
     (rtsys, "initialize"),
     (ccallback.CFunc, "compile"),
     (dispatcher.Dispatcher, "enable_caching"),
+    (dispatcher.Dispatcher, "get_call_template"),
+    (dispatcher.Dispatcher, "add_overload"),
     (dispatcher.Dispatcher, "disable_compile"),
     (lowering.Lower, "_find_singly_assigned_variable"),
 ]
@@ -106,6 +108,50 @@ def test_a_compiled_function_reads_the_cache_of_this_package(monkeypatch):
     monkeypatch.setattr(double._cache, "load_overload", lambda sig, context: signatures.append(sig))
     assert double(1.5) == 3.0
     assert len(signatures) == 1, f"numba {numba.__version__} does not ask Dispatcher._cache for machine code"
+
+
+@needs_compiled_functions
+def test_a_function_for_compiled_callers_is_compiled_again_for_python():
+    @allocation_free
+    def half(x):
+        return 0.5 * x
+
+    @allocation_free
+    def of_both(x, y):
+        return half(x) - half(y)
+
+    assert of_both(3.0, 1.0) == 1.0
+    (part,) = half.overloads.values()
+    assert not numba_internals._is_callable(part), (
+        f"numba {numba.__version__} compiles the conversion of arguments in spite of no_cpython_wrapper"
+    )
+    assert half(3.0) == 1.5
+    (complete,) = half.overloads.values()
+    assert numba_internals._is_callable(complete)
+    assert half(np.float32(2.0)) == 1.0  # other types are compiled for Python at once
+    assert of_both(5.0, 1.0) == 2.0
+
+
+@needs_compiled_functions
+def test_a_stored_function_for_compiled_callers_is_not_taken_for_python(monkeypatch, tmp_path):
+    monkeypatch.setattr(cache, "cache_folder", lambda: tmp_path)
+
+    def build():
+        @allocation_free
+        def third(x):
+            return x / 3.0
+
+        @allocation_free
+        def of_sum(x, y):
+            return third(x + y)
+
+        return third, of_sum
+
+    for hits in (0, 2):  # the second time from the cache, once for the caller and once for Python
+        third, of_sum = build()
+        assert of_sum(2.0, 4.0) == 2.0
+        assert third(3.0) == 1.0
+        assert sum(third.stats.cache_hits.values()) == hits
 
 
 def test_the_addresses_of_mujoco_are_those_that_mj_step_takes():

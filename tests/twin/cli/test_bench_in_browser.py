@@ -86,7 +86,8 @@ def test_a_bench_is_driven_from_a_browser(tmp_path):
         until(bench, lambda state: np.abs(state.qdot_ref_rad_s).max() < 1e-3)
         at_rest(page, tab)
         here = np.array(bench.state().q_ref_rad)
-        there = here + [0.35, 0.1, 0.0]
+        # Towards the upright: the shaft is held where it was, which may be near the end of its range.
+        there = here - np.copysign([0.35, 0.1, 0.0], here)
         tab.drag(on_screen(page, tab, tip_m(bench, here)), on_screen(page, tab, tip_m(bench, there)))
         # A pixel is 5 mrad of the shaft as the page comes up, seen from ahead; here it is seen at a slant.
         until(bench, lambda state: np.abs(np.array(state.q_ref_rad) - there).max() < 2e-2)
