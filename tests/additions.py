@@ -83,7 +83,7 @@ class Kick(DisturbanceTerm):
     "telemetry column": Addition(
         "",
         """
-@inlined
+@part_of_its_caller
 def write_largest(row, controller, sensors, plant):
     row[0] = 0.0
     for j in range(plant.current.shape[0]):
@@ -314,7 +314,7 @@ class Gear(NamedTuple):
     line: FaultLine
 
 
-@allocation_free
+@inlined
 def turn(stage, measurement, noise):
     for i in range(3):
         turned = stage.ratio[i] * measurement[0, i]
