@@ -21,7 +21,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from spheretwin.models.base.compiled import allocation_free
+from spheretwin.models.base.compiled import inlined
 from spheretwin.models.kinematics import generalised_torque
 from spheretwin.models.lagrangian import (
     InertiaEntries,
@@ -87,7 +87,7 @@ def read_chain(model: mujoco.MjModel) -> JointChain:
     return JointChain(hinges[0], hinges[1], masses, gravity(model.opt))
 
 
-@allocation_free
+@inlined
 def inertia_at(chain: JointChain | None, inertia: Array, q: Triple) -> InertiaEntries:
     """Return the inertia matrix at a pose (rad) of a general joint or, if chain is None, an ideal one.
 
@@ -99,7 +99,7 @@ def inertia_at(chain: JointChain | None, inertia: Array, q: Triple) -> InertiaEn
     return equations(chain, q, _ZERO)[0]
 
 
-@allocation_free
+@inlined
 def acceleration_at(
     chain: JointChain | None, inertia: Array, weight_moment: float, q: Triple, qdot: Triple, torque: Triple
 ) -> Triple:
@@ -113,7 +113,7 @@ def acceleration_at(
     return solve_inertia(M, _less(torque, bias), chain)
 
 
-@allocation_free
+@inlined
 def equations(chain: JointChain, q: Triple, qdot: Triple) -> tuple[InertiaEntries, Triple]:
     """Return the equations of motion of a general joint.
 
@@ -151,7 +151,7 @@ def equations(chain: JointChain, q: Triple, qdot: Triple) -> tuple[InertiaEntrie
     return InertiaEntries(aa, bb, cc, ab, ac, bc), (bias_a, bias_b, bias_c)
 
 
-@allocation_free
+@inlined
 def hinge_torque(chain: JointChain, q: Array, torque_S: Array, torque_q: Array) -> None:
     """Compute the torque on each hinge of a torque on the rotor: its component along the axis.
 
@@ -170,7 +170,7 @@ def hinge_torque(chain: JointChain, q: Array, torque_S: Array, torque_q: Array) 
         torque_q[i] = _dot(axes[i], triple(torque_S))
 
 
-@allocation_free
+@inlined
 def ideal_pose(chain: JointChain, q: Array, qdot: Array, ideal_q: Array, ideal_qdot: Array) -> None:
     """Compute the angles of ideal hinges with the orientation of a general joint, and their rates.
 
@@ -192,7 +192,7 @@ def ideal_pose(chain: JointChain, q: Array, qdot: Array, ideal_q: Array, ideal_q
     ideal_qdot[0] = x - at.sb * ideal_qdot[2]
 
 
-@allocation_free
+@inlined
 def update_ideal_motion(
     chain: JointChain | None, q: Array, qdot: Array, ideal_q: Array, ideal_qdot: Array
 ) -> None:
@@ -201,7 +201,7 @@ def update_ideal_motion(
         ideal_pose(chain, q, qdot, ideal_q, ideal_qdot)
 
 
-@allocation_free
+@inlined
 def torque_on_hinges(chain: JointChain | None, q: Array, torque_S: Array, torque_q: Array) -> None:
     """Compute the torque on the hinges of a torque on the rotor, as `hinge_torque`, of any joint."""
     if chain is None:
@@ -210,7 +210,7 @@ def torque_on_hinges(chain: JointChain | None, q: Array, torque_S: Array, torque
         hinge_torque(chain, q, torque_S, torque_q)
 
 
-@allocation_free
+@inlined
 def chain_at(chain: JointChain, q: Triple) -> tuple[tuple[Frame, Frame, Frame], Rows, Rows]:
     """Return frames of the bodies, axes of the hinges, and a point of each axis, at a pose (rad)."""
     outer, e_a, p_a = _turned(chain, 0, _STATOR, q[0])
@@ -219,7 +219,7 @@ def chain_at(chain: JointChain, q: Triple) -> tuple[tuple[Frame, Frame, Frame], 
     return (outer, inner, rotor), (e_a, e_b, e_c), (p_a, p_b, p_c)
 
 
-@allocation_free
+@inlined
 def _turned(chain: JointChain, hinge: int, frame: Frame, angle: float) -> tuple[Frame, Triple, Triple]:
     """Return the frame after a hinge, the axis of the hinge and a point of it."""
     X, Y, Z, origin = frame
@@ -230,44 +230,44 @@ def _turned(chain: JointChain, hinge: int, frame: Frame, angle: float) -> tuple[
     return (x, y, z, _sum(p, _rotated(_less(origin, p), e, c, s))), e, p
 
 
-@allocation_free
+@inlined
 def _rotated(v: Triple, e: Triple, c: float, s: float) -> Triple:
     """Rotate a vector about a unit vector by an angle with a given cosine and sine (Rodrigues)."""
     return _sum(_sum(_scaled(v, c), _scaled(_cross(e, v), s)), _scaled(e, (1.0 - c) * _dot(e, v)))
 
 
-@allocation_free
+@inlined
 def _acceleration(w: Triple, w_rate: Triple, a: Triple, x: Triple) -> Triple:
     """Return the acceleration at x of a body whose point at the origin has the acceleration a."""
     return _sum(a, _sum(_cross(w_rate, x), _cross(w, _cross(w, x))))
 
 
-@allocation_free
+@inlined
 def _place(frame: Frame, y: Triple) -> Triple:
     X, Y, Z, origin = frame
     return _sum(origin, _sum(_scaled(X, y[0]), _sum(_scaled(Y, y[1]), _scaled(Z, y[2]))))
 
 
-@allocation_free
+@inlined
 def _sum(a: Triple, b: Triple) -> Triple:
     return a[0] + b[0], a[1] + b[1], a[2] + b[2]
 
 
-@allocation_free
+@inlined
 def _less(a: Triple, b: Triple) -> Triple:
     return a[0] - b[0], a[1] - b[1], a[2] - b[2]
 
 
-@allocation_free
+@inlined
 def _scaled(a: Triple, factor: float) -> Triple:
     return factor * a[0], factor * a[1], factor * a[2]
 
 
-@allocation_free
+@inlined
 def _dot(a: Triple, b: Triple) -> float:
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
-@allocation_free
+@inlined
 def _cross(a: Triple, b: Triple) -> Triple:
     return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]

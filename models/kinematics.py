@@ -9,7 +9,7 @@ from math import cos, sin
 import numpy as np
 from numpy.typing import NDArray
 
-from spheretwin.models.base.compiled import allocation_free, compiled
+from spheretwin.models.base.compiled import compiled, inlined
 
 Row = tuple[float, float, float]
 
@@ -38,7 +38,7 @@ def rotation(q: NDArray[np.float64]) -> NDArray[np.float64]:
     return R_SR
 
 
-@allocation_free
+@inlined
 def rotation_rows(q: NDArray[np.float64]) -> tuple[Row, Row, Row]:
     """Return the rows of `rotation` as tuples: an array would take a third of the time of a torque matrix."""
     ca, sa = cos(q[0]), sin(q[0])
@@ -96,7 +96,7 @@ def rotor_rate_jacobian(q: NDArray[np.float64]) -> NDArray[np.float64]:
     return B
 
 
-@allocation_free
+@inlined
 def cartesian_torque(
     q: NDArray[np.float64], torque_q: NDArray[np.float64], torque_S: NDArray[np.float64]
 ) -> None:
@@ -123,7 +123,7 @@ def cartesian_torque(
     torque_S[2] = sa * torque_q[1] + ca * in_plane
 
 
-@allocation_free
+@inlined
 def generalised_torque(
     q: NDArray[np.float64], torque_S: NDArray[np.float64], torque_q: NDArray[np.float64]
 ) -> None:
@@ -145,7 +145,7 @@ def generalised_torque(
     torque_q[2] = sb * torque_S[0] + cb * (ca * torque_S[2] - sa * torque_S[1])
 
 
-@allocation_free
+@inlined
 def angular_velocity(q: NDArray[np.float64], qdot: NDArray[np.float64], rate_S: NDArray[np.float64]) -> None:
     """Compute the angular velocity of the rotor in the stator frame: ``w_SR_S = E(q) qdot``.
 

@@ -28,8 +28,12 @@ F = TypeVar("F", bound=Callable[..., Any])
 COMPILES = not numba.config.DISABLE_JIT
 """Whether functions are compiled; ``NUMBA_DISABLE_JIT=1`` runs them as plain Python, for debugging."""
 
-# Without a second conversion of the arguments, for functions that are passed as values: ours go by address.
-_OPTIONS: dict[str, Any] = {"error_model": "numpy", "fastmath": {"contract"}, "no_cfunc_wrapper": True}
+_OPTIONS: dict[str, Any] = {
+    "error_model": "numpy",
+    "fastmath": {"contract"},
+    "forceinline": False,  # otherwise a function takes the option of the caller that needs it first
+    "no_cfunc_wrapper": True,  # a conversion for functions that are passed as values: ours go by address
+}
 _ALLOCATION_FREE = {**NO_ALLOCATION, "pipeline_class": TupleCompiler}
 
 # Attribute of a plain function with its compiled callbacks: they refer to it, and must not outlive it.

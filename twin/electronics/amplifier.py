@@ -34,7 +34,7 @@ from pydantic import Field, model_validator
 from spheretwin.electronics.coil import OPEN, GroupCoils, Relaxation, relaxation
 from spheretwin.electronics.random_streams import UNIFORM, errors
 from spheretwin.electronics.stages import DriveSetup, DriveStage, FaultLine, fault_line
-from spheretwin.models.base.compiled import allocation_free, inlined
+from spheretwin.models.base.compiled import inlined
 
 # No motion of the rotor induces as much; the bound keeps squares of currents finite.
 LARGEST_EMF_V = 1e9
@@ -335,7 +335,7 @@ def _added(passed: Phase, more: Phase) -> Phase:
 Array = NDArray[np.float64]
 
 
-@allocation_free
+@inlined
 def advance_open_short(
     contact: int,
     coil: GroupCoils,

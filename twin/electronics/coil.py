@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field
 
-from spheretwin.models.base.compiled import allocation_free, inlined
+from spheretwin.models.base.compiled import inlined
 
 # Terms -(-x)**n / (n + 1)! and (-x)**n (2**n - 2) / (n + 1)!, without (-x)**n and with the sign of the first;
 # up to x = 1/4, the omitted terms are beyond the last digit.
@@ -254,7 +254,7 @@ def current_lag(time_constant_s: float, step_s: float, current_limit_A: float) -
     return CurrentLag(exp(-steps), -expm1(-steps) / steps, current_limit_A)
 
 
-@allocation_free
+@inlined
 def advance_lag(
     lag: CurrentLag,
     command: NDArray[np.float64],

@@ -29,7 +29,7 @@ from numpy.typing import NDArray
 from spheretwin.electronics.amplifier import Amplifier
 from spheretwin.electronics.coil import GroupCoils, relaxation
 from spheretwin.electronics.drive_section import ResolvedDrive
-from spheretwin.models.base.compiled import allocation_free
+from spheretwin.models.base.compiled import inlined
 from spheretwin.models.base.errors import InputError, distinct_texts
 
 Array = NDArray[np.float64]
@@ -87,7 +87,7 @@ def check_coupling(section: ResolvedDrive, mutual_H: Array) -> None:
         )
 
 
-@allocation_free
+@inlined
 def predict_changes(
     coupling: Coupling, amplifier: Amplifier, coil: GroupCoils, setpoint: Array, current: Array
 ) -> None:
@@ -101,7 +101,7 @@ def predict_changes(
         coupling.change_A[j] = max(change, per_volt * min(amplifier.lowest_V - opposed, 0.0))
 
 
-@allocation_free
+@inlined
 def induce_voltages(coupling: Coupling, duration_s: float, emf: Array) -> None:
     """Compute the EMF by the motion of the rotor and by the changes of the currents in a time."""
     for j in range(emf.shape[0]):
@@ -112,7 +112,7 @@ def induce_voltages(coupling: Coupling, duration_s: float, emf: Array) -> None:
             emf[j] += coupling.mutual_H[k, j] * slope
 
 
-@allocation_free
+@inlined
 def update_changes(coupling: Coupling, start: Array, current: Array) -> bool:
     """Update the changes of the currents since the start of the part; return True if they stay the same."""
     largest = 0.0

@@ -50,7 +50,7 @@ from spheretwin.electronics.coil_coupling import (
 from spheretwin.electronics.delay import Delay, delay, due, latch
 from spheretwin.electronics.drive_section import STAGES, ResolvedDrive
 from spheretwin.electronics.stages import DriveSetup, FaultLine, chained, fault_line, through
-from spheretwin.models.base.compiled import allocation_free, implements, inlined
+from spheretwin.models.base.compiled import implements, inlined
 from spheretwin.models.base.state import transfer_state
 from spheretwin.models.kinematics import angular_velocity
 
@@ -285,7 +285,7 @@ def _advance_uncoupled_groups(
     _advance_groups(chain, amplifier, setpoint, any_open_short, current, mean)
 
 
-@allocation_free
+@inlined
 def _advance_coupled_groups(
     coupling: Coupling, chain: DriveChain, setpoint: Array, any_open_short: bool, current: Array, mean: Array
 ) -> None:

@@ -11,7 +11,7 @@ from pydantic import BaseModel, Field, model_validator
 
 from spheretwin.electronics.random_streams import NORMAL, PHASE, REVERSAL, SMOOTH, UNIFORM, errors, uniforms
 from spheretwin.electronics.stages import FaultLine, SensorSetup, SensorStage, TickNoise, fault_line, through
-from spheretwin.models.base.compiled import allocation_free, inlined
+from spheretwin.models.base.compiled import inlined
 from spheretwin.trajectories.rounding import CONFIG
 
 CHANNELS = 2
@@ -344,7 +344,7 @@ def pass_encoder(encoder: Encoder, measurement: NDArray[np.float64], noise: Tick
         measurement[0, 2] += encoder.counter[0] * line_rad
 
 
-@allocation_free
+@inlined
 def update_reference(encoder: Encoder, count: float) -> None:
     """Remove the error of the start if the count is at the index or has passed it since the last tick."""
     turns = (count - encoder.index_count) / encoder.counts_per_turn

@@ -35,7 +35,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field
 
-from spheretwin.models.base.compiled import allocation_free, copy_into
+from spheretwin.models.base.compiled import copy_into, inlined
 from spheretwin.models.joint_chain import JointChain, inertia_at
 from spheretwin.models.lagrangian import InertiaEntries, solve_inertia, triple
 from spheretwin.plant.cable import CableSection, acts, constant_torque_Nm
@@ -175,7 +175,7 @@ def bristle_friction(
     )
 
 
-@allocation_free
+@inlined
 def begin_bristles(
     bristles: BristleFriction | None, middle_q: Array, q: Array, qdot: Array, torque_q: Array
 ) -> None:
@@ -194,7 +194,7 @@ def begin_bristles(
         torque_q[i] += bristles.spring_q[i] - bristles.torque_q[0, i] - bristles.torque_q[1, i]
 
 
-@allocation_free
+@inlined
 def apply_bristles(
     bristles: BristleFriction | None,
     middle_q: Array,
@@ -280,7 +280,7 @@ def apply_bristles(
         q[i], qdot[i] = trial[START, i] + travel, trial[RATE, i]
 
 
-@allocation_free
+@inlined
 def log_bristles(bristles: BristleFriction | None, substep: int, friction_q: Array) -> None:
     """Add the friction of the bearings in a physics step to (3,), N·m; keep the cable's in the first one."""
     if bristles is None:
@@ -291,28 +291,28 @@ def log_bristles(bristles: BristleFriction | None, substep: int, friction_q: Arr
             bristles.first_cable_q[i] = bristles.spring_q[i] - bristles.torque_q[1, i]
 
 
-@allocation_free
+@inlined
 def log_presliding(bristles: BristleFriction | None, row: Array) -> None:
     """Write the elastic rotation within static friction into the beginning of a row."""
     if bristles is not None:
         copy_into(row, 0, bristles.deflection_rad[LAST], 3)
 
 
-@allocation_free
+@inlined
 def log_cable(bristles: BristleFriction | None, row: Array) -> None:
     """Write the torque of the cable into the beginning of a row."""
     if bristles is not None:
         copy_into(row, 0, bristles.first_cable_q, 3)
 
 
-@allocation_free
+@inlined
 def log_end_stops(bristles: BristleFriction | None, row: Array) -> None:
     """Write the torque of the end stops into the beginning of a row."""
     if bristles is not None:
         log_stops(bristles.stops, row)
 
 
-@allocation_free
+@inlined
 def _stribeck_factor(bristles: BristleFriction, hinge: int, rate: float) -> float:
     """Return the factor of the slip deflections of a bearing at the end of the step; 1 unless it slips."""
     deflection = bristles.deflection_rad[LAST, hinge]
@@ -323,7 +323,7 @@ def _stribeck_factor(bristles: BristleFriction, hinge: int, rate: float) -> floa
     return share + (1.0 - share) * exp(-ratio * ratio)
 
 
-@allocation_free
+@inlined
 def _hinge_torque(bristles: BristleFriction, hinge: int, secant: bool) -> tuple[float, float]:
     """Return the mean torque against the trial rotation, N·m, and its slope or secant, N·m/rad."""
     torque, slope = 0.0, 0.0
@@ -337,7 +337,7 @@ def _hinge_torque(bristles: BristleFriction, hinge: int, secant: bool) -> tuple[
     return with_stop(bristles.stops, hinge, bristles.trial[START, hinge], travel, secant, torque, slope)
 
 
-@allocation_free
+@inlined
 def _element(
     bristles: BristleFriction, element: int, hinge: int, travel: float, factor: float
 ) -> tuple[float, float, float]:

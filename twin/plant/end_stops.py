@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field
 
-from spheretwin.models.base.compiled import allocation_free, copy_into
+from spheretwin.models.base.compiled import copy_into, inlined
 from spheretwin.models.base.errors import InputError
 
 Array = NDArray[np.float64]
@@ -89,7 +89,7 @@ def end_stops(
     return EndStops(contact, section.stiffness_Nm_rad, damping, float(step_s), np.zeros(3))
 
 
-@allocation_free
+@inlined
 def with_stop(
     stops: EndStops | None, hinge: int, start: float, travel: float, secant: bool, torque: float, slope: float
 ) -> tuple[float, float]:
@@ -102,21 +102,21 @@ def with_stop(
     return torque + own, slope + own_slope
 
 
-@allocation_free
+@inlined
 def store_stop(stops: EndStops | None, hinge: int, start: float, travel: float) -> None:
     """Store the torque of the end stop of a hinge for the rotation of a complete step."""
     if stops is not None:
         stops.torque_q[hinge] = -_mean_torque(stops, hinge, start, travel)[0]
 
 
-@allocation_free
+@inlined
 def log_stops(stops: EndStops | None, row: Array) -> None:
     """Write the torque of the end stops into the beginning of a row."""
     if stops is not None:
         copy_into(row, 0, stops.torque_q, 3)
 
 
-@allocation_free
+@inlined
 def _mean_torque(stops: EndStops, hinge: int, start: float, travel: float) -> tuple[float, float]:
     """Return the mean torque against a rotation that begins at an angle, and its slope."""
     upper, lower = start - stops.contact_rad[hinge, 1], stops.contact_rad[hinge, 0] - start
@@ -128,7 +128,7 @@ def _mean_torque(stops: EndStops, hinge: int, start: float, travel: float) -> tu
     return 0.0, 0.0
 
 
-@allocation_free
+@inlined
 def _one_sided(stops: EndStops, hinge: int, before: float, after: float) -> tuple[float, float]:
     """Return mean torque and slope of a buffer for its penetrations at the ends of a step."""
     k, resistance = stops.stiffness_Nm_rad, stops.damping_Nm_s[hinge] / stops.step_s

@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from spheretwin.models.base.compiled import allocation_free
+from spheretwin.models.base.compiled import inlined
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.joint_chain import JointChain, inertia_at
 from spheretwin.models.lagrangian import InertiaEntries, Triple, solve_inertia, triple
@@ -82,7 +82,7 @@ def friction(
     return Friction(coulomb, viscous, float(smoothing_rate_rad_s), moments, float(step_s), acts, chain)
 
 
-@allocation_free
+@inlined
 def slow_down(
     friction: Friction,
     q: NDArray[np.float64],
@@ -130,7 +130,7 @@ def slow_down(
         mean_torque_q[i] += gained[i] / friction.step_s
 
 
-@allocation_free
+@inlined
 def momentum(M: InertiaEntries, v: Triple, chain: JointChain | None) -> Triple:
     """Return ``M v``; chain is None for an ideal joint."""
     alpha = M.alpha * v[0] + M.alpha_beta * v[1] + M.alpha_gamma * v[2]
@@ -140,7 +140,7 @@ def momentum(M: InertiaEntries, v: Triple, chain: JointChain | None) -> Triple:
     return alpha, beta + M.beta_gamma * v[2], gamma + M.beta_gamma * v[1]
 
 
-@allocation_free
+@inlined
 def _damped(friction: Friction, M: InertiaEntries, rates: Triple, time: Any) -> InertiaEntries:
     """Return the inertia matrix plus a real or complex time times the friction factors at given rates."""
     return InertiaEntries(
@@ -153,7 +153,7 @@ def _damped(friction: Friction, M: InertiaEntries, rates: Triple, time: Any) -> 
     )
 
 
-@allocation_free
+@inlined
 def _factor(friction: Friction, rate: float, hinge: int) -> float:
     """Return the friction of a hinge divided by its rate, N·m·s."""
     smoothing = friction.smoothing_rate_rad_s

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from spheretwin.models import mjcf
 from spheretwin.models.actuator import Actuator
-from spheretwin.models.base.compiled import allocation_free
+from spheretwin.models.base.compiled import allocation_free, inlined
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.joint_chain import JointChain, acceleration_at
 from spheretwin.models.lagrangian import GRAVITY_m_s2, Triple, loaded_inertia, triple
@@ -135,13 +135,13 @@ def step(plant: LagrangianData) -> None:
         plant.qdot[i] = v1[i] + h / 6 * (a1[i] + 2 * a2[i] + 2 * a3[i] + a4[i])
 
 
-@allocation_free
+@inlined
 def _acceleration(plant: LagrangianData, q: Triple, qdot: Triple) -> Triple:
     torque = triple(plant.torque_q)
     return acceleration_at(plant.chain, plant.inertia, plant.weight_moment, q, qdot, torque)
 
 
-@allocation_free
+@inlined
 def _moved(start: Triple, time: float, rate: Triple) -> Triple:
     return start[0] + time * rate[0], start[1] + time * rate[1], start[2] + time * rate[2]
 

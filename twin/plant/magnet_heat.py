@@ -20,7 +20,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from spheretwin.electronics.coil import REFERENCE_degC
 from spheretwin.electronics.drive_chain import DriveChain
-from spheretwin.models.base.compiled import allocation_free
+from spheretwin.models.base.compiled import inlined
 from spheretwin.models.base.errors import InputError
 
 Array = NDArray[np.float64]
@@ -145,7 +145,7 @@ def remanence(section: ThermalSection, ambient_degC: float) -> float:
     return 1.0 + section.remanence_per_K * rise if section.on else 1.0
 
 
-@allocation_free
+@inlined
 def update_gain(heat: MagnetHeat | None, group_gain: Array, present: Array) -> None:
     """Compute the gains (n,) of the groups with the present remanence; without heat both are one array."""
     if heat is None:
@@ -155,7 +155,7 @@ def update_gain(heat: MagnetHeat | None, group_gain: Array, present: Array) -> N
         present[j] = factor * group_gain[j]
 
 
-@allocation_free
+@inlined
 def advance_heat(heat: MagnetHeat | None) -> None:
     """Advance the temperatures of stator and rotor by one control period, after those of the windings.
 
@@ -177,7 +177,7 @@ def advance_heat(heat: MagnetHeat | None) -> None:
     heat.rotor_degC[0] = (matrix[0, 0] * rotor - matrix[1, 0] * stator) / determinant
 
 
-@allocation_free
+@inlined
 def log_heat(heat: MagnetHeat | None, row: Array) -> None:
     """Write the temperatures of stator and rotor into the beginning of a row."""
     if heat is not None:
