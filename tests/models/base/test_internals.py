@@ -18,7 +18,7 @@ from numba.core.runtime import rtsys
 
 import spheretwin
 from spheretwin.models.base import cache, mujoco_library, numba_internals
-from spheretwin.models.base.compiled import allocation_free, compilable, compiled
+from spheretwin.models.base.compiled import allocation_free, compilable, compiled, inlined
 from spheretwin.models.base.errors import EngineError
 from spheretwin.models.base.numba_internals import NO_ALLOCATION
 from tests.requirements import needs_compiled_functions
@@ -130,6 +130,28 @@ def test_a_function_for_compiled_callers_is_compiled_again_for_python():
     assert numba_internals._is_callable(complete)
     assert half(np.float32(2.0)) == 1.0  # other types are compiled for Python at once
     assert of_both(5.0, 1.0) == 2.0
+
+
+@needs_compiled_functions
+def test_a_function_does_not_take_the_inlining_of_its_first_caller():
+    @allocation_free
+    def half(x):
+        return 0.5 * x
+
+    @inlined
+    def quarter(x):
+        return half(half(x))
+
+    @allocation_free
+    def eighth(x):
+        return quarter(half(x))
+
+    assert eighth(16.0) == 2.0
+    is_inlined = {
+        function.py_func.__name__: [part.fndesc.inline for part in function.overloads.values()]
+        for function in (half, quarter, eighth)
+    }
+    assert is_inlined == {"half": [False], "quarter": [True], "eighth": [False]}
 
 
 @needs_compiled_functions
