@@ -224,19 +224,19 @@ def coupling_torques(
     return coupling
 
 
-@compiled
+@inlined
 def triple(vector: NDArray[np.float64]) -> Triple:
     """Return the entries of a (3,) array."""
     return vector[0], vector[1], vector[2]
 
 
-@compiled
+@inlined
 def turns(q: Triple) -> Turns:
     """Return the cosines and sines of a pose (rad)."""
     return Turns(cos(q[0]), sin(q[0]), cos(q[1]), sin(q[1]), cos(q[2]), sin(q[2]))
 
 
-@compiled
+@inlined
 def inertia_entries(at: Turns, inertia: Triple) -> InertiaEntries:
     """Return the entries of `inertia_matrix` (kg·m²)."""
     J1, J2, J3 = inertia
@@ -300,7 +300,7 @@ def acceleration_entries(
     return solve_inertia(inertia_entries(at, inertia), net, None)
 
 
-@compiled
+@inlined
 def solve_inertia(M: InertiaEntries, torque: Triple, chain: object | None) -> Triple:
     """Solve ``M x = torque`` for an inertia matrix, or its sum with a diagonal matrix, also a complex one.
 
