@@ -18,7 +18,7 @@ from spheretwin.control.supervision.enabled_groups import EnabledGroups, mask_di
 from spheretwin.control.supervision.fault_detector import Detector, detect_faults
 from spheretwin.control.supervision.watchdog import GO, Reason, Watchdog, trip, watch
 from spheretwin.models.base.compiled import compilable
-from spheretwin.models.base.numba_internals import function_at
+from spheretwin.models.base.numba_internals.addresses import function_at
 from spheretwin.models.kinematics import cartesian_torque
 from spheretwin.models.magnetics import CachedMatrix, TorqueModel, cached_matrix, update_cached_matrix
 

@@ -32,7 +32,8 @@ from spheretwin.models.base.compiled import (
     uncompiled,
 )
 from spheretwin.models.base.errors import InputError
-from spheretwin.models.base.numba_internals import Dispatcher, function_at
+from spheretwin.models.base.numba_internals.addresses import function_at
+from spheretwin.models.base.numba_internals.functions import Dispatcher
 from spheretwin.models.telemetry.signals import MOTION_SIGNALS, offsets, width
 from spheretwin.plant.plant_tick import (
     DIVERGED,

@@ -20,7 +20,8 @@ from spheretwin.external import Connection, ExternalController, ExternalPlant, e
 from spheretwin.loop import dispatch, is_user_law
 from spheretwin.models.base.compiled import for_types_of
 from spheretwin.models.base.errors import LawError
-from spheretwin.models.base.numba_internals import Dispatcher, callback_errors
+from spheretwin.models.base.numba_internals.callbacks import callback_errors
+from spheretwin.models.base.numba_internals.functions import Dispatcher
 from spheretwin.models.base.state import check_length, restore_state, save_state, transfer_state
 from spheretwin.models.base.turns import outside_turn
 from spheretwin.models.telemetry.signals import width

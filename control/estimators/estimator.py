@@ -31,7 +31,7 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
 from spheretwin.control.law import each
 from spheretwin.models.base.compiled import COMPILES, allocation_free, compiled_callback
 from spheretwin.models.base.errors import InputError, shown
-from spheretwin.models.base.numba_internals import function_at
+from spheretwin.models.base.numba_internals.addresses import function_at
 from spheretwin.models.telemetry.signals import ANGLES
 
 _vector = types.float64[::1]

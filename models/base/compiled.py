@@ -13,15 +13,15 @@ from llvmlite import ir
 from numba.extending import intrinsic, overload
 from numpy.typing import NDArray
 
-from spheretwin.models.base.numba_internals import (
+from spheretwin.models.base.numba_internals.callbacks import c_callback
+from spheretwin.models.base.numba_internals.functions import (
     NO_ALLOCATION,
     Dispatcher,
     TupleCompiler,
-    c_callback,
     compiled_function,
-    fingerprint_of_types,
     inline_overload,
 )
+from spheretwin.models.base.numba_internals.machine_code import fingerprint_of_types
 
 F = TypeVar("F", bound=Callable[..., Any])
 

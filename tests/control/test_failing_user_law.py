@@ -11,7 +11,7 @@ from spheretwin import cli
 from spheretwin import scenario as scenarios
 from spheretwin.control.law import Law
 from spheretwin.models.base.errors import LawError
-from spheretwin.models.base.numba_internals import callback_errors
+from spheretwin.models.base.numba_internals.callbacks import callback_errors
 from spheretwin.models.telemetry.table import read_parquet
 from spheretwin.session import Session
 from spheretwin.simulation import simulate

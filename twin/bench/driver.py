@@ -12,7 +12,7 @@ from spheretwin.bench.modes import Limits
 from spheretwin.control.law import Law
 from spheretwin.loop import is_user_law
 from spheretwin.models.base.errors import InputError, exception_text
-from spheretwin.models.base.numba_internals import Dispatcher
+from spheretwin.models.base.numba_internals.functions import Dispatcher
 from spheretwin.models.telemetry.run_record import RunRecord
 from spheretwin.models.telemetry.table import Table
 from spheretwin.provenance import record_of

@@ -22,7 +22,7 @@ from spheretwin.models import actuator
 from spheretwin.models.base import mujoco_library as library
 from spheretwin.models.base.compiled import COMPILES, compiled_callback
 from spheretwin.models.base.errors import EngineError, SpheretwinError, exception_text
-from spheretwin.models.base.numba_internals import function_at, in_memory
+from spheretwin.models.base.numba_internals.addresses import function_at, in_memory
 from spheretwin.mujoco_plugin.coils import ACT_DOT, FORCE, SENSORS, Coils, coils_of, respond
 from spheretwin.mujoco_plugin.configuration import PLUGIN, TORQUE, Attributes, Parts, quantity_of, read
 

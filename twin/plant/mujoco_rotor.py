@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from spheretwin.models.base.compiled import COMPILES, compiled
 from spheretwin.models.base.mujoco_library import addresses, step_address
-from spheretwin.models.base.numba_internals import external_function
+from spheretwin.models.base.numba_internals.addresses import external_function
 from spheretwin.models.mjcf import Mjcf, idle_stages
 from spheretwin.plant.mass_properties import MassErrors, true_model
 from spheretwin.plant.rotor import EngineKind

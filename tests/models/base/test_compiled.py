@@ -83,8 +83,9 @@ def write_package(root):
     base.mkdir()
     for folder in (models, base):
         (folder / "__init__.py").write_text("")
-    for name in ("cache.py", "compiled.py", "errors.py", "files.py", "numba_internals.py", "compilation.py"):
+    for name in ("cache.py", "compiled.py", "errors.py", "files.py", "compilation.py"):
         shutil.copy(SOURCE / name, base)
+    shutil.copytree(SOURCE / "numba_internals", base / "numba_internals")
     (models / "callee.py").write_text(
         "from spheretwin.models.base.compiled import compiled\n@compiled\ndef answer():\n    return 41\n"
     )

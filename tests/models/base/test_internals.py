@@ -17,10 +17,11 @@ from numba.core import ccallback, compiler, dispatcher, event, lowering
 from numba.core.runtime import rtsys
 
 import spheretwin
-from spheretwin.models.base import cache, mujoco_library, numba_internals
+from spheretwin.models.base import cache, mujoco_library
 from spheretwin.models.base.compiled import allocation_free, compilable, compiled, inlined
 from spheretwin.models.base.errors import EngineError
-from spheretwin.models.base.numba_internals import NO_ALLOCATION
+from spheretwin.models.base.numba_internals import addresses, functions, machine_code
+from spheretwin.models.base.numba_internals.functions import NO_ALLOCATION
 from tests.requirements import needs_compiled_functions
 
 NUMBA = [
@@ -39,7 +40,9 @@ MODEL = "<mujoco><worldbody><body><joint/><geom size='1'/></body></worldbody></m
 
 @pytest.mark.parametrize(("owner", "name"), NUMBA)
 def test_numba_has_the_private_names(owner, name):
-    assert hasattr(owner, name), f"numba {numba.__version__} has no {owner}.{name}: see numba_internals.py"
+    assert hasattr(owner, name), (
+        f"numba {numba.__version__} has no {owner}.{name}: see models/base/numba_internals"
+    )
 
 
 @needs_compiled_functions
@@ -86,15 +89,15 @@ def test_a_tuple_that_is_assigned_once_is_a_value(monkeypatch):
         find(lower)
         values.update(lower._singly_assigned_vars)
 
-    find = numba_internals._TupleLower._find_singly_assigned_variable
-    monkeypatch.setattr(numba_internals._TupleLower, "_find_singly_assigned_variable", record)
+    find = functions._TupleLower._find_singly_assigned_variable
+    monkeypatch.setattr(functions._TupleLower, "_find_singly_assigned_variable", record)
     random = np.random.default_rng(5)
     pairs = Pair(*random.random((2, 40))), Pair(*random.random((2, 40)))
-    function = numba.njit(sum_of_larger, _nrt=False, pipeline_class=numba_internals.TupleCompiler)
+    function = numba.njit(sum_of_larger, _nrt=False, pipeline_class=functions.TupleCompiler)
     # The same operations in the same order.
     assert function(*pairs, 40) == sum_of_larger(*pairs, 40)
     assert {"pair", "other", "inner"} <= values, (
-        f"numba {numba.__version__} asks other functions than _TupleLower in numba_internals.py"
+        f"numba {numba.__version__} asks other functions than _TupleLower in models/base/numba_internals"
     )
 
 
@@ -122,12 +125,12 @@ def test_a_function_for_compiled_callers_is_compiled_again_for_python():
 
     assert of_both(3.0, 1.0) == 1.0
     (part,) = half.overloads.values()
-    assert not numba_internals._is_callable(part), (
+    assert not functions._is_callable(part), (
         f"numba {numba.__version__} compiles the conversion of arguments in spite of no_cpython_wrapper"
     )
     assert half(3.0) == 1.5
     (complete,) = half.overloads.values()
-    assert numba_internals._is_callable(complete)
+    assert functions._is_callable(complete)
     assert half(np.float32(2.0)) == 1.0  # other types are compiled for Python at once
     assert of_both(5.0, 1.0) == 2.0
 
@@ -236,7 +239,7 @@ def test_compiled_code_reads_a_tuple_from_memory():
         (first, second), number, count = memory[0]
         return first[2] + 10 * second[3] + 100 * number + 1000 * count
 
-    memory = numba_internals.in_memory((pair, 7.5, 3))
+    memory = addresses.in_memory((pair, 7.5, 3))
     assert read.ctypes(ctypes.c_void_p(memory.ctypes.data)) == 2 + 30 + 750 + 3000
 
 
@@ -291,7 +294,7 @@ def test_values_with_one_fingerprint_have_one_type():
 
 
 def fingerprint(*values):
-    return numba_internals.fingerprint_of_types(values)
+    return machine_code.fingerprint_of_types(values)
 
 
 def test_no_two_named_tuples_of_the_package_have_one_fingerprint():

@@ -1,0 +1,183 @@
+"""Compiled functions: for Python or for compiled callers, with tuples as values, inlined implementations."""
+
+from __future__ import annotations
+
+import threading
+from collections import Counter
+from collections.abc import Callable
+from typing import Any
+
+from numba import njit, types
+from numba.core import ir as numba_ir
+from numba.core.analysis import compute_cfg_from_blocks, compute_use_defs, must_use_alloca
+from numba.core.caching import NullCache
+from numba.core.compiler import Compiler, CompilerBase, CompileResult, DefaultPassBuilder
+from numba.core.compiler_lock import global_compiler_lock
+from numba.core.compiler_machinery import PassManager, register_pass
+from numba.core.dispatcher import Dispatcher as Dispatcher  # the class of compiled functions
+from numba.core.lowering import Lower
+from numba.core.registry import CPUDispatcher
+from numba.core.sigutils import normalize_signature
+from numba.core.typed_passes import NativeLowering
+from numba.core.typing.templates import infer, infer_global, make_overload_template
+
+from spheretwin.models.base.numba_internals.machine_code import MachineCode
+
+NO_ALLOCATION: dict[str, Any] = {"_nrt": False}
+"""Options of a compiled function that creates no array: it counts no references."""
+
+
+class _Nesting(threading.local):
+    """Number of functions that a thread compiles for compiled callers, one inside the other."""
+
+    depth = 0
+
+
+_NESTING = _Nesting()
+
+
+class CompiledFunction(CPUDispatcher):
+    """Compiled function that Python can call after the first call from Python.
+
+    For a compiled caller it is compiled without the conversion of its arguments, which takes longer to
+    compile than most functions; the first call from Python compiles it again, with the conversion.
+    """
+
+    _cache: Any
+    _part_cache: Any = NullCache()
+    """Of the machine code for compiled callers."""
+
+    def get_call_template(self, args: Any, kws: Any) -> Any:
+        """Compile the function for a compiled caller; return its signature."""
+        _NESTING.depth += 1
+        try:
+            return super().get_call_template(args, kws)
+        finally:
+            _NESTING.depth -= 1
+
+    def compile(self, sig: Any) -> Any:
+        """Compile the function for a signature; return what Python calls."""
+        with global_compiler_lock:
+            arguments, is_part = tuple(normalize_signature(sig)[0]), _NESTING.depth > 0
+            known = self.overloads.get(arguments)
+            if known is not None and not is_part and not _is_callable(known):
+                del self.overloads[arguments]
+            self._compiler.targetoptions = {**self.targetoptions, "no_cpython_wrapper": is_part}
+            cache, self._cache = self._cache, self._part_cache if is_part else self._cache
+            try:
+                return super().compile(sig)
+            finally:
+                self._cache = cache
+
+    def add_overload(self, cres: CompileResult) -> None:
+        """Add the machine code of a signature; calls from Python find only what Python can call."""
+        if _is_callable(cres):
+            super().add_overload(cres)
+        else:
+            self.overloads[tuple(cres.signature.args)] = cres
+
+
+def _is_callable(result: CompileResult) -> bool:
+    """True if Python can call the machine code of a function."""
+    wrapper = result.fndesc.llvm_cpython_wrapper_name
+    return bool(result.library.get_pointer_to_function(wrapper))
+
+
+def compiled_function(
+    function: Callable[..., Any], *, pipeline_class: type[CompilerBase] = Compiler, **options: Any
+) -> CompiledFunction:
+    """Return a compiled function with a cache.
+
+    Parameters
+    ----------
+    function : callable
+        A plain function of this package.
+    pipeline_class : type
+        Compiler.
+    **options
+        Of `numba.njit`.
+    """
+    own = CompiledFunction(function, {}, {"nopython": True, "boundscheck": None, **options}, pipeline_class)
+    own._cache, own._part_cache = MachineCode(function, "function"), MachineCode(function, "part")
+    return own
+
+
+class _TupleLower(Lower):
+    """Translation to LLVM in which a tuple that is assigned once is a value, not a place in memory.
+
+    For functions without reference counting: numba may release a variable where it has no value.
+    """
+
+    def _find_singly_assigned_variable(self) -> None:
+        super()._find_singly_assigned_variable()
+        blocks = self.func_ir.blocks
+        dominators, flow = compute_cfg_from_blocks(blocks).dominators(), compute_use_defs(blocks)
+        assignments = Counter(
+            statement.target.name
+            for block in blocks.values()
+            for statement in block.find_insts(numba_ir.Assign)
+        )
+        in_memory = must_use_alloca(blocks)
+        for label, names in flow.defmap.items():
+            for name in names:
+                is_tuple = isinstance(self.typeof(name), types.BaseTuple)
+                if not is_tuple or assignments[name] != 1 or name in in_memory:
+                    continue
+                users = [user for user, used in flow.usemap.items() if name in used]
+                # Blocks are translated in the order of their labels.
+                if all(label < user and label in dominators[user] for user in users):
+                    self._singly_assigned_vars.add(name)
+
+
+@register_pass(mutates_CFG=True, analysis_only=False)
+class _TupleLowering(NativeLowering):
+    """Pass with this translation."""
+
+    _name = "tuple_lowering"
+
+    @property
+    def lowering_class(self) -> type[Lower]:
+        return _TupleLower
+
+
+class TupleCompiler(CompilerBase):
+    """Numba's compiler with tuples as values."""
+
+    def define_pipelines(self) -> list[PassManager]:
+        """Return the passes."""
+        passes = DefaultPassBuilder.define_nopython_pipeline(self.state)
+        passes.passes = [
+            (_TupleLowering if kind is NativeLowering else kind, name) for kind, name in passes.passes
+        ]
+        passes.finalize()
+        return [passes]
+
+
+def inline_overload(function: Callable[..., Any], implementation: Callable[..., Any], **options: Any) -> None:
+    """Inline what `implementation` returns for the argument types into compiled callers.
+
+    As ``numba.extending.overload(function, inline="always")``, without machine code of the implementation.
+
+    Parameters
+    ----------
+    function : callable
+        Plain function.
+    implementation : callable
+        Returns a plain function for types of arguments, or None.
+    **options
+        Of `numba.jit`.
+    """
+    jit_options = {"no_cpython_wrapper": True, **options}
+    complete: Any = make_overload_template(function, implementation, jit_options, False, "always")
+
+    class Typed(complete):
+        def _get_jit_decorator(self) -> Callable[..., Any]:
+            def decorator(function: Callable[..., Any]) -> Any:
+                dispatcher = njit(**jit_options)(function)
+                dispatcher._can_compile = False  # the inliner infers the types by itself
+                return dispatcher
+
+            return lambda **_: decorator
+
+    infer(Typed)
+    infer_global(function, types.Function(Typed))

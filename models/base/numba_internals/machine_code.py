@@ -1,0 +1,120 @@
+"""Machine code of compiled functions in the cache of this package, and the key of their types."""
+
+from __future__ import annotations
+
+import hashlib
+import pickle
+import re
+import warnings
+from collections.abc import Callable
+from typing import Any
+
+from numba import _dispatcher
+from numba.core.caching import NullCache
+from numba.core.compiler import CompileResult
+from numba.core.errors import NumbaWarning
+from numba.core.runtime import rtsys
+from numba.core.serialize import dumps
+from numba.cpython import hashing
+from numba.experimental import function_type
+
+from spheretwin.models.base import cache, compilation
+
+# Loaded machine code needs the symbols of hashes and the type of a callback, in addition to the math and
+# run-time libraries. These imports register them.
+_REGISTERED = hashing, function_type
+
+
+class MachineCode(NullCache):
+    """Cache of the machine code of one function, one entry for each signature.
+
+    Numba's own cache takes its folder from a setting that all packages share, and an entry that is damaged or
+    cannot be written is an error at every call. Here the function is compiled again.
+
+    Parameters
+    ----------
+    function : callable
+        A plain function of this package: the cache tracks only its sources.
+    kind : str
+        Distinguishes different compilations of one function.
+    """
+
+    def __init__(self, function: Callable[..., Any], kind: str) -> None:
+        self._name = f"{function.__module__}.{function.__qualname__}"
+        self._function, self._kind = function, kind
+
+    @property
+    def cache_path(self) -> str | None:
+        """Folder of the entries."""
+        folder = cache.cache_folder()
+        return str(folder) if folder else None
+
+    def load_overload(self, sig: Any, target_context: Any) -> CompileResult | None:
+        """Return the machine code for a signature; None if there is no usable entry."""
+        # Numba's cache would import everything that can be compiled, with scipy.linalg: a third of a short
+        # run.
+        rtsys.initialize(target_context)
+        content = cache.load_entry(self._entry(sig, target_context.codegen()))
+        result = self._rebuilt(content, sig, target_context) if content else None
+        if result is None:
+            compilation.report(self._name)
+        return result
+
+    @staticmethod
+    def _rebuilt(content: bytes, sig: Any, target_context: Any) -> CompileResult | None:
+        try:
+            signature, parts = pickle.loads(content)
+            if signature != sig:  # a different signature with the same text
+                return None
+            return CompileResult._rebuild(target_context, *parts)
+        # Unpickling or linking a damaged entry may raise anything; the function is compiled again.
+        except Exception:
+            return None
+
+    def save_overload(self, sig: Any, data: CompileResult) -> None:
+        """Store the machine code for a signature."""
+        if data.library.has_dynamic_globals:
+            complaint = f"{self._name} is compiled in every process: it holds an address or a large array"
+            warnings.warn(complaint, NumbaWarning, stacklevel=2)
+            return
+        cache.store_entry(self._entry(sig, data.codegen), dumps((sig, data._reduce())))
+
+    def _entry(self, sig: Any, codegen: Any) -> str:
+        """Return the name of an entry: function, then a digest of function, signature and processor."""
+        line = self._function.__code__.co_firstlineno
+        enclosed = _enclosed(self._function)
+        key = repr((self._name, line, enclosed, self._kind, str(sig), codegen.magic_tuple()))
+        readable = re.sub(r"\W+", "-", self._name.removeprefix("spheretwin."))[:60]
+        return f"{readable}-{hashlib.sha256(key.encode()).hexdigest()[:24]}"
+
+
+def _enclosed(function: Callable[..., Any]) -> list[Any]:
+    """Return the values that a function encloses, the same in each process.
+
+    Pickled, a compiled function is different in each process. One of this package is defined by its name, its
+    line and what it encloses: the cache tracks its source.
+    """
+    identities: list[Any] = []
+    for cell in function.__closure__ or ():
+        plain = getattr(cell.cell_contents, "py_func", None)
+        if plain is not None and plain.__module__.startswith("spheretwin."):
+            line = plain.__code__.co_firstlineno
+            identities.append((plain.__module__, plain.__qualname__, line, _enclosed(plain)))
+        else:
+            identities.append(dumps(cell.cell_contents))
+    return identities
+
+
+def fingerprint_of_types(values: tuple[Any, ...]) -> bytes:
+    """Return a key of numba's types of values: values with one key have one type.
+
+    Numba itself looks up the type of an argument by it. It has the names of a named tuple's class and fields,
+    and no two classes of this package share both.
+
+    Raises
+    ------
+    NotImplementedError
+        A value is no number, array or tuple of them.
+    """
+    key: bytes = _dispatcher.compute_fingerprint(values)
+    return key
