@@ -1,4 +1,13 @@
-"""Functions and values by address: C functions for compiled code, compiled functions for C code."""
+"""Functions and values by address: C functions for compiled code, compiled functions for C code.
+
+*Functions by address* (`cgutils`, `FunctionType`). Reason: the loop is compiled once for all laws.
+Consequence of a change: the loop does not compile.
+
+*Values in memory* (`get_data_type`, `get_abi_sizeof`). Reason: C code passes an address to compiled code,
+which reads a tuple of arrays there. Consequence: a plugin reads invalid memory.
+
+`tests/models/base/test_internals.py` checks both.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,9 @@
-"""Compiled callbacks: with bounds checks, and with exceptions that reach Python."""
+"""Compiled callbacks: with bounds checks, and with exceptions that reach Python.
+
+`CFunc`, `Dispatcher` and the text of `sys.unraisablehook` are private. Reason: numba checks bounds only in
+the outermost function, and drops the exceptions of callbacks. Consequence of a change: an exception of a law
+is printed, and the run ends as diverged. `tests/models/base/test_internals.py` checks it.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,22 @@
-"""Compiled functions: for Python or for compiled callers, with tuples as values, inlined implementations."""
+"""Compiled functions: for Python or for compiled callers, with tuples as values, inlined implementations.
+
+*Functions for compiled callers* (`CPUDispatcher`, its `_cache`, `_compiler`, `overloads` and `add_overload`).
+Reason: numba compiles the conversion of Python arguments of every function, a fifth of the compile time of a
+loop. Consequence of a change: a loop compiles longer, or a function is compiled at every call.
+
+*Inlined implementations without machine code* (`make_overload_template`, `_get_jit_decorator`,
+`_can_compile`). Reason: numba compiles an implementation completely, then inlines it and drops the code, a
+tenth of the compile time of a loop. Consequence: the loop does not compile, or takes longer.
+
+*No reference counting* (`_nrt`). Reason: it takes a third of the loop's own time. Consequence: the option is
+refused, or the loop is slower.
+
+*Tuples as values* (`Lower._find_singly_assigned_variable`). Reason: numba gives each variable that several
+blocks use a place in memory, and LLVM spends most of the compile time on copies of tuples of many arrays.
+Consequence: the loop compiles two to three times as long.
+
+`tests/models/base/test_internals.py` checks each of them.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,14 @@
-"""Machine code of compiled functions in the cache of this package, and the key of their types."""
+"""Machine code of compiled functions in the cache of this package, and the key of their types.
+
+*Machine code in a cache of this package* (`CompileResult._rebuild` and `_reduce`, `rtsys`). Reason: numba's
+cache tracks one file of sources, and a damaged entry is an error at every call. Consequence of a change: a
+function is compiled in every process, or an exception at its first call.
+
+*Fingerprint of types* (`_dispatcher.compute_fingerprint`). Reason: numba's type of the hundred arrays of a
+loop takes half of the start-up time of a session. Consequence: an exception at the first loop.
+
+`tests/models/base/test_internals.py` checks both.
+"""
 
 from __future__ import annotations
 
