@@ -76,23 +76,34 @@ def simulate(
     scenario = _scenario(scenario, changes or {})
     with Session(scenario, law, trajectory) as session:
         record = record_of(session)  # now: with the digests of the files at the start
-        if scenario.event:  # an event may change the columns
-            buffer = TelemetryBuffer(session.signals, scenario.ticks)
-            status = follow(session, scenario.ticks, [buffer, *sinks])
-            telemetry = buffer.table
-        else:
-            log = allocated(scenario.ticks, width(session.signals))
-            status = follow(session, scenario.ticks, sinks, log=log)
-            telemetry = Table(session.signals, log[: session.tick])
-        return Run(
-            session.initial_scenario,
-            status,
-            telemetry,
-            session.loop_s,
-            session.actuator,
-            session.law_error,
-            replace(record, ticks=session.tick),
-        )
+        run = run_session(session, sinks)
+    return replace(run, record=replace(record, ticks=len(run.telemetry)))
+
+
+def run_session(session: Session, sinks: Sequence[Sink] = ()) -> Run:
+    """Run a session from tick 0 to the end of its scenario; the result has no record.
+
+    Parameters
+    ----------
+    session : Session
+    sinks : sequence of Sink
+        Receive the telemetry while the run runs.
+
+    Raises
+    ------
+    InputError
+        As `simulate`.
+    """
+    scenario = session.initial_scenario
+    if scenario.event:  # an event may change the columns
+        buffer = TelemetryBuffer(session.signals, scenario.ticks)
+        status = follow(session, scenario.ticks, [buffer, *sinks])
+        telemetry = buffer.table
+    else:
+        log = allocated(scenario.ticks, width(session.signals))
+        status = follow(session, scenario.ticks, sinks, log=log)
+        telemetry = Table(session.signals, log[: session.tick])
+    return Run(scenario, status, telemetry, session.loop_s, session.actuator, session.law_error)
 
 
 def _scenario(given: Scenario | str | Path, changes: Mapping[str, Any]) -> Scenario:

@@ -72,9 +72,9 @@ def _text(experiment: Experiment, cases: Sequence[Case], seeds: int) -> str:
     plan = Plan(experiment, list(cases), seeds)
     outcomes = []
     for job in plan.jobs:
-        made = partial(made_run, name=job.name, most_ticks=MOST_TICKS.get(name, 1500))
-        with patch.object(runner, "simulate", made):
-            outcomes.append(runner._outcome(experiment, job))
+        scenario = runner.scenario_of(job.case, job.plant, job.seed)
+        run = made_run(scenario, name=job.name, most_ticks=MOST_TICKS.get(name, 1500))
+        outcomes.append(runner._outcome(experiment, run))
     result = PlanResult(plan, runner.summarise(plan), plan.by_case(outcomes), [1e-9, 3e-9])
     of_json = rows(plan, result.outcomes, result.summaries)
     with patch.object(noise_and_lag, "compare", made_comparison):

@@ -27,13 +27,17 @@ from spheretwin.models.telemetry.status import Status
 from spheretwin.paper.experiment import Case, Experiment, Outcome, Outcomes
 from spheretwin.provenance import digest
 from spheretwin.run import Run, figures_of
+from spheretwin.scenario.changes import complete_fields
+from spheretwin.scenario.files import FilesCache
 from spheretwin.scenario.reading import named_files
 from spheretwin.scenario.sections import Scenario
 from spheretwin.scenario.writing import command_words
-from spheretwin.simulation import simulate
+from spheretwin.session import Session
+from spheretwin.simulation import run_session
 from spheretwin.study.agreement import Ending, compare
 from spheretwin.study.engines.threads import run_each
 from spheretwin.study.study import FULL, fast_engine
+from spheretwin.study.template import Template, are_numbers, template_of
 
 Array = NDArray[np.float64]
 
@@ -317,8 +321,13 @@ def _run(
     for i in outcomes:
         done(jobs[i].case.name)
     missing = [i for i in range(len(jobs)) if i not in outcomes]
+    runs = _Runs()
+
+    def outcome(i: int) -> Outcome:
+        return _outcome(plan.experiment, runs.run(jobs[i]))
+
     try:
-        with closing(run_each(missing, lambda i: _outcome(plan.experiment, jobs[i]), threads)) as results:
+        with closing(run_each(missing, outcome, threads)) as results:
             for i, outcome in results:
                 outcomes[i] = outcome
                 if cache:
@@ -330,8 +339,35 @@ def _run(
     return [outcomes[i] for i in range(len(jobs))]
 
 
-def _outcome(experiment: Experiment, job: Job) -> Outcome:
-    run = simulate(scenario_of(job.case, job.plant, job.seed))
+class _Runs:
+    """Runs of jobs, which read each file once; those of a case differ in numbers alone."""
+
+    def __init__(self) -> None:
+        self._files = FilesCache()
+        self._templates: dict[tuple[str, str | None], Template | None] = {}
+
+    def run(self, job: Job) -> Run:
+        """Run a job."""
+        scenario = self._scenario(job)
+        with Session(scenario, files=self._files.files_of(scenario)) as session:
+            return run_session(session)
+
+    def _scenario(self, job: Job) -> Scenario:
+        case, numbers = job.case, {"seed": job.seed, **job.case.seeded_fields(job.seed)}
+        if case.single_run or not case.is_random or not are_numbers(numbers.values()):
+            return scenario_of(case, job.plant, job.seed)
+        shape = case.name, job.plant
+        if shape not in self._templates:
+            engine = scenario_of(case, job.plant, job.seed).plant.engine
+            fields = complete_fields(case.scenario, {**case.fields, **numbers, PLANT: engine})
+            self._templates[shape] = template_of(fields, tuple(numbers), case.scenario)
+        template = self._templates[shape]
+        if template is None:
+            return scenario_of(case, job.plant, job.seed)
+        return template.scenario(tuple(numbers.values()))
+
+
+def _outcome(experiment: Experiment, run: Run) -> Outcome:
     error = np.abs(measured_error(run))
     largest = error.max(axis=0) if len(error) else np.full(3, np.nan)
     return Outcome(run.status, figures_of(run), largest, experiment.reduce(run))

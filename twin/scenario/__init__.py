@@ -8,8 +8,8 @@ from typing import Any
 from spheretwin.control.laws import LAWS
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.base.user_code import is_reference
-from spheretwin.scenario.changes import check_events, fields_with
-from spheretwin.scenario.reading import fill_hardware, resolve_paths, validated
+from spheretwin.scenario.changes import check_events, complete_fields
+from spheretwin.scenario.reading import validated
 from spheretwin.scenario.sections import Scenario
 from spheretwin.trajectories import SHAPES
 
@@ -31,13 +31,7 @@ def load(source: str, overrides: Mapping[str, Any] | None = None) -> Scenario:
     InputError
         The scenario does not exist, or a field is unknown, of the wrong type or out of range.
     """
-    fields = fields_with(source, overrides or {})
-    fill_hardware(fields)
-    try:
-        resolved = resolve_paths("", fields)
-    except RecursionError:
-        raise InputError(f"scenario {source}: expected values with fewer levels of nesting") from None
-    return check_events(validated(resolved, source), source)
+    return check_events(validated(complete_fields(source, overrides or {}), source), source)
 
 
 def from_record(fields: Mapping[str, Any], source: str) -> Scenario:

@@ -15,7 +15,15 @@ from spheretwin.control.laws import LAWS
 from spheretwin.models.base.errors import InputError, shown
 from spheretwin.models.telemetry.run_record import Change
 from spheretwin.scenario.fields import Kind, families, kind_of, section_kind
-from spheretwin.scenario.reading import is_dotted, override, read, resolve_paths, shipped, validated
+from spheretwin.scenario.reading import (
+    fill_hardware,
+    is_dotted,
+    override,
+    read,
+    resolve_paths,
+    shipped,
+    validated,
+)
 from spheretwin.scenario.sections import Scenario, UserController, kind_of_scenario, scenario_with
 from spheretwin.trajectories.rounding import Triple
 
@@ -58,6 +66,22 @@ class StateChange(BaseModel):
 
 TAGS = frozenset(name.rpartition(".")[2] for name in families(Scenario))
 """Names of the fields that select a member of a family, such as ``shape`` and ``law``."""
+
+
+def complete_fields(source: str, overrides: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the fields of a scenario as `fields_with`, with those of its hardware and with resolved paths.
+
+    Raises
+    ------
+    InputError
+        As `fields_with`, or the fields are nested too deeply.
+    """
+    fields = fields_with(source, overrides)
+    fill_hardware(fields)
+    try:
+        return resolve_paths("", fields)
+    except RecursionError:
+        raise InputError(f"scenario {source}: expected values with fewer levels of nesting") from None
 
 
 def fields_with(source: str, overrides: Mapping[str, Any]) -> dict[str, Any]:

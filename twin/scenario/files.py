@@ -36,6 +36,20 @@ def files_of(scenario: Scenario) -> Files:
     )
 
 
+class FilesCache:
+    """Files of scenarios that run in one process; each set of names is read once."""
+
+    def __init__(self) -> None:
+        self._read: dict[tuple[str | None, ...], Files] = {}
+
+    def files_of(self, scenario: Scenario) -> Files:
+        """Return the files of a scenario as they were when a scenario first named them."""
+        named = (scenario.plant.mjcf, scenario.plant.torque_curve, nominal_curve(scenario))
+        if named not in self._read:
+            self._read[named] = files_of(scenario)
+        return self._read[named]
+
+
 def nominal_curve(scenario: Scenario) -> str:
     """Return the torque curve of the controller's data sheet: a path, or `SHIPPED`.
 
@@ -67,11 +81,6 @@ def _with_curve(model: Mjcf, scenario: Scenario, curve: str) -> Actuator:
 
 def _path(curve: str) -> Path | None:
     return None if curve == SHIPPED else Path(curve)
-
-
-def named_files(scenario: Scenario) -> tuple[str | None, ...]:
-    """Return the names of the files of a scenario."""
-    return scenario.plant.mjcf, scenario.plant.torque_curve, nominal_curve(scenario)
 
 
 def digest(files: Files) -> str:

@@ -28,14 +28,15 @@ from spheretwin.run import Figures, Run, load_metrics, own_values
 from spheretwin.scenario import reading
 from spheretwin.scenario.changes import check_events, fields_with, is_tag
 from spheretwin.scenario.fields import INDEX, every_field, flat, new_name, without_indices
-from spheretwin.scenario.files import Files, files_of, named_files
+from spheretwin.scenario.files import FilesCache
 from spheretwin.scenario.sections import Scenario, scenario_with
 from spheretwin.scenario.writing import command_words
 from spheretwin.session import Session
 from spheretwin.simulation import Sink, follow
 from spheretwin.study.axes import Axis, DrawnAxis
-from spheretwin.study.grid import Row, Template, are_numbers, template_of
+from spheretwin.study.grid import Row
 from spheretwin.study.study import Study, fast_engine
+from spheretwin.study.template import Template, are_numbers, template_of
 
 ENGINE = "plant.engine"
 
@@ -73,7 +74,7 @@ class Rows:
     def __init__(self, study: Study, telemetry: Path | None = None) -> None:
         self.study = study
         self._telemetry = telemetry
-        self._files: dict[tuple[str | None, ...], Files] = {}
+        self._files = FilesCache()
         self._templates: dict[tuple[Any, ...], Template | None] = {}
         self._fields = fields_with(study.source, self._resolve(study.fields))
         self._names_files = True
@@ -133,10 +134,7 @@ class Rows:
 
     def session(self, scenario: Scenario) -> Session:
         """Session of a row's scenario without unread sensors; its files are read once for a study."""
-        named = named_files(scenario)
-        if named not in self._files:
-            self._files[named] = files_of(scenario)
-        return Session(self._without_unread(scenario), files=self._files[named])
+        return Session(self._without_unread(scenario), files=self._files.files_of(scenario))
 
     def _without_unread(self, scenario: Scenario) -> Scenario:
         """Scenario without the noise of current sensors if neither detector nor telemetry has their currents.

@@ -23,13 +23,13 @@ def cache(monkeypatch):
 @pytest.fixture
 def ran(monkeypatch):
     """Scenarios that were really run."""
-    real, results = runner.simulate, []
+    real, results = runner.run_session, []
 
-    def simulate(scenario):
-        results.append(scenario)
-        return real(scenario)
+    def run_session(session):
+        results.append(session.initial_scenario)
+        return real(session)
 
-    monkeypatch.setattr(runner, "simulate", simulate)
+    monkeypatch.setattr(runner, "run_session", run_session)
     return results
 
 

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from spheretwin.models.base.errors import InputError
-from spheretwin.study.grid import Grid, _mixed, are_numbers
+from spheretwin.study.grid import Grid, _mixed
 from tests.twin.study.cases import loads, study, values
 
 
@@ -139,9 +139,3 @@ def test_rows_are_numbered_from_zero_and_no_others_exist():
             grid[number]
     assert grid.values("disturbance.load") == [0.0, 1.0]
     assert grid.values("seed") is None
-
-
-def test_numbers_alone_have_a_gap_in_a_template():
-    assert are_numbers([1, 2.5])
-    assert not are_numbers([1.0, True])
-    assert not are_numbers(["1"])

@@ -7,7 +7,7 @@ import pytest
 
 from spheretwin.models.base.errors import InputError
 from spheretwin.scenario import reading
-from spheretwin.study.grid import are_numbers, template_of
+from spheretwin.study.template import are_numbers, template_of
 
 GAPS = ("seed", "plant.payload_kg", "plant.coulomb_Nm.1", "disturbance.load", "duration")
 SOME = (3, 0.01, 0.002, 1, 0.5)
