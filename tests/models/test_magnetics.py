@@ -3,9 +3,18 @@
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
+from spheretwin.models.base.vectors import cubic
 from spheretwin.models.kinematics import rate_jacobian, rotation
-from spheretwin.models.magnetics import lookup_table, place, torque_matrix, torque_model
+from spheretwin.models.magnetics import (
+    fill_torque_matrix,
+    lookup_table,
+    place,
+    scratch_of,
+    torque_matrix,
+    torque_model,
+)
 from spheretwin.models.torque_curve import TorqueCurve
 
 # The look-up stays within 1e-6 of the curve's peak a pole and coil; a column sums 16 poles and two coils.
@@ -48,6 +57,28 @@ def test_matrix_is_the_paper_s_sum_over_all_pairs(actuator):
     tolerance = SUMMED * actuator.torque_curve.peak_Nm_per_A
     for q in random_poses(20):
         np.testing.assert_allclose(torque_matrix(q, actuator), papers_sum(q, actuator), atol=tolerance)
+
+
+@pytest.mark.parametrize("groups", [1, 2, 3, 4, 5, 7, 8, 17])
+def test_columns_are_the_same_for_any_number_of_groups(actuator, groups):
+    complete = torque_model(actuator)
+    some = complete._replace(group_axes=np.ascontiguousarray(complete.group_axes[:, :groups]))
+    G, around = np.empty((3, groups)), np.full((5, groups), 7.0)
+    for q in random_poses(5):
+        fill_torque_matrix(q, some, G, scratch_of(some))
+        fill_torque_matrix(q, some, around[1:4], scratch_of(some))
+        np.testing.assert_array_equal(G, torque_matrix(q, actuator)[:, :groups])
+        np.testing.assert_array_equal(around, np.vstack([np.full(groups, 7.0), G, np.full(groups, 7.0)]))
+
+
+def test_lookup_goes_on_beyond_its_ends(actuator):
+    """The cosine of a pole in front of a coil, or behind it, may round past 1."""
+    model, eps = torque_model(actuator), np.finfo(float).eps
+    peak = actuator.torque_curve.peak_Nm_per_A
+    for end in (-1.0, 1.0):
+        inside, at, beyond = (cubic(model.table, place(end * (1 + step * eps))) for step in (-64, 0, 4))
+        assert abs(at - inside) < 1e-9 * peak
+        assert abs(beyond - at) < 1e-9 * peak
 
 
 def test_pole_in_front_of_a_coil_is_no_singular_case(actuator):

@@ -55,7 +55,7 @@ class LaneField(NamedTuple):
     coils: Array  # (n, 4, coils)
     torque_gain: Array  # (n, groups)
     G: Array  # (3, groups)
-    scratch: Array  # (5, pairs)
+    scratch: Array  # (lines, 6)
     vectors: Array  # (3, largest of 3 and groups)
 
 

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from spheretwin.models.base.compiled import allocation_free, compiled
 from spheretwin.models.joint_chain import JointChain, torque_on_hinges, update_ideal_motion
-from spheretwin.models.magnetics import TorqueModel, fill_torque_matrix, rotor_torque
+from spheretwin.models.magnetics import SCRATCH_COLUMNS, TorqueModel, fill_torque_matrix, rotor_torque
 from spheretwin.plant.friction import Friction, slow_down
 from spheretwin.plant.lagrangian_rotor import LagrangianData
 from spheretwin.plant.lagrangian_rotor import step as step_rotor
@@ -71,7 +71,8 @@ def torque_matrix(q: Array, parameters: Parameters) -> Array:
     (3, n) array, N·m/A
     """
     groups = parameters.torque_gain.shape[0]
-    G, scratch = np.empty((3, groups)), np.empty((5, parameters.magnetics.line_weights.shape[0] * groups))
+    G = np.empty((3, groups))
+    scratch = np.empty((parameters.magnetics.line_weights.shape[0], SCRATCH_COLUMNS))
     _fill(q, parameters, np.empty((3, 3)), G, scratch)
     for j in range(groups):
         for i in range(3):
@@ -103,7 +104,7 @@ def step(state: State, currents: Array, disturbance: Array, parameters: Paramete
     groups = parameters.torque_gain.shape[0]
     # Few allocations: with one for each vector the step takes half as long again.
     G, vectors = np.empty((3, groups)), np.empty((10, max(3, groups)))
-    scratch = np.empty((5, parameters.magnetics.line_weights.shape[0] * groups))
+    scratch = np.empty((parameters.magnetics.line_weights.shape[0], SCRATCH_COLUMNS))
     q, qdot = state.q_rad.copy(), state.qdot_rad_s.copy()
     _advance(q, qdot, currents, disturbance, parameters, dt, vectors, G, scratch)
     return State(q, qdot)
@@ -132,7 +133,7 @@ def roll_out(
     """
     groups = parameters.torque_gain.shape[0]
     G, vectors = np.empty((3, groups)), np.empty((10, max(3, groups)))
-    scratch = np.empty((5, parameters.magnetics.line_weights.shape[0] * groups))
+    scratch = np.empty((parameters.magnetics.line_weights.shape[0], SCRATCH_COLUMNS))
     present, qdot = state.q_rad.copy(), state.qdot_rad_s.copy()
     for k in range(currents.shape[0]):
         for _ in range(steps):

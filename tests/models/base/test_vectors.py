@@ -1,0 +1,122 @@
+"""Vectors of four numbers against NumPy, and against the same functions of each number."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+
+from spheretwin.models.base.compiled import allocation_free, uncompiled
+from spheretwin.models.base.vectors import WIDTH, cubic, like, limited, load, side, store
+
+NUMBERS = st.floats(-1e6, 1e6)
+FOURS = arrays(np.float64, WIDTH, elements=NUMBERS)
+TABLE = np.random.default_rng(5).normal(size=(9, 4))
+
+# Fused or rounded each: the two differ by less than four roundings of the largest term.
+ROUNDING = 4 * np.finfo(float).eps
+
+
+@allocation_free
+def combine(a, b, number, result):
+    x, y = load(a, 0), load(b, 0)
+    store(number + x * y - number * (y - number), result, 0)
+
+
+@allocation_free
+def move(source, first, target, at):
+    store(load(source, first), target, at)
+
+
+@allocation_free
+def fill_sides(x, result):
+    store(side(load(x, 0)), result, 0)
+
+
+@allocation_free
+def limit(x, low, high, result):
+    store(limited(load(x, 0), low, high), result, 0)
+
+
+@allocation_free
+def look_up(place, result):
+    store(cubic(TABLE, load(place, 0)), result, 0)
+
+
+@allocation_free
+def look_up_each(place, result):
+    for i in range(place.shape[0]):
+        result[i] = cubic(TABLE, place[i])
+
+
+@allocation_free
+def take_like(x, values, first, numbers, four):
+    store(like(load(x, 0), values, first), four, 0)
+    numbers[0] = like(x[0], values, first)
+
+
+def made(function, *arguments):
+    """What a compiled function writes into its last argument, four numbers."""
+    result = np.full(WIDTH, np.nan)
+    function(*arguments, result)
+    return result
+
+
+@given(FOURS, FOURS, NUMBERS)
+def test_operators_are_those_of_numpy(a, b, number):
+    largest = np.abs(a * b) + abs(number) * (np.abs(b) + abs(number)) + abs(number)
+    difference = made(combine, a, b, number) - (number + a * b - number * (b - number))
+    assert np.all(np.abs(difference) <= ROUNDING * largest)
+
+
+def test_four_entries_are_read_and_written_and_no_others():
+    source, target = np.arange(9.0), np.zeros(9)
+    move(source, 3, target, 2)
+    assert target.tolist() == [0, 0, 3, 4, 5, 6, 0, 0, 0]
+
+
+@given(FOURS, st.tuples(NUMBERS, NUMBERS).map(sorted))
+def test_limited_entries_are_those_of_numpy(x, ends):
+    np.testing.assert_array_equal(made(limit, x, *ends), np.clip(x, *ends))
+
+
+def test_a_side_has_the_sign_of_its_entry():
+    x = np.array([-3.0, 0.0, -0.0, 1e-300])
+    np.testing.assert_array_equal(made(fill_sides, x), [-1, 1, -1, 1])
+
+
+@given(arrays(np.float64, WIDTH, elements=st.floats(0, 9, exclude_max=True)))
+def test_cubics_are_the_same_for_four_and_for_each(place):
+    four = made(look_up, place)
+    np.testing.assert_array_equal(four, made(look_up_each, place))
+    row = place.astype(int)
+    expected = np.polynomial.polynomial.polyval(place - row, TABLE[row].T, tensor=False)
+    np.testing.assert_allclose(
+        four, expected, rtol=0, atol=16 * np.finfo(float).eps * np.abs(TABLE).sum(1).max()
+    )
+
+
+def test_like_returns_a_number_for_a_number_and_four_for_a_vector():
+    number, four = np.zeros(1), np.zeros(WIDTH)
+    take_like(np.zeros(WIDTH), np.arange(9.0), 5, number, four)
+    assert number[0] == 5
+    assert four.tolist() == [5, 6, 7, 8]
+
+
+@pytest.mark.parametrize("function", [combine, move, fill_sides, limit, look_up, look_up_each, take_like])
+def test_plain_python_does_the_same(function):
+    """The functions of the module in plain Python act on arrays of four."""
+    arguments = {
+        combine: (np.array([1.0, -2.0, 3.5, 0.25]), np.array([0.5, 4.0, -1.0, 2.0]), 2.0, np.zeros(4)),
+        move: (np.arange(9.0), 3, np.zeros(9), 2),
+        fill_sides: (np.array([1.0, -2.0, 0.0, -0.0]), np.zeros(4)),
+        limit: (np.array([1.0, -2.0, 3.5, 0.25]), -0.5, 1.5, np.zeros(4)),
+        look_up: (np.array([0.0, 3.25, 8.5, 8.0]), np.zeros(4)),
+        look_up_each: (np.array([0.0, 3.25, 8.5, 8.0]), np.zeros(4)),
+        take_like: (np.zeros(4), np.arange(9.0), 5, np.zeros(1), np.zeros(4)),
+    }[function]
+    plain = tuple(np.copy(argument) for argument in arguments)
+    function(*arguments)
+    uncompiled(function)(*(value[()] if value.ndim == 0 else value for value in plain))
+    for ours, theirs in zip(arguments, plain, strict=True):
+        np.testing.assert_allclose(ours, theirs, rtol=ROUNDING, atol=ROUNDING)
