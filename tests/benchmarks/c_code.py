@@ -60,7 +60,6 @@ ORDER(<) ORDER(>) ORDER(<=) ORDER(>=) ORDER(==) ORDER(!=)
     inline Number st_##name(Number a) { Number::count++; return Number(std::name(a.v)); }
 CALL(sin, calls) CALL(cos, calls) CALL(exp, calls) CALL(sqrt, roots)
 inline Number st_fabs(Number a) { return Number(std::fabs(a.v)); }
-inline Number st_floor(Number a) { return Number(std::floor(a.v)); }
 inline Number st_pow(Number a, Number b) { Number::calls++; return Number(std::pow(a.v, b.v)); }
 inline Number st_copysign(Number a, Number b) { return Number(std::copysign(a.v, b.v)); }
 #define ST_REAL Number

@@ -13,7 +13,6 @@
 #define RE(x) (x)
 #define SINE st_sin
 #define COSINE st_cos
-#define FLOOR st_floor
 #include "st_equations.h"
 
 #include ST_ESTIMATOR

@@ -142,6 +142,7 @@ static inline void NAME(torque_matrix)(const T q[3], T G[3][ST_GROUPS])
                 + axis[2] * ST_GROUP_AXES[2][j];
             T beyond = 0, row, t, h;
             const ST_NUMBER *cubic;
+            int place;
 #if ST_SCATTER
             const ST_NUMBER side = RE(cosine) < 0 ? -1 : 1;
             cosine += (ST_PAIR_STRETCH[0][line][j] + side * ST_PAIR_STRETCH[1][line][j]) * (side - cosine);
@@ -152,8 +153,9 @@ static inline void NAME(torque_matrix)(const T q[3], T G[3][ST_GROUPS])
                 beyond = cosine + ST_KNEE;
             }
             row = ST_CENTRE + ST_WIDE * cosine + (ST_NARROW - ST_WIDE) * beyond;
-            t = row - FLOOR(RE(row));
-            cubic = ST_TABLE[(int)RE(row)];
+            place = (int)RE(row); /* 0 also for a row that rounds below it */
+            t = row - (ST_NUMBER)place;
+            cubic = ST_TABLE[place];
             h = cubic[0] + t * (cubic[1] + t * (cubic[2] + t * cubic[3]));
 #if ST_SCATTER
             h *= ST_PAIR_GAIN[0][line][j] + (RE(row) < ST_CENTRE ? -1 : 1) * ST_PAIR_GAIN[1][line][j];

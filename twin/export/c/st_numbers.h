@@ -12,7 +12,6 @@
 #define st_exp expf
 #define st_pow powf
 #define st_fabs fabsf
-#define st_floor floorf
 #define st_copysign copysignf
 #define ST_LARGEST 1e30f     /* of a torque or an angle: products of larger ones overflow */
 #define ST_SINGULAR 1e-9f    /* share of the determinant of a matrix that has lost rank */
@@ -29,7 +28,6 @@
 #define st_exp exp
 #define st_pow pow
 #define st_fabs fabs
-#define st_floor floor
 #define st_copysign copysign
 #endif
 #define ST_LARGEST 1e100

@@ -17,7 +17,6 @@
 #define ROOT sqrt
 #define ARC_SINE asin
 #define ARC_TANGENT atan2
-#define FLOOR floor
 #include "st_equations.h"
 #if ST_GENERAL_JOINT
 #include "st_joint_chain.h"
