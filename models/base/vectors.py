@@ -16,7 +16,7 @@ from typing import Any
 import numba
 import numpy as np
 from llvmlite import ir
-from numba.extending import intrinsic, models, overload, register_model
+from numba.extending import intrinsic, models, register_model
 from numpy.typing import NDArray
 
 from spheretwin.models.base.compiled import implements
@@ -221,12 +221,14 @@ def _build_cubic(typing: Any, table: Any, place: Any) -> tuple[Any, Callable[...
 
 
 def _transposed(builder: Any, rows: list[Any]) -> list[Any]:
-    low = [_arranged(builder, *pair, [0, 4, 2, 6]) for pair in (rows[:2], rows[2:])]
-    high = [_arranged(builder, *pair, [1, 5, 3, 7]) for pair in (rows[:2], rows[2:])]
+    even, odd = (
+        [_arranged(builder, rows[k], rows[k + 1], places) for k in (0, 2)]
+        for places in ([0, 4, 2, 6], [1, 5, 3, 7])
+    )
     return [
-        _arranged(builder, *columns, places)
+        _arranged(builder, first, second, places)
         for places in ([0, 1, 4, 5], [2, 3, 6, 7])
-        for columns in (low, high)
+        for first, second in (even, odd)
     ]
 
 
@@ -251,7 +253,7 @@ def _overload_operator(of_python: Callable[..., Any], of_builder: str) -> None:
 
     operation: Any = intrinsic(build_operation)
 
-    @overload(of_python)
+    @implements(of_python)
     def implementation(x: Any, y: Any) -> Callable[..., Any] | None:
         def call(x: Any, y: Any) -> Any:
             return operation(x, y)

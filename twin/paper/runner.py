@@ -323,11 +323,11 @@ def _run(
     missing = [i for i in range(len(jobs)) if i not in outcomes]
     runs = _Runs()
 
-    def outcome(i: int) -> Outcome:
+    def work(i: int) -> Outcome:
         return _outcome(plan.experiment, runs.run(jobs[i]))
 
     try:
-        with closing(run_each(missing, outcome, threads)) as results:
+        with closing(run_each(missing, work, threads)) as results:
             for i, outcome in results:
                 outcomes[i] = outcome
                 if cache:
