@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import threading
+import time
 from collections.abc import Callable, Generator, Iterable
 from queue import SimpleQueue
 from typing import TypeVar
@@ -13,8 +14,12 @@ from spheretwin.study.engines.engine import Engine, Order
 from spheretwin.study.grid import Row
 from spheretwin.study.row import Result
 
+PAUSE_s = 0.02
+"""Time in which results gather for the caller, which takes the interpreter lock from the thread that has the
+turn."""
+
 # Results of each thread that wait for the caller: enough that no thread waits, few enough to need no memory.
-AHEAD = 4
+AHEAD = 16
 
 T = TypeVar("T")
 R = TypeVar("R")
@@ -30,6 +35,7 @@ def run_each(
 
     Each thread takes the next item by itself: a dispatcher would need a tenth of the time of a run of a
     millisecond. One thread at a time runs Python, the others run their compiled loops (`models.base.turns`).
+    Results are yielded in blocks, at most `PAUSE_s` late.
 
     Parameters
     ----------
@@ -69,6 +75,8 @@ def run_each(
     try:
         while running:
             with outside_turn:  # of a caller that is itself such work
+                if results.empty():
+                    time.sleep(PAUSE_s)
                 result = results.get()
             if isinstance(result, BaseException):
                 raise result

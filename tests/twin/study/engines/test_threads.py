@@ -4,6 +4,7 @@ import threading
 
 from spheretwin.control.law import Law
 from spheretwin.models.base.turns import turn
+from spheretwin.study.engines import threads
 from spheretwin.study.engines.threads import run_each
 from tests.twin.session_cases import session
 from tests.waiting import PATIENCE_S
@@ -42,3 +43,23 @@ def test_items_are_worked_on_in_turns():
     assert set(most) == {1}
     with turn():  # no thread kept it
         pass
+
+
+def test_results_are_taken_in_blocks(monkeypatch):
+    asleep, finished, pauses = threading.Event(), threading.Event(), []
+
+    def pause(time_s):
+        pauses.append(time_s)
+        asleep.set()
+        assert finished.wait(PATIENCE_S)
+
+    def work(number):
+        assert asleep.wait(PATIENCE_S)
+        if number == threads.AHEAD - 1:
+            finished.set()
+        return -number
+
+    monkeypatch.setattr(threads.time, "sleep", pause)
+    assert list(run_each(range(threads.AHEAD), work, threads=1)) == [(n, -n) for n in range(threads.AHEAD)]
+    # One for all results, and one if the thread puts the last of them, or its end, later.
+    assert 1 <= len(pauses) <= 3
