@@ -93,7 +93,7 @@ def stalls(monkeypatch, periods_s, limit_s=TICKS_s, processor_s=lambda now_s: No
     clock, noticed = Clock(periods_s), []
     monkeypatch.setattr(supervisor, "processor_time_s", lambda thread: processor_s(clock.now))
     watching = Supervisor(lambda what: noticed.append(clock.now), lambda: None)
-    monkeypatch.setattr(supervisor.time, "monotonic", clock.monotonic)
+    monkeypatch.setattr(supervisor, "time", clock)
     monkeypatch.setattr(watching, "_ended", clock)
     with watching.limited("work", limit_s):
         watching._watch()

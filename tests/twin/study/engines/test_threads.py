@@ -1,6 +1,7 @@
 """Rows in threads: their loops run together, their Python does not."""
 
 import threading
+from types import SimpleNamespace
 
 from spheretwin.control.law import Law
 from spheretwin.models.base.turns import turn
@@ -59,7 +60,8 @@ def test_results_are_taken_in_blocks(monkeypatch):
             finished.set()
         return -number
 
-    monkeypatch.setattr(threads.time, "sleep", pause)
+    # Only the name of this module: threads that other tests left behind sleep by the one of the library.
+    monkeypatch.setattr(threads, "time", SimpleNamespace(sleep=pause))
     assert list(run_each(range(threads.AHEAD), work, threads=1)) == [(n, -n) for n in range(threads.AHEAD)]
     # One for all results, and one if the thread puts the last of them, or its end, later.
     assert 1 <= len(pauses) <= 3
