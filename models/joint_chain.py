@@ -22,16 +22,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spheretwin.models.base.compiled import inlined
-from spheretwin.models.kinematics import generalised_torque
-from spheretwin.models.lagrangian import (
-    InertiaEntries,
-    Triple,
-    acceleration_entries,
-    inertia_entries,
-    solve_inertia,
-    triple,
-    turns,
-)
+from spheretwin.models.kinematics import Triple, generalised_torque, triple, turns
+from spheretwin.models.lagrangian import InertiaEntries, acceleration_entries, inertia_entries, solve_inertia
 from spheretwin.models.mjcf import gravity
 
 Array = NDArray[np.float64]

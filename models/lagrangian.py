@@ -12,28 +12,15 @@ Each formula is implemented once, on scalars: arrays of three are too slow for a
 per second. The functions with arrays call those on scalars.
 """
 
-from math import cos, sin
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from spheretwin.models.base.compiled import compiled, inlined
+from spheretwin.models.kinematics import Triple, Turns, triple, turns
 
 GRAVITY_m_s2 = 9.81
-
-Triple = tuple[float, float, float]  # an entry for each of alpha, beta, gamma
-
-
-class Turns(NamedTuple):
-    """Cosines and sines of a pose, its only terms in the equations of motion."""
-
-    ca: float
-    sa: float
-    cb: float
-    sb: float
-    cg: float
-    sg: float
 
 
 class InertiaEntries(NamedTuple):
@@ -222,18 +209,6 @@ def coupling_torques(
     coupling[1, 1] = -inertia * cb * qdot[0] * qdot[2]
     coupling[1, 2] = inertia * cb * qdot[0] * qdot[1]
     return coupling
-
-
-@inlined
-def triple(vector: NDArray[np.float64]) -> Triple:
-    """Return the entries of a (3,) array."""
-    return vector[0], vector[1], vector[2]
-
-
-@inlined
-def turns(q: Triple) -> Turns:
-    """Return the cosines and sines of a pose (rad)."""
-    return Turns(cos(q[0]), sin(q[0]), cos(q[1]), sin(q[1]), cos(q[2]), sin(q[2]))
 
 
 @inlined

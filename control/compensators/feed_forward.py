@@ -27,7 +27,8 @@ from spheretwin.control.applied_torque import split_delay
 from spheretwin.control.law import NonNegativeEach, each
 from spheretwin.models.base.compiled import allocation_free
 from spheretwin.models.base.state import delayed_mean, push
-from spheretwin.models.lagrangian import coriolis_rows, inertia_entries, triple, turns
+from spheretwin.models.kinematics import triple, turns
+from spheretwin.models.lagrangian import coriolis_rows, inertia_entries
 
 Array = NDArray[np.float64]
 

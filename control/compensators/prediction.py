@@ -34,8 +34,8 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from spheretwin.control.applied_torque import AppliedTorque, LagStep, lag_step
 from spheretwin.models.base.compiled import allocation_free
-from spheretwin.models.kinematics import generalised_torque
-from spheretwin.models.lagrangian import acceleration_entries, triple, turns
+from spheretwin.models.kinematics import generalised_torque, triple, turns
+from spheretwin.models.lagrangian import acceleration_entries
 from spheretwin.models.magnetics import (
     CachedMatrix,
     TorqueModel,

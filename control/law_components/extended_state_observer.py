@@ -54,7 +54,7 @@ from spheretwin.control.law_components.nominal_motion import (
 )
 from spheretwin.models.base.compiled import allocation_free
 from spheretwin.models.base.state import delayed_mean, push
-from spheretwin.models.lagrangian import Triple
+from spheretwin.models.kinematics import Triple
 
 
 class ObserverGains(NamedTuple):

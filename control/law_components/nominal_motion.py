@@ -6,16 +6,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spheretwin.models.base.compiled import allocation_free, compiled
+from spheretwin.models.kinematics import Triple, Turns, turns
 from spheretwin.models.lagrangian import (
     InertiaEntries,
-    Triple,
-    Turns,
     acceleration_entries,
     coriolis_matrix,
     coriolis_rows,
     inertia_entries,
     inertia_matrix,
-    turns,
 )
 
 UPRIGHT = Turns(1.0, 0.0, 1.0, 0.0, 1.0, 0.0)

@@ -100,7 +100,7 @@ from spheretwin.control.law_components.nominal_motion import (
 )
 from spheretwin.control.law_components.parameters import LawParameters, named
 from spheretwin.models.base.compiled import allocation_free
-from spheretwin.models.lagrangian import Triple
+from spheretwin.models.kinematics import Triple
 from spheretwin.models.telemetry.signals import ANGLES, Signal
 
 Array = NDArray[np.float64]

@@ -1,7 +1,7 @@
 """Vectors of four numbers: in compiled code one register each, in plain Python a NumPy array.
 
 For loops that the compiler does not vectorise by itself, such as those with reads of a table. The operators
-``+``, ``-`` and ``*`` act on each entry; a number is taken for all four. `limited`, `side`, `cubic` and
+``+``, ``-``, ``*`` and `numpy.floor` act on each entry; a number is taken for all four. `limited`, `side`, `cubic` and
 `like` also take a number in place of a vector, so that one formula serves blocks of four columns and the
 columns that are left.
 """
@@ -16,6 +16,7 @@ from typing import Any
 import numba
 import numpy as np
 from llvmlite import ir
+from numba.core.cgutils import get_or_insert_function
 from numba.extending import intrinsic, models, register_model
 from numpy.typing import NDArray
 
@@ -45,6 +46,16 @@ _VECTOR = _VectorType()
 class _VectorModel(models.PrimitiveModel):
     def __init__(self, manager: Any, kind: Any) -> None:
         super().__init__(manager, kind, _NUMBERS)
+
+
+def vector(a: float, b: float, c: float, d: float) -> Vector:
+    """Return the vector of four numbers."""
+    return np.array([a, b, c, d])
+
+
+def entry(x: Vector, number: int) -> float:
+    """Return an entry, from 0."""
+    return float(x[number])
 
 
 def load(values: Array, first: int) -> Vector:
@@ -85,6 +96,14 @@ def cubic(table: Array, place: Vector) -> Vector:
     row = np.trunc(place)
     t, of_row = place - row, table[np.asarray(row, dtype=np.int64)].T
     return of_row[0] + t * (of_row[1] + t * (of_row[2] + t * of_row[3]))
+
+
+@implements(np.floor)
+def _compiled_floor(x: Any) -> Callable[..., Any] | None:
+    def call(x: Any) -> Any:
+        return _floor(x)
+
+    return call if x is _VECTOR else None
 
 
 @implements(load)
@@ -149,6 +168,22 @@ def _compiled_cubic(table: Any, place: Any) -> Callable[..., Any]:
     return call if place is _VECTOR else call_number
 
 
+@implements(vector)
+def _compiled_vector(a: Any, b: Any, c: Any, d: Any) -> Callable[..., Any]:
+    def call(a: Any, b: Any, c: Any, d: Any) -> Any:
+        return _vector(a, b, c, d)
+
+    return call
+
+
+@implements(entry)
+def _compiled_entry(x: Any, number: Any) -> Callable[..., Any]:
+    def call(x: Any, number: Any) -> Any:
+        return _entry(x, number)
+
+    return call
+
+
 def _all_four(builder: Any, number: Any) -> Any:
     first = builder.insert_element(ir.Constant(_NUMBERS, ir.Undefined), number, ir.Constant(_INDEX, 0))
     return _arranged(builder, first, first, [0] * WIDTH)
@@ -179,6 +214,31 @@ def _build_store(typing: Any, vector: Any, values: Any, first: Any) -> tuple[Any
         return context.get_dummy_value()
 
     return numba.types.void(vector, values, numba.types.intp), build
+
+
+def _build_vector(typing: Any, a: Any, b: Any, c: Any, d: Any) -> tuple[Any, Callable[..., Any]]:
+    def build(context: Any, builder: Any, signature: Any, given: Any) -> Any:
+        made = ir.Constant(_NUMBERS, ir.Undefined)
+        for place, number in enumerate(given):
+            made = builder.insert_element(made, number, ir.Constant(_INDEX, place))
+        return made
+
+    return _VECTOR(numba.float64, numba.float64, numba.float64, numba.float64), build
+
+
+def _build_entry(typing: Any, x: Any, number: Any) -> tuple[Any, Callable[..., Any]]:
+    def build(context: Any, builder: Any, signature: Any, given: Any) -> Any:
+        return builder.extract_element(*given)
+
+    return numba.float64(x, numba.types.intp), build
+
+
+def _build_floor(typing: Any, x: Any) -> tuple[Any, Callable[..., Any]]:
+    def build(context: Any, builder: Any, signature: Any, given: Any) -> Any:
+        kind = ir.FunctionType(_NUMBERS, [_NUMBERS])
+        return builder.call(get_or_insert_function(builder.module, kind, f"llvm.floor.v{WIDTH}f64"), given)
+
+    return _VECTOR(x), build
 
 
 def _build_limited(typing: Any, x: Any, low: Any, high: Any) -> tuple[Any, Callable[..., Any]]:
@@ -234,6 +294,9 @@ def _transposed(builder: Any, rows: list[Any]) -> list[Any]:
 
 _load: Any = intrinsic(_build_load)
 _store: Any = intrinsic(_build_store)
+_vector: Any = intrinsic(_build_vector)
+_entry: Any = intrinsic(_build_entry)
+_floor: Any = intrinsic(_build_floor)
 _limited: Any = intrinsic(_build_limited)
 _side: Any = intrinsic(_build_side)
 _cubic: Any = intrinsic(_build_cubic)

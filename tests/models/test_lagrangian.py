@@ -8,14 +8,8 @@ from scipy.integrate import solve_ivp
 
 from spheretwin.models import actuator as actuators
 from spheretwin.models import mjcf
-from spheretwin.models.kinematics import rate_jacobian, rotation, rotor_rate_jacobian
-from spheretwin.models.lagrangian import (
-    InertiaEntries,
-    coriolis_matrix,
-    inertia_matrix,
-    solve_inertia,
-    triple,
-)
+from spheretwin.models.kinematics import rate_jacobian, rotation, rotor_rate_jacobian, triple
+from spheretwin.models.lagrangian import InertiaEntries, coriolis_matrix, inertia_matrix, solve_inertia
 
 
 def random_states(count, seed=0):

@@ -22,8 +22,8 @@ from spheretwin.models.actuator import Actuator
 from spheretwin.models.base.checks import Check
 from spheretwin.models.base.errors import InputError, without_breaks
 from spheretwin.models.joint_chain import JointChain, equations, hinge_torque, read_chain
-from spheretwin.models.kinematics import rate_jacobian, rotation
-from spheretwin.models.lagrangian import coriolis_matrix, gravity_torque, inertia_matrix, triple
+from spheretwin.models.kinematics import rate_jacobian, rotation, triple
+from spheretwin.models.lagrangian import coriolis_matrix, gravity_torque, inertia_matrix
 from spheretwin.models.mjcf import PAYLOAD, gravity, read
 from spheretwin.plant.lagrangian_rotor import LagrangianRotor
 from spheretwin.plant.mass_properties import MassErrors, MassSection, mass_errors, true_model

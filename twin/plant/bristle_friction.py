@@ -37,7 +37,8 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from spheretwin.models.base.compiled import copy_into, inlined
 from spheretwin.models.joint_chain import JointChain, inertia_at
-from spheretwin.models.lagrangian import InertiaEntries, solve_inertia, triple
+from spheretwin.models.kinematics import triple
+from spheretwin.models.lagrangian import InertiaEntries, solve_inertia
 from spheretwin.plant.cable import CableSection, acts, constant_torque_Nm
 from spheretwin.plant.end_stops import EndStops, log_stops, store_stop, with_stop
 from spheretwin.plant.friction import momentum

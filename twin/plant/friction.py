@@ -19,7 +19,8 @@ from numpy.typing import NDArray
 from spheretwin.models.base.compiled import inlined
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.joint_chain import JointChain, inertia_at
-from spheretwin.models.lagrangian import InertiaEntries, Triple, solve_inertia, triple
+from spheretwin.models.kinematics import Triple, triple
+from spheretwin.models.lagrangian import InertiaEntries, solve_inertia
 
 # Far below any motion; its square is far above the smallest number, so that k(0) is finite.
 SLOWEST_SMOOTHING_rad_s = 1e-12

@@ -15,7 +15,8 @@ from spheretwin.models.actuator import Actuator
 from spheretwin.models.base.compiled import allocation_free, inlined
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.joint_chain import JointChain, acceleration_at
-from spheretwin.models.lagrangian import GRAVITY_m_s2, Triple, loaded_inertia, triple
+from spheretwin.models.kinematics import Triple, triple
+from spheretwin.models.lagrangian import GRAVITY_m_s2, loaded_inertia
 from spheretwin.plant.rotor import EngineKind, RotorSettings
 
 

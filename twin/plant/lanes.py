@@ -16,14 +16,8 @@ from numpy.typing import NDArray
 
 from spheretwin.models.base.compiled import allocation_free, inlined
 from spheretwin.models.base.trigonometry import sine_cosine
-from spheretwin.models.lagrangian import (
-    InertiaEntries,
-    Triple,
-    Turns,
-    acceleration_entries,
-    inertia_entries,
-    solve_inertia,
-)
+from spheretwin.models.kinematics import Triple, Turns
+from spheretwin.models.lagrangian import InertiaEntries, acceleration_entries, inertia_entries, solve_inertia
 from spheretwin.models.magnetics import TorqueModel, fill_torque_matrix, rotor_torque
 from spheretwin.plant.friction import momentum
 
