@@ -291,7 +291,8 @@ def solve_inertia(M: InertiaEntries, torque: Triple, chain: object | None) -> Tr
         alpha = (torque[0] - from_alpha * torque[2] - share * on_beta) / left
         beta = on_beta / b - share * alpha
         return alpha, beta, torque[2] / M.gamma - from_alpha * alpha - from_beta * beta
-    to_beta, to_gamma = M.alpha_beta / M.beta, M.alpha_gamma / M.gamma
+    of_beta, of_gamma = 1.0 / M.beta, 1.0 / M.gamma
+    to_beta, to_gamma = M.alpha_beta * of_beta, M.alpha_gamma * of_gamma
     left = M.alpha - to_beta * M.alpha_beta - to_gamma * M.alpha_gamma
     alpha = (torque[0] - to_beta * torque[1] - to_gamma * torque[2]) / left
-    return alpha, torque[1] / M.beta - to_beta * alpha, torque[2] / M.gamma - to_gamma * alpha
+    return alpha, torque[1] * of_beta - to_beta * alpha, torque[2] * of_gamma - to_gamma * alpha

@@ -20,26 +20,27 @@ RULES = SETS * SETS
 CONSEQUENTS = 3 * RULES
 
 
+# Neighbouring sets at the distance d: with ``r = exp(SLOPE x)``, their degrees are as ``r**-2 FAR``,
+# ``NEAR / r``, 1, ``NEAR r`` and ``r**2 FAR``.
+_SPACING = CENTRES[1] - CENTRES[0]
+_SLOPE = SHAPE * _SPACING / (2.0 * WIDTH**2)
+_NEAR, _FAR = (exp(-SHAPE * (places * _SPACING / (2.0 * WIDTH)) ** 2) for places in (1, 2))
+
+# There the degree of an outer set differs from 1 by less than a rounding error.
+_SATURATION = 100.0
+
+
 @allocation_free
 def memberships(x: float) -> tuple[float, float, float, float, float]:
-    """Return the degrees of membership of `x` in the five sets, normalised to sum 1.
+    """Return the degrees of membership of `x` in the five sets, normalised to sum 1 (57).
 
-    The exponent of the nearest set is subtracted before the exponential, which divides numerator and
-    denominator alike. At least one degree is then 1 before normalisation, and nothing underflows as long as
-    the square of `x` is finite (up to 1e150).
+    The centres are equally spaced: one exponential gives all degrees relative to that of the middle set.
     """
-    a, b, c, d, e = exponent(x, 0), exponent(x, 1), exponent(x, 2), exponent(x, 3), exponent(x, 4)
-    nearest = max(a, b, c, d, e)
-    a, b, c = exp(a - nearest), exp(b - nearest), exp(c - nearest)
-    d, e = exp(d - nearest), exp(e - nearest)
-    share = 1.0 / (a + b + c + d + e)
-    return a * share, b * share, c * share, d * share, e * share
-
-
-@allocation_free
-def exponent(x: float, k: int) -> float:
-    """Return the logarithm of the membership of `x` in set `k` (57)."""
-    return -SHAPE * ((x - CENTRES[k]) / (2.0 * WIDTH)) ** 2
+    rise = exp(_SLOPE * min(max(x, -_SATURATION), _SATURATION))
+    fall = 1.0 / rise
+    a, b, d, e = _FAR * fall * fall, _NEAR * fall, _NEAR * rise, _FAR * rise * rise
+    share = 1.0 / (a + b + 1.0 + d + e)
+    return a * share, b * share, share, d * share, e * share
 
 
 @allocation_free

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from spheretwin.models.base.compiled import allocation_free
+from spheretwin.models.base.compiled import allocation_free, copy_into
 from spheretwin.models.base.errors import InputError
 
 Array = NDArray[np.float64]
@@ -95,6 +95,15 @@ def push(history: Array, column: int, value: float) -> None:
     for row in range(history.shape[0] - 1, 0, -1):
         history[row, column] = history[row - 1, column]
     history[0, column] = value
+
+
+@allocation_free
+def push_all(history: Array, values: Array) -> None:
+    """Store the newest value of every column of a history in row 0; the oldest ones are dropped."""
+    columns = values.shape[0]
+    for row in range(history.shape[0] - 1, 0, -1):
+        copy_into(history[row], 0, history[row - 1], columns)
+    copy_into(history[0], 0, values, columns)
 
 
 @allocation_free

@@ -1,9 +1,9 @@
 """Vectors of four numbers: in compiled code one register each, in plain Python a NumPy array.
 
 For loops that the compiler does not vectorise by itself, such as those with reads of a table. The operators
-``+``, ``-``, ``*`` and `numpy.floor` act on each entry; a number is taken for all four. `limited`, `side`, `cubic` and
-`like` also take a number in place of a vector, so that one formula serves blocks of four columns and the
-columns that are left.
+``+``, ``-``, ``*`` and `numpy.floor` act on each entry; a number is taken for all four. `limited`, `side`,
+`cubic` and `like` also take a number in place of a vector, so that one formula serves blocks of four columns
+and the columns that are left.
 """
 
 from __future__ import annotations

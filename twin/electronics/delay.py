@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field
 
 from spheretwin.models.base.compiled import inlined
-from spheretwin.models.base.state import push
+from spheretwin.models.base.state import push_all
 
 # Clock times are decimal fractions: a delay is a multiple of a step only up to rounding.
 WHOLE = 1e-9
@@ -74,8 +74,7 @@ def delay(section: DelaySection, step_s: float, substeps: int, groups: int) -> D
 @inlined
 def latch(delay: Delay, command: NDArray[np.float64]) -> None:
     """Store the command (n,), A, that was computed from the sample of this control tick."""
-    for j in range(command.shape[0]):
-        push(delay.history, j, command[j])
+    push_all(delay.history, command)
 
 
 @inlined

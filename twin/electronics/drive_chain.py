@@ -50,7 +50,7 @@ from spheretwin.electronics.coil_coupling import (
 from spheretwin.electronics.delay import Delay, delay, due, latch
 from spheretwin.electronics.drive_section import STAGES, ResolvedDrive
 from spheretwin.electronics.stages import DriveSetup, FaultLine, chained, fault_line, through
-from spheretwin.models.base.compiled import implements, inlined
+from spheretwin.models.base.compiled import copy_into, implements, inlined
 from spheretwin.models.base.state import transfer_state
 from spheretwin.models.kinematics import angular_velocity
 
@@ -411,14 +411,19 @@ def end(chain: DriveChain) -> bool:
 @inlined
 def write_telemetry(chain: DriveChain, row: Array) -> None:
     """Write power, losses, temperatures and limits of the control period into the beginning of `row`."""
-    flow, period_s, groups = chain.flow, chain.coil.period_s, chain.emf.shape[0]
-    row[0] = chain.period[SUPPLY_V] * chain.period[DRAWN_As] / period_s
-    for j in range(groups):
-        row[1 + j] = flow.work_J[j] / period_s
-        row[1 + groups + j] = flow.copper_J[j] / period_s
-        row[1 + 2 * groups + j] = chain.coil.temperature_degC[j]
-        row[1 + 3 * groups + j] = flow.voltage_limited_s[j] / period_s
-        row[1 + 4 * groups + j] = flow.current_limited_s[j] / period_s
+    flow, per_s, groups = chain.flow, 1.0 / chain.coil.period_s, chain.emf.shape[0]
+    row[0] = chain.period[SUPPLY_V] * chain.period[DRAWN_As] * per_s
+    _write_scaled(flow.work_J, per_s, row, 1)
+    _write_scaled(flow.copper_J, per_s, row, 1 + groups)
+    copy_into(row, 1 + 2 * groups, chain.coil.temperature_degC, groups)
+    _write_scaled(flow.voltage_limited_s, per_s, row, 1 + 3 * groups)
+    _write_scaled(flow.current_limited_s, per_s, row, 1 + 4 * groups)
+
+
+@inlined
+def _write_scaled(values: Array, factor: float, row: Array, first: int) -> None:
+    for j in range(values.shape[0]):
+        row[first + j] = values[j] * factor
 
 
 def transfer(before: DriveChain | None, after: DriveChain, command: Array) -> None:

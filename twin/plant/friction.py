@@ -118,17 +118,35 @@ def slow_down(
     R is the real part of ``(1 - i) / (1 + p x)`` with ``p = (1 + i) / 2``: one complex system
     ``(M + p t K) u = M v``, of the same zeros as M.
     """
-    t = 0.5 * friction.step_s
     v = triple(qdot)
     M = inertia_at(friction.chain, friction.inertia, triple(q))
-    before = momentum(M, v, friction.chain)
-    middle = solve_inertia(_damped(friction, M, v, 0.5 * t), before, friction.chain)
-    slowed = solve_inertia(_damped(friction, M, middle, _POLE * t), before, friction.chain)
-    for i in range(3):
-        qdot[i] = (_RESIDUE * slowed[i]).real
-    gained = momentum(M, (qdot[0] - v[0], qdot[1] - v[1], qdot[2] - v[2]), friction.chain)
+    viscous, coulomb = triple(friction.viscous_Nm_s), triple(friction.coulomb_Nm)
+    smoothing, chain = friction.smoothing_rate_rad_s, friction.chain
+    qdot[0], qdot[1], qdot[2] = slowed(M, v, viscous, coulomb, smoothing, 0.5 * friction.step_s, chain)
+    gained = momentum(M, (qdot[0] - v[0], qdot[1] - v[1], qdot[2] - v[2]), chain)
     for i in range(3):
         mean_torque_q[i] += gained[i] / friction.step_s
+
+
+@inlined
+def slowed(
+    M: InertiaEntries,
+    v: Triple,
+    viscous: Triple,
+    coulomb: Triple,
+    smoothing: float,
+    t: float,
+    chain: JointChain | None,
+) -> Triple:
+    """Return the rates (rad/s) after a time t (s) of friction alone; chain is None for an ideal joint."""
+    before = momentum(M, v, chain)
+    k = _factors(viscous, coulomb, smoothing, v)
+    middle = solve_inertia(_damped(M, k, 0.5 * t), before, chain)
+    k = _factors(viscous, coulomb, smoothing, middle)
+    if chain is None:
+        return _slowed_ideal(M, (0.5 * t * k[0], 0.5 * t * k[1], 0.5 * t * k[2]), before)
+    alpha, beta, gamma = solve_inertia(_damped(M, k, _POLE * t), before, chain)
+    return (_RESIDUE * alpha).real, (_RESIDUE * beta).real, (_RESIDUE * gamma).real
 
 
 @inlined
@@ -142,12 +160,23 @@ def momentum(M: InertiaEntries, v: Triple, chain: JointChain | None) -> Triple:
 
 
 @inlined
-def _damped(friction: Friction, M: InertiaEntries, rates: Triple, time: Any) -> InertiaEntries:
-    """Return the inertia matrix plus a real or complex time times the friction factors at given rates."""
+def _factors(viscous: Triple, coulomb: Triple, smoothing: float, rates: Triple) -> Triple:
+    """Return the friction of each hinge divided by its rate, N·m·s."""
+    square = smoothing**2
+    return (
+        viscous[0] + coulomb[0] / sqrt(rates[0] ** 2 + square),
+        viscous[1] + coulomb[1] / sqrt(rates[1] ** 2 + square),
+        viscous[2] + coulomb[2] / sqrt(rates[2] ** 2 + square),
+    )
+
+
+@inlined
+def _damped(M: InertiaEntries, k: Triple, time: Any) -> InertiaEntries:
+    """Return the inertia matrix plus a real or complex time times the friction factors."""
     return InertiaEntries(
-        alpha=M.alpha + time * _factor(friction, rates[0], 0),
-        beta=M.beta + time * _factor(friction, rates[1], 1),
-        gamma=M.gamma + time * _factor(friction, rates[2], 2),
+        alpha=M.alpha + time * k[0],
+        beta=M.beta + time * k[1],
+        gamma=M.gamma + time * k[2],
         alpha_beta=M.alpha_beta,
         alpha_gamma=M.alpha_gamma,
         beta_gamma=M.beta_gamma,
@@ -155,10 +184,34 @@ def _damped(friction: Friction, M: InertiaEntries, rates: Triple, time: Any) -> 
 
 
 @inlined
-def _factor(friction: Friction, rate: float, hinge: int) -> float:
-    """Return the friction of a hinge divided by its rate, N·m·s."""
-    smoothing = friction.smoothing_rate_rad_s
-    return friction.viscous_Nm_s[hinge] + friction.coulomb_Nm[hinge] / sqrt(rate**2 + smoothing**2)
+def _slowed_ideal(M: InertiaEntries, damping: Triple, before: Triple) -> Triple:
+    """Return the real part of ``(1 - i) u``, where ``(M + (1 + i) diag(damping)) u = before``.
+
+    It is the elimination of `solve_inertia` for an ideal joint, with real and imaginary parts apart: complex
+    divisions have branches, take longer, and are not vectorised.
+    """
+    a, b, c = damping
+    # Reciprocals of the two diagonal entries that are eliminated.
+    beta_re, beta_im = M.beta + b, b
+    share = 1.0 / (beta_re * beta_re + beta_im * beta_im)
+    beta_re, beta_im = share * beta_re, -share * beta_im
+    gamma_re, gamma_im = M.gamma + c, c
+    share = 1.0 / (gamma_re * gamma_re + gamma_im * gamma_im)
+    gamma_re, gamma_im = share * gamma_re, -share * gamma_im
+    left_re = M.alpha + a - beta_re * M.alpha_beta**2 - gamma_re * M.alpha_gamma**2
+    left_im = a - beta_im * M.alpha_beta**2 - gamma_im * M.alpha_gamma**2
+    share = 1.0 / (left_re * left_re + left_im * left_im)
+    from_beta, from_gamma = M.alpha_beta * before[1], M.alpha_gamma * before[2]
+    rest_re = before[0] - beta_re * from_beta - gamma_re * from_gamma
+    rest_im = -beta_im * from_beta - gamma_im * from_gamma
+    alpha_re = share * (rest_re * left_re + rest_im * left_im)
+    alpha_im = share * (rest_im * left_re - rest_re * left_im)
+    on_beta_re, on_beta_im = before[1] - M.alpha_beta * alpha_re, -M.alpha_beta * alpha_im
+    on_gamma_re, on_gamma_im = before[2] - M.alpha_gamma * alpha_re, -M.alpha_gamma * alpha_im
+    # The real part of (1 - i) u is the sum of both parts of u.
+    beta = beta_re * (on_beta_re + on_beta_im) + beta_im * (on_beta_re - on_beta_im)
+    gamma = gamma_re * (on_gamma_re + on_gamma_im) + gamma_im * (on_gamma_re - on_gamma_im)
+    return alpha_re + alpha_im, beta, gamma
 
 
 def _coefficients(name: str, values: NDArray[np.float64]) -> NDArray[np.float64]:

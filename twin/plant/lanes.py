@@ -1,14 +1,12 @@
 """Compiled step of many plants at a time: a plant in each lane of the vector unit.
 
-The operations and the formulas are those of `plant_step`. Three things differ, because the compiler
-vectorises only loops without branches and calls: sine and cosine are polynomials, the complex system of the
-friction is solved in real arithmetic, and all numbers of a block of plants are in one vector. The reads of
-the torque table are scattered: the field is computed plant by plant.
+The operations and the formulas are those of `plant_step`. The compiler vectorises only loops without
+branches and calls, so all numbers of a block of plants are in one vector. The reads of the torque table are
+scattered: the field is computed plant by plant.
 """
 
 from __future__ import annotations
 
-from math import sqrt
 from typing import NamedTuple
 
 import numpy as np
@@ -17,9 +15,9 @@ from numpy.typing import NDArray
 from spheretwin.models.base.compiled import allocation_free, inlined
 from spheretwin.models.base.trigonometry import sine_cosine
 from spheretwin.models.kinematics import Triple, Turns
-from spheretwin.models.lagrangian import InertiaEntries, acceleration_entries, inertia_entries, solve_inertia
+from spheretwin.models.lagrangian import acceleration_entries, inertia_entries
 from spheretwin.models.magnetics import TorqueModel, fill_torque_matrix, rotor_torque
-from spheretwin.plant.friction import momentum
+from spheretwin.plant.friction import slowed
 
 Array = NDArray[np.float64]
 
@@ -207,59 +205,7 @@ def _slow_down(block: Array, dt: float) -> None:
     for lane in range(LANES):
         M = inertia_entries(_turns(block, lane), _triple(block, INERTIA, lane))
         rates = _triple(block, QDOT, lane)
-        before = momentum(M, rates, None)
-        a, b, c = _factors(block, lane, rates)
-        middle = solve_inertia(_with_diagonal(M, 0.5 * t * a, 0.5 * t * b, 0.5 * t * c), before, None)
-        a, b, c = _factors(block, lane, middle)
-        alpha, beta, gamma = _slowed(M, (0.5 * t * a, 0.5 * t * b, 0.5 * t * c), before)
+        viscous, coulomb = _triple(block, VISCOUS, lane), _triple(block, COULOMB, lane)
+        alpha, beta, gamma = slowed(M, rates, viscous, coulomb, block[SMOOTHING + lane], t, None)
         block[QDOT + lane], block[QDOT + LANES + lane] = alpha, beta
         block[QDOT + 2 * LANES + lane] = gamma
-
-
-@inlined
-def _factors(block: Array, lane: int, rates: Triple) -> Triple:
-    """Return the friction of each hinge divided by its rate, N·m·s."""
-    a, b, c = _triple(block, VISCOUS, lane)
-    coulomb, square = _triple(block, COULOMB, lane), block[SMOOTHING + lane] ** 2
-    return (
-        a + coulomb[0] / sqrt(rates[0] ** 2 + square),
-        b + coulomb[1] / sqrt(rates[1] ** 2 + square),
-        c + coulomb[2] / sqrt(rates[2] ** 2 + square),
-    )
-
-
-@inlined
-def _with_diagonal(M: InertiaEntries, alpha: float, beta: float, gamma: float) -> InertiaEntries:
-    return InertiaEntries(
-        M.alpha + alpha, M.beta + beta, M.gamma + gamma, M.alpha_beta, M.alpha_gamma, M.beta_gamma
-    )
-
-
-@inlined
-def _slowed(M: InertiaEntries, damping: Triple, before: Triple) -> Triple:
-    """Return the real part of ``(1 - i) u``, where ``(M + (1 + i) diag(damping)) u = before``.
-
-    It is the elimination of `solve_inertia` for an ideal joint, with real and imaginary parts apart.
-    """
-    a, b, c = damping
-    # Reciprocals of the two diagonal entries that are eliminated.
-    beta_re, beta_im = M.beta + b, b
-    share = 1.0 / (beta_re * beta_re + beta_im * beta_im)
-    beta_re, beta_im = share * beta_re, -share * beta_im
-    gamma_re, gamma_im = M.gamma + c, c
-    share = 1.0 / (gamma_re * gamma_re + gamma_im * gamma_im)
-    gamma_re, gamma_im = share * gamma_re, -share * gamma_im
-    left_re = M.alpha + a - beta_re * M.alpha_beta**2 - gamma_re * M.alpha_gamma**2
-    left_im = a - beta_im * M.alpha_beta**2 - gamma_im * M.alpha_gamma**2
-    share = 1.0 / (left_re * left_re + left_im * left_im)
-    from_beta, from_gamma = M.alpha_beta * before[1], M.alpha_gamma * before[2]
-    rest_re = before[0] - beta_re * from_beta - gamma_re * from_gamma
-    rest_im = -beta_im * from_beta - gamma_im * from_gamma
-    alpha_re = share * (rest_re * left_re + rest_im * left_im)
-    alpha_im = share * (rest_im * left_re - rest_re * left_im)
-    on_beta_re, on_beta_im = before[1] - M.alpha_beta * alpha_re, -M.alpha_beta * alpha_im
-    on_gamma_re, on_gamma_im = before[2] - M.alpha_gamma * alpha_re, -M.alpha_gamma * alpha_im
-    # The real part of (1 - i) u is the sum of both parts of u.
-    beta = beta_re * (on_beta_re + on_beta_im) + beta_im * (on_beta_re - on_beta_im)
-    gamma = gamma_re * (on_gamma_re + on_gamma_im) + gamma_im * (on_gamma_re - on_gamma_im)
-    return alpha_re + alpha_im, beta, gamma
