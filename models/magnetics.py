@@ -12,7 +12,18 @@ from spheretwin.models.actuator import Actuator, CoilGeometry, Magnet
 from spheretwin.models.base.cache import cached_array
 from spheretwin.models.base.compiled import allocation_free, inlined
 from spheretwin.models.base.errors import InputError, distinct_texts, one_line
-from spheretwin.models.base.vectors import WIDTH, Vector, cubic, like, limited, load, side, store
+from spheretwin.models.base.vectors import (
+    WIDTH,
+    Vector,
+    cubic,
+    like,
+    limited,
+    load,
+    side,
+    store,
+    total,
+    vector,
+)
 from spheretwin.models.kinematics import rotation_rows
 from spheretwin.models.torque_curve import TorqueCurve
 from spheretwin.models.torque_field import TorqueField
@@ -350,11 +361,18 @@ def rotor_torque(G: NDArray[np.float64], current: NDArray[np.float64], torque_S:
     torque_S : (3,) array, N·m
         Result: on the rotor, stator frame.
     """
-    for i in range(3):
-        total = 0.0
-        for j in range(current.shape[0]):
-            total += G[i, j] * current[j]
-        torque_S[i] = total
+    G_x, G_y, G_z = G[0], G[1], G[2]
+    groups = current.shape[0]
+    left = groups % WIDTH
+    of_x = of_y = of_z = vector(0.0, 0.0, 0.0, 0.0)
+    for j in range(0, groups - left, WIDTH):
+        amperes = load(current, j)
+        of_x, of_y = of_x + load(G_x, j) * amperes, of_y + load(G_y, j) * amperes
+        of_z = of_z + load(G_z, j) * amperes
+    x, y, z = total(of_x), total(of_y), total(of_z)
+    for j in range(groups - left, groups):
+        x, y, z = x + G_x[j] * current[j], y + G_y[j] * current[j], z + G_z[j] * current[j]
+    torque_S[0], torque_S[1], torque_S[2] = x, y, z
 
 
 def _cached_table(curve: TorqueCurve) -> NDArray[np.float64]:

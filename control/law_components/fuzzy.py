@@ -5,12 +5,13 @@ one set of the rate and one of the angle; its consequent is ``theta_0 + theta_1 
 """
 
 from math import exp, sqrt
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from spheretwin.models.base.compiled import allocation_free
+from spheretwin.models.base.compiled import allocation_free, inlined
+from spheretwin.models.base.vectors import Vector, like, store, total, vector
 
 CENTRES = (-3.0, -1.5, 0.0, 1.5, 3.0)
 WIDTH = 1.0  # sigma of (57)
@@ -61,20 +62,24 @@ def approximate_and_adapt(rate: float, angle: float, drive: float, consequents: 
     float
         Output of the approximator before the adaptation.
     """
-    of_rate, of_angle = memberships(rate), memberships(angle)
-    output = 0.0
+    of_rate, (a, b, c, d, last) = memberships(rate), memberships(angle)
+    of_first, of_last = vector(0.0, 0.0, 0.0, 0.0), 0.0
     for i in range(SETS):
-        for j in range(SETS):
-            k = SETS * i + j
-            psi = of_rate[i] * of_angle[j]
-            output += psi * (
-                consequents[k] + consequents[RULES + k] * rate + consequents[2 * RULES + k] * angle
-            )
-            step = drive * psi
-            consequents[k] += step
-            consequents[RULES + k] += step * rate
-            consequents[2 * RULES + k] += step * angle
-    return output
+        first_four = of_rate[i] * vector(a, b, c, d)
+        of_first = of_first + _apply_and_adapt(first_four, SETS * i, rate, angle, drive, consequents)
+        of_last += _apply_and_adapt(of_rate[i] * last, SETS * i + 4, rate, angle, drive, consequents)
+    return total(of_first) + of_last
+
+
+@inlined
+def _apply_and_adapt(psi: Vector, k: int, rate: float, angle: float, drive: float, theta: Any) -> Vector:
+    """Return the contribution of rule k, or of four rules from it on, before the adaptation."""
+    constant, of_rate = like(psi, theta, k), like(psi, theta, RULES + k)
+    of_angle, step = like(psi, theta, 2 * RULES + k), drive * psi
+    store(constant + step, theta, k)
+    store(of_rate + step * rate, theta, RULES + k)
+    store(of_angle + step * angle, theta, 2 * RULES + k)
+    return psi * (constant + of_rate * rate + of_angle * angle)
 
 
 class AdaptationLimits(NamedTuple):

@@ -1,9 +1,9 @@
 """Vectors of four numbers: in compiled code one register each, in plain Python a NumPy array.
 
 For loops that the compiler does not vectorise by itself, such as those with reads of a table. The operators
-``+``, ``-``, ``*`` and `numpy.floor` act on each entry; a number is taken for all four. `limited`, `side`,
-`cubic` and `like` also take a number in place of a vector, so that one formula serves blocks of four columns
-and the columns that are left.
+``+``, ``-``, ``*`` and `numpy.floor` act on each entry; a number is taken for all four. `store`,
+`limited`, `side`, `cubic` and `like` also take a number in place of a vector, so that one formula serves
+blocks of four columns and the columns that are left.
 """
 
 from __future__ import annotations
@@ -58,14 +58,19 @@ def entry(x: Vector, number: int) -> float:
     return float(x[number])
 
 
+def total(x: Vector) -> float:
+    """Return the sum of the entries."""
+    return float(x[0] + x[1] + (x[2] + x[3]))
+
+
 def load(values: Array, first: int) -> Vector:
     """Return four entries of an array, which are not checked to exist."""
     return values[first : first + WIDTH].copy()
 
 
 def store(vector: Vector, values: Array, first: int) -> None:
-    """Write a vector into four entries of an array, which are not checked to exist."""
-    values[first : first + WIDTH] = vector
+    """Write a vector into four entries of an array, which are not checked to exist, or a number into one."""
+    values[first : first + np.size(vector)] = vector
 
 
 def like(x: Vector, values: Array, first: int) -> Vector:
@@ -98,6 +103,14 @@ def cubic(table: Array, place: Vector) -> Vector:
     return of_row[0] + t * (of_row[1] + t * (of_row[2] + t * of_row[3]))
 
 
+@implements(total)
+def _compiled_total(x: Any) -> Callable[..., Any]:
+    def call(x: Any) -> Any:
+        return _entry(x, 0) + _entry(x, 1) + (_entry(x, 2) + _entry(x, 3))
+
+    return call
+
+
 @implements(np.floor)
 def _compiled_floor(x: Any) -> Callable[..., Any] | None:
     def call(x: Any) -> Any:
@@ -119,7 +132,10 @@ def _compiled_store(vector: Any, values: Any, first: Any) -> Callable[..., Any]:
     def call(vector: Any, values: Any, first: Any) -> None:
         _store(vector, values, first)
 
-    return call
+    def call_number(vector: Any, values: Any, first: Any) -> None:
+        values[first] = vector
+
+    return call if vector is _VECTOR else call_number
 
 
 @implements(like)

@@ -228,11 +228,9 @@ def back_emf(
     emf : (n,) array, V
         Result, opposed to the current.
     """
+    x, y, z = rate_S[0], rate_S[1], rate_S[2]
     for j in range(emf.shape[0]):
-        turned = 0.0
-        for i in range(3):
-            turned += torque_matrix[i, j] * rate_S[i]
-        emf[j] = gain[j] * turned
+        emf[j] = gain[j] * (torque_matrix[0, j] * x + torque_matrix[1, j] * y + torque_matrix[2, j] * z)
 
 
 class CurrentLag(NamedTuple):
