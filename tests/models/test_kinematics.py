@@ -27,6 +27,13 @@ def test_rotation_is_the_intrinsic_xyz_rotation_of_scipy(q):
     )
 
 
+@pytest.mark.parametrize("pose", [(0.3, -1.2, 31.0), (0.3, -1.2, 3e7), (-2e5, 0.1, 1e15)])
+def test_turns_are_those_of_the_library_from_any_turn_on(pose):
+    cosines, sines = np.cos(pose), np.sin(pose)
+    expected = np.column_stack([cosines, sines]).ravel()
+    np.testing.assert_allclose(kinematics.turns(pose), expected, rtol=0, atol=4e-16)
+
+
 @given(poses)
 def test_rotor_jacobian_is_the_stator_jacobian_seen_from_the_rotor(q):
     R_SR = kinematics.rotation(q)

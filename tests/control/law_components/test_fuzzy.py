@@ -43,6 +43,17 @@ def test_far_spin_angle_underflows_nothing():
     assert np.all(psi > 0)
 
 
+@given(st.floats(90, 1e3))
+def test_far_from_the_centres_one_set_has_all_of_the_degree(distance):
+    # At 90 the next set has 5e-15 of it, by the definition.
+    assert fuzzy.memberships(distance) == pytest.approx((0, 0, 0, 0, 1), abs=1e-14)
+    assert fuzzy.memberships(-distance) == pytest.approx((1, 0, 0, 0, 0), abs=1e-14)
+
+
+def test_an_input_that_is_no_number_has_no_degrees():
+    assert np.isnan(fuzzy.memberships(np.nan)).all()
+
+
 @given(near, near, st.floats(-1, 1), st.integers(0, 2**32 - 1))
 def test_approximation_and_adaptation_are_the_regressor_form(rate, angle, drive, seed):
     theta = np.random.default_rng(seed).normal(size=75)

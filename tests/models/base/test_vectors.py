@@ -7,7 +7,18 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from spheretwin.models.base.compiled import allocation_free, uncompiled
-from spheretwin.models.base.vectors import WIDTH, cubic, like, limited, load, side, store
+from spheretwin.models.base.vectors import (
+    WIDTH,
+    cubic,
+    entry,
+    like,
+    limited,
+    load,
+    side,
+    store,
+    total,
+    vector,
+)
 
 NUMBERS = st.floats(-1e6, 1e6)
 FOURS = arrays(np.float64, WIDTH, elements=NUMBERS)
@@ -36,6 +47,18 @@ def fill_sides(x, result):
 @allocation_free
 def limit(x, low, high, result):
     store(limited(load(x, 0), low, high), result, 0)
+
+
+@allocation_free
+def round_down(x, result):
+    store(np.floor(load(x, 0)), result, 0)
+
+
+@allocation_free
+def take_apart(x, result):
+    made = vector(x[3], x[2], x[1], x[0])
+    store(entry(made, 0), result, 2)
+    store(total(made), result, 0)
 
 
 @allocation_free
@@ -80,6 +103,19 @@ def test_limited_entries_are_those_of_numpy(x, ends):
     np.testing.assert_array_equal(made(limit, x, *ends), np.clip(x, *ends))
 
 
+@given(FOURS)
+def test_rounded_down_entries_are_those_of_numpy(x):
+    np.testing.assert_array_equal(made(round_down, x), np.floor(x))
+
+
+@given(FOURS)
+def test_a_vector_is_taken_apart_into_numbers(x):
+    result = made(take_apart, x)
+    assert result[0] == x[3] + x[2] + (x[1] + x[0])
+    assert result[2] == x[3]
+    assert np.isnan(result[[1, 3]]).all()
+
+
 def test_a_side_has_the_sign_of_its_entry():
     x = np.array([-3.0, 0.0, -0.0, 1e-300])
     np.testing.assert_array_equal(made(fill_sides, x), [-1, 1, -1, 1])
@@ -103,7 +139,10 @@ def test_like_returns_a_number_for_a_number_and_four_for_a_vector():
     assert four.tolist() == [5, 6, 7, 8]
 
 
-@pytest.mark.parametrize("function", [combine, move, fill_sides, limit, look_up, look_up_each, take_like])
+@pytest.mark.parametrize(
+    "function",
+    [combine, move, fill_sides, limit, round_down, take_apart, look_up, look_up_each, take_like],
+)
 def test_plain_python_does_the_same(function):
     """The functions of the module in plain Python act on arrays of four."""
     arguments = {
@@ -111,6 +150,8 @@ def test_plain_python_does_the_same(function):
         move: (np.arange(9.0), 3, np.zeros(9), 2),
         fill_sides: (np.array([1.0, -2.0, 0.0, -0.0]), np.zeros(4)),
         limit: (np.array([1.0, -2.0, 3.5, 0.25]), -0.5, 1.5, np.zeros(4)),
+        round_down: (np.array([1.5, -2.5, 3.0, -0.25]), np.zeros(4)),
+        take_apart: (np.array([1.0, -2.0, 3.5, 0.25]), np.zeros(4)),
         look_up: (np.array([0.0, 3.25, 8.5, 8.0]), np.zeros(4)),
         look_up_each: (np.array([0.0, 3.25, 8.5, 8.0]), np.zeros(4)),
         take_like: (np.zeros(4), np.arange(9.0), 5, np.zeros(1), np.zeros(4)),

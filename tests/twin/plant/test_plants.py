@@ -5,7 +5,6 @@ import pytest
 
 from spheretwin import plant
 from spheretwin.models.base.errors import InputError
-from spheretwin.models.base.trigonometry import sine_cosine
 from spheretwin.plant.plant_step import step
 
 FRICTION = {"plant.coulomb_Nm": [2e-3, 5e-3, 0.0], "plant.viscous_Nm_s": [1e-4, 0.0, 2e-4]}
@@ -136,17 +135,6 @@ def test_values_of_all_plants_are_given_once():
     assert_equal(
         (plants.q_rad, plants.qdot_rad_s), (np.repeat(expected[0], 18, 0), np.repeat(expected[1], 18, 0))
     )
-
-
-def test_sine_and_cosine_are_exact_to_rounding():
-    generator = np.random.default_rng(8)
-    angles = np.concatenate(
-        [generator.uniform(-2, 2, 2000), generator.uniform(-1e5, 1e5, 2000), np.arange(-9, 10) * np.pi / 4]
-    )
-    values = np.array([sine_cosine(angle) for angle in angles])
-    # NumPy's own are within one unit in the last place, 1.1e-16 near 1.
-    np.testing.assert_allclose(values[:, 0], np.sin(angles), rtol=0, atol=4e-16)
-    np.testing.assert_allclose(values[:, 1], np.cos(angles), rtol=0, atol=4e-16)
 
 
 @pytest.mark.parametrize(

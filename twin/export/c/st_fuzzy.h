@@ -2,26 +2,25 @@
 /* First-order Takagi-Sugeno approximator of one axis: 25 rules, 75 adapted consequents. */
 enum { ST_SETS = 5, ST_RULES = 25, ST_CONSEQUENTS = 75 };
 
-/* Degrees of membership in the five sets, normalised to the sum 1. */
+/* Degrees of membership of a centre in the next set and in the one behind it. */
+#define ST_NEXT_DEGREE (st_real)0.7548396019890073 /* exp(-0.28125) */
+#define ST_FAR_DEGREE (st_real)0.32465246735834974 /* exp(-1.125) */
+
+/* Degrees of membership in the five sets, normalised to the sum 1: relative to the degree in the middle set,
+ * those of the others are powers of one exponential. Beyond 100 an outer set has all of the degree. */
 static void st_memberships(st_real x, st_real degrees[ST_SETS])
 {
-    st_real nearest, sum = 0;
+    const st_real rise = st_exp((st_real)0.375 * (x > 100 ? 100 : x < -100 ? -100 : x)), fall = 1 / rise;
+    st_real share;
     int k;
+    degrees[0] = ST_FAR_DEGREE * fall * fall;
+    degrees[1] = ST_NEXT_DEGREE * fall;
+    degrees[2] = 1;
+    degrees[3] = ST_NEXT_DEGREE * rise;
+    degrees[4] = ST_FAR_DEGREE * rise * rise;
+    share = 1 / (degrees[0] + degrees[1] + degrees[2] + degrees[3] + degrees[4]);
     for (k = 0; k < ST_SETS; k++) {
-        const st_real distance = (x - (st_real)(k - 2) * (st_real)1.5) / 2;
-        degrees[k] = -(distance * distance) / 2;
-    }
-    nearest = degrees[0];
-    for (k = 1; k < ST_SETS; k++) {
-        nearest = st_greatest(nearest, degrees[k]);
-    }
-    for (k = 0; k < ST_SETS; k++) {
-        degrees[k] = st_exp(degrees[k] - nearest);
-        sum += degrees[k];
-    }
-    sum = 1 / sum;
-    for (k = 0; k < ST_SETS; k++) {
-        degrees[k] *= sum;
+        degrees[k] *= share;
     }
 }
 
