@@ -83,6 +83,11 @@ def limited(x: Vector, low: float, high: float) -> Vector:
     return np.minimum(np.maximum(x, low), high)
 
 
+def within(x: Vector, low: float, high: float) -> bool:
+    """Return True if no entry is NaN or outside of a range."""
+    return bool(np.all((low <= x) & (x <= high)))
+
+
 def side(x: Vector) -> Vector:
     """Return 1 with the sign of `x`."""
     return np.copysign(1.0, x)
@@ -158,6 +163,14 @@ def _compiled_limited(x: Any, low: Any, high: Any) -> Callable[..., Any]:
         return min(max(x, low), high)
 
     return call if x is _VECTOR else call_number
+
+
+@implements(within)
+def _compiled_within(x: Any, low: Any, high: Any) -> Callable[..., Any]:
+    def call(x: Any, low: Any, high: Any) -> Any:
+        return _within(x, low, high)
+
+    return call
 
 
 @implements(side)
@@ -266,6 +279,16 @@ def _build_limited(typing: Any, x: Any, low: Any, high: Any) -> tuple[Any, Calla
     return _VECTOR(x, numba.float64, numba.float64), build
 
 
+def _build_within(typing: Any, x: Any, low: Any, high: Any) -> tuple[Any, Callable[..., Any]]:
+    def build(context: Any, builder: Any, signature: Any, given: Any) -> Any:
+        x, low, high = given[0], _all_four(builder, given[1]), _all_four(builder, given[2])
+        inside = builder.and_(builder.fcmp_ordered("<=", low, x), builder.fcmp_ordered("<=", x, high))
+        bits = builder.bitcast(inside, ir.IntType(WIDTH))
+        return builder.icmp_unsigned("==", bits, ir.Constant(ir.IntType(WIDTH), 2**WIDTH - 1))
+
+    return numba.boolean(x, numba.float64, numba.float64), build
+
+
 def _build_side(typing: Any, x: Any) -> tuple[Any, Callable[..., Any]]:
     def build(context: Any, builder: Any, signature: Any, given: Any) -> Any:
         bits = builder.bitcast(given[0], _INDICES)
@@ -314,6 +337,7 @@ _vector: Any = intrinsic(_build_vector)
 _entry: Any = intrinsic(_build_entry)
 _floor: Any = intrinsic(_build_floor)
 _limited: Any = intrinsic(_build_limited)
+_within: Any = intrinsic(_build_within)
 _side: Any = intrinsic(_build_side)
 _cubic: Any = intrinsic(_build_cubic)
 

@@ -35,6 +35,7 @@ from spheretwin.electronics.coil import OPEN, GroupCoils, Relaxation, relaxation
 from spheretwin.electronics.random_streams import UNIFORM, errors
 from spheretwin.electronics.stages import DriveSetup, DriveStage, FaultLine, fault_line
 from spheretwin.models.base.compiled import inlined
+from spheretwin.models.base.vectors import WIDTH, Vector, load, store, within
 
 # No motion of the rotor induces as much; the bound keeps squares of currents finite.
 LARGEST_EMF_V = 1e9
@@ -177,12 +178,12 @@ def reset_sums(flow: Flow) -> None:
 
 
 class Phase(NamedTuple):
-    """Phase of a step in which current and voltage relax with one time constant."""
+    """Phase of a step of one group or four, in which current and voltage relax with one time constant."""
 
-    current_A: float  # at its end
-    charge_As: float
-    square_A2s: float
-    work_J: float
+    current_A: Vector  # at its end
+    charge_As: Vector
+    square_A2s: Vector
+    work_J: Vector
 
 
 @inlined
@@ -211,38 +212,76 @@ def drive_coils(
     flow : Flow
         Result: the mean current is written, the sums increase.
     """
-    h, limit, highest, lowest = (
-        amplifier.step_s,
-        amplifier.current_limit_A,
-        amplifier.highest_V,
-        amplifier.lowest_V,
-    )
-    stiffness = coil.inductance_H * amplifier.bandwidth_rad_s
-    for j in range(current.shape[0]):
-        unlimited = setpoint[j] + amplifier.offset_A[j]
-        target = min(max(unlimited, -limit), limit)
-        e = min(max(emf[j], -LARGEST_EMF_V), LARGEST_EMF_V)
-        start, R = current[j], coil.resistance_ohm[j]
-        volts = R * start + stiffness * (target - start) + e
-        last_volts = R * target + e
-        if lowest <= volts <= highest and lowest <= last_volts <= highest:
-            whole = _phase(amplifier.following, h, start, target, volts, last_volts)
-        else:
-            whole, limited = _within_limits(amplifier, coil.inductance_H, R, e, target, start)
-            flow.voltage_limited_s[j] += limited
-        current[j] = whole.current_A
-        flow.mean_current_A[j] = whole.charge_As / h
-        flow.copper_J[j] += R * whole.square_A2s
-        flow.work_J[j] += whole.work_J
-        if abs(unlimited) > limit:
-            flow.current_limited_s[j] += h
+    groups = current.shape[0]
+    left = groups % WIDTH
+    for j in range(0, groups - left, WIDTH):
+        if not _follow_four(amplifier, coil, setpoint, emf, current, flow, j):
+            for group in range(j, j + WIDTH):
+                _drive_group(amplifier, coil, setpoint, emf, current, flow, group)
+    for group in range(groups - left, groups):
+        _drive_group(amplifier, coil, setpoint, emf, current, flow, group)
+
+
+@inlined
+def _follow_four(
+    amplifier: Amplifier, coil: GroupCoils, setpoint: Array, emf: Array, current: Array, flow: Flow, j: int
+) -> bool:
+    """Advance four groups from j on if none of them reaches a limit; otherwise return False."""
+    h, limit, highest, lowest = _step_and_limits(amplifier)
+    start, R, e = load(current, j), load(coil.resistance_ohm, j), load(emf, j)
+    target = load(setpoint, j) + load(amplifier.offset_A, j)
+    volts = R * start + coil.inductance_H * amplifier.bandwidth_rad_s * (target - start) + e
+    last_volts = R * target + e
+    if not (
+        within(target, -limit, limit)
+        and within(e, -LARGEST_EMF_V, LARGEST_EMF_V)
+        and within(volts, lowest, highest)
+        and within(last_volts, lowest, highest)
+    ):
+        return False
+    whole = _phase(amplifier.following, h, start, target, volts, last_volts)
+    store(whole.current_A, current, j)
+    store(whole.charge_As * (1.0 / h), flow.mean_current_A, j)
+    store(load(flow.copper_J, j) + R * whole.square_A2s, flow.copper_J, j)
+    store(load(flow.work_J, j) + whole.work_J, flow.work_J, j)
+    return True
+
+
+@inlined
+def _drive_group(
+    amplifier: Amplifier, coil: GroupCoils, setpoint: Array, emf: Array, current: Array, flow: Flow, j: int
+) -> None:
+    """Advance one group."""
+    h, limit, highest, lowest = _step_and_limits(amplifier)
+    unlimited = setpoint[j] + amplifier.offset_A[j]
+    target = min(max(unlimited, -limit), limit)
+    e = min(max(emf[j], -LARGEST_EMF_V), LARGEST_EMF_V)
+    start, R = current[j], coil.resistance_ohm[j]
+    volts = R * start + coil.inductance_H * amplifier.bandwidth_rad_s * (target - start) + e
+    last_volts = R * target + e
+    if lowest <= volts <= highest and lowest <= last_volts <= highest:
+        whole = _phase(amplifier.following, h, start, target, volts, last_volts)
+    else:
+        whole, limited_s = _within_limits(amplifier, coil.inductance_H, R, e, target, start)
+        flow.voltage_limited_s[j] += limited_s
+    current[j] = whole.current_A
+    flow.mean_current_A[j] = whole.charge_As * (1.0 / h)
+    flow.copper_J[j] += R * whole.square_A2s
+    flow.work_J[j] += whole.work_J
+    if abs(unlimited) > limit:
+        flow.current_limited_s[j] += h
+
+
+@inlined
+def _step_and_limits(amplifier: Amplifier) -> tuple[float, float, float, float]:
+    return amplifier.step_s, amplifier.current_limit_A, amplifier.highest_V, amplifier.lowest_V
 
 
 @inlined
 def _phase(
-    shares: Relaxation, duration: float, start: float, last: float, volts: float, last_volts: float
+    shares: Relaxation, duration: float, start: Vector, last: Vector, volts: Vector, last_volts: Vector
 ) -> Phase:
-    """Return the integrals over a phase, from initial and final current and voltage."""
+    """Return the integrals over a phase of one group or four, from initial and final current and voltage."""
     way = last - start
     crossed = volts * last + last_volts * start
     return Phase(
