@@ -18,6 +18,7 @@ from spheretwin.models.base.vectors import (
     store,
     total,
     vector,
+    within,
 )
 
 NUMBERS = st.floats(-1e6, 1e6)
@@ -52,6 +53,11 @@ def limit(x, low, high, result):
 @allocation_free
 def round_down(x, result):
     store(np.floor(load(x, 0)), result, 0)
+
+
+@allocation_free
+def check_range(x, low, high, result):
+    result[0] = within(load(x, 0), low, high)
 
 
 @allocation_free
@@ -103,6 +109,17 @@ def test_limited_entries_are_those_of_numpy(x, ends):
     np.testing.assert_array_equal(made(limit, x, *ends), np.clip(x, *ends))
 
 
+@given(FOURS, st.tuples(NUMBERS, NUMBERS).map(sorted))
+def test_entries_are_within_a_range_if_all_of_them_are(x, ends):
+    assert made(check_range, x, *ends)[0] == np.all((ends[0] <= x) & (x <= ends[1]))
+    assert made(check_range, x, x.min(), x.max())[0] == 1
+    for entry_outside in range(WIDTH):
+        for value in (np.nan, np.inf, -np.inf, 2e6):
+            changed = x.copy()
+            changed[entry_outside] = value
+            assert made(check_range, changed, -1e6, 1e6)[0] == 0
+
+
 @given(FOURS)
 def test_rounded_down_entries_are_those_of_numpy(x):
     np.testing.assert_array_equal(made(round_down, x), np.floor(x))
@@ -141,7 +158,7 @@ def test_like_returns_a_number_for_a_number_and_four_for_a_vector():
 
 @pytest.mark.parametrize(
     "function",
-    [combine, move, fill_sides, limit, round_down, take_apart, look_up, look_up_each, take_like],
+    [combine, move, fill_sides, limit, check_range, round_down, take_apart, look_up, look_up_each, take_like],
 )
 def test_plain_python_does_the_same(function):
     """The functions of the module in plain Python act on arrays of four."""
@@ -150,6 +167,7 @@ def test_plain_python_does_the_same(function):
         move: (np.arange(9.0), 3, np.zeros(9), 2),
         fill_sides: (np.array([1.0, -2.0, 0.0, -0.0]), np.zeros(4)),
         limit: (np.array([1.0, -2.0, 3.5, 0.25]), -0.5, 1.5, np.zeros(4)),
+        check_range: (np.array([1.0, -2.0, 3.5, 0.25]), -2.0, 3.5, np.zeros(1)),
         round_down: (np.array([1.5, -2.5, 3.0, -0.25]), np.zeros(4)),
         take_apart: (np.array([1.0, -2.0, 3.5, 0.25]), np.zeros(4)),
         look_up: (np.array([0.0, 3.25, 8.5, 8.0]), np.zeros(4)),
