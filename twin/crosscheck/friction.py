@@ -268,10 +268,10 @@ def _viscous(way: str, move: Mover, hinge: Hinge) -> Check:
 
 
 def _worst(checks: Iterable[Check]) -> Check:
-    """The check that takes up most of its bound, with the figures of all."""
+    """Return the check that takes up most of its bound, with the figures and the states of all."""
     every = list(checks)
     figures = {name: figure for each in every for name, figure in each.detail.items()}
-    return replace(max(every, key=_share), detail=figures)
+    return replace(max(every, key=_share), detail=figures, states=sum(each.states for each in every))
 
 
 def _share(check: Check) -> float:
