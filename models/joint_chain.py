@@ -14,7 +14,7 @@ acceleration of the point at constant hinge rates. No tensor and no derivative o
 
 from __future__ import annotations
 
-from math import asin, atan2, cos, sin
+from math import asin, atan2
 from typing import Any, NamedTuple
 
 import mujoco
@@ -205,19 +205,19 @@ def torque_on_hinges(chain: JointChain | None, q: Array, torque_S: Array, torque
 @inlined
 def chain_at(chain: JointChain, q: Triple) -> tuple[tuple[Frame, Frame, Frame], Rows, Rows]:
     """Return frames of the bodies, axes of the hinges, and a point of each axis, at a pose (rad)."""
-    outer, e_a, p_a = _turned(chain, 0, _STATOR, q[0])
-    inner, e_b, p_b = _turned(chain, 1, outer, q[1])
-    rotor, e_c, p_c = _turned(chain, 2, inner, q[2])
+    at = turns(q)
+    outer, e_a, p_a = _turned(chain, 0, _STATOR, at.ca, at.sa)
+    inner, e_b, p_b = _turned(chain, 1, outer, at.cb, at.sb)
+    rotor, e_c, p_c = _turned(chain, 2, inner, at.cg, at.sg)
     return (outer, inner, rotor), (e_a, e_b, e_c), (p_a, p_b, p_c)
 
 
 @inlined
-def _turned(chain: JointChain, hinge: int, frame: Frame, angle: float) -> tuple[Frame, Triple, Triple]:
-    """Return the frame after a hinge, the axis of the hinge and a point of it."""
+def _turned(chain: JointChain, hinge: int, frame: Frame, c: float, s: float) -> tuple[Frame, Triple, Triple]:
+    """Return the frame after a hinge, from cosine and sine of its angle, its axis and a point of this."""
     X, Y, Z, origin = frame
     p = _place(frame, chain.points[hinge])
     e = _less(_place(frame, chain.axes[hinge]), origin)
-    c, s = cos(angle), sin(angle)
     x, y, z = _rotated(X, e, c, s), _rotated(Y, e, c, s), _rotated(Z, e, c, s)
     return (x, y, z, _sum(p, _rotated(_less(origin, p), e, c, s))), e, p
 
