@@ -26,6 +26,7 @@ from spheretwin import scenario
 from spheretwin.linear import linearise
 from spheretwin.simulation import simulate
 
+np.random.seed(3)  # of the systems of control.rss, which may have any gain and memory
 generator = np.random.default_rng(3)
 errors = generator.uniform(-1, 1, (40, 2, 3))  # tick, row, axis
 
@@ -45,7 +46,9 @@ def same(system, inputs):
 
 def check(system, inputs):
     expected = np.hstack([same(system, each) for each in inputs])
-    np.testing.assert_allclose(torques(Law.from_lti(system)), expected, rtol=0, atol=1e-12)
+    # Rounding is relative to the largest torque of a run: the memory of a system keeps what it once rounded.
+    size = max(1.0, np.abs(expected).max())
+    np.testing.assert_allclose(torques(Law.from_lti(system)), expected, rtol=0, atol=1e-12 * size)
 
 
 each_axis = [errors[:, 0, axis : axis + 1] for axis in range(3)]
