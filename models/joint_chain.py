@@ -214,7 +214,7 @@ def chain_at(chain: JointChain, q: Triple) -> tuple[tuple[Frame, Frame, Frame], 
 
 @inlined
 def _turned(chain: JointChain, hinge: int, frame: Frame, c: float, s: float) -> tuple[Frame, Triple, Triple]:
-    """Return the frame after a hinge, from cosine and sine of its angle, its axis and a point of this."""
+    """Return the frame after a hinge at an angle of cosine c and sine s, its axis and a point of the axis."""
     X, Y, Z, origin = frame
     p = _place(frame, chain.points[hinge])
     e = _less(_place(frame, chain.axes[hinge]), origin)

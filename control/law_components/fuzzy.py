@@ -5,7 +5,7 @@ one set of the rate and one of the angle; its consequent is ``theta_0 + theta_1 
 """
 
 from math import exp, sqrt
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,8 +21,8 @@ RULES = SETS * SETS
 CONSEQUENTS = 3 * RULES
 
 
-# Neighbouring sets at the distance d: with ``r = exp(SLOPE x)``, their degrees are as ``r**-2 FAR``,
-# ``NEAR / r``, 1, ``NEAR r`` and ``r**2 FAR``.
+# Relative to that of the middle set, the degrees are ``_FAR / r**2``, ``_NEAR / r``, 1, ``_NEAR r`` and
+# ``_FAR r**2``, with ``r = exp(_SLOPE x)``.
 _SPACING = CENTRES[1] - CENTRES[0]
 _SLOPE = SHAPE * _SPACING / (2.0 * WIDTH**2)
 _NEAR, _FAR = (exp(-SHAPE * (places * _SPACING / (2.0 * WIDTH)) ** 2) for places in (1, 2))
@@ -72,7 +72,9 @@ def approximate_and_adapt(rate: float, angle: float, drive: float, consequents: 
 
 
 @inlined
-def _apply_and_adapt(psi: Vector, k: int, rate: float, angle: float, drive: float, theta: Any) -> Vector:
+def _apply_and_adapt(
+    psi: Vector, k: int, rate: float, angle: float, drive: float, theta: NDArray[np.float64]
+) -> Vector:
     """Return the contribution of rule k, or of four rules from it on, before the adaptation."""
     constant, of_rate = like(psi, theta, k), like(psi, theta, RULES + k)
     of_angle, step = like(psi, theta, 2 * RULES + k), drive * psi
