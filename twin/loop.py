@@ -31,6 +31,7 @@ from spheretwin.models.base.compiled import (
     uncompiled,
 )
 from spheretwin.models.base.errors import InputError
+from spheretwin.models.base.function_identity import is_of_package
 from spheretwin.models.base.numba_internals.addresses import function_at
 from spheretwin.models.base.numba_internals.functions import Dispatcher
 from spheretwin.models.base.vectors import WIDTH, load, total, vector
@@ -275,4 +276,4 @@ def dispatch(
 
 def is_user_law(law: Law) -> bool:
     """True if a law is a user law, not one of this package."""
-    return not (law.step.__module__ or "").startswith("spheretwin.")
+    return not is_of_package(law.step)

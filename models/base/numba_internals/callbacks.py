@@ -27,8 +27,7 @@ def c_callback(
     step = _with_bounds_checks(function, {}) if check_bounds else function
     options = {**options, "boundscheck": check_bounds}
     callback: Any = CFunc(step, (signature.args, signature.return_type), {}, options)
-    # The cache tracks the sources of this package only; entries of others would become stale.
-    if function.__module__.startswith("spheretwin.") and not check_bounds:
+    if not check_bounds:
         callback._cache = MachineCode(function, "callback")
     callback.compile()
     return callback

@@ -29,6 +29,7 @@ from numba.cpython import hashing
 from numba.experimental import function_type
 
 from spheretwin.models.base import cache, compilation
+from spheretwin.models.base.function_identity import function_identity, is_of_package
 
 # Loaded machine code needs the symbols of hashes and the type of a callback, in addition to the math and
 # run-time libraries. These imports register them.
@@ -44,7 +45,7 @@ class MachineCode(NullCache):
     Parameters
     ----------
     function : callable
-        A plain function of this package: the cache tracks only its sources.
+        A plain function; one without an identity is compiled in each process.
     kind : str
         Distinguishes different compilations of one function.
     """
@@ -64,7 +65,8 @@ class MachineCode(NullCache):
         # Numba's cache would import everything that can be compiled, with scipy.linalg: a third of a short
         # run.
         rtsys.initialize(target_context)
-        content = cache.load_entry(self._entry(sig, target_context.codegen()))
+        entry = self._entry(sig, target_context.codegen())
+        content = cache.load_entry(entry) if entry else None
         result = self._rebuilt(content, sig, target_context) if content else None
         if result is None:
             compilation.report(self._name)
@@ -84,35 +86,25 @@ class MachineCode(NullCache):
     def save_overload(self, sig: Any, data: CompileResult) -> None:
         """Store the machine code for a signature."""
         if data.library.has_dynamic_globals:
+            if not is_of_package(self._function):
+                return  # users refer to what they like
             complaint = f"{self._name} is compiled in every process: it holds an address or a large array"
             warnings.warn(complaint, NumbaWarning, stacklevel=2)
             return
-        cache.store_entry(self._entry(sig, data.codegen), dumps((sig, data._reduce())))
+        if entry := self._entry(sig, data.codegen):
+            cache.store_entry(entry, dumps((sig, data._reduce())))
 
-    def _entry(self, sig: Any, codegen: Any) -> str:
-        """Return the name of an entry: function, then a digest of function, signature and processor."""
-        line = self._function.__code__.co_firstlineno
-        enclosed = _enclosed(self._function)
-        key = repr((self._name, line, enclosed, self._kind, str(sig), codegen.magic_tuple()))
+    def _entry(self, sig: Any, codegen: Any) -> str | None:
+        """Return the name of an entry: function, then a digest of function, signature and processor.
+
+        None for a function without an identity: an entry would become stale.
+        """
+        identity = function_identity(self._function)
+        if identity is None:
+            return None
+        key = repr((self._name, identity, self._kind, str(sig), codegen.magic_tuple()))
         readable = re.sub(r"\W+", "-", self._name.removeprefix("spheretwin."))[:60]
         return f"{readable}-{hashlib.sha256(key.encode()).hexdigest()[:24]}"
-
-
-def _enclosed(function: Callable[..., Any]) -> list[Any]:
-    """Return the values that a function encloses, the same in each process.
-
-    Pickled, a compiled function is different in each process. One of this package is defined by its name, its
-    line and what it encloses: the cache tracks its source.
-    """
-    identities: list[Any] = []
-    for cell in function.__closure__ or ():
-        plain = getattr(cell.cell_contents, "py_func", None)
-        if plain is not None and plain.__module__.startswith("spheretwin."):
-            line = plain.__code__.co_firstlineno
-            identities.append((plain.__module__, plain.__qualname__, line, _enclosed(plain)))
-        else:
-            identities.append(dumps(cell.cell_contents))
-    return identities
 
 
 def fingerprint_of_types(values: tuple[Any, ...]) -> bytes:

@@ -114,7 +114,9 @@ def test_a_compiled_function_reads_the_cache_of_this_package(monkeypatch):
 
 
 @needs_compiled_functions
-def test_a_function_for_compiled_callers_is_compiled_again_for_python():
+def test_a_function_for_compiled_callers_is_compiled_again_for_python(monkeypatch):
+    monkeypatch.setattr(cache, "cache_folder", lambda: None)  # every function is compiled
+
     @allocation_free
     def half(x):
         return 0.5 * x
@@ -136,7 +138,9 @@ def test_a_function_for_compiled_callers_is_compiled_again_for_python():
 
 
 @needs_compiled_functions
-def test_a_function_does_not_take_the_inlining_of_its_first_caller():
+def test_a_function_does_not_take_the_inlining_of_its_first_caller(monkeypatch):
+    monkeypatch.setattr(cache, "cache_folder", lambda: None)  # every function is compiled
+
     @allocation_free
     def half(x):
         return 0.5 * x
@@ -161,20 +165,20 @@ def test_a_function_does_not_take_the_inlining_of_its_first_caller():
 def test_a_stored_function_for_compiled_callers_is_not_taken_for_python(monkeypatch, tmp_path):
     monkeypatch.setattr(cache, "cache_folder", lambda: tmp_path)
 
-    def build():
+    def build(factor):
         @allocation_free
         def third(x):
             return x / 3.0
 
         @allocation_free
-        def of_sum(x, y):
-            return third(x + y)
+        def of_sum(x, y):  # each factor is another caller, which is compiled
+            return factor * third(x + y)
 
         return third, of_sum
 
-    for hits in (0, 2):  # the second time from the cache, once for the caller and once for Python
-        third, of_sum = build()
-        assert of_sum(2.0, 4.0) == 2.0
+    for factor, hits in ((1.0, 0), (2.0, 2)):  # from the cache once for the caller and once for Python
+        third, of_sum = build(factor)
+        assert of_sum(2.0, 4.0) == 2.0 * factor
         assert third(3.0) == 1.0
         assert sum(third.stats.cache_hits.values()) == hits
 
