@@ -7,7 +7,7 @@ BIN := .venv/bin
 WHEEL := .venv-wheel/bin
 SYNC = $(UV) sync --quiet --frozen --no-default-groups --python $(PYTHON)
 
-.PHONY: demo test check format benchmark peers reproduce tune-rivals screenshots docs docs-snippets results extras dist setup clean
+.PHONY: demo test test-all check format benchmark peers reproduce tune-rivals screenshots docs docs-snippets results extras dist setup clean
 
 demo: .venv/demo ## run the nutation under AFSM and leave a recording and its telemetry
 	$(BIN)/spheretwin simulate nutation --record nutation.rrd --telemetry nutation.parquet
@@ -15,8 +15,13 @@ demo: .venv/demo ## run the nutation under AFSM and leave a recording and its te
 # Tests of one file stay together: they share results. The order of the files is that of tests/conftest.py.
 # Bytecode is written: hundreds of processes would compile the sources again. The processes share the cores: threads
 # of a linear algebra library would wait for each other, and take twice the processor time.
-test: setup ## run the tests in parallel
-	PYTHONDONTWRITEBYTECODE= OPENBLAS_NUM_THREADS=1 $(BIN)/pytest -rs --numprocesses auto --maxprocesses 4 --dist loadfile --no-loadscope-reorder
+PYTEST = PYTHONDONTWRITEBYTECODE= OPENBLAS_NUM_THREADS=1 $(BIN)/pytest -rs --numprocesses auto --maxprocesses 4 --dist loadfile --no-loadscope-reorder
+
+test: setup ## run the tests of the first suite in parallel, in five minutes
+	$(PYTEST) -m "not release"
+
+test-all: setup ## run all tests, also those marked release
+	$(PYTEST)
 
 check: .venv-wheel/installed ## format, lint, types, import layers
 	$(WHEEL)/ruff format --check .
