@@ -11,6 +11,9 @@ import tempfile
 from collections.abc import Callable, Iterator
 from importlib import import_module
 from pathlib import Path
+from typing import Any
+
+import pytest
 
 from spheretwin import cli
 from tests.content.compare import difference
@@ -75,6 +78,14 @@ def check(name: str, cases: Cases) -> None:
     assert not result, (
         f"{name}: the content changed. If it is right: python -m tests.content.approve {name}\n{result}"
     )
+
+
+def with_release(cases: Cases, reasons: dict[str, str]) -> list[Any]:
+    """Return the names of cases as parameters of a test; some have the mark `release` with a reason."""
+    return [
+        pytest.param(name, marks=pytest.mark.release(reasons[name])) if name in reasons else name
+        for name in cases
+    ]
 
 
 def all_cases() -> dict[str, Cases]:

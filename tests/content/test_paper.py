@@ -13,7 +13,7 @@ from spheretwin.paper import EXPERIMENTS, page, runner
 from spheretwin.paper.experiment import Case, Experiment
 from spheretwin.paper.page import chapter_of, rows
 from spheretwin.paper.runner import Plan, PlanResult
-from tests.content.content import Cases, check, scratch
+from tests.content.content import Cases, check, scratch, with_release
 from tests.content.pages import folder_text
 from tests.content.runs import made_run
 from tests.content.values import tree
@@ -90,6 +90,13 @@ CASES: Cases = {f"paper_{name}": partial(chapter, name) for name in EXPERIMENTS}
 CASES |= {f"paper_{name}_limited": partial(limited, name) for name in EXPERIMENTS}
 
 
-@pytest.mark.parametrize("name", CASES)
+RELEASE = {
+    "paper_faults": "7 s; paper_faults_limited has the same page of fewer cases",
+    "paper_rivals": "1.3 s; paper_rivals_limited has the same page of fewer cases",
+    "paper_figure6": "1.2 s; figure 7 and figure 6_limited have the same page of other cases",
+}
+
+
+@pytest.mark.parametrize("name", with_release(CASES, RELEASE))
 def test_content(name):
     check(name, CASES)

@@ -21,7 +21,9 @@ from tests.content.short_runs import LAGRANGIAN, SHORT, brief
 from tests.content.values import array, number, tree
 
 TICKS = 40
-PROTOTYPE = {"hardware": "prototype", "duration": 0.04}
+PROTOTYPE = {"hardware": "prototype", "duration": 0.04, **LAGRANGIAN}
+ELECTRONICS = {"hardware": "electronics", "plant.engine": "mujoco"}
+"""Hardware and engine whose loops other tests compile, too."""
 
 
 def columns(table):
@@ -56,7 +58,7 @@ def of_hardware():
     return "\n".join(
         [
             run_text("nutation", {**SHORT, **LAGRANGIAN}),
-            run_text("nutation", {**SHORT, "hardware": "electronics"}),
+            run_text("nutation", {**SHORT, **ELECTRONICS}),
             run_text("nutation", PROTOTYPE),
         ]
     )
@@ -73,9 +75,7 @@ def of_parts():
     )
     base = {**SHORT, **LAGRANGIAN}
     listed = [{"controller.law": law} for law in LAWS]
-    listed += [
-        {"estimator.kind": kind, "hardware": "electronics"} for kind in families(Scenario)["estimator.kind"]
-    ]
+    listed += [{"estimator.kind": kind, **ELECTRONICS} for kind in families(Scenario)["estimator.kind"]]
     listed += [
         {"allocation": kind, "controller.law": "pd", "disturbance.load": 9.0}
         for kind in ("least_norm", "bounded")
@@ -115,11 +115,11 @@ def of_parts():
     ]
     listed += [
         {"controller.governor.acceleration_rad_s2": [5.0, 6.0, 7.0]},
-        {"controller.prediction.on": True, "hardware": "electronics"},
+        {"controller.prediction.on": True, **ELECTRONICS},
         {
             "controller.feed_forward.friction": [1.0, 0.5, 0.2],
-            "hardware": "electronics",
             "controller.feed_forward.inertia": [1.0, 0.9, 0.8],
+            **ELECTRONICS,
         },
         {"manual.currents_A": [0.1] * 18},
         {"watchdog.on": True, "watchdog.largest_rate_rad_s": 0.05},

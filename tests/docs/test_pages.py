@@ -7,7 +7,28 @@ import pytest
 
 from tests.docs.snippets import LANGUAGES, MODULES, PAGES, ROOT, examples, run_shell
 
-PAGES_WITH_SNIPPETS = [page for page in (*PAGES, *MODULES) if examples(page)]
+FIRST_SUITE = (
+    "README.md", "docs/how-to/own_scenario.md", "docs/how-to/replay.md", "docs/how-to/inject_fault.md",
+    "docs/how-to/change_during_run.md",
+)  # fmt: skip
+"""Pages with commands in the first suite: the main job, scenarios, replay, faults and changes of a run."""
+
+RELEASE = pytest.mark.release("commands of a page, 0.5 to 35 s; the tests of each verb have what it does")
+
+
+def _is_named(page):
+    return str(page.relative_to(ROOT)) in FIRST_SUITE
+
+
+def _has_commands(page):
+    return any(example.document.text[example.start :].startswith("```sh") for example in examples(page))
+
+
+PAGES_WITH_SNIPPETS = [
+    pytest.param(page, marks=() if _is_named(page) or not _has_commands(page) else RELEASE)
+    for page in (*PAGES, *MODULES)
+    if examples(page)
+]
 
 
 def reason_to_skip(example):
