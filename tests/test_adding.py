@@ -218,13 +218,27 @@ def python(folder, script, *arguments, compiles=False):
     return subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True)
 
 
-@pytest.fixture(scope="module")
-def grown(folder):
-    """What the copy says of its new members."""
-    done = python(folder, SCRIPT, folder, compiles=True)
+def results_of(folder, *, compiles):
+    """Return the summary of a run of the new members, and what the copy states of them."""
+    done = python(folder, SCRIPT, folder, compiles=compiles)
     assert done.returncode == 0, done.stderr
     figures, output = done.stdout.split("RESULT")
     return {"summary": json.loads(figures.splitlines()[0]), **json.loads(output)}
+
+
+@pytest.fixture(scope="module")
+def grown(folder):
+    """Results without a compiler: a copy with other sources would compile everything again."""
+    return results_of(folder, compiles=False)
+
+
+@pytest.mark.release("compiles the copy for 30 s; the other tests run its members as plain Python")
+def test_the_members_compile_and_act_as_in_plain_python(folder, grown):
+    compiled = results_of(folder, compiles=True)
+    assert compiled["columns"] == grown["columns"]
+    for name in ("q", "measured", "carried", "disturbance", "blown"):
+        # Sums of at most some hundred products below 8, rounded differently, amplified in 50 ms.
+        np.testing.assert_allclose(compiled[name], grown[name], rtol=0, atol=1e-12)
 
 
 def test_a_law(grown):
@@ -343,6 +357,7 @@ EVERY = {
 }
 
 
+@pytest.mark.release("8 s; the same tests run the shipped members in the first suite")
 def test_the_families_tests_run_the_new_members_and_pass(folder, grown):
     tests = ROOT / "tests"
     assert set(EVERY) == {str(path.relative_to(tests)) for path in tests.rglob("test_every_*.py")}
