@@ -7,7 +7,7 @@ BIN := .venv/bin
 WHEEL := .venv-wheel/bin
 SYNC = $(UV) sync --quiet --frozen --no-default-groups --python $(PYTHON)
 
-.PHONY: demo test test-all check format benchmark peers reproduce tune-rivals screenshots docs docs-snippets results extras dist setup clean
+.PHONY: demo test test-all compiled check format benchmark peers reproduce tune-rivals screenshots docs docs-snippets results extras dist setup clean
 
 demo: .venv/demo ## run the nutation under AFSM and leave a recording and its telemetry
 	$(BIN)/spheretwin simulate nutation --record nutation.rrd --telemetry nutation.parquet
@@ -17,11 +17,17 @@ demo: .venv/demo ## run the nutation under AFSM and leave a recording and its te
 # of a linear algebra library would wait for each other, and take twice the processor time.
 PYTEST = PYTHONDONTWRITEBYTECODE= OPENBLAS_NUM_THREADS=1 $(BIN)/pytest -rs --numprocesses auto --maxprocesses 4 --dist loadfile --no-loadscope-reorder
 
-test: setup ## run the tests of the first suite in parallel, in five minutes
+test: compiled ## run the tests of the first suite in parallel, in five minutes
 	$(PYTEST) -m "not release"
 
-test-all: setup ## run all tests, also those marked release
+test-all: compiled ## run all tests, also those marked release
 	$(PYTEST)
+
+# Tests that run in parallel load these loops; without them each process would compile its own.
+HOLD = $(BIN)/spheretwin simulate hold --duration 0.1 --json --plant.engine
+compiled: setup ## compile the loops of the first suite, a process for each engine
+	( $(HOLD) mujoco && $(HOLD) mujoco --hardware electronics ) > /dev/null & \
+	( $(HOLD) lagrangian && $(HOLD) lagrangian --hardware prototype ) > /dev/null && wait $$!
 
 check: .venv-wheel/installed ## format, lint, types, import layers
 	$(WHEEL)/ruff format --check .
