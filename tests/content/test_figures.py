@@ -21,16 +21,7 @@ from spheretwin.viz.figures.style import PAPER_WIDTHS_in, fit_width
 from tests.content.content import Cases, check
 from tests.content.figures import figure_text
 from tests.viz.comparison.compared import RAMP, SIGNALS, SPIKE, VALUE, T_s, run_of
-from tests.viz.figures import test_comparison as of_runs
-from tests.viz.figures import test_conditions as of_conditions
-from tests.viz.figures import test_errors as of_errors
-from tests.viz.figures import test_faults as of_faults
-from tests.viz.figures import test_fronts as of_fronts
-from tests.viz.figures import test_hinge_friction as of_friction
-from tests.viz.figures import test_over_time as of_time
-from tests.viz.figures import test_paths as of_paths
-from tests.viz.figures import test_plots as of_crosscheck
-from tests.viz.figures import test_study as of_study
+from tests.viz.figures import drawn
 
 HINGES = ("α", "β", "γ")
 LAWS = {"pd": "PD", "pid": "PID", "adaptive_fuzzy": "adaptive fuzzy", "afsm": "AFSM"}
@@ -83,7 +74,7 @@ def events():
 
 
 def currents():
-    return comparison.currents([of_runs.with_currents(), run_of(RAMP[:1500], "2 short")], "Currents")
+    return comparison.currents([drawn.run_with_currents(), run_of(RAMP[:1500], "2 short")], "Currents")
 
 
 def overview():
@@ -181,7 +172,7 @@ def map_lines_of_names():
 
 
 def narrow_map():
-    panel = maps.MapPanel(1 + 0.1 * of_study.VALUES / 20, of_study.LOST)
+    panel = maps.MapPanel(1 + 0.1 * drawn.VALUES / 20, drawn.LOST)
     return maps.maps({"pd": panel}, ("rows", "columns"), (["1", "2"], list("abc")), "q", "Narrow")
 
 
@@ -284,10 +275,10 @@ def angle_traces():
 
 
 def error_lines():
-    line = over_time.ErrorLine("as printed", of_errors.SIZES, 0.5 * of_errors.SIZES)
+    line = over_time.ErrorLine("as printed", drawn.SIZES, 0.5 * drawn.SIZES)
     lines = [
         line,
-        line._replace(label="as acceleration", measured_deg=3 * of_errors.SIZES),
+        line._replace(label="as acceleration", measured_deg=3 * drawn.SIZES),
         line._replace(label="c"),
     ]
     groups = [
@@ -324,17 +315,17 @@ def clouds():
 
 def tuned():
     trials = {
-        "pid": of_fronts.TRIALS,
-        "afsm": of_fronts.TRIALS._replace(
+        "pid": drawn.TRIALS,
+        "afsm": drawn.TRIALS._replace(
             law="afsm",
-            values=of_fronts.TRIALS.values[::-1] * 1.5,
+            values=drawn.TRIALS.values[::-1] * 1.5,
             completed=np.array([True, True, True, False, False, True]),
             best=np.array([False, True, False, False, False, True]),
             signs=np.array([1.0, -1.0]),
             has_start=False,
         ),
     }
-    objectives = of_fronts.OBJECTIVES
+    objectives = drawn.OBJECTIVES
     figures = (fronts.progress(trials, objectives, "Trials"), fronts.front(trials, objectives, "Front"))
     return "\n".join(map(figure_text, figures))
 
@@ -372,39 +363,39 @@ FIGURES = {
     "compared_currents": currents,
     "compared_long_run": long_run,
     "overview": overview,
-    "by_condition": of_conditions.by_condition,
-    "by_condition_of_three_hinges": of_time.drawn,
+    "by_condition": drawn.by_condition,
+    "by_condition_of_three_hinges": drawn.by_condition_of_three_hinges,
     "margins_of_laws": margins_of_laws,
     "ratios": ratios,
-    "estimators": of_conditions.drawn,
-    "crosscheck_margins": of_crosscheck.FIGURES["margins"],
+    "estimators": drawn.estimators,
+    "crosscheck_margins": drawn.margins,
     "crosscheck_spreads": spreads,
     "crosscheck_motion": motion,
     "crosscheck_convergence": convergence,
     "crosscheck_drifts": drifts,
     "crosscheck_closed_loops": closed_loops,
-    "crosscheck_friction": of_friction.drawn,
-    "map": of_study.map_figure,
+    "crosscheck_friction": drawn.hinge_friction,
+    "map": drawn.study_map,
     "map_narrow": narrow_map,
     "map_large": large_map,
     "map_lines": map_lines,
     "map_lines_of_names": map_lines_of_names,
-    "heat": of_errors.heated,
+    "heat": drawn.heat,
     "heat_of_many": heat_of_many,
     "workspace": workspace_figures,
     "distributions": spread_figures,
     "ranks": rank_figures,
     "scatters": scatter_figures,
-    "error_courses": of_errors.courses,
+    "error_courses": drawn.courses,
     "error_lines": error_lines,
     "error_bands": error_bands,
     "error_bands_one_column": one_column,
     "angle_traces": angle_traces,
-    "tip_paths": of_paths.figure_of_paths,
-    "fault_shares": of_faults.shares,
+    "tip_paths": drawn.tip_paths,
+    "fault_shares": drawn.shares,
     "fault_shares_of_many": many_shares,
     "fault_remaining": remaining,
-    "fault_triangles": of_faults.triangles,
+    "fault_triangles": drawn.triangles,
     "fault_clouds": clouds,
     "tuning": tuned,
     "condition_fronts": condition_fronts,
@@ -412,8 +403,8 @@ FIGURES = {
 
 
 def _text(draw) -> str:
-    drawn = draw()
-    return drawn if isinstance(drawn, str) else figure_text(drawn)
+    result = draw()
+    return result if isinstance(result, str) else figure_text(result)
 
 
 CASES: Cases = {f"figure_{name}": (lambda draw=draw: _text(draw)) for name, draw in FIGURES.items()}
