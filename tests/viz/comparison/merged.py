@@ -8,26 +8,23 @@ from spheretwin.viz.layout.view import TIMELINE
 
 
 class Merged:
-    """What a merged recording holds, read chunk by chunk."""
+    """Entities of a merged recording, its numbers by entity and field, and its text."""
 
     def __init__(self, path):
-        self.path, self.entities, self.columns, self.names, self.static = path, set(), {}, {}, {}
+        self.path, self.entities, self.columns, self.text = path, set(), {}, ""
         for chunk in RrdReader(path).stream():
             self.entities.add(chunk.entity_path)
             batch = chunk.to_record_batch()
             if "Scalars:scalars" in batch.schema.names:
-                self.take(batch, chunk.entity_path, batch.column("Scalars:scalars"))
+                self._add(batch, chunk.entity_path, batch.column("Scalars:scalars"))
             if "values_0" in batch.schema.names:
                 rows = batch.column("values_0").flatten()
                 for field in rows.type:
-                    self.take(batch, f"{chunk.entity_path}:{field.name}", rows.field(field.name))
-            for column in batch.schema.names:
-                if ":" in column and "Scalars" not in column and "indicator" not in column:
-                    self.static.setdefault((chunk.entity_path, column), batch.column(column).to_pylist())
-            if "SeriesLines:names" in batch.schema.names:
-                self.names[chunk.entity_path] = batch.column("SeriesLines:names").to_pylist()[0]
+                    self._add(batch, f"{chunk.entity_path}:{field.name}", rows.field(field.name))
+            if chunk.entity_path == "/runs" and "TextDocument:text" in batch.schema.names:
+                ((self.text,),) = batch.column("TextDocument:text").to_pylist()
 
-    def take(self, batch, name, column):
+    def _add(self, batch, name, column):
         t_ns = np.asarray(batch.column(TIMELINE).cast(pa.int64()))
         values = np.asarray(column.flatten()).reshape(len(t_ns), -1)
         self.columns.setdefault(name, []).append((t_ns, values))

@@ -1,13 +1,14 @@
 """Runs with the same reference show it once."""
 
 import numpy as np
+import pytest
 
 from spheretwin.models.telemetry.signals import common_signals, width
 from spheretwin.models.telemetry.table import Table
 from spheretwin.viz.comparison.runs import leaders
 
 
-def asked(rows, period_s, rate=1.0):
+def reference(rows, period_s, rate=1.0):
     signals = common_signals(3)
     table = Table(signals, np.zeros((rows, width(signals))))
     table["t_s"][:] = np.arange(rows) * period_s
@@ -15,13 +16,13 @@ def asked(rows, period_s, rate=1.0):
     return table
 
 
-def test_the_longest_of_equals_shows_it_at_whatever_rate():
-    assert leaders([asked(100, 1e-3), asked(300, 7e-4), asked(50, 2e-3)]) == [1]
-
-
-def test_each_distinct_reference_is_shown():
-    assert leaders([asked(100, 1e-3), asked(90, 1e-3, 2.0), asked(80, 1e-3), asked(95, 1e-3, 2.0)]) == [0, 3]
-
-
-def test_a_tick_alone_is_enough_to_be_the_same():
-    assert leaders([asked(1, 1e-3), asked(1, 1e-3)]) == [0]
+@pytest.mark.parametrize(
+    ("references", "expected"),
+    [
+        ([(100, 1e-3), (300, 7e-4), (50, 2e-3)], [1]),
+        ([(100, 1e-3), (90, 1e-3, 2.0), (80, 1e-3), (95, 1e-3, 2.0)], [0, 3]),
+        ([(1, 1e-3), (1, 1e-3)], [0]),
+    ],
+)
+def test_the_longest_of_equal_references_is_shown_at_whatever_rate(references, expected):
+    assert leaders([reference(*each) for each in references]) == expected

@@ -37,39 +37,25 @@ def test_no_two_runs_have_one_shape_or_one_time():
     assert len(set(times)) == len(times)
 
 
-def test_a_value_that_is_no_number_has_none():
+def test_a_value_that_is_no_number_has_no_mark_and_a_run_of_one_row_has_one():
     broken = np.where(T_s > 2.0, np.nan, RAMP)
     _, t_ns, values = marks_of(2, broken)
     assert np.isfinite(values).all()
     assert len(t_ns) == 6
     assert marks_of(2, np.full(len(T_s), np.nan))[1] is None
-
-
-def test_a_run_of_one_row_has_one():
     assert len(marks_of(0, RAMP[:1])[1]) == 1
-
-
-def corners(place):
-    return merged_recording._outline(place)
 
 
 def test_outlines_of_the_legend_are_the_markers():
     """In the view y points down."""
-    assert [str(shape) for shape in merged_recording._OUTLINES] == [
-        "Circle",
-        "Diamond",
-        "Square",
-        "Up",
-        "Down",
-        "Left",
-        "Right",
-    ]
-    for place in range(7):
-        np.testing.assert_allclose(corners(place)[0], corners(place)[-1], atol=1e-12)
-        np.testing.assert_allclose(np.hypot(*corners(place).T), 1.0)
-    assert [len(corners(place)) - 1 for place in range(7)] == [24, 4, 4, 3, 3, 3, 3]
-    tips = {3: [0, -1], 4: [0, 1], 5: [-1, 0], 6: [1, 0], 1: [1, 0]}
-    for place, tip in tips.items():
-        np.testing.assert_allclose(corners(place)[0], tip, atol=1e-12)
-    np.testing.assert_allclose(np.abs(corners(2)), np.sqrt(0.5))
-    assert sorted(map(tuple, corners(7))) == [(-1, 0), (0, -1), (0, 0), (0, 1), (1, 0)]
+    shapes = [str(shape) for shape in merged_recording._OUTLINES]
+    assert shapes == ["Circle", "Diamond", "Square", "Up", "Down", "Left", "Right"]
+    corners = [merged_recording._outline(place) for place in range(8)]
+    for of_one in corners[:7]:
+        np.testing.assert_allclose(of_one[0], of_one[-1], atol=1e-12)
+        np.testing.assert_allclose(np.hypot(*of_one.T), 1.0)
+    assert [len(of_one) - 1 for of_one in corners[:7]] == [24, 4, 4, 3, 3, 3, 3]
+    for place, tip in {3: [0, -1], 4: [0, 1], 5: [-1, 0], 6: [1, 0], 1: [1, 0]}.items():
+        np.testing.assert_allclose(corners[place][0], tip, atol=1e-12)
+    np.testing.assert_allclose(np.abs(corners[2]), np.sqrt(0.5))
+    assert sorted(map(tuple, corners[7])) == [(-1, 0), (0, -1), (0, 0), (0, 1), (1, 0)]
