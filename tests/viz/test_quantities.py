@@ -15,15 +15,11 @@ from spheretwin.viz.quantities import (
     COPPER_LOSS,
     COUPLING,
     DELIVERED,
-    ERROR,
     ERROR_ANGLE,
-    ESTIMATED_RATE,
     MARGIN,
-    MEASURED_ANGLE,
     QUANTITIES,
     TIP_DISTANCE,
     QuantityRows,
-    quantities_of,
 )
 
 SIGNALS = (
@@ -51,13 +47,6 @@ def test_the_error_angle_is_that_of_the_rotation_between_both_poses(rows):
     expected = np.degrees((desired.inv() * actual).magnitude())
     # Both take the angle from quaternions with an error of some 1e-16; near a half turn SciPy's has 1e-14.
     np.testing.assert_allclose(ERROR_ANGLE.values(rows)[:, 0], expected, rtol=1e-12)
-
-
-def test_a_small_error_angle_keeps_its_digits(rows):
-    rows.table["q_ref_rad"][:] = rows.table["q_rad"]
-    rows.table["q_ref_rad"][:, 0] += 1e-7
-    # A hinge angle of order 1 has 1e-16, so that a turn of 1e-7 about one hinge has 1e-9 of itself.
-    np.testing.assert_allclose(ERROR_ANGLE.values(rows)[:, 0], np.degrees(1e-7), rtol=1e-8)
 
 
 def test_tip_distance_is_that_of_both_rotations(rows, actuator):
@@ -135,17 +124,6 @@ def test_copper_loss_is_of_cold_coils_without_a_column(rows, actuator):
     np.testing.assert_array_equal(COPPER_LOSS.values(rows._replace(table=table))[:, 0], 9.0)
 
 
-def test_measurement_errors_are_measured_minus_true(rows):
-    table = rows.table
-    np.testing.assert_array_equal(ERROR.values(rows), 1e3 * table["error_rad"])
-    np.testing.assert_array_equal(
-        MEASURED_ANGLE.values(rows), 1e3 * (table["q_measured_rad"] - table["q_rad"])
-    )
-    np.testing.assert_array_equal(
-        ESTIMATED_RATE.values(rows), table["qdot_estimated_rad_s"] - table["qdot_rad_s"]
-    )
-
-
 @pytest.mark.parametrize("quantity", QUANTITIES, ids=lambda quantity: quantity.name)
 def test_every_quantity_is_the_same_whatever_the_chunks(quantity, rows):
     whole = quantity.values(rows)
@@ -154,10 +132,3 @@ def test_every_quantity_is_the_same_whatever_the_chunks(quantity, rows):
     second = rows._replace(table=rows.table.rows(cut, COUNT), before=rows.table.rows(cut - 1, cut))
     parts = [quantity.values(rows._replace(table=rows.table.rows(0, cut))), quantity.values(second)]
     np.testing.assert_array_equal(np.concatenate(parts), whole)
-
-
-def test_a_run_has_the_quantities_whose_signals_it_has():
-    names = {quantity.name for quantity in QUANTITIES}
-    plain = {quantity.name for quantity in quantities_of({signal.name for signal in common_signals(18)})}
-    assert names - plain == {"measurement_error_mrad", "rate_error_rad_s"}
-    assert {each.name for each in quantities_of({signal.name for signal in SIGNALS})} == names

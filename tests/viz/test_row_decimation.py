@@ -81,14 +81,6 @@ def test_the_first_rows_of_bins_and_those_that_stand_out_are_kept_and_no_others(
     assert thinned_rows.tobytes() == slowly(long).tobytes()
 
 
-def test_every_window_has_its_extremes(long, thinned_rows):
-    of_all, of_kept = (np.floor(values[:, 0] / WINDOW_S + 1e-6) for values in (long.values, thinned_rows))
-    for window in range(2):
-        whole, some = long.values[of_all == window], thinned_rows[of_kept == window]
-        np.testing.assert_array_equal(some.max(axis=0), whole.max(axis=0))
-        np.testing.assert_array_equal(some.min(axis=0), whole.min(axis=0))
-
-
 @given(st.lists(st.integers(1, 25_299), max_size=12))
 def test_the_same_rows_however_they_come_in_chunks(long, thinned_rows, places):
     ends = sorted({*places, len(long)})
@@ -131,15 +123,9 @@ def recorded(path, rate_Hz=None):
     return read(path)
 
 
-@pytest.fixture(scope="module")
-def both(tmp_path_factory):
-    """The same run with all of its rows, and thinned."""
-    folder = tmp_path_factory.mktemp("rates")
-    return recorded(folder / "all.rrd"), recorded(folder / "some.rrd", RATE_Hz)
-
-
-def test_a_decimated_recording_has_complete_rows_and_all_events(both):
-    every, some = both
+@pytest.mark.release("1.5 s; content of values_decimated has the rows")
+def test_a_decimated_recording_has_complete_rows_all_extremes_and_all_events(tmp_path):
+    every, some = recorded(tmp_path / "all.rrd"), recorded(tmp_path / "some.rrd", RATE_Hz)
     assert (every.facts["record_rate_Hz"], some.facts["record_rate_Hz"]) == (None, RATE_Hz)
     assert some.events == every.events
     assert any("current limit" in text for _, _, text in some.events)
@@ -147,10 +133,6 @@ def test_a_decimated_recording_has_complete_rows_and_all_events(both):
     places = np.searchsorted(every.table["t_s"], some.table["t_s"])
     assert some.table.values.tobytes() == every.table.values[places].tobytes()
     assert len(some.table) < 0.2 * len(every.table)
-
-
-def test_extremes_of_a_thinned_recording_are_those_of_the_run(both):
-    every, some = both
     for reduce in (np.nanmax, np.nanmin):
         np.testing.assert_array_equal(reduce(some.table.values, axis=0), reduce(every.table.values, axis=0))
     np.testing.assert_array_equal(some.table.values[-1], every.table.values[-1])

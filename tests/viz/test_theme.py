@@ -9,6 +9,7 @@ from itertools import combinations
 import numpy as np
 import pytest
 
+from spheretwin.control.laws import LAWS as CONTROL_LAWS
 from spheretwin.viz import theme
 from spheretwin.viz.figures import style
 
@@ -111,9 +112,10 @@ def test_every_line_has_a_contrast_of_three_on_every_ground(ground):
     assert {name: ratio for name, ratio in ratios.items() if ratio < 3} == {}
 
 
-@pytest.mark.parametrize("count", [8, 17, 40])
-def test_colours_of_many_runs_of_one_law_are_distinct_and_have_this_contrast(count):
-    colours = theme.run_colours(["afsm"] * count)
+@pytest.mark.parametrize("law", ["afsm", "afsm_eso"])
+@pytest.mark.parametrize("count", [2, 5, 6, 7, 8, 17, 40])
+def test_colours_of_many_runs_of_one_law_are_distinct_and_have_this_contrast(law, count):
+    colours = theme.run_colours([law] * count)
     assert len(set(colours)) == count
     assert min(contrast(rgb(colour), ground) for colour in colours for ground in GROUNDS.values()) >= 3
 
@@ -123,35 +125,37 @@ def test_lines_of_figures_have_this_contrast_on_white():
         assert contrast(rgb(colour), (255, 255, 255)) >= 3, colour
 
 
-def test_axes_differ_for_every_reader():
-    assert least_difference(theme.AXIS_COLOURS) >= 40
-
-
 @pytest.mark.parametrize("axis", range(3))
 def test_lines_of_one_plot_differ_for_every_reader(axis):
     # Within these contrasts, lightness L* is from 42 to 62: greys differ by no more than 20.
     assert least_difference([theme.AXIS_COLOURS[axis], *ROLES]) >= 15
 
 
-def test_states_differ_for_every_reader():
-    assert least_difference([theme.FINE, theme.ESTIMATE, theme.WARNING, theme.FAILURE]) >= 25
+MARKS = (theme.TRACE, theme.DESIRED_TRACE, theme.COIL_TORQUE, theme.LOAD, theme.FAILURE)
 
 
-def test_marks_of_the_scene_differ_for_every_reader():
-    marks = (theme.TRACE, theme.DESIRED_TRACE, theme.COIL_TORQUE, theme.LOAD, theme.FAILURE)
-    assert least_difference([*theme.AXIS_COLOURS, *marks]) >= 17
+@pytest.mark.parametrize(
+    ("colours", "least"),
+    [
+        (theme.AXIS_COLOURS, 40),
+        ([theme.FINE, theme.ESTIMATE, theme.WARNING, theme.FAILURE], 25),
+        ([*theme.AXIS_COLOURS, *MARKS], 17),
+        (LAWS, 17),
+        ([*LAWS, *map(rgb, theme.SPARE), rgb(theme.OTHER_LAW)], 10),
+        ([rgb(colour) for colour in style.SERIES], 35),
+    ],
+    ids=["axes", "states", "marks of the scene", "laws", "all laws", "series of figures"],
+)
+def test_colours_of_a_kind_differ_for_every_reader(colours, least):
+    assert least_difference(colours) >= least
 
 
-def test_laws_differ_for_every_reader_and_have_the_colour_of_no_role():
-    assert least_difference(LAWS) >= 17
-    assert least_difference([*LAWS, *map(rgb, theme.SPARE), rgb(theme.OTHER_LAW)]) >= 10
+def test_laws_have_colours_of_their_own_and_that_of_no_role():
+    assert set(theme.LAW_COLOURS) <= set(CONTROL_LAWS)
+    assert theme.law_colour("one of the user's") == theme.OTHER_LAW not in theme.LAW_COLOURS.values()
     for law in (*LAWS, *map(rgb, theme.SPARE), rgb(theme.OTHER_LAW)):
         assert min(difference(law, role) for role in (theme.COMMAND, theme.DESIRED_TRACE)) >= 10
         assert difference(law, theme.FAILURE) >= 12
-
-
-def test_series_of_figures_differ_for_every_reader():
-    assert least_difference([rgb(colour) for colour in style.SERIES]) >= 35
 
 
 def test_the_scale_of_currents_is_linear_with_a_neutral_zero():

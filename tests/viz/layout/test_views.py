@@ -1,6 +1,5 @@
 """Views name existing entities only, for any hardware, law and faults."""
 
-import numpy as np
 import pytest
 from rerun.chunk import RrdReader
 
@@ -11,15 +10,7 @@ from spheretwin.session import Session
 from spheretwin.simulation import follow
 from spheretwin.viz.layout import layout as blueprints
 from spheretwin.viz.layout.layout import VIEWS
-from spheretwin.viz.layout.view import (
-    AFTER_THE_END,
-    STYLES,
-    VALUES,
-    VIEW_NAMES,
-    View,
-    application,
-    shown_until_s,
-)
+from spheretwin.viz.layout.view import STYLES, VALUES, VIEW_NAMES, View, application
 from spheretwin.viz.recording import plots
 from spheretwin.viz.recording.recorder import Recorder
 from tests.viz.recording.panels import panels
@@ -54,25 +45,24 @@ RUNS = {
 
 
 def recorded(path, name, fields, view="overview"):
-    """Recording of a brief run, and how it ended."""
+    """Recording of a brief run."""
     fields = {"duration": 0.3, "plant.engine": "lagrangian", **fields}
     with Session(scenarios.load(name, fields)) as session:
         facts = facts_of(session.initial_scenario)
         with Recorder(session.actuator, session.signals, facts, path=path, shown=view) as recorder:
-            return path, follow(session, session.initial_scenario.ticks, [recorder])
+            follow(session, session.initial_scenario.ticks, [recorder])
+    return path
 
 
 @pytest.fixture(scope="module", params=RUNS)
-def run(request, tmp_path_factory):
+def path(request, tmp_path_factory):
     return recorded(tmp_path_factory.mktemp("views") / f"{request.param}.rrd", *RUNS[request.param])
 
 
-def columns(path, store=None, below=""):
+def columns(path, store):
     """Every value of every component, by entity and component."""
     results = {}
     for chunk in RrdReader(path).stream(store=store):
-        if not chunk.entity_path.startswith(below):
-            continue
         batch = chunk.to_record_batch()
         for name in batch.schema.names:
             if ":" in name:
@@ -118,8 +108,7 @@ def exists(wanted, entities):
     return any(entity == below or entity.startswith(f"{below}/") for entity in entities)
 
 
-def test_views_show_only_what_the_recording_holds(run):
-    path, _ = run
+def test_views_show_only_what_the_recording_holds(path):
     entities = {chunk.entity_path for chunk in RrdReader(path).stream()}
     for layout in layouts(path):
         shown = list(contents(layout))
@@ -141,8 +130,7 @@ def fields(path):
     return results
 
 
-def test_what_draws_a_signal_finds_its_values_and_its_looks(run):
-    path, _ = run
+def test_what_draws_a_signal_finds_its_values_and_its_looks(path):
     there = fields(path)
     taken = [
         (f"/{entity.partition('/overrides/')[2].partition('/visualizers')[0]}", each)
@@ -162,24 +150,11 @@ def test_what_draws_a_signal_finds_its_values_and_its_looks(run):
 @pytest.mark.parametrize("name", ["afsm", "pid", "observer"])
 def test_every_signal_of_a_law_is_in_a_plot(name, tmp_path):
     scenario, fields = RUNS[name]
-    path, _ = recorded(tmp_path / "run.rrd", scenario, {**fields, "duration": 0.02})
+    path = recorded(tmp_path / "run.rrd", scenario, {**fields, "duration": 0.02})
     with Session(scenarios.load(scenario, fields)) as session:
         own = {signal.name for signal in session.law.signals}
     assert own
     assert own <= {line.name for panel in panels(path) for line in panel.lines}
-
-
-def test_the_whole_layout_has_every_view_in_a_tab(run):
-    path, _ = run
-    whole = layouts(path)[-1]
-    names = container_names(whole)
-    results = [
-        tuple(names.get(part) for part in each)
-        for (_, name), values in whole.items()
-        for each in values
-        if name == "ContainerBlueprint:contents"
-    ]
-    assert VIEW_NAMES in results
 
 
 def test_the_names_of_views_are_those_of_the_registry():
@@ -187,46 +162,21 @@ def test_the_names_of_views_are_those_of_the_registry():
 
 
 @pytest.mark.parametrize("view", VIEW_NAMES)
-def test_the_chosen_view_is_open(view, tmp_path, monkeypatch):
+def test_a_recording_that_takes_long_is_laid_out_before_its_end_with_its_chosen_view(
+    view, tmp_path, monkeypatch
+):
     monkeypatch.setattr(plots, "OPENED_AFTER_s", 0.0)
-    path, _ = recorded(tmp_path / "run.rrd", "hold", {"duration": 0.02}, view)
+    path = recorded(tmp_path / "run.rrd", "hold", {"duration": 0.05}, view)
     opening, whole = layouts(path)
+    names = container_names(whole)
     active = [
-        each[0]
+        names.get(each[0])
         for (_, name), values in whole.items()
         for each in values
         if name == "ContainerBlueprint:active_tab" and each
     ]
-    names = container_names(whole)
-    assert [names[each] for each in active if names.get(each) in VIEW_NAMES] == [view]
+    assert [name for name in active if name in VIEW_NAMES] == [view]
     assert set(container_names(opening).values()) & set(VIEW_NAMES) == {view}
-
-
-def test_an_early_end_is_marked_in_plots_and_states(tmp_path):
-    path, status = recorded(tmp_path / "run.rrd", *RUNS["failed"])
-    assert status == "left_workspace"
-    results = {**columns(path, below="/ended"), **columns(path, below="/run")}
-    heights = np.array(results["/ended", "Scalars:scalars"])
-    assert np.all(heights[0] < -1e4)
-    assert np.all(heights[-1] > 1e4)
-    whole = layouts(path)[-1]
-    shown = [each for each in contents(whole) if each == "/ended"]
-    assert len(shown) > 10
-    assert results["/run", "StateChange:state"] == [
-        ["running"],
-        ["left workspace"],
-        ["left workspace"],
-    ]
-    completed, _ = recorded(tmp_path / "whole.rrd", "hold", {})
-    assert columns(completed, below="/ended") == {}
-
-
-def test_a_recording_that_takes_long_is_laid_out_before_its_end(tmp_path, monkeypatch):
-    path, _ = recorded(tmp_path / "brief.rrd", "hold", {})
-    assert len(layouts(path)) == 1
-    monkeypatch.setattr(plots, "OPENED_AFTER_s", 0.0)
-    path, _ = recorded(tmp_path / "long.rrd", "hold", {})
-    opening, _ = layouts(path)
     entities = {chunk.entity_path for chunk in RrdReader(path).stream()}
     assert all(exists(each, entities) for each in contents(opening))
 
@@ -236,11 +186,6 @@ def test_a_live_view_follows_the_run_and_a_recording_is_played_in_a_loop(live, p
     view = View(1.0, 8.0, 18, (), live=live)
     for shown in (blueprints.layout(view), blueprints.opening_layout(view)):
         assert (shown.time_panel.play_state, shown.time_panel.loop_mode) == played
-
-
-def test_time_axes_show_that_a_run_has_ended_early():
-    assert shown_until_s(10.0, 1.0) == 1 + AFTER_THE_END
-    assert shown_until_s(1.01, 1.0) == 1.01
 
 
 def test_layouts_differ_by_application():

@@ -238,13 +238,6 @@ def test_meshes_without_names_have_those_of_their_files_and_move_with_what_carri
         np.testing.assert_allclose(spanned(points), spanned(expected), atol=1e-7)
 
 
-def test_current_colours_tell_sign_and_size():
-    idle, small, full, negative = theme.current_colours(np.array([0.0, 2.0, 8.0, -8.0]), 8.0).astype(int)
-    assert full[0] > small[0] > idle[0]
-    assert negative[2] > full[2]
-    np.testing.assert_array_equal(theme.current_colours(np.array([100.0]), 8.0)[0], full)
-
-
 def test_the_scale_has_the_colours_that_coils_have_at_its_currents():
     scale, labels = current_scale(1.0), current_scale_labels(6.0, 1.0)
     colours = np.array(scale.vertex_colors.as_arrow_array().to_pylist())
