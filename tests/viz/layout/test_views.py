@@ -22,11 +22,12 @@ RUNS = {
     "pd": ("sinusoid", {"controller.law": "pd"}),
     "pid": ("sinusoid", {"controller.law": "pid"}),
     "observer": ("tilt", {"controller.law": "afsm_eso"}),
-    "electronics": ("hold", {"hardware": "electronics", "fault": [OPEN]}),
+    "electronics": ("hold", {"hardware": "electronics", "plant.engine": "mujoco", "fault": [OPEN]}),
     "around": (
         "tilt",
         {
             "hardware": "electronics",
+            "plant.engine": "mujoco",
             "controller.governor.acceleration_rad_s2": [20.0] * 3,
             "controller.prediction.on": True,
             "controller.feed_forward.inertia": [1.0] * 3,

@@ -251,7 +251,7 @@ FAULT = {"target": "coil.04", "mode": "open", "start_s": 0.0}
 # and plots of them, of which each is told in some ten kilobytes.
 @pytest.mark.parametrize(
     ("changes", "most"),
-    [({}, 1_000_000), ({"hardware": "electronics", "fault": [FAULT]}, 1_150_000)],
+    [({}, 1_000_000), ({"hardware": "electronics", "plant.engine": "mujoco", "fault": [FAULT]}, 1_150_000)],
     ids=["ideal", "electronics"],
 )
 def test_what_a_recording_holds_whatever_its_length_is_bounded(tmp_path, changes, most):

@@ -45,7 +45,13 @@ def follow_a_run():
         bar.finish("completed")
 
 
-@pytest.mark.parametrize("follow", [follow_steps, follow_parts, follow_runs, follow_a_run])
+def follow_rows():
+    with counted("short", "trials") as done:
+        for finished in (2, 3, 4):
+            done(finished, 4)
+
+
+@pytest.mark.parametrize("follow", [follow_steps, follow_parts, follow_runs, follow_a_run, follow_rows])
 def test_nothing_is_printed_where_stderr_is_no_terminal(capsys, follow):
     follow()
     assert capsys.readouterr() == ("", "")
@@ -60,53 +66,30 @@ def watched(monkeypatch):
 
 
 @pytest.mark.usefixtures("watched")
-def test_steps_end_at_their_whole(capsys):
-    follow_steps()
+@pytest.mark.parametrize(
+    ("follow", "name", "more"),
+    [
+        (follow_steps, "direct sums", ""),
+        (follow_runs, "reproduce, pd: all", ""),
+        (follow_a_run, "hold: completed", "1.98 s simulated "),
+        (follow_rows, "short", r"\S* *\S* *"),
+    ],
+)
+def test_a_terminal_shows_name_share_and_time(capsys, follow, name, more):
+    follow()
     out, err = capsys.readouterr()
     assert out == ""
-    assert re.search(LOOK.format("direct sums", ""), ESCAPES.sub("", err))
+    last = re.split(r"[\r\n]+", ESCAPES.sub("", err).rstrip())[-1]
+    assert re.search(LOOK.format(name, more), last)
 
 
 @pytest.mark.usefixtures("watched")
 def test_parts_are_counted_as_they_begin(capsys):
     follow_parts()
     lines = re.split(r"[\r\n]+", ESCAPES.sub("", capsys.readouterr().err))
-    messages = [
-        (line.split(" ━")[0].split(" ╸")[0], int(re.search(r"(\d+)%", line)[1]))
-        for line in lines
-        if "%" in line
-    ]
+    *_, last = (line for line in lines if "%" in line)
     # The last to begin has half the parts behind it, and is not done.
-    assert messages[-1] == ("closed loop", 50)
-    assert all(share >= 0 for _, share in messages)
-
-
-@pytest.mark.usefixtures("watched")
-def test_runs_are_counted_as_they_are_done(capsys):
-    follow_runs()
-    out, err = capsys.readouterr()
-    assert out == ""
-    assert re.search(LOOK.format("reproduce, pd: all", ""), ESCAPES.sub("", err))
-
-
-@pytest.mark.usefixtures("watched")
-def test_progress_shows_simulated_time_and_status(capsys):
-    follow_a_run()
-    assert re.search(
-        LOOK.format("hold: completed", "1.98 s simulated "), ESCAPES.sub("", capsys.readouterr().err)
-    )
-
-
-@pytest.mark.usefixtures("watched")
-def test_rows_are_counted_with_their_rate_and_earlier_ones_are_no_start(capsys):
-    with counted("short", "trials") as done:
-        done(2, 4)
-        getting_ready = ESCAPES.sub("", capsys.readouterr().err)
-        done(3, 4)
-        done(4, 4)
-    lines = ESCAPES.sub("", capsys.readouterr().err)
-    assert "short: getting ready" in getting_ready
-    assert re.search(LOOK.format("short", r"\S* *\S* *"), re.split(r"[\r\n]+", lines.rstrip())[-1])
+    assert (re.split(" [━╸]", last)[0], re.search(r"(\d+)%", last)[1]) == ("closed loop", "50")
 
 
 @pytest.mark.parametrize(

@@ -1,4 +1,4 @@
-"""Tables of a run's figures: status in the title, errors in mrad and degrees."""
+"""A failed run in a terminal, and the command that opens its recording."""
 
 import math
 import subprocess
@@ -33,64 +33,20 @@ SUMMARY = {
 }
 
 
-def printed(capsys, why=None, faults=(), **changed):
-    print_run("pd", 10.0, {**SUMMARY, **changed}, band_rad=0.01, why=why, faults=faults)
-    return capsys.readouterr().out.splitlines()
-
-
-def cells(lines, name):
-    (line,) = (line for line in lines if line.startswith(f"| {name} "))
-    return [cell.strip() for cell in line.strip("|").split("|")][1:]
-
-
 @pytest.fixture(autouse=True)
 def piped(monkeypatch):
     monkeypatch.delenv("COLUMNS", raising=False)
-
-
-def test_errors_are_printed_in_mrad_and_degrees(capsys):
-    lines = printed(capsys)
-    assert lines[0].rstrip() == "hold under pd, electronics hardware: completed"
-    assert cells(lines, "largest") == ["1260 (72.3°)", "30.1 (1.72°)", "< 0.001 (< 0.001°)"]
-    assert cells(lines, "settled to ±10 mrad after") == ["never", "0.276 s", "0 s"]
-
-
-@pytest.mark.parametrize(
-    ("status", "why", "title"),
-    [
-        (
-            Status.LEFT_WORKSPACE,
-            None,
-            "hold under pd, electronics hardware: left_workspace at 1.223 s of 10 s",
-        ),
-        (
-            Status.FAILSAFE,
-            "a coil is too hot",
-            "hold under pd, electronics hardware: failsafe at 1.223 s of 10 s, a coil is too hot",
-        ),
-        (Status.INTERRUPTED, None, "hold under pd, electronics hardware: interrupted at 1.223 s of 10 s"),
-    ],
-)
-def test_the_title_of_a_run_that_failed_says_when_and_why(capsys, status, why, title):
-    assert printed(capsys, status=str(status), why=why)[0].rstrip() == title
 
 
 def test_a_failure_stands_out_in_a_terminal(capsys, monkeypatch):
     monkeypatch.setenv("FORCE_COLOR", "1")
     monkeypatch.setenv("TERM", "xterm")
     assert COLOURS[Status.LEFT_WORKSPACE.level] == "bold red"
-    first = printed(capsys, status="left_workspace")[0]
+    print_run("pd", 10.0, {**SUMMARY, "status": "left_workspace"}, band_rad=0.01, why=None, faults=())
+    first = capsys.readouterr().out.splitlines()[0]
     assert "\x1b[1;31m" in first
     assert Text.from_ansi(first).plain.startswith("hold under pd, electronics hardware: left_workspace")
     assert tables.terminal_console().is_terminal
-
-
-def test_shares_have_three_digits_and_faults_a_line_each(capsys):
-    faults = ("coil.07 open from 0.5 s, detected after 5 ms", "adc noise from 1 s, not detected")
-    lines = printed(capsys, saturated_fraction=0.0096, realtime_factor=0.5, faults=faults)
-    assert "largest current 8.00 A, the limit cut the torque at 0.960 % of the ticks" in lines
-    assert "1.2234 s simulated in 0.500 s: 0.500 times real time" in lines
-    assert [line for line in lines if line.startswith("fault")] == [f"fault {fault}" for fault in faults]
 
 
 def _installed(folder, monkeypatch):
