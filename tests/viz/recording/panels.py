@@ -19,8 +19,6 @@ class PanelLine(NamedTuple):
     name: str
     """Field of the component."""
     visualizer: str
-    look: dict
-    """Properties that the layout sets itself."""
 
 
 class Panel(NamedTuple):
@@ -30,9 +28,6 @@ class Panel(NamedTuple):
     band: tuple | None
     shown: list | None
     """Which entries of each line are visible; None for all."""
-    marked: list | None
-    """Which entries of the markers are visible; None for all."""
-    legend: bool
     entities: list
     lines: list
 
@@ -68,13 +63,6 @@ def rows(path, entity, component, field):
     return t_ns[order], whole[order]
 
 
-def style(path, entity, field):
-    """Style of a line: its properties as lists."""
-    values, _ = columns(path)
-    (column,) = values[f"/{entity.removeprefix('/')}", "styles_0"]
-    return column.to_pylist()[0][0][field]
-
-
 def panels(path):
     """Plots of the last layout of a recording."""
     stores = [columns(path, store)[0] for store in RrdReader(path).blueprints()]
@@ -100,8 +88,6 @@ def panels(path):
                 (layout.get((view, "ViewBlueprint:display_name")) or [[""]])[-1][0],
                 (layout.get((f"{view}/ScalarAxis", "ScalarAxis:range")) or [[None]])[-1][0],
                 (layout.get((f"{view}/defaults", "SeriesLines:visible_series")) or [None])[-1],
-                (layout.get((f"{view}/defaults", "SeriesPoints:visible_series")) or [None])[-1],
-                (layout.get((f"{view}/PlotLegend", "PlotLegend:visible")) or [[True]])[-1][0],
                 entities,
                 lines,
             )
@@ -113,11 +99,9 @@ def _panel_line(entity, mappings, layout, path):
     by_target = {mapping["target"]: mapping for mapping in mappings}
     scalars = by_target["Scalars:scalars"]
     kind = (layout.get((path, "VisualizerInstruction:visualizer_type")) or [[""]])[-1][0]
-    look = {name: values[-1] for (place, name), values in layout.items() if place == path and ":" in name}
     return PanelLine(
         entity,
         scalars["source_component"],
         scalars["selector"].removeprefix(".").removesuffix("[]"),
         kind,
-        look,
     )

@@ -7,39 +7,52 @@ from rerun.chunk import RrdReader
 from spheretwin import scenario as scenarios
 from spheretwin.provenance import facts_of
 from spheretwin.session import Session
-from spheretwin.simulation import simulate
-from spheretwin.viz.layout.view import TIMELINE
+from spheretwin.simulation import follow
+from spheretwin.viz.layout.view import TELEMETRY, TIMELINE
 from spheretwin.viz.recording.recorder import Recorder
 
 
-def recorded(path, name="nutation", **changes):
-    scenario = scenarios.load(name, {"duration": 2.3, **changes})
-    session = Session(scenario)
-    facts = facts_of(session.scenario)
-    with Recorder(session.actuator, session.signals, facts, path=path) as recorder:
-        return session, simulate(scenario, sinks=[recorder])
+def session_and_facts(name="hold", **changes):
+    """A session of a tenth of a second, and its facts."""
+    session = Session(scenarios.load(name, {"duration": 0.1, "plant.engine": "lagrangian", **changes}))
+    return session, facts_of(session.initial_scenario)
 
 
-def rows_of(path, entity, component, field=None):
-    """Times in ns and values of one component, or of one field of it, in order."""
-    times, values = [], []
-    chunks = (
-        RrdReader(path).stream().filter(content=f"/{entity}", components=component, has_timeline=TIMELINE)
-    )
-    for chunk in chunks:
+def recorded(path, name="hold", **changes):
+    """Status of a run that was recorded."""
+    session, facts = session_and_facts(name, **changes)
+    with session, Recorder(session.actuator, session.signals, facts, path=path) as recorder:
+        return follow(session, session.initial_scenario.ticks, [recorder])
+
+
+def batches(path, entity, component, **of):
+    """Batches of an entity that have a component."""
+    for chunk in RrdReader(path).stream().filter(content=f"/{entity}", **of):
         batch = chunk.to_record_batch()
-        column = batch.column(component)
-        if field:
-            column = column.flatten().field(field)
-        while pa.types.is_nested(column.type):
-            column = column.flatten()
+        if component in batch.schema.names:
+            yield batch
+
+
+def static(path, entity, component):
+    """Value of a component that has no time."""
+    return next(batches(path, entity, component, is_static=True)).column(component).to_pylist()[0]
+
+
+def timed(path, entity, component):
+    """Times in ms and values of a component, a list for each row, in the order of time."""
+    rows = []
+    for batch in batches(path, entity, component, has_timeline=TIMELINE):
+        times = batch.column(TIMELINE).cast(pa.int64()).to_pylist()
+        rows += zip(times, batch.column(component).to_pylist(), strict=True)
+    return [(t_ns // 1_000_000, values) for t_ns, values in sorted(rows, key=lambda row: row[0])]
+
+
+def telemetry_of(path, signal):
+    """Times in ns and values (n, size) of a signal of the telemetry."""
+    times, values = [], []
+    for batch in batches(path, TELEMETRY, "values_0", has_timeline=TIMELINE):
         times.append(np.asarray(batch.column(TIMELINE).cast(pa.int64())))
-        values.append(np.asarray(column).reshape(len(batch), -1))
-    times, values = np.concatenate(times), np.concatenate(values)
-    order = np.argsort(times, kind="stable")
-    return times[order], values[order]
-
-
-def hold_facts(**changes):
-    session = Session(scenarios.load("hold", {"duration": 0.1, **changes}))
-    return session, facts_of(session.scenario)
+        column = batch.column("values_0").flatten().field(signal)
+        values.append(np.asarray(column.flatten()).reshape(len(batch), -1))
+    order = np.argsort(np.concatenate(times), kind="stable")
+    return np.concatenate(times)[order], np.concatenate(values)[order]

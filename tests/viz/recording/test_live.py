@@ -65,6 +65,7 @@ def same(path, headless):
     return table.signals == headless.signals and table.values.tobytes() == headless.values.tobytes()
 
 
+@pytest.mark.release("two viewers, 8 s; changes with Rerun")
 def test_telemetry_is_the_same_whoever_watches(tmp_path, headless):
     stuck, killed = [], []
 
@@ -147,6 +148,7 @@ def marked(mark):
     return results
 
 
+@pytest.mark.release("browser and viewer, 14 s; test_viewer_server.py has the addresses")
 @needs_a_browser
 def test_the_page_shows_the_run_and_asks_nothing_of_another_machine():
     """In a browser of which every request is seen, its workers' too."""

@@ -2,22 +2,18 @@
 
 import numpy as np
 import pytest
-from rerun.components import AggregationPolicy, InterpolationMode, MarkerShape
 
-from spheretwin import scenario as scenarios
 from spheretwin.models.telemetry.signals import ANGLES, Signal, common_signals, width
 from spheretwin.models.telemetry.status import Status
 from spheretwin.models.telemetry.table import Table
-from spheretwin.provenance import facts_of
-from spheretwin.session import Session
 from spheretwin.viz import theme
-from spheretwin.viz.layout.view import CURRENT_LIMITS, CURRENT_MAP, CURRENT_VARIATION, TELEMETRY
+from spheretwin.viz.layout.view import CURRENT_MAP, CURRENT_VARIATION, TELEMETRY
 from spheretwin.viz.quantities import QuantityRows, quantities_of
 from spheretwin.viz.recording import currents, plots
 from spheretwin.viz.recording.reader import rewrite
 from spheretwin.viz.recording.recorder import Recorder
-from spheretwin.viz.scene.meshes import COILS
-from tests.viz.recording.panels import columns, panels, rows, style
+from tests.viz.recording.panels import columns, panels, rows
+from tests.viz.recording.recordings import session_and_facts
 
 TICK_s, TICKS, LIMIT_A = 1e-3, 3000, 8.0
 
@@ -53,13 +49,20 @@ def table():
     return table
 
 
-def record(path, table, rate_Hz, status=Status.COMPLETED, rows_at_once=97):
-    scenario = scenarios.load("hold", {"duration": 3.0})
-    with Session(scenario) as session:
-        facts, actuator = facts_of(session.initial_scenario), session.actuator
-    with Recorder(actuator, table.signals, facts, path=path, rate_Hz=rate_Hz) as recorder:
-        for first in range(0, TICKS, rows_at_once):
-            recorder.write(table.rows(first, min(first + rows_at_once, TICKS)))
+def write(recorder, table):
+    for first in range(0, TICKS, 97):
+        recorder.write(table.rows(first, min(first + 97, TICKS)))
+
+
+def new_recorder(path, table, rate_Hz):
+    session, facts = session_and_facts(duration=3.0)
+    return Recorder(session.actuator, table.signals, facts, path=path, rate_Hz=rate_Hz), session.actuator
+
+
+def record(path, table, rate_Hz, status=Status.COMPLETED):
+    recorder, actuator = new_recorder(path, table, rate_Hz)
+    with recorder:
+        write(recorder, table)
         recorder.finish(status)
     return actuator
 
@@ -120,148 +123,6 @@ def test_every_line_is_the_signal_at_each_tick_or_its_bounds_in_each_bin(recordi
         np.testing.assert_allclose(mean, means, rtol=1e-6, atol=1e-9)
 
 
-def test_all_lines_share_one_reduction(recording):
-    path, rate_Hz, plotted = recording
-    for panel in panels(path):
-        for line in panel.lines:
-            look = style(path, line.entity, line.name)
-            assert look["aggregation_policy"] == [AggregationPolicy.MinMax.value]  # all values of a pixel
-            mode = line.look.get("SeriesLines:interpolation_mode")
-            size = plotted[line.name].shape[1]
-            if rate_Hz is None:
-                assert mode is None
-                assert len(look["names"]) == size
-                continue
-            assert mode == [InterpolationMode.StepAfter.value]  # to the end of the bin
-            assert len(look["names"]) == 3 * size
-            low, mean, high = np.split(np.array(look["widths"]), 3)
-            assert np.all(low < mean)
-            assert np.all(high < mean)
-            assert panel.shown is None or panel.shown == panel.shown[:3] * 3
-
-
-MARKERS = {"●": MarkerShape.Circle, "×": MarkerShape.Cross, "+": MarkerShape.Plus}
-
-
-def test_lines_that_share_a_panel_have_a_legend_or_a_key_and_markers_on_the_signal(recording):
-    path, _, plotted = recording
-    values, times = columns(path)
-    several = 0
-    for panel in panels(path):
-        names = sorted({line.name for line in panel.lines})
-        few = [name for name in names if plotted[name].shape[1] <= 3]
-        (entity,) = [entity for entity in panel.entities if entity.startswith("/marks/")] or [None]
-        several_lines = sum(plotted[name].shape[1] for name in names) > 1  # a title names one line
-        has_legend = several_lines and names == few and panel.shown is None and "●" not in panel.title
-        assert panel.legend == has_legend, panel.title
-        if not (len(few) > 1 or any(plotted[name].shape[1] == 3 for name in few)):
-            assert entity is None, panel.title
-            continue
-        several += 1
-        look = {
-            name: values[entity, f"SeriesPoints:{name}"][0].to_pylist()[0]
-            for name in ("names", "colors", "markers")
-        }
-        styles = [
-            style(path, line.entity, line.name) for name in few for line in panel.lines if line.name == name
-        ]
-        by_name = {
-            name: colour for of in styles for name, colour in zip(of["names"], of["colors"], strict=True)
-        }
-        assert dict(zip(look["names"], look["colors"], strict=True)) == by_name
-        whole = np.concatenate([plotted[name] for name in few], axis=1)
-        key = entity, "Scalars:scalars"
-        marks = np.array([row for column in values[key] for row in column.to_pylist()])
-        ticks_shown = ticks(np.concatenate(times[key]))
-        assert len(ticks_shown) == pytest.approx(3 * plots.MARKS_OF_A_LINE, abs=1)
-        there = np.isfinite(marks)
-        assert np.all(there.sum(axis=0) >= plots.MARKS_OF_A_LINE - 1)
-        np.testing.assert_array_equal(marks[there], whole[ticks_shown][there])
-        if panel.shown is None:
-            continue
-        # The title says which line has which marker; no two of them have one at the same time.
-        shown = np.array(panel.shown[:3] * len(few))
-        assert panel.marked == shown.tolist()
-        assert there[:, shown].sum(axis=1).max() == 1
-        stated = {marker for glyph, marker in MARKERS.items() if f"{glyph} " in panel.title}
-        assert stated <= {
-            MarkerShape(marker) for marker, one in zip(look["markers"], shown, strict=True) if one
-        }
-    assert several > 5
-
-
-def test_axes_that_share_a_panel_have_markers_of_their_own(recording):
-    path, _, _ = recording
-    values, _ = columns(path)
-    for panel in panels(path):
-        if panel.title.startswith(("error of each", "sliding", "measured", "coupling")):
-            (entity,) = [entity for entity in panel.entities if entity.startswith("/marks/")]
-            markers = values[entity, "SeriesPoints:markers"][0].to_pylist()[0]
-            assert len(set(markers)) == 3, panel.title
-
-
-def test_each_panel_of_a_hinge_shows_its_own_entries(recording):
-    path, _, _ = recording
-    shown = {panel.title: panel.shown for panel in panels(path) if panel.shown}
-    assert len(shown) == 6
-    for title, entries in shown.items():
-        (hinge,) = (name for name in ANGLES if name in title)
-        assert entries[:3] == [name == hinge for name in ANGLES], title
-
-
-def test_ranges_and_titles_hold_the_largest_values(recording):
-    path, _, plotted = recording
-    by_title = {panel.title: panel for panel in panels(path)}
-    (title,) = {title for title in by_title if title.startswith("error of each")}
-    assert f"largest {np.abs(plotted['error_mrad']).max():.3g}" in title
-    for place, name in enumerate(ANGLES):
-        torques = [
-            plotted[of][:, place] for of in ("torque_delivered_Nm", "torque_command_Nm", "disturbance_Nm")
-        ]
-        (title,) = (title for title in by_title if title.startswith(f"{name}: ●coils"))
-        assert f"largest {np.abs(torques).max():.3g}" in title
-        angles = np.concatenate([plotted[of][:, place] for of in ("q_rad", "q_ref_rad", "q_measured_rad")])
-        (title,) = (title for title in by_title if title.startswith(f"{name}: ● actual"))
-        low, high = by_title[title].band
-        assert low <= angles.min() < angles.max() <= high
-        stated = [float(text) for text in title.partition("[rad], ")[2].split(" to ")]
-        np.testing.assert_allclose(stated, [angles.min(), angles.max()], atol=0.01 * np.ptp(angles))
-
-
-def test_coils_and_bars_are_the_row_at_the_cursor(recording, table):
-    path, rate_Hz, _ = recording
-    values, times = columns(path)
-    key = f"/{COILS}", "BarChart:values"
-    bars = [tensor["buffer"] for column in values[key] for (tensor,) in column.to_pylist()]
-    t_ns = np.concatenate(times[key])
-    expected = np.arange(TICKS) if rate_Hz is None else [part[0] for part in bins_of(60.0)]
-    order = np.argsort(t_ns, kind="stable")
-    np.testing.assert_array_equal(ticks(t_ns[order]), expected)
-    # Half precision keeps three digits.
-    np.testing.assert_allclose(np.array(bars)[order], table["current_A"][expected], rtol=2**-11, atol=1e-7)
-    texture = f"/{COILS}", "Mesh3D:albedo_texture_buffer"
-    colours = np.array(
-        [
-            np.frombuffer(bytes(texel), np.uint8)
-            for column in values[texture]
-            for (texel,) in column.to_pylist()
-        ]
-    )
-    of_rows = theme.current_colours(table["current_A"][expected], LIMIT_A).reshape(len(expected), -1)
-    np.testing.assert_array_equal(colours[np.argsort(np.concatenate(times[texture]), kind="stable")], of_rows)
-
-
-def test_bars_have_the_limit_as_their_scale(recording):
-    path, _, _ = recording
-    values, _ = columns(path)
-    (ends,) = values[f"/{CURRENT_LIMITS}", "BarChart:values"][0].to_pylist()[0]
-    assert ends["buffer"] == [LIMIT_A, -LIMIT_A]
-    assert values[f"/{CURRENT_LIMITS}", "BarChart:widths"][0].to_pylist()[0] == [0.0, 0.0]
-    (places,) = values[f"/{COILS}", "BarChart:abscissa"][0].to_pylist()[0]
-    widths = values[f"/{COILS}", "BarChart:widths"][0].to_pylist()[0]
-    np.testing.assert_allclose(np.array(places["buffer"]) + np.array(widths) / 2, np.arange(18), atol=1e-6)
-
-
 def packed(colours):
     return [[int.from_bytes(bytes([*colour, 255]), "big") for colour in row] for row in colours.tolist()]
 
@@ -295,53 +156,27 @@ def test_the_map_is_the_mean_of_each_cell_and_its_lane_the_deviation(recording, 
     assert deviation[2:-2].min() > 0.1 * LIMIT_A
 
 
-def test_lines_of_a_run_that_ended_early_reach_its_end(table, tmp_path):
-    for rate_Hz in (None, 60.0):
-        path = tmp_path / f"{rate_Hz}.rrd"
-        record(path, table, rate_Hz, Status.LEFT_WORKSPACE)
-        for panel in panels(path):
-            assert "/ended" in panel.entities
-            for line in panel.lines:
-                if line.visualizer == "SeriesLines":
-                    t_ns, _ = rows(path, line.entity, line.component, line.name)
-                    assert ticks(t_ns)[-1] == TICKS - 1
-
-
 @pytest.mark.parametrize("rate_Hz", [None, 60.0], ids=["every row", "60 Hz"])
-def test_a_recording_that_was_not_closed_is_recovered_with_its_whole_picture(table, tmp_path, rate_Hz):
+def test_a_recording_that_was_not_closed_is_recovered_with_the_panels_of_a_closed_one(
+    table, tmp_path, rate_Hz
+):
     closed, cut, recovered = (tmp_path / f"{name}.rrd" for name in ("closed", "cut", "recovered"))
     record(closed, table, rate_Hz, Status.LEFT_WORKSPACE)
-    end = len(closed.read_bytes())
-    with Session(scenarios.load("hold", {"duration": 3.0})) as session:
-        facts, actuator = facts_of(session.initial_scenario), session.actuator
-    recorder = Recorder(actuator, table.signals, facts, path=cut, rate_Hz=rate_Hz)
-    for first in range(0, TICKS, 97):
-        recorder.write(table.rows(first, min(first + 97, TICKS)))
-    part = recorder.partial()
-    cut.write_bytes(part.path.read_bytes())
+    recorder, _ = new_recorder(cut, table, rate_Hz)
+    write(recorder, table)
+    cut.write_bytes(recorder.partial().path.read_bytes())
     recorder.close()
-    assert cut.stat().st_size < end
+    assert cut.stat().st_size < closed.stat().st_size
     recorded = rewrite(cut, recovered)
     assert len(recorded.table) > (0.9 * TICKS if rate_Hz is None else 150)
-    last = recorded.table["t_s"][-1]
     by_title = {panel.title.partition(",")[0].partition(" ±")[0]: panel for panel in panels(recovered)}
     for panel in panels(closed):
         again = by_title[panel.title.partition(",")[0].partition(" ±")[0]]
         assert again.shown == panel.shown
-        assert [line[:4] for line in again.lines] == [line[:4] for line in panel.lines]
+        assert again.lines == panel.lines
         assert set(again.entities) == set(panel.entities)
         if panel.band:  # of rows that end a little earlier
             np.testing.assert_allclose(again.band, panel.band, rtol=0.15, atol=1e-9)
-    values, times = columns(recovered)
-    text = values["/summary", "TextDocument:text"][-1].to_pylist()[0][0]
-    headline, figures = text.split("  \n", 1)
-    assert headline.startswith("**⚠ NOT CLOSED · hold under afsm")
-    assert f"its rows end at {last:.3g} s of 3 s" in figures
-    assert "largest" in figures
-    marks = [entity for entity, name in values if entity.startswith("/marks/") and name == "Scalars:scalars"]
-    assert len(marks) > 5
-    marked_s = np.concatenate([t_ns for each in marks for t_ns in times[each, "Scalars:scalars"]]) * 1e-9
-    assert marked_s.min() >= 0
-    assert 0.5 * last < marked_s.max() <= last + 1e-6
+    _, times = columns(recovered)
     ended = np.concatenate(times["/ended", "Scalars:scalars"])
-    assert abs(ended[0] * 1e-9 - last) < 1e-6
+    assert abs(ended[0] * 1e-9 - recorded.table["t_s"][-1]) < 1e-6

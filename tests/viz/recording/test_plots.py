@@ -4,39 +4,19 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from rerun.chunk import RrdReader
 
-from spheretwin import scenario as scenarios
 from spheretwin.models.telemetry.signals import Signal, width
 from spheretwin.models.telemetry.status import QUIET_S, Status
 from spheretwin.models.telemetry.table import Table
-from spheretwin.provenance import facts_of
-from spheretwin.session import Session
-from spheretwin.simulation import simulate
 from spheretwin.viz.decimation import FIRST_CHUNK_S, TimeBins
 from spheretwin.viz.layout.extents import SPANS, ExtentTracker, PlotChannel
-from spheretwin.viz.layout.view import SUMMARY
-from spheretwin.viz.quantities import angle_between
-from spheretwin.viz.recording.recorder import Recorder
 from spheretwin.viz.recording.status import LEVELS, LimitSpells
 from spheretwin.viz.recording.summary import Summary
+from tests.viz.recording.recordings import session_and_facts
 
 TICK_s = 1e-3
 
 OPEN = {"target": "coil.00", "mode": "open", "start_s": 0.02}
-
-
-@pytest.fixture(scope="module")
-def run(tmp_path_factory):
-    """A run that begins at the current limit, and its recording."""
-    path = tmp_path_factory.mktemp("drawn") / "run.rrd"
-    fields = {"duration": 2.6, "plant.engine": "lagrangian", "disturbance.load": 2.0}
-    scenario = scenarios.load("nutation", fields)
-    session = Session(scenario)
-    facts = facts_of(session.scenario)
-    with Recorder(session.actuator, session.signals, facts, path=path) as recorder:
-        finished = simulate(scenario, sinks=[recorder])
-    return path, session, finished.telemetry
 
 
 def spans(t_s, rate_Hz):
@@ -137,39 +117,6 @@ def test_the_tracker_keeps_all_bounds_in_bounded_memory():
     assert ExtentTracker({"a": 1}).extents(None) is None
 
 
-def test_the_headline_says_what_was_run_how_it_ended_and_how_good_it_was(run):
-    path, session, table = run
-    for chunk in RrdReader(path).stream().filter(content=f"/{SUMMARY}"):
-        batch = chunk.to_record_batch()
-        text = batch.column("TextDocument:text").to_pylist()[-1][0]
-    headline, figures, chosen = text.split("  \n")
-    assert chosen == (
-        "chosen: trajectory.shape nutation · estimator.kind ideal · duration 2.6 · plant.engine lagrangian ·"
-        " plant.modelling_torque_Nm 0.002, 0.001, 0.001 · disturbance.random_bound_Nm 0.05"
-    )
-    assert (
-        headline
-        == "**✔ COMPLETED · nutation under afsm · modelling error m = 0.2 · load L = 2 · ideal hardware**"
-    )
-    error_deg = np.degrees(angle_between(table["q_rad"], table["q_ref_rad"]))
-    saturated = np.mean((table["allocation_scale"] > 0) & (table["allocation_scale"] < 1))
-    largest, rms, share = error_deg.max(), np.sqrt(np.mean(error_deg**2)), 100 * saturated
-    assert figures == (
-        f"error: largest **{largest:.3g}°**, RMS **{rms:.3g}°** · saturated {share:.1f} % of the time"
-    )
-    summary = Summary(facts_of(session.scenario))
-    assert summary.running().startswith("**▶ RUNNING · nutation")
-    assert summary.ended(Status.DIVERGED).startswith("**✗ FAILED · nutation")
-    summary.add(table.rows(0, 4), np.array([1.0, 7.0, 5.0, 5.0]))
-    lines = summary.ended(Status.LEFT_WORKSPACE).split("  \n")[1:]
-    alpha, beta, gamma = np.degrees(table["q_rad"][3])
-    assert lines[0] == (
-        "**left workspace at 0.003 s of 2.6 s: a hinge reached the end of its range,"
-        f" α {alpha:.0f}°, β {beta:.0f}°, γ {gamma:.0f}°**"
-    )
-    assert lines[1].startswith("error: largest **7°**, RMS **5°** · saturated")
-
-
 FAULT_SIGNALS = (
     Signal("t_s", "s", 1, "time"),
     Signal("q_rad", "rad", 3, "angles"),
@@ -184,8 +131,7 @@ FAULT_SIGNALS = (
 @pytest.fixture(scope="module")
 def facts_with_faults():
     faults = [OPEN, {**OPEN, "target": "coil.02"}, {**OPEN, "target": "coil.01"}]
-    with Session(scenarios.load("hold", {"fault": faults})) as session:
-        return facts_of(session.initial_scenario)
+    return session_and_facts(duration=3.0, fault=faults)[1]
 
 
 @given(st.sets(st.integers(1, 99)))

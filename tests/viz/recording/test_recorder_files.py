@@ -9,36 +9,27 @@ import sys
 import numpy as np
 import pytest
 
-from spheretwin import scenario as scenarios
 from spheretwin.analysis.recorded_run import read
 from spheretwin.models import actuator as actuators
 from spheretwin.models.base.errors import InputError, SpheretwinError
-from spheretwin.models.telemetry.signals import common_signals, width
+from spheretwin.models.telemetry.signals import width
 from spheretwin.models.telemetry.table import Table
-from spheretwin.provenance import facts_of
-from spheretwin.session import Session
-from spheretwin.simulation import follow, simulate
-from spheretwin.viz.layout.view import TELEMETRY
+from spheretwin.simulation import follow
 from spheretwin.viz.recording import recorder as recording
 from spheretwin.viz.recording.recorder import Recorder
-from tests.viz.recording.recordings import hold_facts, recorded, rows_of
-
-SIGNALS = common_signals(18)
+from tests.viz.recording.recordings import recorded, session_and_facts, telemetry_of
 
 
 def test_unwritable_path_is_bad_input(tmp_path, actuator):
-    facts = facts_of(scenarios.load("hold", {"drive.current_limit_A": 8.0}))
+    session, facts = session_and_facts()
     with pytest.raises(InputError, match="writable"):
-        Recorder(actuator, SIGNALS, facts, path=tmp_path / "missing" / "run.rrd")
+        Recorder(actuator, session.signals, facts, path=tmp_path / "missing" / "run.rrd")
 
 
 def test_a_fault_while_recording_is_raised_not_lost(tmp_path):
-    session = Session(scenarios.load("hold", {"duration": 0.1}))
-    facts = facts_of(session.scenario)
+    session, facts = session_and_facts()
     recorder = Recorder(session.actuator, session.signals, facts, path=tmp_path / "run.rrd")
-    backwards = Table(SIGNALS, np.zeros((2, width(SIGNALS))))
-    backwards.values[:, 0] = np.nan
-    recorder.write(backwards)
+    recorder.write(Table(session.signals, np.full((2, width(session.signals)), np.nan)))
     with pytest.raises(SpheretwinError, match=r"recording: .*run\.rrd could not be completed") as raised:
         recorder.close()
     (left_over,) = os.listdir(tmp_path)
@@ -46,7 +37,7 @@ def test_a_fault_while_recording_is_raised_not_lost(tmp_path):
 
 
 def test_a_folder_at_the_path_is_reported_with_the_place_of_the_recording(tmp_path):
-    session, facts = hold_facts()
+    session, facts = session_and_facts()
     recorder = Recorder(session.actuator, session.signals, facts, path=tmp_path / "run.rrd")
     follow(session, session.scenario.ticks, [recorder])
     (tmp_path / "run.rrd").mkdir()
@@ -54,11 +45,11 @@ def test_a_folder_at_the_path_is_reported_with_the_place_of_the_recording(tmp_pa
         recorder.close()
     (left_over,) = tmp_path.glob(".run.rrd.*.part")
     assert f"{raised.value}".endswith(f"; the recording is in {left_over}")
-    assert len(rows_of(left_over, TELEMETRY, "values_0", "q_rad")[0]) == 100
+    assert len(telemetry_of(left_over, "q_rad")[0]) == 100
 
 
 def test_a_partial_recording_has_every_row_that_was_written(tmp_path):
-    session, facts = hold_facts()
+    session, facts = session_and_facts()
     recorder = Recorder(session.actuator, session.signals, facts, path=tmp_path / "run.rrd")
     recorder.write(session.advance(37))
     part = recorder.partial()
@@ -68,7 +59,7 @@ def test_a_partial_recording_has_every_row_that_was_written(tmp_path):
 
 
 def test_closing_twice_is_closing_once(tmp_path):
-    session, facts = hold_facts()
+    session, facts = session_and_facts()
     with Recorder(session.actuator, session.signals, facts, path=tmp_path / "run.rrd") as recorder:
         follow(session, session.scenario.ticks, [recorder])
         recorder.close()
@@ -77,8 +68,8 @@ def test_closing_twice_is_closing_once(tmp_path):
 
 def test_where_a_pipe_has_no_path_rerun_writes_the_file(tmp_path, monkeypatch):
     monkeypatch.setattr(recording, "PIPE_PATHS", tmp_path / "none")
-    recorded(path := tmp_path / "run.rrd", "hold", duration=0.1)
-    assert len(rows_of(path, TELEMETRY, "values_0", "q_rad")[0]) == 100
+    recorded(path := tmp_path / "run.rrd")
+    assert len(telemetry_of(path, "q_rad")[0]) == 100
     assert os.listdir(tmp_path) == ["run.rrd"]
 
 
@@ -86,7 +77,7 @@ def test_a_file_that_cannot_be_opened_again_leaves_nothing(tmp_path, monkeypatch
     def out_of_handles():
         raise OSError(24, "Too many open files")
 
-    session, facts = hold_facts()
+    session, facts = session_and_facts()
     monkeypatch.setattr(os, "pipe", out_of_handles)
     with pytest.raises(InputError, match="Too many open files"):
         Recorder(session.actuator, session.signals, facts, path=tmp_path / "run.rrd")
@@ -96,15 +87,15 @@ def test_a_file_that_cannot_be_opened_again_leaves_nothing(tmp_path, monkeypatch
 def test_two_recorders_of_one_path_leave_the_last_whole(tmp_path):
     path = tmp_path / "run.rrd"
     (mine := tmp_path / "run.rrd.part").write_text("mine")
-    session, facts = hold_facts()
-    _, longer = hold_facts(duration=0.2)
+    session, facts = session_and_facts()
+    longer_session, longer = session_and_facts(duration=0.2)
     with Recorder(session.actuator, session.signals, facts, path=path) as first:
         with Recorder(session.actuator, session.signals, longer, path=path) as second:
-            simulate(scenarios.load("hold", {"duration": 0.2}), sinks=[second])
+            follow(longer_session, 200, [second])
             assert not path.exists()
-        assert len(rows_of(path, TELEMETRY, "values_0", "q_rad")[0]) == 200
+        assert len(telemetry_of(path, "q_rad")[0]) == 200
         follow(session, session.scenario.ticks, [first])
-    assert len(rows_of(path, TELEMETRY, "values_0", "q_rad")[0]) == 100
+    assert len(telemetry_of(path, "q_rad")[0]) == 100
     assert sorted(os.listdir(tmp_path)) == ["run.rrd", "run.rrd.part"]
     assert mine.read_text() == "mine"
 
@@ -115,10 +106,10 @@ def test_recording_at_a_link_replaces_the_file_behind_it(tmp_path, there):
     if there:
         (folder / "real.rrd").write_text("old")
     (link := tmp_path / "link.rrd").symlink_to("folder/real.rrd")
-    recorded(link, "hold", duration=0.1)
+    recorded(link)
     assert link.is_symlink()
     assert os.listdir(folder) == ["real.rrd"]
-    assert len(rows_of(folder / "real.rrd", TELEMETRY, "values_0", "q_rad")[0]) == 100
+    assert len(telemetry_of(folder / "real.rrd", "q_rad")[0]) == 100
 
 
 def broken_model(folder):
@@ -131,7 +122,7 @@ def broken_model(folder):
 
 def test_mesh_that_cannot_be_read_is_bad_input_before_the_run(tmp_path):
     (folder := tmp_path / "model").mkdir()
-    session, facts = hold_facts(**{"plant.mjcf": str(broken_model(folder))})
+    session, facts = session_and_facts(**{"plant.mjcf": str(broken_model(folder))})
     with pytest.raises(InputError, match=r"model .*broken\.xml: .*stator") as raised:
         Recorder(session.actuator, session.signals, facts, path=tmp_path / "run.rrd")
     assert "\n" not in f"{raised.value}"
@@ -142,7 +133,8 @@ LIMITED = """
 import resource, sys
 resource.setrlimit(resource.RLIMIT_FSIZE, (int(sys.argv[1]), int(sys.argv[1])))
 from spheretwin.cli import main
-sys.exit(main(["simulate", "hold", "--duration", "0.5", "--record", sys.argv[2], "--json"]))
+run = ["simulate", "hold", "--plant.engine", "lagrangian", "--duration", "0.5"]
+sys.exit(main([*run, "--record", sys.argv[2], "--json"]))
 """
 
 
@@ -151,18 +143,31 @@ def limited(path, size):
     return subprocess.run(command, capture_output=True, text=True, check=False)
 
 
-def test_full_disk_costs_the_recording_and_not_the_run(tmp_path):
-    recorded(tmp_path / "whole.rrd", "hold", duration=0.5)
-    size = (tmp_path / "whole.rrd").stat().st_size
-    # Full from the first bytes, amid the chunks, and before the last bytes; the size varies by some bytes
-    # from run to run, as the wall clock's time in it is packed.
-    for full in (100, size // 2, size - 2000):
-        path = tmp_path / f"{full}.rrd"
-        broken = limited(path, full)
-        assert broken.returncode == 1
-        assert json.loads(broken.stdout)["status"] == "completed"
-        (line,) = broken.stderr.splitlines()
-        assert line.startswith(f"spheretwin: recording: {path} could not be completed, File too large;")
-        (left_over,) = tmp_path.glob(f".{path.name}.*.part")
-        assert line.endswith(f"{left_over}")
-        assert not path.exists()
+@pytest.fixture(scope="module")
+def size(tmp_path_factory):
+    """Bytes of a complete recording; they vary from run to run, as the wall clock's time in it is packed."""
+    recorded(path := tmp_path_factory.mktemp("whole") / "whole.rrd", duration=0.5)
+    return path.stat().st_size
+
+
+# Full from the first bytes, amid the chunks, and before the last bytes.
+@pytest.mark.parametrize(
+    ("share", "more"),
+    [
+        (0.5, 0),
+        pytest.param(0, 100, marks=pytest.mark.release("1.5 s; half of the recording is in the first suite")),
+        pytest.param(
+            1, -2000, marks=pytest.mark.release("1.5 s; half of the recording is in the first suite")
+        ),
+    ],
+)
+def test_full_disk_costs_the_recording_and_not_the_run(tmp_path, size, share, more):
+    path = tmp_path / "run.rrd"
+    broken = limited(path, int(share * size) + more)
+    assert broken.returncode == 1
+    assert json.loads(broken.stdout)["status"] == "completed"
+    (line,) = broken.stderr.splitlines()
+    assert line.startswith(f"spheretwin: recording: {path} could not be completed, File too large;")
+    (left_over,) = tmp_path.glob(f".{path.name}.*.part")
+    assert line.endswith(f"{left_over}")
+    assert not path.exists()

@@ -6,7 +6,7 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from spheretwin.models.telemetry.signals import Signal, width
-from spheretwin.models.telemetry.status import QUIET_S, Events, Level, Status
+from spheretwin.models.telemetry.status import QUIET_S, Events, Status
 from spheretwin.models.telemetry.table import Table
 
 TICKS = 200
@@ -29,28 +29,6 @@ def test_every_status_ends_a_log(status):
     events = Events()
     events.of(rows([0.0, 0.5], [1.0, 1.0]))
     assert events.end(status) == (0.5, status.level, status.text)
-
-
-def test_a_lost_rank_is_an_event_of_its_own():
-    t_s = np.arange(6) * 1.0
-    result = Events().of(rows(t_s, [1.0, 0.5, 0.0, 1.0, 0.0, 0.5]))
-    assert [event[0] for event in result] == [1.0, 2.0, 4.0, 5.0]
-    assert ["rank lost" in event[2] for event in result] == [False, True, True, False]
-    assert ["current limit" in event[2] for event in result] == [True, False, False, True]
-
-
-def test_a_time_at_the_limit_is_one_event():
-    t_s = np.arange(1000) * 1e-3
-    scale = np.ones(1000)
-    scale[100:200:3] = 0.5  # chatters at the limit
-    scale[200 + round(1000 * QUIET_S) :] = 0.25
-    events = Events()
-    results = []
-    for first, last in ((0, 150), (150, 400), (400, 1000)):  # a chunk ends amid each
-        results += events.of(rows(t_s[first:last], scale[first:last]))
-    assert [event[0] for event in results] == [pytest.approx(0.1), pytest.approx(0.3)]
-    assert {event[1] for event in results} == {Level.WARN}
-    assert "50 %" in results[0][2]
 
 
 def slow_messages(t_s, scale):

@@ -3,26 +3,22 @@
 import numpy as np
 import pytest
 
-from spheretwin import scenario as scenarios
 from spheretwin.models.telemetry.signals import width
-from spheretwin.provenance import facts_of
-from spheretwin.session import Session
 from spheretwin.simulation import follow
 from spheretwin.viz.recording import plots, stream
 from spheretwin.viz.recording.currents import CoilCurrents
 from spheretwin.viz.recording.plots import PlotData
 from spheretwin.viz.recording.recorder import Recorder
+from tests.viz.recording.recordings import session_and_facts
 
 
 def size_and_raw(path, duration_s, rate_Hz):
     """Bytes of a recording, and of the numbers of all of its run's rows."""
-    changes = {"plant.engine": "lagrangian", "duration": duration_s}
-    with Session(scenarios.load("sinusoid", changes)) as session:
-        facts, ticks = facts_of(session.initial_scenario), session.initial_scenario.ticks
-        with Recorder(session.actuator, session.signals, facts, path=path, rate_Hz=rate_Hz) as recorder:
-            follow(session, ticks, [recorder])
-        raw = ticks * width(session.signals) * np.float64().itemsize
-    return np.array([path.stat().st_size, raw])
+    session, facts = session_and_facts("sinusoid", duration=duration_s)
+    ticks = session.initial_scenario.ticks
+    with session, Recorder(session.actuator, session.signals, facts, path=path, rate_Hz=rate_Hz) as recorder:
+        follow(session, ticks, [recorder])
+    return np.array([path.stat().st_size, ticks * width(session.signals) * np.float64().itemsize])
 
 
 # Shares of the raw numbers: 760 bytes a row that do not compress. Every row has 13 derived quantities
