@@ -6,7 +6,6 @@ import pytest
 from spheretwin import scenario as scenarios
 from spheretwin.control.supervision.enabled_groups import DETECTED_OPEN, DETECTED_SHORTED, REPORTED
 from spheretwin.faults.fault_injector import FaultMessages
-from spheretwin.models.magnetics import torque_matrix
 from spheretwin.models.telemetry.signals import Signal, width
 from spheretwin.models.telemetry.table import Table
 from spheretwin.session import Session
@@ -17,12 +16,17 @@ START_S = 1.0
 
 
 def scenario(name="nutation", hardware="electronics", **changes):
-    detecting = {"hardware": hardware, "plant.engine": "lagrangian", "detector.detect": True, "seed": 8}
+    detecting = {"hardware": hardware, "plant.engine": "mujoco", "detector.detect": True, "seed": 8}
     return scenarios.load(name, {**detecting, **changes})
 
 
+IDEAL = pytest.param(
+    "ideal", marks=pytest.mark.release("compiles loops of its own for 20 s; electronics has the same")
+)
+
+
 @pytest.mark.parametrize(("mode", "name"), [("open", DETECTED_OPEN), ("short", DETECTED_SHORTED)])
-@pytest.mark.parametrize("hardware", ["electronics", "ideal"])
+@pytest.mark.parametrize("hardware", ["electronics", IDEAL])
 def test_every_group_that_fails_is_found_and_named_and_no_other(hardware, mode, name):
     """In nutation, which asks every group for more than twice the threshold within a tenth of a second."""
     took_s = []
@@ -59,13 +63,14 @@ def supply(volts):
     return {"drive.supply_V": volts, "nominal.swing_V": volts - 4.8}
 
 
+MANY_TICKS = pytest.mark.release("minutes of simulated time for 3 s; shorter runs have the same thresholds")
 LONG = [
     ("ideal-afsm", "sinusoid", "ideal", MINUTES, {}),
     ("electronics-afsm", "sinusoid", "electronics", MINUTES, HOT),
+    ("fuzzy", "sinusoid", "electronics", 60_000, {"controller.law": "adaptive_fuzzy"}),
 ]
 SHORT = [
     ("pd", "sinusoid", "electronics", 60_000, {"controller.law": "pd"}),
-    ("fuzzy", "sinusoid", "electronics", 60_000, {"controller.law": "adaptive_fuzzy"}),
     ("nutation", "nutation", "electronics", 5_000, {}),
     ("prototype", "nutation", "prototype", 5_000, {"plant.engine": "lagrangian"}),
     ("weak supply", "sinusoid", "electronics", 60_000, {**supply(8.0), **HOT}),
@@ -82,7 +87,10 @@ SHORT = [
 ]  # fmt: skip
 
 
-@pytest.mark.parametrize(("label", "name", "hardware", "ticks", "changes"), LONG + SHORT)
+@pytest.mark.parametrize(
+    ("label", "name", "hardware", "ticks", "changes"),
+    [*(pytest.param(*row, marks=MANY_TICKS) for row in LONG), *SHORT],
+)
 def test_no_healthy_group_is_ever_found(label, name, hardware, ticks, changes):
     """Under each law, through voltage-limited swings, and where AFSM chatters, for ten minutes."""
     busy, limited, last = 0, 0, 0
@@ -114,54 +122,17 @@ def test_a_supply_that_the_controller_does_not_know_leaves_its_thresholds():
 
 
 def test_what_is_known_is_left_out_from_its_tick_on_and_taken_back():
-    """All the torque that is wanted comes from the others, by the true torque matrix of an ideal run."""
-    faults = [
-        {
-            "target": f"coil.{group:02d}",
-            "mode": "open",
-            "reported_to_controller": True,
-            "start_s": 0.1,
-            "end_s": 0.2,
-        }
-        for group in (2, 9)
-    ]
-    for allocation in ("least_norm", "bounded"):
-        changes = {"duration": 0.3, "allocation": allocation, "detector.detect": False}
-        run = simulate(scenario("sinusoid", "ideal", fault=faults, **changes))
-        table, out = run.telemetry, run.telemetry["group_out"]
-        assert set(np.flatnonzero(out.any(axis=0)).tolist()) == {2, 9}
-        assert np.flatnonzero(out[:, 2]).tolist() == list(range(100, 200))
-        assert set(out[100:200, 2].tolist()) == {REPORTED}
-        assert not table["current_command_A"][100:200][:, [2, 9]].any()
-        assert table["current_command_A"][:100, 2].any()
-        assert table["current_command_A"][200:, 2].any()
-        assert table["time_to_detection_s"][150, 2] == 0.0
-        for tick in range(100, 200, 9):
-            if table["allocation_scale"][tick] < 1:
-                continue
-            used = np.delete(np.arange(GROUPS), [2, 9])
-            G = torque_matrix(table["q_rad"][tick], run.actuator)
-            current = table["current_command_A"][tick]
-            smallest = np.linalg.pinv(G[:, used]) @ (G @ current)
-            # Rounding, 1e-15 of some amperes, times the condition of G G^T, which is below 1e3.
-            np.testing.assert_allclose(current[used], smallest, rtol=0, atol=1e-11)
-
-
-def test_a_find_is_told_once_with_its_time():
-    fault = {"target": "coil.07", "mode": "open", "start_s": 0.5, "end_s": 1.2}
-    run = simulate(scenario(fault=[fault], duration=1.5))
-    lines = FaultMessages()
-    signals, values = run.telemetry.signals, run.telemetry.values
-    messages = []
-    for first in range(0, len(values), 333):
-        messages += lines.of(Table(signals, values[first : first + 333]))
-    after_ms = 1e3 * run.telemetry["time_to_detection_s"][-1, 7]
-    assert [text for _, text in messages] == [
-        "coil.07 open",
-        f"group 7 found open, {after_ms:.0f} ms after it failed",
-        "coil.07 works again",
-    ]
-    assert [t_s for t_s, _ in messages] == pytest.approx([0.5, 0.5 + 1e-3 * after_ms, 1.2], abs=1e-9)
+    reported = {"mode": "open", "reported_to_controller": True, "start_s": 0.1, "end_s": 0.2}
+    faults = [{"target": f"coil.{group:02d}", **reported} for group in (2, 9)]
+    run = simulate(scenario("sinusoid", fault=faults, duration=0.3, **{"detector.detect": False}))
+    table, out = run.telemetry, run.telemetry["group_out"]
+    expected = np.zeros_like(out)
+    expected[100:200, [2, 9]] = REPORTED
+    np.testing.assert_array_equal(out, expected)
+    assert not table["current_command_A"][100:200][:, [2, 9]].any()
+    assert table["current_command_A"][:100, 2].any()
+    assert table["current_command_A"][200:, 2].any()
+    assert table["time_to_detection_s"][150, 2] == 0.0
 
 
 def test_messages_of_one_chunk_are_in_the_order_of_time():
@@ -192,10 +163,10 @@ def test_detect_of_a_fault_is_the_detector():
     assert one["group_out"][-1, 7] == DETECTED_OPEN
 
 
-def test_a_detector_that_finds_nothing_moves_no_bit():
+@pytest.mark.parametrize("hardware", ["electronics", IDEAL])
+def test_a_detector_that_finds_nothing_moves_no_bit(hardware):
     """Nor does its noise move any other."""
-    for hardware in ("electronics", "ideal"):
-        plain = scenario(hardware=hardware, duration=1.0, **{"detector.detect": False})
-        one, other = simulate(plain).telemetry, simulate(scenario(hardware=hardware, duration=1.0)).telemetry
-        for signal in one.signals:
-            assert one[signal.name].tobytes() == other[signal.name].tobytes()
+    plain = scenario(hardware=hardware, duration=1.0, **{"detector.detect": False})
+    one, other = simulate(plain).telemetry, simulate(scenario(hardware=hardware, duration=1.0)).telemetry
+    for signal in one.signals:
+        assert one[signal.name].tobytes() == other[signal.name].tobytes()
