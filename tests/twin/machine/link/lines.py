@@ -75,6 +75,9 @@ class Script:
     def accept(self):
         pass
 
+    def close(self):
+        pass
+
 
 def machine_channel(transport, frames=OWN):
     """The channel of a machine."""

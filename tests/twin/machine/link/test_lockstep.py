@@ -25,17 +25,8 @@ TICKS = 400
 class Run:
     """The same scenario simulated, and driven over a line."""
 
-    def __init__(
-        self,
-        frame="spheretwin",
-        name="nutation",
-        damage=None,
-        ticks=TICKS,
-        line=None,
-        now=time.monotonic,
-        **changes,
-    ):
-        scenario = scenarios.load(name, {key.replace("__", "."): value for key, value in changes.items()})
+    def __init__(self, frame="spheretwin", changes=None, damage=None, ticks=TICKS, line=None, now=None):
+        scenario = scenarios.load("nutation", changes)
         with Session(scenario) as session:
             self.simulated = session.advance(ticks)
         line, frames = line or Line(), frame_format.load(frame)
@@ -47,7 +38,7 @@ class Run:
         limits = Limits(current_A=8.0)
         settings = LinkSettings(armed=True, ramp_s=0.0, lockstep=True, timeout_s=1000.0, connect_s=1000.0)
         channel = Channel(line, frames.command, frames.measurement, GROUPS)
-        self.link = Link(channel, "a test", settings, limits, heat(), PERIOD_s, now=now)
+        self.link = Link(channel, "a test", settings, limits, heat(), PERIOD_s, now=now or time.monotonic)
         with self.link.session(scenario) as session:
             self.controller = session.advance(ticks)
             self.status = session.status
@@ -61,17 +52,12 @@ class Run:
 
 
 LAW = ("sliding_s", "fuzzy_torque_Nm", "switching_torque_Nm", "switching_gain", "bound_gain")
-CONTROLLER = (
-    "t_s",
-    "q_ref_rad",
-    "qdot_ref_rad_s",
-    "torque_command_Nm",
-    "current_command_A",
-    "allocation_scale",
-)
+CONTROLLER = ("t_s", "q_ref_rad", "qdot_ref_rad_s", "torque_command_Nm", "current_command_A",
+              "allocation_scale")  # fmt: skip
 PLANT = ("t_s", "q_rad", "qdot_rad_s", "error_rad", "torque_Nm", "disturbance_Nm", "current_command_A",
          "current_A", "mean_current_A")  # fmt: skip
-KALMAN, PROTOTYPE = {"estimator__kind": "kalman"}, {"hardware": "prototype"}
+KALMAN = {"estimator.kind": "kalman"}
+PROTOTYPE = {"hardware": "prototype", "plant.engine": "lagrangian"}
 
 
 def check_bytes(run, measured, extra=()):
@@ -94,11 +80,11 @@ def test_the_bytes_of_true_rates(frame):
 
 
 def test_the_bytes_of_an_estimator():
-    check_bytes(Run(**KALMAN), ("q_measured_rad", "qdot_estimated_rad_s"))
+    check_bytes(Run(changes=KALMAN), ("q_measured_rad", "qdot_estimated_rad_s"))
 
 
 def test_the_bytes_of_the_prototype_with_its_electronics():
-    run = Run(**PROTOTYPE, **KALMAN)
+    run = Run(changes=PROTOTYPE | KALMAN)
     measured = ("q_measured_rad", "qdot_estimated_rad_s")
     check_bytes(run, measured, ("coil_temperature_degC", "copper_loss_W", "friction_Nm"))
     np.testing.assert_array_equal(run.controller["q_rad"], run.simulated["q_measured_rad"])
@@ -134,18 +120,17 @@ def test_a_line_that_loses_and_repeats_frames_changes_no_byte():
     assert counts["corrupt"] > 10
 
 
-def test_rates_that_nobody_measures_need_an_estimator():
-    resolved = Session(scenarios.load("sinusoid")).initial_scenario
-    with pytest.raises(
-        InputError, match=r"expected an estimator of the rates, such as --estimator\.kind kalman"
-    ):
-        check_measurement(resolved, Measurement(np.zeros(3), None, np.zeros(18)))
-
-
-def test_a_detector_needs_measured_currents():
-    resolved = Session(scenarios.load("sinusoid", {"detector.detect": True})).initial_scenario
-    with pytest.raises(InputError, match="expected a machine that reports currents"):
-        check_measurement(resolved, Measurement(np.zeros(3), np.zeros(3), None))
+@pytest.mark.parametrize(
+    ("changes", "measurement", "said"),
+    [
+        ({}, (None, np.zeros(18)), r"expected an estimator of the rates, such as --estimator\.kind kalman"),
+        ({"detector.detect": True}, (np.zeros(3), None), "expected a machine that reports currents"),
+    ],
+)
+def test_measurements_that_the_controller_lacks_are_refused(changes, measurement, said):
+    resolved = Session(scenarios.load("sinusoid", changes)).initial_scenario
+    with pytest.raises(InputError, match=said):
+        check_measurement(resolved, Measurement(np.zeros(3), *measurement))
 
 
 def test_the_controller_has_nothing_of_the_plant():

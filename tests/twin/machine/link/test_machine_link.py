@@ -81,18 +81,13 @@ def test_a_healthy_machine_is_driven(machine, lockstep):
         assert figures["jitter"]["max_ms"] == pytest.approx(0.0, abs=1e-9)
 
 
-def test_without_arming_no_command_is_armed_and_nothing_rises(machine):
-    link = linked(machine, armed=False)
+def test_without_arming_nothing_rises_and_frames_are_shown(machine):
+    lines = []
+    link = linked(machine, armed=False, report=lines.append)
     assert link.authority == 0.0
     reasons(link, 20)
     assert link.authority == 0.0
     assert all(command["flags"] == 0 for command in machine.commands)
-
-
-def test_a_dry_run_shows_frames(machine):
-    lines = []
-    link = linked(machine, armed=False, report=lines.append)
-    reasons(link, 20)
     assert sum(line.startswith("sent 162 bytes a5 c3") for line in lines) == 3
     assert sum(line.startswith("received 222 bytes a5 5a") for line in lines) == 3
     assert "angle [0 0 0]" in lines[1]
@@ -119,12 +114,15 @@ LIMIT_CASES = [
     ({"temperature": np.inf}, {}, Reason.MEASUREMENT),
     ({"rate": (np.inf, 0.0, 0.0)}, {}, Reason.MEASUREMENT),
     ({"flags": Flags.FAILSAFE}, {}, Reason.MACHINE),
+    ({"angle": (0.29, -0.29, 3.0)}, {"tilt_rad": 0.3}, Reason.NONE),  # γ may turn
+    ({"current": np.full(GROUPS, 4.9)}, {"current_A": 4.0}, Reason.NONE),
+    ({"temperature": 79.9}, {"temperature_degC": 80.0}, Reason.NONE),
 ]
 
 
 @MODES
 @pytest.mark.parametrize(("values", "limits", "reason"), LIMIT_CASES)
-def test_each_limit_removes_the_currents(machine, values, limits, reason, lockstep):
+def test_each_limit_removes_the_currents_beyond_it(machine, values, limits, reason, lockstep):
     link = linked(machine, limits=Limits(**{"current_A": 8.0, **limits}), lockstep=lockstep)
     assert reasons(link, 2) == [Reason.NONE] * 2
     machine.values = values
@@ -133,20 +131,8 @@ def test_each_limit_removes_the_currents(machine, values, limits, reason, lockst
     assert np.all(np.isfinite(answer.angle_rad))
     machine.values = {}
     assert reasons(link, 2, first=3) == [reason] * 2  # it does not come back
-    assert [command["flags"] for command in machine.commands] == [1, 1, 1, 0, 0]
-
-
-@pytest.mark.parametrize(
-    ("values", "limits"),
-    [
-        ({"angle": (0.29, -0.29, 3.0)}, {"tilt_rad": 0.3}),  # γ may turn
-        ({"current": np.full(GROUPS, 4.9)}, {"current_A": 4.0}),
-        ({"temperature": 79.9}, {"temperature_degC": 80.0}),
-    ],
-)
-def test_below_a_limit_the_machine_is_driven(machine, values, limits):
-    machine.values = values
-    assert reasons(linked(machine, limits=Limits(**{"current_A": 8.0, **limits})), 3) == [Reason.NONE] * 3
+    armed = 1 if reason == Reason.NONE else 0
+    assert [command["flags"] for command in machine.commands] == [1, 1, 1, armed, armed]
 
 
 def test_a_machine_without_a_thermometer_has_an_estimate(machine):
@@ -178,12 +164,6 @@ def test_a_late_measurement_within_the_timeout_is_used(machine):
     assert reasons(link, 20) == [Reason.NONE] * 20
     assert link.late_ticks == {1, 2}
     assert link.figures()["latency"]["p50_ms"] == pytest.approx(2.5)
-
-
-def test_a_measurement_that_is_too_late_removes_the_currents(machine):
-    link = linked(machine)
-    machine.delay_s = 4.6e-3
-    assert Reason.STALE in reasons(link, 6)
 
 
 def test_a_delay_that_grows_slowly_removes_the_currents(machine):
@@ -283,20 +263,17 @@ def test_frames_from_before_the_start_are_not_used(machine):
     assert not machine.script.planned  # nothing waits to be used later
 
 
-def test_the_end_of_the_machine_ends_the_run(machine):
-    link = linked(machine)
-    machine.values = {"flags": Flags.END}
-    assert link.advance(0.0, ONES) is not None
-    assert link.advance(PERIOD_s, ONES) is None
-    assert link.ending == "the machine ended the run"
-
-
-def test_a_stop_ends_the_run(machine):
+@pytest.mark.parametrize("by", ["the machine ended the run", "a stop was requested"])
+def test_the_end_of_the_machine_and_a_stop_end_the_run(machine, by):
     stops = []
     link = linked(machine, stop_requested=lambda: bool(stops))
-    stops.append(1)
-    assert link.advance(0.0, ONES) is None
-    assert link.ending == "a stop was requested"
+    if by == "the machine ended the run":
+        machine.values = {"flags": Flags.END}
+    assert link.advance(0.0, ONES) is not None
+    if by == "a stop was requested":
+        stops.append(1)
+    assert link.advance(PERIOD_s, ONES) is None
+    assert link.ending == by
 
 
 def test_the_release_is_without_currents_and_repeated(machine):

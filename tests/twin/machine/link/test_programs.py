@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 
 from spheretwin import cli, simulation
-from spheretwin import scenario as scenarios
 from spheretwin.bench import Bench
 from spheretwin.models.telemetry.table import read_parquet
 from tests.requirements import C_COMPILER, needs_c_compiler, needs_posix
@@ -104,49 +103,31 @@ def test_without_arming_the_firmware_does_not_move(firmware, capsys):
     assert result["max_abs_error_rad"] == pytest.approx([0.2 * np.sin(0.199 * np.pi)] * 3, rel=1e-3)
 
 
-def test_currents_rise_with_the_ramp(firmware, capsys, tmp_path):
-    path = tmp_path / "run.parquet"
-    code, _ = driven(
-        firmware, capsys, "--arm", "--ramp-s", "0.2", "--duration", "0.1", "--telemetry", str(path)
-    )
-    assert code == 0
-    rows, _ = read_parquet(path)
-    assert not np.any(rows["current_command_A"][0])
-    assert np.any(rows["current_command_A"][1])
-    full = np.abs(rows["torque_command_Nm"]).max(axis=1)
-    sent = np.abs(rows["torque_Nm"]).max(axis=1)
-    assert np.all(sent[1:20] < 0.15 * full[1:20])  # 20 ms are a tenth of the ramp
-
-
 def test_the_bench_drives_the_firmware(firmware, monkeypatch):
-    """The verb itself, whose page presses start and stop: it tracks as a bench with its own plant does."""
+    """The verb itself, whose page presses start and stop: it tracks."""
     pytest.importorskip("viser")
     from spheretwin.viz.bench.page import Page
 
-    ticks, states = 500, []
+    states = []
 
-    def press(bench):
-        bench.do("start")
-        assert bench.advance(ticks) == ticks
-        states.append(bench.state())
-        bench.do("stop")
-        bench.advance(20)
-        states.append(bench.state())
+    def press(page, ended):
+        page._bench.do("start")
+        for command, ticks in ((None, 500), ("stop", 20)):
+            if command:
+                page._bench.do(command)
+            assert page._bench.advance(ticks) == ticks
+            states.append(page._bench.state())
 
     monkeypatch.setattr(Bench, "begin", lambda bench: None)  # no thread with the pace of the clock
-    monkeypatch.setattr(Page, "show", lambda page, ended: press(page._bench))
+    monkeypatch.setattr(Page, "show", press)
     words = ["bench", "sinusoid", "--controller.law", "pid", "--estimator.kind", "kalman"]
     with firmware() as port:
         link = ["--machine", f"udp://:{port}", "--frame", str(HERE / "firmware.toml"), "--lockstep", "--arm"]
         limits = ["--timeout-ms", str(1000 * PATIENCE_S), "--ramp-s", "0", "--port", "0", "--no-browser"]
         assert cli.main([*words, *link, *limits]) == 0
-    with Bench(scenarios.load("sinusoid", SAME_PLANT)) as own:
-        press(own)
-    driven, stopped, twin, _ = states
-    assert driven.t_s == twin.t_s
-    # As for `drive` above.
-    np.testing.assert_allclose(driven.q_rad, twin.q_rad, atol=2e-4)
+    driven, stopped = states
     assert np.abs(driven.q_rad).max() > 0.1
+    assert driven.error_mrad < 10.0
     assert any(driven.current_command_A)
     assert not any(stopped.current_command_A)
 

@@ -1,8 +1,5 @@
 """Streams of measurements: the same estimates as from a file, and how a stream ends."""
 
-import os
-import threading
-
 import numpy as np
 import pytest
 
@@ -15,6 +12,7 @@ from spheretwin.machine.link.transports import Udp
 from spheretwin.machine.log import joined
 from spheretwin.machine.model import model_of
 from spheretwin.models.base.errors import InputError, SpheretwinError
+from tests.twin.machine.link.lines import Script
 from tests.twin.machine.machine_logs import KNOWN, SCENARIO, changing_log
 
 
@@ -33,81 +31,43 @@ def frames_of(log, *, end=True):
     codec = Codec(frame_format.load("spheretwin").measurement, 18)
     for row in range(len(log)):
         last = end and row == len(log) - 1
-        yield codec.encode(
-            {
-                "sequence": row,
-                "echo": 0,
-                "flags": int(Flags.END) if last else 0,
-                "time": log.t_s[row],
-                "angle": log.angle_rad[row],
-                "rate": np.zeros(3),
-                "current": log.current_A[row],
-                "temperature": 20.0,
-            }
-        )
+        values = {"sequence": row, "echo": 0, "flags": int(Flags.END) if last else 0, "time": log.t_s[row]}
+        values |= {"angle": log.angle_rad[row], "rate": np.zeros(3), "current": log.current_A[row]}
+        yield codec.encode({**values, "temperature": 20.0})
 
 
-def received(monkeypatch, content, **options):
-    """Blocks of a stream on standard input."""
-    reading, writing = os.pipe()
-    before = os.dup(0), os.dup(1)
-    os.dup2(reading, 0)
-    thread = threading.Thread(target=lambda: (os.write(writing, content), os.close(writing)))
-    thread.start()
-    try:
-        return list(streamed("-", 18, **options))
-    finally:
-        thread.join()
-        os.dup2(before[0], 0)
-        os.dup2(before[1], 1)
-        for number in (*before, reading):
-            os.close(number)
+def received(script, *contents, closed=False):
+    """Blocks of a stream of bytes, which its sender may close."""
+    script.datagrams, script.is_closed = False, closed
+    for content in contents:
+        script.plan(content)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("spheretwin.machine.link.stream.open_transport", lambda *_, **__: script)
+        return list(streamed("-", 18, now=script.now))
 
 
-def test_a_stream_is_the_log_of_its_frames(monkeypatch, log, model):
-    blocks = received(monkeypatch, b"".join(frames_of(log)))
+def test_a_stream_is_the_log_of_its_frames(log, model):
+    blocks = received(Script(), b"".join(frames_of(log)))
     whole = joined(blocks)
-    assert len(blocks) > 1
     assert whole.digest == log.digest
     running = Shadow(model)
-    values = np.vstack([running.advance(block).values for block in blocks])
+    values = np.vstack([running.advance(block).values for block in received(Script(), *frames_of(log))])
     assert np.array_equal(values, shadow(log, model).telemetry.values)
 
 
-def test_a_stream_ends_with_its_sender(monkeypatch, log):
+def test_a_stream_ends_with_its_sender(log):
     """Closed without the end flag; bytes that are no frame are skipped."""
-    content = b"noise" + b"".join(frames_of(log, end=False))
-    assert joined(received(monkeypatch, content)).digest == log.digest
-
-
-def test_a_stream_without_frames_is_refused(monkeypatch):
+    script, content = Script(), b"noise" + b"".join(frames_of(log, end=False))
+    assert joined(received(script, content, closed=True)).digest == log.digest
+    assert script.t_s < 0.3  # no silence is waited for
     with pytest.raises(SpheretwinError, match="expected frames, received 1 texts"):
-        received(monkeypatch, b"no frame at all")
+        received(Script(), b"no frame at all", closed=True)
 
 
 def test_a_stream_ends_after_a_silence(log):
-    clock = iter(np.arange(0.0, 1e4, 0.5))
-    address = "udp://127.0.0.1:0"
-    frames = iter(frames_of(log, end=False))
-
-    class Loopback:
-        """In place of a socket: some frames, then nothing."""
-
-        datagrams, foreign, is_closed = True, 0, False
-
-        def receive(self, timeout_s):
-            return next(frames, b"")
-
-        def accept(self):
-            pass
-
-        def close(self):
-            pass
-
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("spheretwin.machine.link.stream.open_transport", lambda *a, **k: Loopback())
-        blocks = list(streamed(address, 18, now=lambda: next(clock)))
-    assert joined(blocks).digest == log.digest
+    script = Script()
+    assert joined(received(script, *frames_of(log, end=False))).digest == log.digest
+    assert script.t_s == pytest.approx(2.0, abs=0.2)
 
 
 def test_frames_need_times_angles_and_currents():
