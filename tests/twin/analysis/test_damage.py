@@ -21,7 +21,7 @@ from spheretwin.outputs import Outputs
 from spheretwin.provenance import record_of
 from spheretwin.session import Session
 from spheretwin.simulation import follow
-from tests.twin.analysis.runs import PLANT, WITH_EVENTS, written
+from tests.twin.analysis.runs import PLANT, WITH_EVENTS
 
 # The path of a file below the folder of a test, and a sentence.
 LONGEST_LINE = 600
@@ -31,12 +31,6 @@ NAME = 1
 
 # What a user is told of damage names the place.
 PLACES = ("row group 0", "footer", "entity ", "at byte ", "chunk ", "so damaged that Rerun crashes")
-
-
-@pytest.fixture(scope="module")
-def files(tmp_path_factory):
-    """Telemetry and recording of a run in which much happens."""
-    return written(tmp_path_factory.mktemp("files"), **WITH_EVENTS)
 
 
 @pytest.fixture(scope="module")
@@ -95,6 +89,7 @@ def passed(path, content, whole, capfd):
     return refused(capfd.readouterr(), path)
 
 
+@pytest.mark.release("flips bits of whole files for 6 s; test_checksums.py has each kind of damage")
 @pytest.mark.parametrize(("kind", "count"), [(0, 120), (1, 35)], ids=["telemetry", "recording"])
 def test_a_flipped_bit_is_reported_or_changes_nothing(files, tmp_path, capfd, kind, count):
     whole, path = read(files[kind]), tmp_path / files[kind].name

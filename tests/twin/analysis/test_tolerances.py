@@ -174,31 +174,6 @@ def test_a_shipped_gate_lets_the_same_run_pass_and_stops_another(runs, name, cap
     assert "leaves its tolerance first at" in line
 
 
-def test_without_tolerances_nothing_is_compared(runs, capsys):
-    assert cli.main(["review", str(runs["first"][0]), str(runs["far"][0]), "--json"]) == 0
-    assert json.loads(capsys.readouterr().out)["within_tolerance"] is None
-
-
-def test_one_run_is_printed_in_full_and_two_as_differences(runs, capsys):
-    assert cli.main(["review", str(runs["first"][0])]) == 0
-    alone = capsys.readouterr().out
-    assert "hold under pd: completed" in alone
-    assert "mrad (degrees)" in alone
-    assert cli.main(["review", str(runs["first"][0]), str(runs["near"][1]), str(runs["far"][0])]) == 0
-    compared_runs = capsys.readouterr().out
-    assert "the same" in compared_runs
-    assert " %" in compared_runs
-
-
-@pytest.mark.parametrize(
-    "arguments",
-    [["--tolerance", "gate"], ["--export", "x.txt"], ["--tolerance", "gat"], ["--nothing"]],
-)
-def test_what_cannot_be_asked_is_bad_input(runs, arguments, capsys):
-    assert cli.main(["review", str(runs["first"][0]), *arguments]) == 2
-    assert "expected" in capsys.readouterr().err
-
-
 def test_the_earliest_violation_of_all_signals_comes_first():
     late, other = WAVE.copy(), made_of(WAVE)
     late[120:] += 1.0
