@@ -1,5 +1,6 @@
 """Clients of the bench's page without a browser: requests and sockets."""
 
+import contextlib
 import http.client
 from urllib.parse import urlsplit
 
@@ -57,21 +58,21 @@ def get(page, path="/", **headers):
 def socket_to(page, origin=None, protocol=PROTOCOL, path="", **headers):
     at = f"ws://127.0.0.1:{port(page)}{path}"
     headers = {"Cookie": cookie(page), **headers}
-    return connect(
-        at,
-        origin=origin,
-        subprotocols=[protocol],
-        additional_headers=headers,
-        max_size=None,
-        max_queue=None,
-        proxy=None,
-    )
+    options = {"max_size": None, "max_queue": None, "proxy": None}
+    return connect(at, origin=origin, subprotocols=[protocol], additional_headers=headers, **options)
+
+
+@contextlib.contextmanager
+def page_socket(page):
+    """Socket that has become a page, as the messages of its camera make it."""
+    with socket_to(page) as visitor:
+        visitor.send(msgspec.msgpack.encode(CAMERA))
+        yield visitor
 
 
 def is_alive(page):
-    """Whether a page that comes now is served, and heard."""
-    with socket_to(page) as visitor:
-        visitor.send(msgspec.msgpack.encode(CAMERA))
+    """True if a page that comes now is served, and heard."""
+    with page_socket(page) as visitor:
         return len(visitor.recv(timeout=PATIENCE_S)) > 0
 
 

@@ -1,8 +1,16 @@
-"""A page, and the bench without a twin that it shows."""
+"""A page, the bench without a twin that it shows, and a browser."""
 
 import pytest
 
+from tests.browser import Browser
 from tests.viz.bench import fake
+from tests.viz.bench.on_page import errors, opened
+
+
+@pytest.fixture(scope="module")
+def browser():
+    with Browser() as chromium:
+        yield chromium
 
 
 @pytest.fixture
@@ -14,3 +22,12 @@ def bench():
 def page(bench):
     with fake.shown(bench) as result:
         yield result
+
+
+@pytest.fixture
+def tab(browser, page):
+    """The page in the browser, which has no error on its console at the end."""
+    tab = opened(browser, page)
+    yield tab
+    assert errors(tab) == []
+    tab.close()

@@ -2,9 +2,9 @@
 
 import pytest
 
-from tests.browser import Browser, needs_a_browser
+from tests.browser import needs_a_browser
 from tests.viz.bench import fake
-from tests.viz.bench.on_page import STATUS, errors, opened
+from tests.viz.bench.on_page import STATUS, opened
 from tests.waiting import wait_for
 
 pytestmark = needs_a_browser
@@ -59,109 +59,93 @@ CONTRAST = """(() => {
 })()"""
 
 
-@pytest.fixture(scope="module")
-def browser():
-    with Browser() as chromium:
-        yield chromium
-
-
-def test_all_is_visible_at_each_size_and_in_both_themes(browser):
+@pytest.mark.release("browser, 3 to 17 s; content of the bench has the page's messages")
+def test_all_is_visible_at_each_size_and_in_both_themes(tab, bench):
     """At its worst: every badge, the largest numbers, long messages."""
-    bench = fake.Bench(
-        mode="trajectory",
-        stopped=True,
-        saturated=True,
-        rank_lost=True,
-        status="failsafe",
-        t_s=123456.789,
-        missed=123456,
-        torque_margin=1.0,
-        error_mrad=1234.56,
-        chatter_A_s=1234.5,
-        active_faults=("coil.07 open",) * 12,
-        recording=("/a/long/path/" * 20 + "run.rrd",),
-        note="long " * 99,
-        law="backstepping_sliding_mode",
-    )
-    with fake.shown(bench) as page:
-        tab = opened(browser, page)
-        fonts = []
-        for scheme in ("dark", "light"):
-            tab.wait_for(f"document.documentElement.dataset.mantineColorScheme === '{scheme}'")
-            for size in SIZES:
-                tab.resize(*size)
-                tab.draw(3)
-                hidden = [text for text in tab.evaluate(HIDDEN) if not text.startswith("control law")]
-                assert hidden == [], (size, scheme)
-                root, bar, dock = tab.evaluate(
-                    "['#root', '#bench-bar', '#bench-dock'].map((id) => document.querySelector(id)"
-                    ".getBoundingClientRect()).map(({top, bottom}) => [top, bottom])"
-                )
-                assert bar[0] == 0.0
-                assert root == pytest.approx(
-                    [bar[1], dock[0]], abs=1.0
-                )  # nothing is under the bar and the plots
-                assert root[1] - root[0] > 0.35 * size[1]
-                fonts.append(
-                    float(tab.evaluate("parseFloat(getComputedStyle(document.documentElement).fontSize)"))
-                )
-                contrast, text = tab.evaluate(CONTRAST)
-                assert contrast > 4.5, (text, scheme)
-            tab.click("[data-theme]")
-        assert fonts[: len(SIZES)] == fonts[len(SIZES) :] == sorted(set(fonts))  # larger in a larger window
-        assert errors(tab) == []
-        tab.close()
+    worst = {
+        "mode": "trajectory",
+        "stopped": True,
+        "saturated": True,
+        "rank_lost": True,
+        "status": "failsafe",
+        "t_s": 123456.789,
+        "missed": 123456,
+        "torque_margin": 1.0,
+        "error_mrad": 1234.56,
+        "chatter_A_s": 1234.5,
+        "active_faults": ("coil.07 open",) * 12,
+        "recording": ("/a/long/path/" * 20 + "run.rrd",),
+        "note": "long " * 99,
+        "law": "backstepping_sliding_mode",
+    }
+    bench.now.__dict__.update(worst)
+    tab.wait_for(f"{STATUS}.innerText.includes('FAILSAFE')")
+    fonts = []
+    for scheme in ("dark", "light"):
+        tab.wait_for(f"document.documentElement.dataset.mantineColorScheme === '{scheme}'")
+        for size in SIZES:
+            tab.resize(*size)
+            tab.draw(3)
+            hidden = [text for text in tab.evaluate(HIDDEN) if not text.startswith("control law")]
+            assert hidden == [], (size, scheme)
+            root, bar, dock = tab.evaluate(
+                "['#root', '#bench-bar', '#bench-dock'].map((id) => document.querySelector(id)"
+                ".getBoundingClientRect()).map(({top, bottom}) => [top, bottom])"
+            )
+            assert bar[0] == 0.0
+            assert root == pytest.approx([bar[1], dock[0]], abs=1.0)  # nothing is under the bar and the plots
+            assert root[1] - root[0] > 0.35 * size[1]
+            fonts.append(
+                float(tab.evaluate("parseFloat(getComputedStyle(document.documentElement).fontSize)"))
+            )
+            contrast, text = tab.evaluate(CONTRAST)
+            assert contrast > 4.5, (text, scheme)
+        tab.click("[data-theme]")
+    assert fonts[: len(SIZES)] == fonts[len(SIZES) :] == sorted(set(fonts))  # larger in a larger window
 
 
-def test_nothing_in_the_bar_moves_with_the_numbers(browser):
-    bench = fake.Bench()
-    with fake.shown(bench) as page:
-        tab = opened(browser, page)
-        tab.resize(1280, 800)
-        tab.draw(3)
-        tab.wait_for("document.querySelector('[data-role]').innerText === 'OPERATOR'")
-        before = tab.evaluate(BOXES)
-        bench.now.t_s, bench.now.error_mrad, bench.now.missed = 98765.4321, 999.99, 54321
-        bench.now.note = "something happened"
-        bench.now.recording = ("run.rrd",)
-        tab.wait_for(f"{STATUS}.innerText.includes('98765.432 s')")
-        assert tab.evaluate(BOXES) == before
-        tab.close()
+@pytest.mark.release("browser, 3 to 17 s; content of the bench has the page's messages")
+def test_nothing_in_the_bar_moves_with_the_numbers(tab, bench):
+    tab.resize(1280, 800)
+    tab.draw(3)
+    tab.wait_for("document.querySelector('[data-role]').innerText === 'OPERATOR'")
+    before = tab.evaluate(BOXES)
+    bench.now.t_s, bench.now.error_mrad, bench.now.missed = 98765.4321, 999.99, 54321
+    bench.now.note = "something happened"
+    bench.now.recording = ("run.rrd",)
+    tab.wait_for(f"{STATUS}.innerText.includes('98765.432 s')")
+    assert tab.evaluate(BOXES) == before
 
 
-def test_every_button_sends_its_command(browser):
-    bench = fake.Bench()
+@pytest.mark.release("browser, 3 to 17 s; content of the bench has the page's messages")
+def test_every_button_sends_its_command(tab, bench):
     expected = []
-    with fake.shown(bench) as page:
-        tab = opened(browser, page)
-        for name in ("stop", *RUN):
-            tab.click(f"[data-send={name}]")
-            expected.append((name, {}))
-            wait_for(lambda: bench.commands() == expected)
-        for mode, given in MODES.items():
-            tab.click(f"[data-mode={mode}]")
-            expected.append((mode, given))
-            wait_for(lambda: bench.commands() == expected)
-        tab.evaluate("(s => { s.value = '0.5×'; s.dispatchEvent(new Event('change', {bubbles: true})); })"
-                     "(document.querySelector('[data-speed]'))")  # fmt: skip
-        wait_for(lambda: bench.commands()[-1] == ("speed", {"factor": 0.5}))
-        tab.close()
+    for name in ("stop", *RUN):
+        tab.click(f"[data-send={name}]")
+        expected.append((name, {}))
+        wait_for(lambda: bench.commands() == expected)
+    for mode, given in MODES.items():
+        tab.click(f"[data-mode={mode}]")
+        expected.append((mode, given))
+        wait_for(lambda: bench.commands() == expected)
+    tab.evaluate("(s => { s.value = '0.5×'; s.dispatchEvent(new Event('change', {bubbles: true})); })"
+                 "(document.querySelector('[data-speed]'))")  # fmt: skip
+    wait_for(lambda: bench.commands()[-1] == ("speed", {"factor": 0.5}))
 
 
-def test_the_bar_follows_commands_from_elsewhere(browser):
-    bench = fake.Bench(mode="hold", running=False)
+@pytest.mark.release("browser, 3 to 17 s; content of the bench has the page's messages")
+def test_the_bar_follows_commands_from_elsewhere(tab, bench):
+    bench.now.running = False
     pressed = "[...document.querySelectorAll('#bench-bar [aria-pressed=true]')].map((each) => each.innerText)"
-    with fake.shown(bench) as page:
-        tab = opened(browser, page)
-        tab.wait_for(f"{pressed}.join() === 'hold'")
-        bench.now.mode, bench.now.running = "jog", True
-        tab.wait_for(f"{pressed}.join() === 'start,jog'")
-        for speed, text in ((2.0, "2×"), (1e6, "as fast as possible"), (3.7, "3.7×")):
-            bench.now.speed = speed
-            tab.wait_for(f"document.querySelector('[data-speed]').selectedOptions[0].text === {text!r}")
-        tab.close()
+    tab.wait_for(f"{pressed}.join() === 'hold'")
+    bench.now.mode, bench.now.running = "jog", True
+    tab.wait_for(f"{pressed}.join() === 'start,jog'")
+    for speed, text in ((2.0, "2×"), (1e6, "as fast as possible"), (3.7, "3.7×")):
+        bench.now.speed = speed
+        tab.wait_for(f"document.querySelector('[data-speed]').selectedOptions[0].text === {text!r}")
 
 
+@pytest.mark.release("browser, 3 to 17 s; content of the bench has the page's messages")
 def test_a_badge_states_whose_page_it_is(browser):
     bench = fake.Bench()
     role = "document.querySelector('[data-role]').innerText"
@@ -177,6 +161,7 @@ def test_a_badge_states_whose_page_it_is(browser):
         second.close()
 
 
+@pytest.mark.release("browser, 3 to 17 s; content of the bench has the page's messages")
 def test_a_page_without_its_server_says_so(browser):
     with fake.shown(fake.Bench()) as page:
         tab = opened(browser, page)

@@ -2,13 +2,12 @@
 
 from dataclasses import replace
 
-import msgspec
 import pytest
 
 from spheretwin.viz.bench.event_handlers import Note
 from spheretwin.viz.bench.protocols import FieldSetting
 from spheretwin.viz.bench.settings_tab import Form
-from tests.viz.bench.clients import CAMERA, changed, handle_of, socket_to
+from tests.viz.bench.clients import changed, handle_of, page_socket
 from tests.waiting import wait_for
 
 BUTTONS = {
@@ -43,8 +42,7 @@ CHANGES = {
 
 
 def test_each_button_is_one_command(page, bench):
-    with socket_to(page) as visitor:
-        visitor.send(msgspec.msgpack.encode(CAMERA))
+    with page_socket(page) as visitor:
         for number, (label, expected) in enumerate(BUTTONS.items()):
             visitor.send(changed(handle_of(page, label), value=True))
             wait_for(lambda number=number: len(bench.commands()) > number)
@@ -58,8 +56,7 @@ def test_each_change_is_one_command(page, bench, change):
     touched = page._server.gui._gui_input_handle_from_uuid[handle_of(page, label)]
     if label != "remote":  # which takes any text
         wait_for(lambda: value in getattr(touched, "options", [value]))  # else it is refused
-    with socket_to(page) as visitor:
-        visitor.send(msgspec.msgpack.encode(CAMERA))
+    with page_socket(page) as visitor:
         visitor.send(changed(handle_of(page, label), value=value))
         wait_for(lambda: bench.commands() == [expected])
 
@@ -93,8 +90,7 @@ def test_a_form_follows_the_active_values_and_keeps_a_change_in_progress(page):
 
 
 def test_reset_of_gains_sets_those_that_differ(page, bench):
-    with socket_to(page) as visitor:
-        visitor.send(msgspec.msgpack.encode(CAMERA))
+    with page_socket(page) as visitor:
         visitor.send(changed(handle_of(page, "Reset gains to defaults"), value=True))
         wait_for(lambda: len(bench.commands()) == 2)
         assert bench.commands() == [
@@ -106,8 +102,7 @@ def test_reset_of_gains_sets_those_that_differ(page, bench):
 def test_changes_of_a_watching_page_are_undone(page, bench):
     bench.now.operator = "another"
     name = handle_of(page, "save as")
-    with socket_to(page) as visitor:
-        visitor.send(msgspec.msgpack.encode(CAMERA))
+    with page_socket(page) as visitor:
         visitor.send(changed(name, value="/etc/passwd"))
         visitor.send(changed(handle_of(page, "Save the present settings"), value=True))
         visitor.send(changed(handle_of(page, "remote"), value='["hold", {}]'))
@@ -118,8 +113,7 @@ def test_changes_of_a_watching_page_are_undone(page, bench):
 
 def test_the_page_sends_no_command_without_an_event(page, bench):
     """Sliders follow the twin, forms what is in force: none of it is a person's."""
-    with socket_to(page) as visitor:
-        visitor.send(msgspec.msgpack.encode(CAMERA))
+    with page_socket(page):
         wait_for(lambda: ("hello", "page 0", {}) in bench.told)
         bench.now.mode, bench.now.q_ref_rad = "trajectory", (0.5, 0.6, -0.7)
         slider = page._server.gui._gui_input_handle_from_uuid[handle_of(page, "γ, °")]

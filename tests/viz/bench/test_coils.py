@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from tests.browser import Browser, needs_a_browser
-from tests.viz.bench import fake
-from tests.viz.bench.on_page import at_rest, errors, on_screen, opened
+from tests.browser import needs_a_browser
+from tests.viz.bench.on_page import at_rest, on_screen
 from tests.waiting import wait_for
 
 pytestmark = needs_a_browser
@@ -16,31 +15,16 @@ NEAREST = """bench.places().map((at, coil) => ({...at, coil})).filter((at) => !a
   .sort((a, b) => a.depth - b.depth)[0]"""
 
 
-@pytest.fixture(scope="module")
-def browser():
-    with Browser() as chromium:
-        yield chromium
-
-
 @pytest.fixture
-def bench():
-    return fake.Bench()
+def tab(tab, page):
+    tab.wait_for("bench.places().length === 36")
+    at_rest(page, tab)
+    return tab
 
 
-@pytest.fixture
-def shown(browser, bench):
-    with fake.shown(bench) as page:
-        tab = opened(browser, page)
-        tab.wait_for("bench.places().length === 36")
-        at_rest(page, tab)
-        yield page, tab
-        assert errors(tab) == []
-        tab.close()
-
-
-def test_coils_are_where_the_camera_shows_them(shown, bench):
+@pytest.mark.release("browser, 7 to 9 s; content of the bench has the coils' messages")
+def test_coils_are_where_the_camera_shows_them(tab, page, bench):
     """The camera of the page's messages and that of its script give the same places."""
-    page, tab = shown
     actuator = bench.actuator
     ends = (actuator.coil.distance_m + actuator.coil.length_m / 2) * actuator.coil_axes
 
@@ -56,8 +40,8 @@ def test_coils_are_where_the_camera_shows_them(shown, bench):
     assert hidden.any()
 
 
-def test_a_coil_shows_its_number_and_value_and_a_menu(shown, bench):
-    _, tab = shown
+@pytest.mark.release("browser, 7 to 9 s; content of the bench has the coils' messages")
+def test_a_coil_shows_its_number_and_value_and_a_menu(tab, bench):
     at = tab.evaluate(NEAREST)
     coil, place = at["coil"], (at["x"], at["y"])
     (group,) = np.flatnonzero((bench.actuator.groups == coil).any(axis=1)).tolist()
@@ -84,8 +68,8 @@ def test_a_coil_shows_its_number_and_value_and_a_menu(shown, bench):
     tab.wait_for(f"document.querySelector('[data-pane=currents] .values').innerText.includes('{group}: ')")
 
 
-def test_a_bar_selects_a_group_and_its_coils_are_marked(shown, bench, tmp_path):
-    _, tab = shown
+@pytest.mark.release("browser, 7 to 9 s; content of the bench has the coils' messages")
+def test_a_bar_selects_a_group_and_its_coils_are_marked(tab, bench, tmp_path):
     tab.wait_for("document.querySelector('[data-pane=bars]')?.scale !== undefined")
     at = tab.evaluate(NEAREST)
     group = tab.evaluate(f"bench.groupOf({at['coil']})")

@@ -1,13 +1,9 @@
-"""Controls of the page: initial values, limits and choices; lists of faults and snapshots."""
+"""Controls of the page follow commands of others; the list of faults is no markup."""
 
 import numpy as np
 import pytest
 
-from spheretwin.viz.bench.modes_tab import FASTEST_JOG_DEG_S
-from tests.viz.bench import fake
 from tests.waiting import wait_for
-
-AXES = "αβγ"
 
 
 @pytest.fixture
@@ -19,51 +15,6 @@ def controls(page):
     return results
 
 
-def test_sliders_have_the_limits_of_their_quantities(controls, bench):
-    limit_A = bench.actuator.group.current_limit_A
-    ranges = {
-        **{f"{axis}, °/s": (-FASTEST_JOG_DEG_S, FASTEST_JOG_DEG_S) for axis in AXES},
-        **{f"{group:02}, A": (-limit_A, limit_A) for group in range(fake.GROUPS)},
-        "group": (0, fake.GROUPS - 1),
-    }
-    for axis, hinge in zip(AXES, np.degrees(bench.actuator.hinge_range_rad), strict=True):
-        ranges[f"{axis}, °"] = tuple(np.round(np.clip(hinge, -180, 180)))
-    for label, (low, high) in ranges.items():
-        assert (controls[label].min, controls[label].max) == (low, high), label
-        if not label.endswith(", °"):  # which follow the twin
-            assert controls[label].value == 0, label
-
-
-def test_sliders_of_angles_show_the_desired_pose(controls, bench):
-    for axis, angle in zip(AXES, bench.now.q_ref_rad, strict=True):
-        slider = controls[f"{axis}, °"]
-        wait_for(
-            lambda slider=slider, angle=angle: slider.value == pytest.approx(np.degrees(angle), abs=0.05)
-        )
-
-
-def test_lists_have_the_choices_and_the_active_one(controls):
-    for label, options, value in (
-        ("shape", fake.CHOICES.shapes, "hold"),
-        ("restart with", fake.CHOICES.scenarios(), fake.CHOICES.scenarios()[0]),
-        ("law", fake.CHOICES.laws(), "afsm"),
-        ("target", tuple(fake.CHOICES.targets), "coil.00"),
-        ("section", ("plant",), "plant"),
-    ):
-        assert (tuple(controls[label].options), controls[label].value) == (options, value), label
-    for label, value in (
-        ("rate, rad/s", fake.CHOICES.limits[0]),
-        ("acceleration, rad/s²", fake.CHOICES.limits[1]),
-        ("recording", "bench.rrd"),
-        ("telemetry", "bench.parquet"),
-        ("stiffness", "4 4 4"),
-        ("known", True),
-        ("load", "0"),
-        ("step_s", "0.0005"),
-    ):
-        assert controls[label].value == value, label
-
-
 def test_faults_are_listed_as_text_from_0_on(page, bench):
     box = page._faults_tab._list
     wait_for(lambda: "no faults" in box.content)
@@ -72,16 +23,6 @@ def test_faults_are_listed_as_text_from_0_on(page, bench):
     assert 'start="0"' in box.content
     bench.now.faults = ()
     wait_for(lambda: "no faults" in box.content)
-
-
-def test_snapshots_can_be_chosen_when_there_are_some(page, bench, controls):
-    buttons = controls["restore"]
-    assert not buttons.visible
-    bench.now.snapshots = ("first", "second")
-    wait_for(lambda: buttons.visible)
-    assert tuple(buttons.options) == ("first", "second")
-    bench.now.snapshots = ()
-    wait_for(lambda: not buttons.visible)
 
 
 def test_controls_follow_commands_from_elsewhere(controls, bench):
@@ -102,9 +43,3 @@ def test_controls_follow_commands_from_elsewhere(controls, bench):
     wait_for(lambda: (scrubber.min, scrubber.max, scrubber.value) == (1.0, 7.0, 3.5))
     wait_for(lambda: controls["file"].value == "/other/run.rrd")
     wait_for(lambda: controls["03, A"].value == 0.0)  # a mode ended
-
-
-def test_the_pose_as_numbers_follows_the_desired_pose(page, bench):
-    for axis, angle in zip(AXES, bench.now.q_ref_rad, strict=True):
-        line = page._modes_tab._pose._lines[f"pose.exact {axis}, °"]
-        wait_for(lambda line=line, angle=angle: line.value == f"{np.degrees(angle):.2f}")

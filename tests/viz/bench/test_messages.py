@@ -17,13 +17,7 @@ from spheretwin.viz.bench import server
 from spheretwin.viz.bench.connections import CONTROL, MOST_MESSAGES_PER_S, MOST_WAITING
 from spheretwin.viz.bench.event_handlers import LATEST_INTERVAL_S
 from spheretwin.viz.bench.viser_internals import moved_thing
-from tests.viz.bench.clients import (
-    CAMERA,
-    changed,
-    handle_of,
-    is_alive,
-    socket_to,
-)
+from tests.viz.bench.clients import CAMERA, changed, handle_of, is_alive, page_socket, socket_to
 from tests.waiting import PATIENCE_S, wait_for
 
 PLAIN = st.none() | st.booleans() | st.integers(-(2**40), 2**40) | st.floats() | st.text(max_size=20)
@@ -111,8 +105,7 @@ def test_the_server_survives_any_message(page, bench, capfd):
         | ANYTHING.map(msgspec.msgpack.encode)
         | nearly(handles(page)).map(msgspec.msgpack.encode)
     )
-    with socket_to(page) as visitor:
-        visitor.send(msgspec.msgpack.encode(CAMERA))
+    with page_socket(page) as visitor:
 
         @hypothesis.settings(max_examples=60)
         @hypothesis.given(st.lists(anything, min_size=10, max_size=10))
@@ -137,8 +130,7 @@ def test_the_server_survives_any_message(page, bench, capfd):
 
 def test_no_message_disables_stop(page, bench):
     """viser sets whatever attribute of a handle a message names: that it is gone, what it calls."""
-    with socket_to(page) as visitor:
-        visitor.send(msgspec.msgpack.encode(CAMERA))
+    with page_socket(page) as visitor:
         for updates in ({"removed": True}, {"update_cb": []}, {"value": True, "removed": True}):
             for name in handles(page):
                 visitor.send(changed(name, **updates))
@@ -179,8 +171,7 @@ def test_of_a_flood_the_last_move_acts_and_the_socket_stays_open(page, bench):
     """Ten thousand moves hold up neither the server, nor another page, nor a button of the same page."""
     before = len(bench.commands())
     name = handle_of(page, "α, °")
-    with socket_to(page) as flooding:
-        flooding.send(msgspec.msgpack.encode(CAMERA))
+    with page_socket(page) as flooding:
         begun = time.monotonic()
         for i in range(1, 10_001):
             flooding.send(changed(name, value=0.001 * i))
@@ -195,8 +186,7 @@ def test_of_a_flood_the_last_move_acts_and_the_socket_stays_open(page, bench):
 
 
 def test_messages_that_are_no_moves_wait_in_their_socket(page, bench):
-    with socket_to(page) as flooding:
-        flooding.send(msgspec.msgpack.encode(CAMERA))
+    with page_socket(page) as flooding:
         begun = time.monotonic()
         for _ in range(2 * MOST_WAITING):
             flooding.send(changed(handle_of(page, "remote"), value='["pause", {}]'))
@@ -205,10 +195,10 @@ def test_messages_that_are_no_moves_wait_in_their_socket(page, bench):
         assert time.monotonic() - begun > 2 * MOST_WAITING / MOST_MESSAGES_PER_S - 1.5
 
 
+@pytest.mark.release("browser, 6 s; test_stop.py of the bench has STOP without one")
 def test_stop_of_the_control_channel_waits_for_no_rate(page, bench):
     """After ten thousand presses of the same page."""
-    with socket_to(page) as flooding, control_of(page) as control:
-        flooding.send(msgspec.msgpack.encode(CAMERA))
+    with page_socket(page) as flooding, control_of(page) as control:
         press = changed(handle_of(page, "remote"), value='["pause", {}]')
         flood = threading.Thread(target=send_until_closed, args=(flooding, [press] * 10_000), daemon=True)
         flood.start()
@@ -251,8 +241,7 @@ def test_a_watching_page_changes_no_value(page, bench):
     """Neither what a text field holds, nor by a socket that has not become a page."""
     file = handle_of(page, "file")
     known = page._server.gui._gui_input_handle_from_uuid[file]
-    with socket_to(page) as operator, socket_to(page) as watcher, socket_to(page) as unknown:
-        operator.send(msgspec.msgpack.encode(CAMERA))
+    with page_socket(page) as operator, socket_to(page) as watcher, socket_to(page) as unknown:
         operator.send(changed(file, value="mine.parquet"))
         wait_for(lambda: known.value == "mine.parquet")
         watcher.send(msgspec.msgpack.encode(CAMERA))
@@ -269,8 +258,7 @@ def test_a_watching_page_changes_no_value(page, bench):
 
 def test_a_press_comes_after_what_was_moved_before_it(page, bench):
     """The slider's last place is told before the button, however short a time ago another was."""
-    with socket_to(page) as visitor:
-        visitor.send(msgspec.msgpack.encode(CAMERA))
+    with page_socket(page) as visitor:
         for angle in (10.0, 20.0, 30.0):
             visitor.send(changed(handle_of(page, "α, °"), value=angle))
         visitor.send(changed(handle_of(page, "remote"), value='["hold", {}]'))

@@ -9,9 +9,9 @@ from PIL import Image
 from spheretwin.models.kinematics import rotation
 from spheretwin.viz import theme
 from spheretwin.viz.bench.page import FRAMES_A_SETTING
-from tests.browser import Browser, needs_a_browser
+from tests.browser import needs_a_browser
 from tests.viz.bench import fake
-from tests.viz.bench.on_page import STATUS, at_rest, errors, on_screen, opened, show_tab, write
+from tests.viz.bench.on_page import STATUS, at_rest, on_screen, opened, show_tab, write
 from tests.waiting import PATIENCE_S, wait_for
 
 # Of two colours, as directions: light and shade change their length. Told as they are, they come out pale:
@@ -19,12 +19,6 @@ from tests.waiting import PATIENCE_S, wait_for
 ALIKE = 0.985
 
 pytestmark = needs_a_browser
-
-
-@pytest.fixture(scope="module")
-def browser():
-    with Browser() as chromium:
-        yield chromium
 
 
 def told(bench, count):
@@ -37,86 +31,64 @@ def tip(bench, q_rad):
     return rotation(np.array(q_rad)) @ bench.actuator.shaft_tip_m
 
 
-def test_each_control_sends_a_command(browser):
-    bench = fake.Bench()
-    with fake.shown(bench) as page:
-        tab = opened(browser, page)
-        (client,) = page._server.get_clients().values()
-        tab.click("text=start")
-        assert told(bench, 1) == [("start", {})]
-        tab.key(" ")  # the button that was clicked has the focus: the space bar is STOP all the same
-        assert told(bench, 2)[1:] == [("stop", {})]
-        tab.key("ArrowUp")
-        ((name, given),) = told(bench, 3)[2:]
-        assert name == "point"
-        assert given["pose_rad"] == pytest.approx([0.1 - np.radians(1.0), -0.1, 0.3], abs=1e-12)
-        tab.click("text=pause")
-        assert told(bench, 4)[3:] == [("pause", {})]
-        assert client.camera.position == pytest.approx([0.11, -0.16, 0.12])  # an arrow steers the twin alone
-        assert errors(tab) == []
-        assert tab.outside == []
-        others = [url for url in tab.requests if "/bench.data" not in url]
-        assert len(others) == 4  # the address with the token, the page, its sockets for STOP and for the rest
-        tab.close()
+@pytest.mark.release("browser, 3 to 12 s; test_server.py and test_messages.py have the protocol without one")
+def test_each_control_sends_a_command(tab, page, bench):
+    (client,) = page._server.get_clients().values()
+    tab.click("text=start")
+    assert told(bench, 1) == [("start", {})]
+    tab.key(" ")  # the button that was clicked has the focus: the space bar is STOP all the same
+    assert told(bench, 2)[1:] == [("stop", {})]
+    tab.key("ArrowUp")
+    ((name, given),) = told(bench, 3)[2:]
+    assert name == "point"
+    assert given["pose_rad"] == pytest.approx([0.1 - np.radians(1.0), -0.1, 0.3], abs=1e-12)
+    tab.click("text=pause")
+    assert told(bench, 4)[3:] == [("pause", {})]
+    assert client.camera.position == pytest.approx([0.11, -0.16, 0.12])  # an arrow steers the twin alone
+    assert tab.outside == []
+    others = [url for url in tab.requests if "/bench.data" not in url]
+    assert len(others) == 4  # the address with the token, the page, its sockets for STOP and for the rest
 
 
-def test_the_tip_is_dragged_where_the_pointer_is(browser):
-    bench = fake.Bench()
-    with fake.shown(bench) as page:
-        tab = opened(browser, page)
-        at_rest(page, tab)
-        wanted = np.array([0.3, 0.2, 0.3])
-        tab.drag(
-            on_screen(page, tab, tip(bench, bench.now.q_ref_rad)), on_screen(page, tab, tip(bench, wanted))
-        )
-        # A pixel is 5 mrad of the shaft as the page comes up; it is pointed at to one, from one.
-        arrived = [("point", {"pose_rad": pytest.approx(wanted, abs=1e-2)})]
-        wait_for(lambda: bench.commands()[-1:] == arrived)
-        tab.close()
+@pytest.mark.release("browser, 3 to 12 s; test_server.py and test_messages.py have the protocol without one")
+def test_the_tip_is_dragged_where_the_pointer_is(tab, page, bench):
+    at_rest(page, tab)
+    wanted = np.array([0.3, 0.2, 0.3])
+    tab.drag(on_screen(page, tab, tip(bench, bench.now.q_ref_rad)), on_screen(page, tab, tip(bench, wanted)))
+    # A pixel is 5 mrad of the shaft as the page comes up; it is pointed at to one, from one.
+    arrived = [("point", {"pose_rad": pytest.approx(wanted, abs=1e-2)})]
+    wait_for(lambda: bench.commands()[-1:] == arrived)
 
 
-def test_invalid_commands_are_refused_without_effect(browser):
-    bench = fake.Bench(
-        mode="fault", status="failsafe", reason="<img src=x onerror=alert(1)>", saturated=True, stopped=True
-    )
-    with fake.shown(bench) as page:
-        tab = opened(browser, page)
-        shown = tab.evaluate(f"{STATUS}.innerText")
-        for word in (
-            "FAULT",
-            "FAILSAFE",
-            "STOPPED",
-            "SATURATED",
-            "1.250 s",
-            "100.00 mrad",
-            "12.3 A/s",
-        ):
-            assert word in shown
-        assert bench.now.reason in shown
-        bench.now.mode, bench.now.reason, bench.now.status = "hold", None, "running"
-        tab.wait_for(f"!{STATUS}.innerText.includes('FAULT')")
-        assert "FAILSAFE" not in tab.evaluate(f"{STATUS}.innerText")
-        assert errors(tab) == []
-        tab.close()
+def test_the_status_follows_the_bench_and_its_texts_are_no_markup(tab, bench):
+    reason = "<img src=x onerror=alert(1)>"
+    faulty = {"mode": "fault", "status": "failsafe", "reason": reason, "saturated": True, "stopped": True}
+    bench.now.__dict__.update(faulty)
+    tab.wait_for(f"{STATUS}.innerText.includes('FAULT')")
+    shown = tab.evaluate(f"{STATUS}.innerText")
+    for word in ("FAILSAFE", "STOPPED", "SATURATED", "1.250 s", "100.00 mrad", "12.3 A/s", reason):
+        assert word in shown
+    bench.now.mode, bench.now.reason, bench.now.status = "hold", None, "running"
+    tab.wait_for(f"!{STATUS}.innerText.includes('FAULT')")
+    assert "FAILSAFE" not in tab.evaluate(f"{STATUS}.innerText")
 
 
-def test_a_refusal_is_shown_at_its_field(browser):
-    bench = fake.Bench(refused={"set": "controller.stiffness: expected a value ≥ 0, received -1"})
-    with fake.shown(bench) as page:
-        tab = opened(browser, page)
-        show_tab(tab, "law")
-        tab.click("text=all fields of the controller")
-        write(tab, "stiffness", "-1")
-        tab.click("text=Set gains")
-        assert told(bench, 1) == [("set", {"name": "controller.stiffness", "value": "-1"})]
-        tab.wait_for("document.body.innerText.includes('expected a value ≥ 0, received -1')")
-        bench.refused.clear()
-        write(tab, "stiffness", "5")
-        tab.click("text=Set gains")
-        tab.wait_for("!document.body.innerText.includes('received -1')")
-        tab.close()
+@pytest.mark.release("browser, 3 to 12 s; test_server.py and test_messages.py have the protocol without one")
+def test_a_refusal_is_shown_at_its_field(tab, bench):
+    bench.refused["set"] = "controller.stiffness: expected a value ≥ 0, received -1"
+    show_tab(tab, "law")
+    tab.click("text=all fields of the controller")
+    write(tab, "stiffness", "-1")
+    tab.click("text=Set gains")
+    assert told(bench, 1) == [("set", {"name": "controller.stiffness", "value": "-1"})]
+    tab.wait_for("document.body.innerText.includes('expected a value ≥ 0, received -1')")
+    bench.refused.clear()
+    write(tab, "stiffness", "5")
+    tab.click("text=Set gains")
+    tab.wait_for("!document.body.innerText.includes('received -1')")
 
 
+@pytest.mark.release("browser, 3 to 12 s; test_server.py and test_messages.py have the protocol without one")
 def test_one_page_operates_and_gives_over(browser):
     bench = fake.Bench()
     with fake.shown(bench) as page:
@@ -136,6 +108,7 @@ def test_one_page_operates_and_gives_over(browser):
         second.close()
 
 
+@pytest.mark.release("browser, 3 to 12 s; test_server.py and test_messages.py have the protocol without one")
 def test_without_an_operator_the_pages_explain_how_to_take_over(browser):
     bench = fake.Bench()
     with fake.shown(bench) as page:
@@ -157,6 +130,7 @@ def test_without_an_operator_the_pages_explain_how_to_take_over(browser):
         third.close()
 
 
+@pytest.mark.release("browser, 3 to 12 s; test_server.py and test_messages.py have the protocol without one")
 def test_a_reloaded_single_page_operates(browser, monkeypatch):
     monkeypatch.setattr("spheretwin.viz.bench.page.FRESH_S", PATIENCE_S)  # a busy machine opens it slowly
     bench = fake.Bench(operator="page 7", watching=("page 0",))
@@ -170,6 +144,7 @@ def test_a_reloaded_single_page_operates(browser, monkeypatch):
         tab.close()
 
 
+@pytest.mark.release("browser, 3 to 12 s; test_server.py and test_messages.py have the protocol without one")
 def test_a_single_watching_page_does_not_operate(browser, monkeypatch):
     monkeypatch.setattr("spheretwin.viz.bench.page.FRESH_S", 0.5)
     bench = fake.Bench(operator="page 7", watching=("page 0",))
@@ -189,32 +164,27 @@ def likeness(tab, path, at, colour):
     return pixel @ colour / max(np.linalg.norm(pixel) * np.linalg.norm(colour), 1.0)
 
 
-def test_a_coil_has_the_colour_of_its_current(browser, tmp_path):
-    bench = fake.Bench(q_ref_rad=(0.0, 0.0, 0.0))
+@pytest.mark.release("browser, 3 to 12 s; test_server.py and test_messages.py have the protocol without one")
+def test_a_coil_has_the_colour_of_its_current(tab, page, bench, tmp_path):
+    bench.now.q_ref_rad = (0.0, 0.0, 0.0)
     actuator = bench.actuator
-    with fake.shown(bench) as page:
-        tab = opened(browser, page)
-        at_rest(page, tab)
-        (client,) = page._server.get_clients().values()
-        nearest = int(np.argmax(actuator.coil_axes @ client.camera.position))
-        (group,) = np.flatnonzero((actuator.groups == nearest).any(axis=1))
-        axis, coil = actuator.coil_axes[nearest], actuator.coil
-        end = (coil.distance_m + coil.length_m / 2) * axis
-        above = np.array([0.0, 0.0, 1.0]) - axis[2] * axis  # a hoop goes across the middle
-        middle = (coil.inner_radius_m + coil.outer_radius_m) / 2
-        at = tuple(map(int, on_screen(page, tab, end + middle * above / np.linalg.norm(above))))
-        for current in (-8.0, 0.0, 8.0):
-            bench.now.current_A = (0.0,) * group + (current,) + (0.0,) * (fake.GROUPS - 1 - group)
-            meant = theme.current_colours(np.array(current), 8.0).astype(float)
-            wait_for(lambda meant=meant: likeness(tab, tmp_path / "page.png", at, meant) > ALIKE, current)
-        tab.close()
+    at_rest(page, tab)
+    (client,) = page._server.get_clients().values()
+    nearest = int(np.argmax(actuator.coil_axes @ client.camera.position))
+    (group,) = np.flatnonzero((actuator.groups == nearest).any(axis=1))
+    axis, coil = actuator.coil_axes[nearest], actuator.coil
+    end = (coil.distance_m + coil.length_m / 2) * axis
+    above = np.array([0.0, 0.0, 1.0]) - axis[2] * axis  # a hoop goes across the middle
+    middle = (coil.inner_radius_m + coil.outer_radius_m) / 2
+    at = tuple(map(int, on_screen(page, tab, end + middle * above / np.linalg.norm(above))))
+    for current in (-8.0, 0.0, 8.0):
+        bench.now.current_A = (0.0,) * group + (current,) + (0.0,) * (fake.GROUPS - 1 - group)
+        meant = theme.current_colours(np.array(current), 8.0).astype(float)
+        wait_for(lambda meant=meant: likeness(tab, tmp_path / "page.png", at, meant) > ALIKE, current)
 
 
-def test_a_page_reconnects(browser):
-    bench = fake.Bench()
-    with fake.shown(bench) as page:
-        tab = opened(browser, page)
-        page._server._websock_server.disconnect_all_clients()
-        bench.now.t_s = 77.0
-        tab.wait_for(f"{STATUS}?.innerText.includes('77.000 s')")
-        tab.close()
+@pytest.mark.release("browser, 3 to 12 s; test_server.py and test_messages.py have the protocol without one")
+def test_a_page_reconnects(tab, page, bench):
+    page._server._websock_server.disconnect_all_clients()
+    bench.now.t_s = 77.0
+    tab.wait_for(f"{STATUS}?.innerText.includes('77.000 s')")

@@ -74,13 +74,6 @@ def test_solids_have_the_volume_of_their_prisms():
     assert volume(solids.tube(1.0, 2.0, 0.0, 1.5, 16)) == pytest.approx(4.5 * polygon(16), rel=SINGLE)
 
 
-def test_a_zone_lies_on_its_sphere_between_its_heights():
-    zone = solids.zone(2.0, -0.5, 1.0, 6, 12)
-    assert np.linalg.norm(zone.positions, axis=1) == pytest.approx(2.0, rel=SINGLE)
-    assert zone.positions[:, 2].min() == pytest.approx(-0.5, rel=SINGLE)
-    assert zone.positions[:, 2].max() == pytest.approx(1.0, rel=SINGLE)
-
-
 def test_the_rotor_is_a_ball_cut_flat_above_and_below(actuator):
     """Its arms stand within the cut, one of them at its edge."""
     vertices = actuator_solids(actuator).rotor.positions
