@@ -309,6 +309,7 @@ def test_a_law_that_writes_outside_its_arrays_is_found_on_request(file, law, ver
     assert capfd.readouterr().err.endswith(message)
 
 
+@pytest.mark.release("compiles two laws again for 3 s; other tests run laws with bounds checks")
 @pytest.mark.parametrize("law", ["pd", "afsm_eso"])
 def test_bounds_checks_change_no_bit_of_a_law_that_keeps_to_its_arrays(law):
     runs = [

@@ -271,5 +271,6 @@ assert "control" not in sys.modules
 """
 
 
+@pytest.mark.release("imports the package in a process of its own, 1.3 s; changes with a dependency")
 def test_python_control_is_imported_by_nobody(tmp_path):
     subprocess.run([sys.executable, "-c", UNIMPORTED], cwd=tmp_path, check=True)

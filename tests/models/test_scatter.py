@@ -85,6 +85,9 @@ def test_errors_of_placement_vanish_with_their_square(angle_rad, distance_m):
     assert left[0.5] / left[0.25] == pytest.approx(4.0, rel=0.15)
 
 
+@pytest.mark.release(
+    "direct sums for 1.6 s; test_errors_of_placement_vanish_with_their_square has their order"
+)
 def test_one_moved_pole_and_one_moved_coil_are_where_their_errors_say():
     """The sum over displaced conductors in the field of displaced magnets, with nothing but geometry."""
     table = [np.zeros((parts, 4)) for parts in PARTS]

@@ -104,6 +104,7 @@ np.testing.assert_allclose(run.telemetry["q_rad"][-1], [0.2, -0.1, 0.3], rtol=0.
 """
 
 
+@pytest.mark.release("2 s; changes with python-control")
 def test_its_systems_are_laws_and_its_designs_run():
     done = subprocess.run([sys.executable, "-P", "-c", SCRIPT], cwd=ROOT, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr

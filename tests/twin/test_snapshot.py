@@ -158,6 +158,7 @@ fast = Law("mine", numba.njit(step), np.array([0.5]), np.zeros(3))
 """
 
 
+@pytest.mark.release("two processes of 3 s; test_another_process_goes_on_bit_for_bit has one")
 @pytest.mark.parametrize("kind", ["plain", "fast"])
 def test_another_process_goes_on_under_a_law_that_both_have(kind, tmp_path, monkeypatch):
     (tmp_path / f"of_the_user_{kind}.py").write_text(MODULE)

@@ -108,6 +108,7 @@ def test_coil_driven_motion_agrees_with_dop853(engine, monkeypatch):
     np.testing.assert_allclose(np.log2(np.array(errors[:-1]) / errors[1:]), 2, atol=0.2)
 
 
+@pytest.mark.release("1.3 s; test_coil_driven_motion_agrees_with_dop853 has a field")
 def test_the_first_actuator_runs_as_a_field(tmp_path, actuator):
     axes = directions(181, 360).reshape(-1, 3)
     torque = np.zeros_like(axes)

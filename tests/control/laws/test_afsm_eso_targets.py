@@ -92,6 +92,7 @@ def test_benefit_of_the_coupled_model_in_the_nutation():
     assert coupled["current_variation_A_s"] < 0.8 * single["current_variation_A_s"]
 
 
+@pytest.mark.release("ten minutes of two runs, 3 s; shorter runs have the same figures")
 @pytest.mark.parametrize("preset", ["ideal", "fast"])
 def test_nothing_drifts_in_ten_minutes(preset):
     """Error, torque, variation of the currents and what is observed: the last minute as the second."""
@@ -164,6 +165,7 @@ def median_deg():
     }
 
 
+@pytest.mark.release("3 s; the other targets have a shorter run of the same law")
 @pytest.mark.parametrize("mismatch", ["friction", "heavier"])
 def test_robust_bears_friction_and_inertia_that_the_nominal_model_does_not_have(median_deg, mismatch):
     """Nominal friction is 2 of 5 mN·m, or the rotor half as heavy again."""

@@ -143,6 +143,7 @@ def test_edited_callee_in_another_file_is_seen(filled):
     assert ask(filled) == (42, 0)
 
 
+@pytest.mark.release("processes of 3 s; test_second_process_compiles_nothing has the cache in one")
 def test_machine_code_is_loaded_without_all_that_can_be_compiled(package):
     """Memory, mathematics, hashes and callbacks work without the modules that compile them."""
     environment = {
@@ -209,6 +210,7 @@ def test_entry_that_cannot_be_used_is_made_again(tmp_path, monkeypatch, damage):
     assert [hits(), hits()] == [0, 1]
 
 
+@pytest.mark.release("a process of 0.7 s; test_no_folder_at_all_is_done_without has the same refusal")
 def test_file_in_place_of_the_folder_is_done_without(filled):
     (folder,) = (filled / "cache").iterdir()
     shutil.rmtree(folder)
@@ -217,6 +219,7 @@ def test_file_in_place_of_the_folder_is_done_without(filled):
     assert folder.read_text() == "no folder"
 
 
+@pytest.mark.release("a process of 0.7 s; test_no_folder_at_all_is_done_without has the same refusal")
 def test_full_disk_is_done_without(package):
     environment = {**os.environ, "PYTHONPATH": str(package), "SPHERETWIN_CACHE_DIR": str(package / "cache")}
     environment["PYTHONDONTWRITEBYTECODE"] = "1"  # Python itself keeps bytecode that the limit has cut
@@ -231,6 +234,7 @@ def test_no_folder_at_all_is_done_without(package):
     assert python(RUN, **environment).split() == ["41", "0", "0"]
 
 
+@pytest.mark.release("a process of 0.8 s; tests marked uncompiled run without a compiler")
 def test_run_without_compilation():
     """Everything a run calls works as plain Python, and to rounding says the same."""
     code = (
@@ -280,6 +284,7 @@ def test_uncompiled_is_the_plain_function():
     assert compiled.uncompiled(double) is double
 
 
+@pytest.mark.release("a process of 1.2 s; test_no_folder_at_all_is_done_without has the same refusal")
 def test_read_only_home_still_compiles():
     named = ("XDG_CACHE_HOME", "SPHERETWIN_CACHE_DIR")
     environment = {key: value for key, value in os.environ.items() if key not in named}

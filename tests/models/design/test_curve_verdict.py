@@ -22,6 +22,7 @@ def few_samples(monkeypatch):
     sample_coarsely(monkeypatch)
 
 
+@pytest.mark.release("recomputes a torque curve for 1.4 to 1.9 s; test_pole_torque.py has its parts")
 def test_a_weaker_magnet_is_a_factor_and_no_difference_in_shape(actuator):
     curve = actuator.torque_curve
     rows = np.r_[0:120:4, 120:721:20]
@@ -45,6 +46,7 @@ def computed():
         return curve_check.compute()
 
 
+@pytest.mark.release("recomputes a torque curve for 1.4 to 1.9 s; test_pole_torque.py has its parts")
 def test_a_computed_curve_is_bounded(computed):
     mesh, lookup = computed.checks
     assert broken(computed.checks) == computed.warnings == []
@@ -57,6 +59,7 @@ def test_a_computed_curve_is_bounded(computed):
     np.testing.assert_allclose(again.torque_Nm_per_A, computed.curve.torque_Nm_per_A, rtol=0, atol=5.1e-13)
 
 
+@pytest.mark.release("recomputes a torque curve for 1.4 to 1.9 s; test_pole_torque.py has its parts")
 @pytest.mark.usefixtures("few_samples")
 def test_a_table_that_misses_the_spline_breaks_its_bound_alone(monkeypatch):
     right = curve_check.lookup_table
@@ -67,6 +70,7 @@ def test_a_table_that_misses_the_spline_breaks_its_bound_alone(monkeypatch):
     assert computed.lookup_error == pytest.approx(1e-5, rel=0.1)
 
 
+@pytest.mark.release("recomputes a torque curve for 1.4 to 1.9 s; test_pole_torque.py has its parts")
 @pytest.mark.usefixtures("few_samples")
 def test_a_model_with_nothing_but_poles_and_coils_has_a_curve(tmp_path, computed):
     (path := tmp_path / "mine.xml").write_text(TEXT.replace("group_resistance_ohm", "elsewhere"))

@@ -96,6 +96,9 @@ def test_a_stack_s_field_tends_to_that_of_the_body(actuator):
     assert off[2] < 5e-4
 
 
+@pytest.mark.release(
+    "sums over all windings for 1 to 3 s; test_the_content of design_direct_sums has their values"
+)
 def test_a_pair_s_torque_tends_to_the_current_sheet_s(actuator):
     few, more, many = (pair_errors(actuator, Rule(12, 12, 48, stacked)) for stacked in (6, 12, 24))
     # Steps miss the front by the square of their number, and nothing else is left.
@@ -136,11 +139,17 @@ def test_a_pair_s_torque_is_normal_to_its_two_axes(actuator):
     assert torque @ np.cross(pole, axis) < 0  # the coil is pulled towards the pole
 
 
+@pytest.mark.release(
+    "sums over all windings for 1 to 3 s; test_the_content of design_direct_sums has their values"
+)
 def test_model_is_the_direct_sum(compared, actuator):
     # Measured: 1e-3 on this coarse quadrature; 1e-4 on the default one.
     assert error_share(compared, actuator) < 3e-3
 
 
+@pytest.mark.release(
+    "sums over all windings for 1 to 3 s; test_the_content of design_direct_sums has their values"
+)
 def test_finer_sums_come_closer(actuator):
     # The error of the sum falls with its points, and the model is what it tends to.
     q = pose(TILTS[0], 0.7, 0.3)

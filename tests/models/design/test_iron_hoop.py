@@ -81,6 +81,9 @@ def test_without_iron_the_pole_has_its_torque_curve(actuator):
     assert errors[0] > 4 * errors[1]
 
 
+@pytest.mark.release(
+    "finite elements for 1 to 5 s; test_large_permeability_is_the_image_in_a_sphere has an exact solution"
+)
 @pytest.mark.parametrize("half_angle_deg", [11.0, 180.0])
 def test_the_effect_of_iron_converges_below_its_image(half_angle_deg, actuator):
     coarse, fine = (effect(actuator.magnet, actuator.coil, half_angle_deg, count) for count in (8, 16))
@@ -90,6 +93,9 @@ def test_the_effect_of_iron_converges_below_its_image(half_angle_deg, actuator):
     assert 1 < fine.mean < 1.24
 
 
+@pytest.mark.release(
+    "finite elements for 1 to 5 s; test_large_permeability_is_the_image_in_a_sphere has an exact solution"
+)
 def test_more_iron_has_more_effect(actuator):
     effects = [effect(actuator.magnet, actuator.coil, angle, 8) for angle in (11.0, 29.0)]
     assert effects[1].peak > effects[0].peak + 0.05

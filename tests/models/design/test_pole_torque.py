@@ -52,6 +52,9 @@ def torque_at(magnet: Magnet, coil: CoilGeometry, degrees, mesh: Mesh | None = N
 # The computation
 
 
+@pytest.mark.release(
+    "recomputes fields for 0.7 to 4 s; the other tests of this file compare the same integral with exact ones"
+)
 @pytest.mark.parametrize("front_radius_m", [0.05, 0.0])
 def test_doubled_mesh_changes_little(magnet, coil, shipped, front_radius_m):
     pole = replace(magnet, front_radius_m=front_radius_m)
@@ -172,6 +175,9 @@ def test_magnet_pushes_back_on_the_winding(flat, coil, shipped, degrees):
     assert_allclose(torque, [0, expected, 0], rtol=0, atol=5e-4 * shipped.peak_Nm_per_A)
 
 
+@pytest.mark.release(
+    "recomputes fields for 0.7 to 4 s; the other tests of this file compare the same integral with exact ones"
+)
 @pytest.mark.parametrize("degrees", [2.5, 22.0, 40.0])
 def test_winding_pulls_on_the_magnet_as_a_body_of_dipoles(flat, coil, shipped, degrees):
     target = magpylib_magnet(flat, degrees)
@@ -194,6 +200,9 @@ def magpylib_discs(magnet: Magnet, degrees: float, discs: int) -> magpylib.Colle
     )
 
 
+@pytest.mark.release(
+    "recomputes fields for 0.7 to 4 s; the other tests of this file compare the same integral with exact ones"
+)
 @pytest.mark.parametrize("degrees", [2.5, 7.0, 10.5])
 def test_a_ground_magnet_s_own_field_pushes_back_on_the_winding(magnet, coil, shipped, degrees):
     winding = magpylib.Collection(magpylib_loops(coil, 14, 28))
@@ -282,6 +291,9 @@ def test_a_flat_magnet_on_iron_is_twice_as_long(flat, coil, shipped):
     assert on_iron.computed_for is None
 
 
+@pytest.mark.release(
+    "recomputes fields for 0.7 to 4 s; the other tests of this file compare the same integral with exact ones"
+)
 def test_iron_behind_the_shipped_pole_adds_what_the_readme_says(magnet, coil, shipped):
     # The image holds in front of the plane, to which the coil's inner rim comes down at 27 degrees.
     near, angle = coil.distance_m - 0.5 * coil.length_m, np.radians([27.0, 27.01])

@@ -83,6 +83,7 @@ def flux_linkage(R_SR, group, actuator):
     return linkage
 
 
+@pytest.mark.release("flux through all windings for 10 s; test_coil.py has the identity in the plant")
 @pytest.mark.parametrize("group", [0, 7, 15])
 def test_torque_matrix_transposed_is_the_rate_of_the_flux_linkage(actuator, group):
     generator = np.random.default_rng(group)

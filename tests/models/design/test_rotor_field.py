@@ -71,6 +71,7 @@ def test_the_mirror_image_makes_each_magnet_twice_as_long(tmp_path):
     assert np.abs(difference).max() < 1e-9 * expected.peak_Nm_per_A  # the same field, summed otherwise
 
 
+@pytest.mark.release("field of all poles for 6 s; a sphere and a box are compared in less")
 def test_the_shipped_poles_have_the_torque_of_their_curve(actuator):
     field = rotor_field.compute(actuators.MJCF_PATH, 6.0, 90).field
     axes = directions(31, 60)

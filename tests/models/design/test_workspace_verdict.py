@@ -15,6 +15,7 @@ def surveyed(actuator):
     return torque_map.survey(actuator, largest_tilt_deg=12)
 
 
+@pytest.mark.release("surveys the workspace for 1 s; content of design_workspaces has its values")
 def test_torque_is_told_by_tilt(surveyed):
     verdict = torque_map.judge(surveyed)
     assert [row.tilt_deg for row in verdict.by_tilt] == list(range(13))

@@ -49,6 +49,7 @@ class Loop:
                 self.state = plant.step(self.state, current, load_Nm, parameters, PERIOD_s / 2)
 
 
+@pytest.mark.release("0.9 s; changes with CasADi and IPOPT")
 def test_a_constant_load_leaves_no_error(parameters, actuator):
     target = np.array([0.1, -0.05, 0.15])
     loop = Loop(parameters, actuator, target, load_Nm=0.03)

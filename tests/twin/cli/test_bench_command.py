@@ -136,6 +136,9 @@ def hangs(t, reference, measurement, parameters, state, torque):
 """
 
 
+@pytest.mark.release(
+    "a process of 3 s; test_ctrl_c_ends_it_and_what_was_recorded_is_kept interrupts a bench in less"
+)
 def test_a_compiled_law_that_never_returns_ends_by_one_ctrl_c_with_complete_files(tmp_path):
     """The compiled loop cannot be interrupted: the process ends around it."""
     (tmp_path / "law.py").write_text(LAW)

@@ -55,6 +55,7 @@ def says(tab, *words):
         tab.wait_for(f"{STATUS}.innerText.includes({word!r})")
 
 
+@pytest.mark.release("browser, 6 to 70 s; tests/twin/bench has the same commands and refusals without one")
 def test_a_bench_is_driven_from_a_browser(tmp_path):
     scenario = scenarios.load("sinusoid", {"plant.engine": "lagrangian"})
     telemetry_path = tmp_path / "bench.parquet"
@@ -117,6 +118,7 @@ def test_a_bench_is_driven_from_a_browser(tmp_path):
     assert again.read_bytes() == telemetry_path.read_bytes()
 
 
+@pytest.mark.release("browser, 6 to 70 s; tests/twin/bench has the same commands and refusals without one")
 def test_what_is_out_of_range_is_refused_in_the_words_of_the_command_line():
     scenario = scenarios.load("hold", {"plant.engine": "lagrangian"})
     with driven(scenario) as (_, page), Browser((800, 600)) as browser:
@@ -137,6 +139,7 @@ def test_what_is_out_of_range_is_refused_in_the_words_of_the_command_line():
 FREEZE = "setTimeout(() => { while (true); }, 0)"
 
 
+@pytest.mark.release("browser, 6 to 70 s; tests/twin/bench has the same commands and refusals without one")
 def test_a_frozen_page_is_lost_and_the_twin_holds():
     scenario = scenarios.load("hold", {"plant.engine": "lagrangian"})
     with driven(scenario, 10.0) as (bench, page), Browser() as browser:  # 2 s, unless the machine is busy
@@ -152,6 +155,7 @@ def test_a_frozen_page_is_lost_and_the_twin_holds():
         assert page._server.get_clients()  # it has not left
 
 
+@pytest.mark.release("browser, 6 to 70 s; tests/twin/bench has the same commands and refusals without one")
 def test_a_law_that_never_returns_is_shown_and_leaves_the_page_alive(tmp_path):
     (tmp_path / "law.py").write_text(WAITS)
     scenario = scenarios.load("hold", {"plant.engine": "lagrangian"})
@@ -187,6 +191,7 @@ def waits(t, reference, measurement, parameters, state, torque):
 """
 
 
+@pytest.mark.release("browser, 6 to 70 s; tests/twin/bench has the same commands and refusals without one")
 def test_a_rotor_that_is_let_go_stays_on_the_bench_and_the_currents_return_to_zero():
     scenario = scenarios.load("hold", {"plant.engine": "lagrangian", "plant.payload_kg": 0.05})
     with driven(scenario) as (bench, page), Browser() as browser:

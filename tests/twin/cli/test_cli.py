@@ -143,6 +143,7 @@ def test_ctrl_c_keeps_the_run(tmp_path):
     assert recording.exists()
 
 
+@pytest.mark.release("a process of 1.3 s; test_ctrl_c_keeps_the_run has the same ending")
 def test_termination_keeps_the_run_too(tmp_path):
     telemetry = tmp_path / "run.parquet"
     with running(tmp_path, "--telemetry", telemetry) as process:
@@ -152,6 +153,7 @@ def test_termination_keeps_the_run_too(tmp_path):
     assert 100 < len(read_parquet(telemetry)[0]) < 60_000
 
 
+@pytest.mark.release("a viewer's server in a process of 1.3 s; test_viewer_server.py has its addresses")
 def test_live_serves_on_this_machine_alone_and_answers_when_it_tells_where():
     process = started("simulate", "hold", "--live", "--duration", "20")
     try:

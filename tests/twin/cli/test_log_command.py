@@ -141,6 +141,7 @@ def test_bad_input_is_refused(arguments, said, tmp_path, monkeypatch, capsys):
     assert said in capsys.readouterr().err
 
 
+@pytest.mark.release("1.2 s; changes with the library of MCAP")
 @pytest.mark.parametrize("suffix", [".parquet", ".mcap"])
 def test_a_review_exports_one_column_for_each_number(files, tmp_path, suffix, capsys):
     out = tmp_path / f"run{suffix}"

@@ -35,6 +35,7 @@ def port_of(process):
     return process.stderr.readline().strip().rpartition(":")[2]
 
 
+@pytest.mark.release("two processes at the pace of the clock, 1 s; test_programs.py runs both in lockstep")
 def test_both_verbs_write_their_files_in_real_time(tmp_path, capsys):
     """No number depends on the load of the computer: the timeouts are long, and only files are compared."""
     names = {name: tmp_path / name for name in ("m.parquet", "d.parquet", "d.rrd", "log.parquet")}

@@ -121,6 +121,7 @@ def _sweep_over(twin, folder, capsys):
     assert "expected no axis over a parameter of the twin, received plant.coulomb_Nm.0" in err
 
 
+@pytest.mark.release("1 s and a viewer's server; tests/twin/machine has the figures")
 def test_a_watch_without_alarms_and_one_that_is_too_short(log, tmp_path, capsys):
     short = tmp_path / "short.parquet"
     write(changing_log(2.4, seed=2), short)
@@ -155,6 +156,7 @@ def pages(monkeypatch):
     return readers
 
 
+@pytest.mark.release("1 s and a viewer's server; tests/twin/machine has the figures")
 def test_a_live_shadow_shows_the_log_and_has_the_figures_of_the_others(log, tmp_path, capsys, pages):
     words, received = [log, *MACHINE, "--json"], tmp_path / "live.rrd"
     _, plain, _ = run(capsys, "shadow", *words)
@@ -169,6 +171,7 @@ def test_a_live_shadow_shows_the_log_and_has_the_figures_of_the_others(log, tmp_
     assert f"| alpha | {plain['chi2']['alpha']:.3f} |" in text
 
 
+@pytest.mark.release("1 s and a viewer's server; tests/twin/machine has the figures")
 def test_a_live_watch_shows_windows_and_alarms(tmp_path, capsys, pages):
     path, received = tmp_path / "log.parquet", tmp_path / "live.rrd"
     write(changing_log(2.6, (2.4, "sensors.angle_offset_rad", [2e-3, 0.0, 0.0])), path)

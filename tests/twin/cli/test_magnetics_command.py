@@ -84,6 +84,7 @@ def computed_once(monkeypatch, results, module, name):
 # curve
 
 
+@pytest.mark.release("recomputes curves or fields for 0.7 to 4 s; content of command_magnetics has the texts")
 def test_user_s_curve_is_judged_in_a_table(capsys, user_csv, monkeypatch, results):
     computed_once(monkeypatch, results, curve_check, "judge")
     code, out, err = here(capsys, "curve", "--csv", user_csv())
@@ -112,6 +113,7 @@ def few_samples(monkeypatch):
     sample_coarsely(monkeypatch)
 
 
+@pytest.mark.release("recomputes curves or fields for 0.7 to 4 s; content of command_magnetics has the texts")
 @pytest.mark.usefixtures("few_samples")
 def test_a_warning_of_the_model_is_printed_with_the_verdict_on_a_curve(capsys, user_csv, changed_model):
     model = changed_model(('autolimits="true"', 'autolimits="true" settotalmass="3"'))
@@ -120,6 +122,7 @@ def test_a_warning_of_the_model_is_printed_with_the_verdict_on_a_curve(capsys, u
     assert "settotalmass" in one_line(err)
 
 
+@pytest.mark.release("recomputes curves or fields for 0.7 to 4 s; content of command_magnetics has the texts")
 @pytest.mark.usefixtures("few_samples")
 def test_computed_curve_gives_its_figures_as_json(capsys, monkeypatch, results):
     computed_once(monkeypatch, results, curve_check, "compute")
@@ -155,6 +158,7 @@ def test_computed_curve_is_written_and_judged(capsys, tmp_path, monkeypatch, res
     assert err.splitlines()[1].startswith("peak 0.02")
 
 
+@pytest.mark.release("recomputes curves or fields for 0.7 to 4 s; content of command_magnetics has the texts")
 @pytest.mark.usefixtures("few_samples")
 def test_computed_curve_that_breaks_a_bound_fails(capsys, monkeypatch):
     right = curve_check.lookup_table
@@ -181,6 +185,7 @@ def one_check(monkeypatch, coarse, results):
     computed_once(monkeypatch, results, field_verdict, "judge")
 
 
+@pytest.mark.release("recomputes curves or fields for 0.7 to 4 s; content of command_magnetics has the texts")
 def test_check_gives_its_verdict_as_json(capsys, one_check, monkeypatch):
     judge, verdicts = field_verdict.judge, []
 
@@ -235,6 +240,7 @@ def wrong_field(monkeypatch):
     monkeypatch.setattr(direct_summation, "direct_torque_matrix", lambda *_: -np.ones((3, 18)))
 
 
+@pytest.mark.release("recomputes curves or fields for 0.7 to 4 s; content of command_magnetics has the texts")
 def test_check_fails_where_the_field_is_another(capsys, coarse, wrong_field):
     code, out, err = here(capsys, "check", "--poses", 1, "--json")
     assert code == 1
@@ -242,6 +248,7 @@ def test_check_fails_where_the_field_is_another(capsys, coarse, wrong_field):
     assert json.loads(out)["checks"][0]["value"] == pytest.approx(1, rel=0.1)
 
 
+@pytest.mark.release("recomputes curves or fields for 0.7 to 4 s; content of command_magnetics has the texts")
 def test_check_finds_a_wrong_curve_and_says_so(capsys, coarse, user_csv):
     code, out, err = here(capsys, "check", "--poses", 1, "--csv", user_csv(1.03), "--json")
     assert code == 1
@@ -253,6 +260,7 @@ def test_check_finds_a_wrong_curve_and_says_so(capsys, coarse, user_csv):
 # map
 
 
+@pytest.mark.release("recomputes curves or fields for 0.7 to 4 s; content of command_magnetics has the texts")
 def test_map_prints_tables_and_writes_a_page(capsys, tmp_path, actuator):
     folder = tmp_path / "page"
     arguments = ["map", "--largest-tilt", 4, "--need", 0.5, "--out", folder, "--figure-format", "pdf"]
@@ -289,6 +297,7 @@ def test_map_prints_tables_and_writes_a_page(capsys, tmp_path, actuator):
     assert ">tilt of the shaft, degrees</text>" in html
 
 
+@pytest.mark.release("recomputes curves or fields for 0.7 to 4 s; content of command_magnetics has the texts")
 def test_headings_of_a_map_are_complete_in_80_columns_and_explained(capsys, monkeypatch):
     monkeypatch.setenv("COLUMNS", "80")
     code, out, _ = here(capsys, "map", "--largest-tilt", 10)
@@ -305,6 +314,7 @@ def test_headings_of_a_map_are_complete_in_80_columns_and_explained(capsys, monk
     assert "best_currents" in magnetics.MAP_TERMS
 
 
+@pytest.mark.release("recomputes curves or fields for 0.7 to 4 s; content of command_magnetics has the texts")
 def test_page_of_a_map_names_a_need_that_is_not_met(capsys, tmp_path):
     code, _, err = here(capsys, "map", "--largest-tilt", 0, "--need", 0.88, "--out", tmp_path)
     assert code == 1

@@ -12,6 +12,9 @@ def printed_command(capsys):
     return shlex.split(capsys.readouterr().out.partition("run it:")[2].strip())[1:]
 
 
+@pytest.mark.release(
+    "compiles the template's law and computes a curve, 2.3 s; test_user_law.py runs laws of files"
+)
 @pytest.mark.parametrize(
     ("kind", "more"),
     [("law", ["--duration", "0.05"]), ("actuator", ["--duration", "0.05"]), ("study", ["--limit", "1"])],

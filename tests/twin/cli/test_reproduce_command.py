@@ -15,6 +15,7 @@ from tests.twin.paper.cases import IDEAL, LOST, experiment
 COMMAND = [sys.executable, "-m", "spheretwin", "reproduce"]
 
 
+@pytest.mark.release("3 s; content of the paper has the pages")
 def test_json_stands_alone_and_the_page_is_written(tmp_path):
     folder = tmp_path / "page"
     arguments = ["figure11", "--json", "--seeds", "2", "--limit", "4", "--out", str(folder)]

@@ -75,6 +75,7 @@ def test_magnetics_map(checker):
     assert checker.tables >= 1
 
 
+@pytest.mark.release("direct sums for 3 s; the other verbs have the width in less")
 def test_magnetics_check(checker, monkeypatch):
     sum_coarsely(monkeypatch)
     assert cli.main(["magnetics", "check", "--poses", "1"]) == cli.DONE

@@ -68,6 +68,7 @@ def report(evidence, tmp_path_factory):
     return done, folder
 
 
+@pytest.mark.release("the complete cross-check, 52 s; the tests of its parts run on fewer states")
 def test_every_bound_is_kept(report):
     (code, out, err), _ = report
     assert (code, err) == (cli.DONE, "")
@@ -250,6 +251,7 @@ def test_a_rotor_that_is_not_axisymmetric_does_not_move_as_euler_found(monkeypat
     assert "torque-free rotor at 2π rad/s: attitude" in broken(checks)
 
 
+@pytest.mark.release("1 to 2 s; other rows are broken in less")
 @pytest.mark.parametrize(
     ("error", "rows"),
     [
@@ -277,6 +279,7 @@ def lagging(*arguments):
     return assembly_of_the_plant(*arguments)._replace(step_s=0.0)
 
 
+@pytest.mark.release("1 to 2 s; other rows are broken in less")
 def test_a_field_that_lags_by_half_a_step_breaks_every_row_of_coils(monkeypatch, actuator):
     monkeypatch.setattr(coil_driven.assembly, "plant_of", lagging)
     checks = coil_driven.compare(actuators.MJCF_PATH, actuator).checks
@@ -295,6 +298,7 @@ def test_a_field_that_lags_by_half_a_step_breaks_the_rows_of_step_size(monkeypat
     }
 
 
+@pytest.mark.release("1 to 2 s; other rows are broken in less")
 def test_a_torque_curve_that_is_not_the_plant_s_breaks_the_coil_driven_motion(actuator):
     curve = actuator.torque_curve
     other = dataclasses.replace(curve, torque_Nm_per_A=curve.torque_Nm_per_A * (1 + 1e-4))
@@ -303,6 +307,7 @@ def test_a_torque_curve_that_is_not_the_plant_s_breaks_the_coil_driven_motion(ac
     assert not any("complete plant" in name for name in broken(checks))
 
 
+@pytest.mark.release("1 to 2 s; other rows are broken in less")
 def test_runs_that_end_apart_break_their_rows(monkeypatch):
     def ends_early(scenario):
         finished = simulate(scenario)
@@ -367,6 +372,7 @@ def test_the_table_fits_80_columns(evidence, checker, monkeypatch):
     assert checker.tables >= 1
 
 
+@pytest.mark.release("1 to 2 s; other rows are broken in less")
 def test_a_model_the_lagrangian_does_not_have_exits_1_and_the_table_tells(tmp_path, monkeypatch):
     with_rings = ("dynamics", "identities", "closed loop")
     monkeypatch.setattr(suite, "PARTS", tuple(part for part in suite.PARTS if part.name in with_rings))

@@ -207,6 +207,7 @@ def edited(folder, *edits):
     return path
 
 
+@pytest.mark.release("4 s; content of the cross-check's page has the rows of the shipped actuator")
 @pytest.mark.parametrize("share", [1e-3, 0.1, 10.0])
 def test_bounds_hold_for_actuators_of_other_inertia(tmp_path, share):
     moments = " ".join(f"{share * moment:.9g}" for moment in (2.219e-3, 2.176e-3, 2.256e-3))
@@ -247,6 +248,7 @@ WRONG_STAGES = {
 }
 
 
+@pytest.mark.release("2 to 4 s; test_bounds_hold and test_breakaway of this file have the rows")
 @pytest.mark.parametrize("wrong", WRONG_STAGES)
 def test_a_wrong_stage_breaks_its_rows(monkeypatch, actuator, wrong):
     level, viscous, smoothing, step, rows = WRONG_STAGES[wrong]
@@ -260,6 +262,7 @@ def test_a_wrong_stage_breaks_its_rows(monkeypatch, actuator, wrong):
 MUJOCO_STOPS = {"stopping time, MuJoCo", "stopping angle, MuJoCo"}
 
 
+@pytest.mark.release("2 to 4 s; test_bounds_hold and test_breakaway of this file have the rows")
 @pytest.mark.parametrize(
     ("field", "share", "rows"),
     [

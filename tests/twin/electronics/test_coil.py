@@ -47,6 +47,7 @@ def test_constant_power_heats_as_one_exponential_to_its_rest():
     np.testing.assert_allclose(made.resistance_ohm, R * (1 + 0.0039 * (exact - 20)), rtol=1e-12)
 
 
+@pytest.mark.release("3 s of an ODE solver; exact solutions of the lag are compared in less")
 @given(st.floats(-50, 1000), st.floats(0, 1e4), st.floats(-6, 1), st.floats(-2, 3), st.floats(-2, 2))
 def test_one_period_is_what_an_ode_solver_finds(start, watts, log_period, log_capacity, log_resistance):
     period_s, capacity, thermal = 10.0**log_period, 10.0**log_capacity, 10.0**log_resistance

@@ -95,6 +95,7 @@ def orders(errors):
     return np.log2(np.array(errors[:-1]) / np.array(errors[1:]))
 
 
+@pytest.mark.release("2.6 s; the convergence to a solver without steps is the stricter comparison")
 def test_without_mutual_inductance_groups_are_uncoupled():
     generator = np.random.default_rng(0)
     coupled = Steps(chain_of(np.zeros((GROUPS, GROUPS)), 5e-4, current_limit_A=8.0), np.zeros(GROUPS))
@@ -266,6 +267,7 @@ def test_share_scales_the_coupling():
 FIELDS = {"hardware": "prototype", "plant.engine": "lagrangian", "duration": 0.2}
 
 
+@pytest.mark.release("3.5 s; the other tests of this file have the coupled currents")
 @pytest.mark.uncompiled
 def test_run_has_the_coupling_of_its_model_and_snapshots_continue_it():
     with Session(scenarios.load("nutation", FIELDS)) as session:

@@ -168,6 +168,7 @@ def test_the_chain_is_its_plain_copy(more, seed):
     np.testing.assert_allclose(measured(section, seed, q), slow_chain(section, seed, q), rtol=0, atol=1e-12)
 
 
+@pytest.mark.release("1.6 s; test_session_chunks.py has the same with all parts")
 @given(st.lists(st.integers(1, 60), min_size=1, max_size=8))
 def test_the_same_seed_gives_the_same_bytes_at_any_chunks(lengths):
     section, q = prototype(**{"sensors.adc.oversampling": 3}), poses(sum(lengths))

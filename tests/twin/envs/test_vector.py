@@ -17,6 +17,7 @@ FALLING = {"episode_s": 0.6, "changes": {"plant.initial_rad": [0.0, 1.0, 0.0]}, 
 """Torques up to the limit leave the workspace."""
 
 
+@pytest.mark.release("2 s; changes with Gymnasium")
 @pytest.mark.parametrize("task", ["Track", "Hold", "Point"])
 @pytest.mark.parametrize("actions", ["torque", "current"])
 def test_gymnasium_accepts_the_registered_environments(task, actions):

@@ -59,6 +59,7 @@ def simulated(path, model, t, inputs, **settings):
     return np.stack([result[name] for name in outputs], axis=1)
 
 
+@pytest.mark.release("compiles and checks FMUs for 4 s; changes with FMPy and the compiler")
 @pytest.mark.parametrize(("fmi", "kind"), KINDS)
 def test_fmpy_finds_no_problem(fmi, kind, files):
     assert validate_fmu(str(files[fmi, kind])) == []
@@ -286,6 +287,7 @@ def test_the_declarations_are_those_of_the_standard(fmi, model, files, tmp_path)
         assert required <= defined
 
 
+@pytest.mark.release("compiler, 2 s; test_model_exchange has the values of the same interface")
 @needs_c_compiler
 @pytest.mark.parametrize("fmi", [2, 3])
 def test_the_interface_runs_under_sanitizers(fmi, files, tmp_path):

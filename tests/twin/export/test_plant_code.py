@@ -158,6 +158,7 @@ def test_a_step_that_is_no_multiple_is_divided_evenly(tmp_path):
     np.testing.assert_allclose(reached, c_plant.x, rtol=1e-14, atol=1e-18)
 
 
+@pytest.mark.release("compiler, 7 s; other tests run the same code without sanitizers")
 @needs_c_compiler
 @pytest.mark.parametrize(
     "changes",

@@ -66,6 +66,7 @@ def test_the_controller_knows_the_parts_of_a_stage_but_not_the_mass(stage, actua
     assert (nominal.angle_noise_rad, nominal.angle_resolution_rad) == accuracy(run.sensors)
 
 
+@pytest.mark.release("3 s; content of the budget has its rows")
 @pytest.mark.uncompiled
 def test_a_stage_is_run_for_each_seed_where_it_draws_and_only_there():
     def rows(stage, seed):

@@ -18,6 +18,7 @@ FACE = {
 }  # fmt: skip
 
 
+@pytest.mark.release("4 s, of which the cases of faults 3.4; content of the paper loads them")
 @pytest.mark.parametrize("name", EXPERIMENTS)
 def test_every_experiment_can_be_loaded_and_its_cases_are_different(name):
     experiment = EXPERIMENTS[name]
@@ -31,6 +32,7 @@ def test_every_experiment_can_be_loaded_and_its_cases_are_different(name):
         scenarios.load(case.scenario, case.fields)
 
 
+@pytest.mark.release("4 s; content of the paper has rows and pages")
 @pytest.mark.parametrize("name", EXPERIMENTS)
 def test_every_experiment_has_rows_and_a_page(name, tmp_path):
     plan = make_plan(EXPERIMENTS[name], seeds=1, limit=2)

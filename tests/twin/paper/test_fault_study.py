@@ -78,6 +78,7 @@ def outcome(ratio, status=Status.COMPLETED, **more_of_it):
     return Outcome(status, {"max_abs_error_rad": [0.0] * 3}, np.zeros(3), data)
 
 
+@pytest.mark.release("1.2 s; the studies have the same for any threads")
 def test_rows_are_the_same_whatever_the_threads(study):
     plan = make_plan(EXPERIMENT, seeds=2)
     assert json.dumps(rows(plan, run_plan(plan, threads=1))) == json.dumps(rows(*study))

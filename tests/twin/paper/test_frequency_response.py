@@ -16,6 +16,7 @@ def loop_of(law):
     return scenarios.load("hold", {**responses.fields(), "controller.law": law})
 
 
+@pytest.mark.release("9 s of plain Python; test_linear_closed_loop.py has the linear loop")
 @pytest.mark.uncompiled
 @pytest.mark.parametrize("law", ["pid", "afsm_eso"])
 def test_the_measured_response_is_that_of_the_linear_loop(law):

@@ -45,6 +45,7 @@ def written(tmp_path_factory):
     return folder, *(path.read_text(encoding="utf-8") for path in paths)
 
 
+@pytest.mark.release("5.5 s; content of the paper has the pages")
 def test_both_forms_and_the_figures_are_in_the_folder(written):
     folder, _, _ = written
     assert sorted(path.name for path in folder.iterdir()) == [

@@ -254,6 +254,7 @@ def short():
     return plan, run_plan(plan)
 
 
+@pytest.mark.release("runs all rivals for 15 s; content of paper_rivals has rows and page")
 def test_rows_and_page_have_what_ran(short, tmp_path):
     plan, outcomes = short
     assert unexpected_ends(plan, outcomes) == []
@@ -271,6 +272,7 @@ def test_rows_and_page_have_what_ran(short, tmp_path):
     assert "make tune-rivals" in written
 
 
+@pytest.mark.release("runs all rivals for 15 s; content of paper_rivals has rows and page")
 def test_full_current_is_below_what_any_law_reaches_with_bounded_allocation(short):
     """Within the same ±8 A: least norm gives away some of the torque, so that a law may share it better."""
     _, outcomes = short

@@ -50,6 +50,7 @@ def test_printed_numbers_are_in_their_order():
     assert printed_rad("pd", 0.3, 1.0) is None
 
 
+@pytest.mark.release("1.4 s; content of figure 7 has the rows")
 def test_rows_have_what_is_printed_and_a_lost_run_is_a_row(figure7):
     plan, outcomes = figure7
     by_condition = {(row["controller"], row["L"]): row for row in rows(plan, outcomes)}

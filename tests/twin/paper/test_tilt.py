@@ -39,6 +39,7 @@ def test_laws_are_the_paper_s_a_tuned_pid_and_ours():
         assert scenario.controller == type(scenario.controller)(**preset)  # printed gains are the defaults
 
 
+@pytest.mark.release("1.3 s; content of figure 11 has the figures")
 def test_json_has_the_paper_s_figures_in_rad(study):
     fields = {
         row["controller"]: row

@@ -101,6 +101,7 @@ def test_a_loaded_rotor_comes_to_rest_at_the_limit(actuator):
 pose = st.floats(-1.45, 1.45)
 
 
+@pytest.mark.release("1.2 s; test_a_bounce_is_the_exact_one_of_a_damped_spring is exact")
 @given(
     st.tuples(pose, pose, st.floats(-0.55, 0.55)).map(np.array),
     three,

@@ -293,6 +293,7 @@ for function in (loop.loop, channels.write_channels):
 """
 
 
+@pytest.mark.release("processes of 2 s; test_compiled.py has the cache")
 def test_compiled_and_plain_loops_are_kept_between_processes():
     """A law in plain Python runs in the plain loop, which calls compiled functions."""
 

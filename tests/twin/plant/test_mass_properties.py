@@ -165,6 +165,9 @@ def test_engines_agree_step_by_step(actuator, shipped, payload_kg):
 SMOOTH = {"controller.law": "pd", "disturbance.load": 0.5, "duration": 1.0}
 
 
+@pytest.mark.release(
+    "compiles loops of four kinds for 30 s; accelerations of both engines are compared in less"
+)
 @pytest.mark.parametrize(
     "bearings",
     [

@@ -63,6 +63,7 @@ def test_each_plant_moves_as_alone(kind):
     assert_equal(reached, one_by_one(parameters, *case, 20))
 
 
+@pytest.mark.release("1.8 s; test_each_plant_moves_as_alone has plants of one kind")
 def test_plants_of_different_kinds_move_as_alone():
     parameters = [plant.parameters("tilt", changes) for changes in (*KINDS.values(), TILTED, LOADED | TILTED)]
     case = motion(len(parameters), seed=1)

@@ -52,6 +52,7 @@ def test_the_list_of_words_finds_what_it_must():
 OF_A_LAW = [name for name in NAMES if name.startswith("controller")]
 
 
+@pytest.mark.release("5 s; test_flags has the same messages of fewer fields")
 @pytest.mark.parametrize(("law", "names"), [("pd", NAMES), ("afsm_eso", OF_A_LAW)], ids=["pd", "afsm_eso"])
 def test_overrides(law, names):
     messages = set()
@@ -75,6 +76,7 @@ def test_flags(value):
         assert line is None or not FORBIDDEN.search(line), line
 
 
+@pytest.mark.release("3 s; test_session_settings.py has the refused changes")
 def test_changes_of_a_run():
     scenario = scenarios.load("hold")
     fields = {message(with_change, scenario, name, value) for name in NAMES for value in VALUES}

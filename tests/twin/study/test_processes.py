@@ -77,6 +77,9 @@ def test_kill_loses_no_finished_row(tmp_path, command, whole, capfd, threads):
     assert gone_on_with(command, folder, whole, capfd)["resumed"] == finished
 
 
+@pytest.mark.release(
+    "processes that are interrupted or killed, 1.3 to 4 s; test_kill_loses_no_finished_row has one"
+)
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_an_interruption_finishes_the_rows_in_flight_and_writes_the_table(
     tmp_path, command, whole, capfd, number
@@ -95,6 +98,9 @@ def test_an_interruption_finishes_the_rows_in_flight_and_writes_the_table(
     assert gone_on_with(command, folder, whole, capfd)["resumed"] == report["rows"]
 
 
+@pytest.mark.release(
+    "processes that are interrupted or killed, 1.3 to 4 s; test_kill_loses_no_finished_row has one"
+)
 def test_a_second_process_is_refused_and_the_first_goes_on(tmp_path, command, whole, capfd):
     folder = tmp_path / "out"
     process = begun([*command, "--threads", "1"], folder)

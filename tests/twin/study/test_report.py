@@ -174,6 +174,7 @@ def test_the_page_tells_of_a_study(tmp_path):
     assert "<table>" in html.read_text()
 
 
+@pytest.mark.release("0.8 s; content of study pages has the text")
 def test_the_same_table_gives_the_same_page(tmp_path):
     for name in ("a", "b"):
         run_rows(loads(), tmp_path / name)
@@ -252,6 +253,7 @@ FIELDS = {
 }
 
 
+@pytest.mark.release("2 s; content of study pages has the figures")
 @pytest.mark.parametrize("count", [1, 2, 3])
 def test_figures_and_summary_have_words_with_units_and_no_raw_keys(count, tmp_path):
     axes = {name: FIELDS[name].round(1) for name in list(FIELDS)[:count]}

@@ -93,6 +93,7 @@ def test_cubic_is_the_clamped_spline():
     np.testing.assert_allclose(two, 3 * share**2 - 2 * share**3, atol=1e-15)
 
 
+@pytest.mark.release("1.4 s; test_path_goes_through_the_poses_and_rests_beyond_them has the path")
 @pytest.mark.parametrize("between", KINDS)
 @given(poses=some_poses())
 @example(poses=TimeSeries(T, np.zeros((4, 3))))

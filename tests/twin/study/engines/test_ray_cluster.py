@@ -45,6 +45,7 @@ def blocked_on(node_id, folder):
     return run_unless_blocked
 
 
+@pytest.mark.release("a Ray cluster for 23 to 83 s; test_a_fault_on_a_node_stops_the_study has one")
 def test_a_node_that_is_killed_half_way_loses_nothing(study, machines, wanted, tmp_path, monkeypatch):
     lost = []
     back = engine.Batches.lost
@@ -94,6 +95,7 @@ def test_a_fault_on_a_node_stops_the_study_and_keeps_what_is_finished(study, mac
     assert len((tmp_path / journal.NAME).read_text().splitlines()) < 1 + ROWS
 
 
+@pytest.mark.release("a Ray cluster for 23 to 83 s; test_a_fault_on_a_node_stops_the_study has one")
 def test_a_row_that_takes_its_process_along_is_told_of(study, machines, tmp_path, monkeypatch):
     monkeypatch.setattr(engine, "MOST_LOSSES", 1)
     (tmp_path / "own.py").write_text("import os\n\n\ndef dies(run):\n    os._exit(1)\n")
@@ -102,6 +104,7 @@ def test_a_row_that_takes_its_process_along_is_told_of(study, machines, tmp_path
         run(fatal, tmp_path / "out", machines, limit=1)
 
 
+@pytest.mark.release("a Ray cluster for 23 to 83 s; test_a_fault_on_a_node_stops_the_study has one")
 def test_a_node_with_other_sources_is_refused_in_one_line(study, machines, wanted, tmp_path):
     package = copy_package(tmp_path / "other")
     with (package / "loop.py").open("a") as file:
@@ -121,6 +124,7 @@ def test_a_node_with_other_sources_is_refused_in_one_line(study, machines, wante
     assert set(of_driver) <= set(of_local)
 
 
+@pytest.mark.release("a Ray cluster for 23 to 83 s; test_a_fault_on_a_node_stops_the_study has one")
 def test_an_address_where_nobody_answers_loses_nothing(study, machines, wanted, tmp_path):
     runner.run(study, tmp_path, limit=20)
     stored = (tmp_path / journal.NAME).read_bytes()
@@ -136,6 +140,7 @@ def test_an_address_where_nobody_answers_loses_nothing(study, machines, wanted, 
 
 
 # The last one: it leaves no cluster.
+@pytest.mark.release("a Ray cluster for 23 to 83 s; test_a_fault_on_a_node_stops_the_study has one")
 def test_a_cluster_that_is_lost_is_told_of_in_one_line(machines, tmp_path):
     source = tmp_path / "long.toml"
     source.write_text(LONG_STUDY)

@@ -3,10 +3,13 @@
 import os
 import signal
 
+import pytest
+
 from spheretwin.study import journal
 from tests.twin.study.engines.clusters import LONG_STUDY, goes_on_locally, started
 
 
+@pytest.mark.release("a Ray cluster for 47 s; test_ray_cluster.py and test_processes.py have its parts")
 def test_a_cluster_of_its_own_is_interrupted_and_the_study_goes_on(tmp_path):
     source = tmp_path / "long.toml"
     source.write_text(LONG_STUDY)

@@ -215,6 +215,7 @@ def test_objectives_are_words_with_their_unit(objective, words):
     assert head == ["trial", "controller damping", words]
 
 
+@pytest.mark.release("0.8 s; content of study_tuning has the command")
 def test_the_command_that_is_told_runs_the_gains(small, tmp_path, capsys):
     assert cli.main(["sweep", small, "--optimise", "--json", "--out", str(tmp_path / "out")]) == cli.DONE
     best = json.loads(capsys.readouterr().out)["laws"]["pd"]["best"][0]
@@ -250,6 +251,7 @@ def test_without_matplotlib_there_are_trials_and_a_word(small, tmp_path, capsys,
     assert "![" not in (tmp_path / "out" / "tuning.md").read_text(encoding="utf-8")
 
 
+@pytest.mark.release("0.9 s; test_trials.py has interrupted searches")
 def test_what_is_interrupted_exits_1_and_goes_on(small, tmp_path, capsys, monkeypatch):
     tune = sweep.tune
 

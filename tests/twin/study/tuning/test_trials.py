@@ -28,6 +28,7 @@ def lines(folder):
 LOCAL = {"sampler": "local", "draws": 10, "perturbations": 14}
 
 
+@pytest.mark.release("6 s; test_a_killed_process_loses_no_trial_that_it_told_of has one")
 @pytest.mark.parametrize("sampler", [{"sampler": "tpe"}, {"sampler": "nsga2"}, LOCAL], ids=str)
 def test_wherever_a_process_was_killed_it_is_gone_on_as_if_it_had_not_been(tmp_path, sampler):
     noisy = study(tmp_path, **TWO, **sampler)
@@ -48,6 +49,7 @@ def test_wherever_a_process_was_killed_it_is_gone_on_as_if_it_had_not_been(tmp_p
         assert table(folder) == whole
 
 
+@pytest.mark.release("2 s; test_a_killed_process_loses_no_trial_that_it_told_of has one")
 def test_every_cut_within_one_batch_is_gone_on_with(tmp_path):
     noisy = study(tmp_path, **TWO)
     tune(noisy, tmp_path, trials=16, threads=1)
