@@ -2,6 +2,8 @@
 
 from dataclasses import replace
 
+import pytest
+
 from spheretwin.analysis.comparison import labels
 from spheretwin.analysis.review import common_conditions, scenario_differences
 from tests.twin.analysis.runs import made_of, named
@@ -24,40 +26,38 @@ def but(**sections):
     }  # fmt: skip
 
 
-def test_equal_scenarios_differ_in_nothing():
-    assert scenario_differences([SCENARIO, SCENARIO]) == []
+FAULTS = [{"target": "coil.07", "mode": "open", "start_s": 1.0}, {"target": "group.3", "mode": "stuck"}]
 
 
-def test_variations_of_the_paper_have_its_names_and_come_first():
-    other = but(plant={"modelling_error": 0.0, "payload_kg": 0.1}, disturbance={"load": 2.0})
-    assert scenario_differences([SCENARIO, other]) == [
-        ("m", ["0.2", "0"]),
-        ("L", ["0", "2"]),
-        ("plant.payload_kg", ["0.05", "0.1"]),
-    ]
-
-
-def test_gains_are_listed_for_runs_of_one_law_only():
-    other = but(controller={"stiffness": [3.0, 2.0]})
-    assert scenario_differences([SCENARIO, other]) == [("controller.stiffness", ["[1.0, 2.0]", "[3.0, 2.0]"])]
-    pid = but(controller={"law": "pid", "kp": 1.0})
-    assert scenario_differences([SCENARIO, pid]) == [("law", ["pd", "pid"])]
-
-
-def test_fields_implied_by_the_hardware_are_not_listed():
-    other = but(hardware="electronics", sensors={"adc": {"bits": 12}})
-    assert scenario_differences([SCENARIO, other]) == [("hardware", ["ideal", "electronics"])]
-
-
-def test_a_missing_field_is_none():
-    assert scenario_differences([SCENARIO, {**SCENARIO, "watch": 1}]) == [("watch", ["none", "1"])]
-
-
-def test_faults_are_listed_with_their_targets():
-    faults = [{"target": "coil.07", "mode": "open", "start_s": 1.0}, {"target": "group.3", "mode": "stuck"}]
-    assert scenario_differences([{**SCENARIO, "fault": faults}, {**SCENARIO, "fault": []}]) == [
-        ("fault", ["coil.07 open + group.3 stuck", "none"])
-    ]
+@pytest.mark.parametrize(
+    ("first", "other", "expected"),
+    [
+        (SCENARIO, SCENARIO, []),
+        # Variations of the paper have its names and come first.
+        (
+            SCENARIO,
+            but(plant={"modelling_error": 0.0, "payload_kg": 0.1}, disturbance={"load": 2.0}),
+            [("m", ["0.2", "0"]), ("L", ["0", "2"]), ("plant.payload_kg", ["0.05", "0.1"])],
+        ),
+        # Gains are listed for runs of one law only.
+        (
+            SCENARIO,
+            but(controller={"stiffness": [3.0, 2.0]}),
+            [("controller.stiffness", ["[1.0, 2.0]", "[3.0, 2.0]"])],
+        ),
+        (SCENARIO, but(controller={"law": "pid", "kp": 1.0}), [("law", ["pd", "pid"])]),
+        # Fields that the hardware implies are not listed.
+        (
+            SCENARIO,
+            but(hardware="electronics", sensors={"adc": {"bits": 12}}),
+            [("hardware", ["ideal", "electronics"])],
+        ),
+        (SCENARIO, {**SCENARIO, "watch": 1}, [("watch", ["none", "1"])]),
+        ({"fault": FAULTS}, {"fault": []}, [("fault", ["coil.07 open + group.3 stuck", "none"])]),
+    ],
+)
+def test_fields_that_differ_are_listed_with_their_values(first, other, expected):
+    assert scenario_differences([first, other]) == expected
 
 
 def test_common_conditions_are_those_of_every_scenario():

@@ -7,7 +7,10 @@ from tests.viz.bench import fake
 from tests.viz.bench.on_page import STATUS, opened
 from tests.waiting import wait_for
 
-pytestmark = needs_a_browser
+pytestmark = [
+    needs_a_browser,
+    pytest.mark.release("browser, 3 to 17 s; content of the bench has the page's messages"),
+]
 
 SIZES = ((800, 600), (1280, 800), (1920, 1080), (2560, 1440))
 
@@ -59,7 +62,6 @@ CONTRAST = """(() => {
 })()"""
 
 
-@pytest.mark.release("browser, 3 to 17 s; content of the bench has the page's messages")
 def test_all_is_visible_at_each_size_and_in_both_themes(tab, bench):
     """At its worst: every badge, the largest numbers, long messages."""
     worst = {
@@ -104,7 +106,6 @@ def test_all_is_visible_at_each_size_and_in_both_themes(tab, bench):
     assert fonts[: len(SIZES)] == fonts[len(SIZES) :] == sorted(set(fonts))  # larger in a larger window
 
 
-@pytest.mark.release("browser, 3 to 17 s; content of the bench has the page's messages")
 def test_nothing_in_the_bar_moves_with_the_numbers(tab, bench):
     tab.resize(1280, 800)
     tab.draw(3)
@@ -117,7 +118,6 @@ def test_nothing_in_the_bar_moves_with_the_numbers(tab, bench):
     assert tab.evaluate(BOXES) == before
 
 
-@pytest.mark.release("browser, 3 to 17 s; content of the bench has the page's messages")
 def test_every_button_sends_its_command(tab, bench):
     expected = []
     for name in ("stop", *RUN):
@@ -133,7 +133,6 @@ def test_every_button_sends_its_command(tab, bench):
     wait_for(lambda: bench.commands()[-1] == ("speed", {"factor": 0.5}))
 
 
-@pytest.mark.release("browser, 3 to 17 s; content of the bench has the page's messages")
 def test_the_bar_follows_commands_from_elsewhere(tab, bench):
     bench.now.running = False
     pressed = "[...document.querySelectorAll('#bench-bar [aria-pressed=true]')].map((each) => each.innerText)"
@@ -145,7 +144,6 @@ def test_the_bar_follows_commands_from_elsewhere(tab, bench):
         tab.wait_for(f"document.querySelector('[data-speed]').selectedOptions[0].text === {text!r}")
 
 
-@pytest.mark.release("browser, 3 to 17 s; content of the bench has the page's messages")
 def test_a_badge_states_whose_page_it_is(browser):
     bench = fake.Bench()
     role = "document.querySelector('[data-role]').innerText"
@@ -161,7 +159,6 @@ def test_a_badge_states_whose_page_it_is(browser):
         second.close()
 
 
-@pytest.mark.release("browser, 3 to 17 s; content of the bench has the page's messages")
 def test_a_page_without_its_server_says_so(browser):
     with fake.shown(fake.Bench()) as page:
         tab = opened(browser, page)

@@ -8,7 +8,10 @@ from tests.browser import needs_a_browser
 from tests.viz.bench.on_page import at_rest, on_screen
 from tests.waiting import wait_for
 
-pytestmark = needs_a_browser
+pytestmark = [
+    needs_a_browser,
+    pytest.mark.release("browser, 7 to 9 s; content of the bench has the coils' messages"),
+]
 
 TIP = "document.querySelector('#bench-tip')"
 NEAREST = """bench.places().map((at, coil) => ({...at, coil})).filter((at) => !at.hidden)
@@ -22,7 +25,6 @@ def tab(tab, page):
     return tab
 
 
-@pytest.mark.release("browser, 7 to 9 s; content of the bench has the coils' messages")
 def test_coils_are_where_the_camera_shows_them(tab, page, bench):
     """The camera of the page's messages and that of its script give the same places."""
     actuator = bench.actuator
@@ -40,7 +42,6 @@ def test_coils_are_where_the_camera_shows_them(tab, page, bench):
     assert hidden.any()
 
 
-@pytest.mark.release("browser, 7 to 9 s; content of the bench has the coils' messages")
 def test_a_coil_shows_its_number_and_value_and_a_menu(tab, bench):
     at = tab.evaluate(NEAREST)
     coil, place = at["coil"], (at["x"], at["y"])
@@ -68,7 +69,6 @@ def test_a_coil_shows_its_number_and_value_and_a_menu(tab, bench):
     tab.wait_for(f"document.querySelector('[data-pane=currents] .values').innerText.includes('{group}: ')")
 
 
-@pytest.mark.release("browser, 7 to 9 s; content of the bench has the coils' messages")
 def test_a_bar_selects_a_group_and_its_coils_are_marked(tab, bench, tmp_path):
     tab.wait_for("document.querySelector('[data-pane=bars]')?.scale !== undefined")
     at = tab.evaluate(NEAREST)

@@ -7,7 +7,10 @@ from tests.browser import needs_a_browser
 from tests.viz.bench import fake
 from tests.waiting import wait_for
 
-pytestmark = needs_a_browser
+pytestmark = [
+    needs_a_browser,
+    pytest.mark.release("browser, 3 to 7 s; content of the bench has the plots' data"),
+]
 
 LIVE = "bench.plots.live"
 
@@ -41,7 +44,6 @@ def values(pane):
     return f"document.querySelector('[data-pane={pane}] .values').innerText"
 
 
-@pytest.mark.release("browser, 3 to 7 s; content of the bench has the plots' data")
 def test_the_plots_have_all_bins_once_also_after_a_restart(tab, bench):
     bench.count = 20
     bench.run = 2
@@ -56,7 +58,6 @@ def test_the_plots_have_all_bins_once_also_after_a_restart(tab, bench):
             np.testing.assert_allclose(shown, factor * part[name][:, 1], rtol=1e-14)
 
 
-@pytest.mark.release("browser, 3 to 7 s; content of the bench has the plots' data")
 def test_a_group_that_is_selected_while_rows_arrive_has_all_of_its_rows(tab, bench):
     tab.evaluate(
         "(() => { const fetch = bench.fetch; bench.fetch = async (...given) => {"
@@ -68,7 +69,6 @@ def test_a_group_that_is_selected_while_rows_arrive_has_all_of_its_rows(tab, ben
     np.testing.assert_allclose(shown, bench.bins().low["current_A"][:, 3], rtol=1e-14)
 
 
-@pytest.mark.release("browser, 3 to 7 s; content of the bench has the plots' data")
 def test_no_extreme_is_lost_in_a_column_of_pixels(tab):
     columns = tab.evaluate(
         "(() => { const t = [...Array(1000).keys()];"
@@ -81,7 +81,6 @@ def test_no_extreme_is_lost_in_a_column_of_pixels(tab):
     assert [(column["low"], column["high"]) for column in columns if column["at"] == 5] == [(-9, 7)]
 
 
-@pytest.mark.release("browser, 3 to 7 s; content of the bench has the plots' data")
 def test_the_cursor_shows_the_values_at_its_time_in_every_pane(tab, bench):
     tab.wait_for("document.querySelector('[data-pane=error]')?.scale !== undefined")
     at = tab.evaluate(
@@ -102,7 +101,6 @@ def test_the_cursor_shows_the_values_at_its_time_in_every_pane(tab, bench):
     assert "desired" in tab.evaluate(values("β"))
 
 
-@pytest.mark.release("browser, 3 to 7 s; content of the bench has the plots' data")
 def test_window_pause_and_zoom(tab, bench):
     bench.count = 30
     bench.run = 2
@@ -122,7 +120,6 @@ def test_window_pause_and_zoom(tab, bench):
     tab.wait_for("document.querySelector('[data-pane=torque]') === null")
 
 
-@pytest.mark.release("browser, 3 to 7 s; content of the bench has the plots' data")
 def test_a_capture_is_armed_shown_with_every_row_and_left(tab, bench):
     for name, value in (
         ("on", "level"),

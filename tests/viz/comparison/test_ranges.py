@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from spheretwin.viz.comparison.runs import quantity_range, settled_range
-from tests.viz.comparison.compared import RAMP, VALUE, T_s, run_of
+from tests.viz.comparison.compared import VALUE, T_s, run_of
 
 
 def range_of(*runs):
@@ -32,29 +32,20 @@ def test_a_transient_is_outside_and_stated():
     assert item.text() == "run 2 reaches 2 (0 s to 0.299 s)"
 
 
-def test_a_failed_run_does_not_flatten_the_others():
+def test_a_failed_run_does_not_flatten_the_others_and_alone_it_is_shown_without_its_end():
     diverged = -np.exp(np.minimum(8 * T_s[:2000], 12.0))
     low, high, outside = range_of(run_of(0.1 * np.sin(9 * T_s)), run_of(diverged, status="diverged"))
     assert (low, high) == pytest.approx((-0.11, 0.11), rel=1e-3)
     assert [(item.run, item.value) for item in outside] == [(2, diverged.min())]
-
-
-def test_failed_runs_alone_are_shown_without_their_ends():
-    diverged = np.where(T_s < 3.9, np.sin(9 * T_s), -1e6)
-    low, high, outside = range_of(run_of(diverged, status="diverged"))
+    low, high, outside = range_of(run_of(np.where(T_s < 3.9, np.sin(9 * T_s), -1e6), status="diverged"))
     assert -1.2 < low < -0.9 < 0.9 < high < 1.2
     assert outside[0].value == -1e6
 
 
-@pytest.mark.parametrize("values", [[np.nan, np.inf], [0.0, 0.0]])
-def test_a_run_without_numbers_or_of_zeros_has_a_range(values):
-    low, high, outside = range_of(run_of(np.array(values)))
-    assert (low, high, outside) == (-1e-3, 1e-3, ())
-
-
-def test_values_without_a_number_are_ignored():
-    values = np.where(T_s > 3.99, np.nan, np.sin(9 * T_s))
-    assert range_of(run_of(values)).outside == ()
+def test_values_without_a_number_are_ignored_and_a_run_without_any_or_of_zeros_has_a_range():
+    assert range_of(run_of(np.where(T_s > 3.99, np.nan, np.sin(9 * T_s)))).outside == ()
+    for values in ([np.nan, np.inf], [0.0, 0.0]):
+        assert range_of(run_of(np.array(values))) == (-1e-3, 1e-3, ())
 
 
 def test_a_reference_is_within_the_range():
@@ -66,7 +57,3 @@ def test_a_reference_is_within_the_range():
     assert low < 0
     assert 1.001 < high < 1.2
     assert [item.run for item in outside] == [2]
-
-
-def test_limits_of_a_quantity_are_its_range():
-    assert quantity_range(VALUE._replace(limits=(-1.0, 0.5)), [run_of(RAMP)], [0]) == (-1.0, 0.5, ())

@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from rerun.chunk import RrdReader
 
 from spheretwin.analysis.comparison import subject_of
 from spheretwin.machine import Log, shadow
@@ -11,6 +10,7 @@ from spheretwin.machine.state_estimation import Verdict
 from spheretwin.viz.comparison import shadow_recording
 from spheretwin.viz.comparison.shadow_recording import CONFIDENCE
 from spheretwin.viz.scene.entities import body_quaternions
+from tests.viz.recording.panels import columns
 
 
 @pytest.fixture(scope="module")
@@ -32,18 +32,16 @@ def recorded(estimated, tmp_path_factory):
     subject = subject_of(model.scenario, model.actuator)
     text = Verdict(result.chi2, result.consistent).markdown(log)
     shadow_recording.write(path, result.telemetry, np.zeros((400, 18)), subject, text)
-    columns = {}
-    for chunk in RrdReader(path).stream():
-        batch = chunk.to_record_batch()
-        for name in batch.schema.names:
-            columns.setdefault((chunk.entity_path, name.rpartition(":")[2]), []).append(batch.column(name))
-    return columns
+    return columns(path)[0]
+
+
+def rows_of(recorded, entity, component):
+    return [row for part in recorded[entity, component] for row in part.to_pylist()]
 
 
 def lines(recorded, entity):
     """Values of the lines of a plot, a column each."""
-    rows = [row for part in recorded[entity, "scalars"] for row in part.to_pylist()]
-    return np.array(rows, dtype=float)
+    return np.array(rows_of(recorded, entity, "Scalars:scalars"), dtype=float)
 
 
 def test_each_line_is_its_column(recorded, estimated):
@@ -63,12 +61,7 @@ def test_each_line_is_its_column(recorded, estimated):
 def test_the_machine_is_drawn_as_measured_and_the_twin_as_estimated(recorded, estimated):
     telemetry = estimated[1].telemetry
     for root, angles in (("machine", "q_measured_rad"), ("twin", "q_estimated_rad")):
-        drawn = np.concatenate(
-            [
-                np.array(part.flatten().to_pylist(), dtype=float).reshape(-1, 4)
-                for part in recorded[f"/{root}/world/rotor", "quaternion"]
-            ]
-        )
+        drawn = np.array(rows_of(recorded, f"/{root}/world/rotor", "Transform3D:quaternion"))[:, 0]
         valid = np.all(np.isfinite(telemetry[angles]), axis=1)
         poses = body_quaternions(telemetry[angles][valid])["rotor"]
         nearest = [np.min(np.linalg.norm(poses - pose, axis=1)) for pose in drawn]
@@ -78,6 +71,6 @@ def test_the_machine_is_drawn_as_measured_and_the_twin_as_estimated(recorded, es
 
 
 def test_the_text_has_the_verdict_and_the_accepted_findings(recorded):
-    texts = [row[0] for part in recorded["/verdict", "text"] for row in part.to_pylist()]
-    assert "consistent" in texts[-1]
-    assert "Accepted findings of `log check`: gaps." in texts[-1]
+    *_, (text,) = rows_of(recorded, "/verdict", "TextDocument:text")
+    assert "consistent" in text
+    assert "Accepted findings of `log check`: gaps." in text
