@@ -47,11 +47,12 @@ def test_a_level_captures_the_rows_around_its_crossing(chunk, edge, event):
 
 
 @pytest.mark.parametrize("chunk", [1, 20, 1000])
-def test_an_early_event_has_fewer_rows_before_it(chunk):
-    rows = table(0, 500)
-    rows["allocation_scale"][40:60] = 0.7
-    capture = captured(Trigger("saturation", before_s=0.1, length_s=0.2), rows, chunk)
-    np.testing.assert_allclose(capture.read()["t_s"].reshape(-1), 1e-3 * np.arange(0, 140))
+@pytest.mark.parametrize(("before_s", "length_s", "rows"), [(0.1, 0.2, (0, 140)), (0.0, 0.02, (40, 60))])
+def test_an_early_event_has_fewer_rows_before_it_or_none(chunk, before_s, length_s, rows):
+    history = table(0, 500)
+    history["allocation_scale"][40:60] = 0.7
+    capture = captured(Trigger("saturation", before_s=before_s, length_s=length_s), history, chunk)
+    np.testing.assert_allclose(capture.read()["t_s"].reshape(-1), 1e-3 * np.arange(*rows))
 
 
 def test_lost_rank_is_no_saturation():
@@ -72,13 +73,6 @@ def test_a_fault_that_begins_triggers_also_when_its_columns_are_new():
     failing["fault"][:] = 2.0
     present.write(failing)  # it has begun before
     assert present.state == "armed"
-
-
-def test_a_capture_without_rows_before():
-    rows = table(0, 100)
-    rows["allocation_scale"][40:] = 0.7
-    capture = captured(Trigger("saturation", before_s=0.0, length_s=0.02), rows, 7)
-    np.testing.assert_allclose(capture.read()["t_s"].reshape(-1), 1e-3 * np.arange(40, 60))
 
 
 @pytest.mark.parametrize(

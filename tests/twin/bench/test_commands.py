@@ -1,10 +1,8 @@
 """Commands of a bench: their effects, their refusals, and that no command ends the bench."""
 
-import json
 import math
 import threading
 
-import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -15,7 +13,7 @@ from spheretwin.bench.command_queue import MOST_WAITING, Queue, QueuedCommand
 from spheretwin.bench.commands import COMMANDS
 from spheretwin.models.base.errors import InputError, SpheretwinError
 from spheretwin.session import Session
-from tests.twin.bench.cases import MODES, begun, bench, done, said
+from tests.twin.bench.cases import MODES, begun, done, paused, said
 
 
 @pytest.fixture(scope="module")
@@ -24,30 +22,12 @@ def common():
         yield made
 
 
-def test_time_runs_after_start():
-    with bench() as made:
-        assert made.advance(10) == 0
-        done(made, "step", ticks=3)
-        assert made.advance(10) == 3
-        assert made.advance(10) == 0
-        done(made, "start")
-        assert "while paused" in said(made, "step")
-        assert made.advance(10) == 10
-        done(made, "pause")
-        assert made.advance(10) == 0
-        assert (made.state().tick, made.state().running) == (13, False)
-
-
 @pytest.mark.parametrize(
     ("name", "value"),
     [
         ("controller.law", "magic"),
-        ("disturbance.load", "heavy"),
         ("plant.payload_kg", -1.0),
-        ("plant.engine", "steam"),
-        ("duration", 0.0),
         ("nothing", 1.0),
-        ("sensors.adc.bits", 1.5),
         ("fault", [{"target": "coil.99", "mode": "open"}]),
         ("trajectory.shape", "spiral"),
     ],
@@ -64,6 +44,7 @@ def test_a_value_is_refused_in_the_words_of_the_command_line(common, name, value
 @pytest.mark.parametrize(
     ("name", "arguments", "message"),
     [
+        ("step", {}, "while paused"),
         ("steer", {}, "bench: expected one of start, "),
         ("stpo", {}, "did you mean stop?"),
         (3, {}, "received 3"),
@@ -76,6 +57,11 @@ def test_a_value_is_refused_in_the_words_of_the_command_line(common, name, value
         ("off", {"now": {1, 2}}, "received now"),
         ("point", {"pose_rad": [0, 1]}, "pose_rad"),
         ("point", {"pose_rad": "up"}, "pose_rad"),
+        (
+            "point",
+            {"pose_rad": [0.0, 1.39, 0.0]},
+            "bench: expected β from -1.34626 to 1.34626 rad, received 1.39",
+        ),
         ("jog", {"rates_rad_s": [math.inf, 0, 0]}, "rates_rad_s"),
         ("manual", {"group": 18}, "expected a group from 0 to 17"),
         ("manual", {}, "either currents_A or group"),
@@ -85,13 +71,11 @@ def test_a_value_is_refused_in_the_words_of_the_command_line(common, name, value
             {"name": "disturbance.load", "value": math.nan},
             "disturbance.load: expected a finite number",
         ),
-        ("set", {"name": "manual.currents_A", "value": None}, "expected a mode instead"),
         ("set", {"name": "trajectory.approach.start_s", "value": 1.0}, "expected a mode instead"),
         ("trajectory", {"fields": {"shape": "spiral"}}, "expected one of sinusoid"),
         ("clear_faults", {"place": 0}, "expected the place of a fault below 0"),
         ("record", {}, "expected a file to record into"),
         ("record", {"telemetry": "/no/such/folder/run.parquet"}, "expected a writable path"),
-        ("keep", {}, "expected a recording to keep"),
         ("replay", {"file": "/no/such/run.parquet"}, "/no/such/run.parquet"),
         ("load", {"source": "nowhere"}, "expected bench, hold, nutation"),
         ("save", {"file": "/no/such/folder/s.toml"}, "expected a writable path"),
@@ -136,17 +120,17 @@ def test_the_bench_survives_any_command(common, name, arguments, field):
 
 def test_a_flood_of_moves_is_the_last_of_them():
     with begun() as made:
-        tickets = [made.command("set", name="disturbance.load", value=i * 1e-4) for i in range(10_000)]
-        others = [made.command("jog", rates_rad_s=[0, 0, i * 1e-4]) for i in range(10_000)]
-        assert len({id(ticket) for ticket in tickets}) == 10_000
+        tickets = [made.command("set", name="disturbance.load", value=i * 1e-3) for i in range(1000)]
+        others = [made.command("jog", rates_rad_s=[0, 0, i * 1e-3]) for i in range(1000)]
+        assert len({id(ticket) for ticket in tickets}) == 1000
         made.advance(1)
         assert all(ticket.done and ticket.refused is None for ticket in tickets + others)
         assert made.state().journal == 2
         fields = {name: value for name, value, _ in made.fields()}
-        assert fields["disturbance.load"] == 0.9999
+        assert fields["disturbance.load"] == 0.999
         assert fields["trajectory.shape"] == "sinusoid"
         made.advance(2000)
-        assert made.state().qdot_ref_rad_s == (0.0, 0.0, 0.9999)
+        assert made.state().qdot_ref_rad_s == (0.0, 0.0, 0.999)
 
 
 def test_the_queue_is_bounded():
@@ -170,55 +154,37 @@ def test_a_fixed_field_waits_for_the_reset():
     with begun() as made:
         made.advance(5)
         done(made, "set", name="controller.period_s", value=2e-3)
-        done(made, "set", name="plant.engine", value="mujoco")
-        assert made.state().pending == (("controller.period_s", "0.002"), ("plant.engine", '"mujoco"'))
+        done(made, "set", name="hardware", value="electronics")
+        assert made.state().pending == (("controller.period_s", "0.002"), ("hardware", '"electronics"'))
         assert made.state().period_s == 1e-3
         done(made, "reset")
         assert (made.state().pending, made.state().period_s, made.state().tick) == ((), 2e-3, 0)
-        done(made, "set", name="hardware", value="electronics")
-        done(made, "reset")
         named = scenarios.load("sinusoid", {"hardware": "electronics"})
         fields = {name: value for name, value, _ in made.fields()}
         assert fields["estimator.kind"] == named.estimator.kind
         assert fields["drive.supply_V"] == named.drive.supply_V
-        done(made, "step")
-        made.advance(1)
-        assert len(made.state().temperature_C) == 18
-        done(made, "set", name="hardware", value="ideal")
-        done(made, "reset")
-        done(made, "step")
-        made.advance(1)
-        assert made.state().temperature_C is None
 
 
-def test_faults_come_and_go():
+def test_faults_are_cleared_by_their_place_and_all_at_once():
     with begun() as made:
-        made.advance(100)
-        done(made, "add_fault", fault={"target": "coil.07", "mode": "open"})
-        done(made, "add_fault", fault={"target": "coil.03", "mode": "open", "start_s": 9.0})
-        made.advance(100)
-        assert made.state().faults == ("coil.07 open from 0.1 s", "coil.03 open from 9 s")
-        assert made.state().current_A[7] == 0.0
+        for group, start_s in ((7, 0.0), (3, 9.0), (4, 9.0)):
+            done(made, "add_fault", fault={"target": f"coil.{group:02d}", "mode": "open", "start_s": start_s})
         done(made, "clear_faults", place=0)
-        made.advance(100)
-        assert made.state().faults == ("coil.03 open from 9 s",)
-        assert made.state().current_A[7] != 0.0
+        assert made.state().faults == ("coil.03 open from 9 s", "coil.04 open from 9 s")
         done(made, "clear_faults")
         assert made.state().faults == ()
 
 
 def test_a_run_that_ends_leaves_a_bench_that_a_reset_brings_back():
-    with begun(plant__end_stops__on=False) as made:
+    with begun() as made:
         done(made, "set", name="disturbance.load", value=3.0)
         done(made, "off")
         made.advance(4000)
         state = made.state()
         assert (state.mode, state.status, state.running) == ("fault", "left_workspace", False)
         assert "end of its range" in state.reason
-        for name in MODES:
-            assert "expected reset, as the run has ended" in said(made, name, **MODES[name])
-        for name, ticks in (("start", {}), ("step", {"ticks": 1})):
-            assert "expected reset, as the run has ended" in said(made, name, **ticks)
+        for name, arguments in [*MODES.items(), ("start", {}), ("step", {"ticks": 1})]:
+            assert "expected reset, as the run has ended" in said(made, name, **arguments)
         assert not made.state().running
         done(made, "set", name="disturbance.load", value=0.0)
         assert made.state().pending == (("disturbance.load", "0.0"),)
@@ -230,7 +196,7 @@ def test_a_run_that_ends_leaves_a_bench_that_a_reset_brings_back():
 
 @pytest.mark.parametrize("reset", [False, True])
 def test_a_snapshot_brings_back_a_run_that_has_ended_and_one_before_a_reset(reset):
-    with begun(plant__end_stops__on=False) as made:
+    with begun() as made:
         made.advance(50)
         done(made, "point", **MODES["point"])
         made.advance(50)
@@ -274,7 +240,11 @@ class Broken(LawParameters):
 def test_a_law_that_raises_is_a_fault_that_says_why(tmp_path):
     (tmp_path / "law.py").write_text(BROKEN)
     with begun() as made:
+        assert "law.py" in said(made, "set", name="controller.law", value=f"{tmp_path / 'law.py'}:Nobody")
         done(made, "set", name="controller.law", value=f"{tmp_path / 'law.py'}:Broken")
+        assert made.advance(5) == 5
+        assert made.state().law.endswith("law.py:Broken")
+        assert made.state().torque_command_Nm == (0.0, 0.0, 0.0)
         made.advance(200)
         assert made.state().mode == "fault"
         assert made.state().reason == "RuntimeError: out of ideas"
@@ -285,27 +255,8 @@ def test_a_law_that_raises_is_a_fault_that_says_why(tmp_path):
         assert made.advance(100) == 100
 
 
-def test_a_user_s_law_runs_and_its_errors_are_reported(tmp_path):
-    (tmp_path / "law.py").write_text(BROKEN)
-    with begun() as made:
-        assert "law.py" in said(made, "set", name="controller.law", value=f"{tmp_path / 'law.py'}:Nobody")
-        done(made, "set", name="controller.law", value=f"{tmp_path / 'law.py'}:Broken")
-        assert made.advance(5) == 5
-        assert made.state().law.endswith("law.py:Broken")
-        np.testing.assert_array_equal(made.state().torque_command_Nm, 0.0)
-
-
-def test_another_scenario_is_loaded_with_overrides():
-    with begun() as made:
-        made.advance(10)
-        done(made, "load", source="tilt", overrides={"controller.law": "pd", "plant.engine": "lagrangian"})
-        state = made.state()
-        assert (state.scenario, state.law, state.shape, state.tick) == ("tilt", "pd", "tilt", 0)
-        assert json.loads(json.dumps(state.pending)) == []
-
-
 def test_advance_is_refused_while_the_thread_runs():
-    with bench() as made:
+    with paused() as made:
         made.begin()
         with pytest.raises(SpheretwinError, match="received one at work"):
             made.advance(1)
@@ -326,22 +277,13 @@ def test_a_snapshot_can_be_restored_again_with_the_fields_that_waited():
 
 
 def test_the_number_of_snapshots_is_bounded_and_a_name_can_be_used_again():
-    with bench() as made:
+    with paused() as made:
         for place in range(16):
             done(made, "snapshot", name=f"{place}")
         message = "bench: expected at most 16 snapshots, received one more"
         assert said(made, "snapshot", name="16") == message
         done(made, "snapshot", name="15")
         assert made.state().snapshots == tuple(f"{place}" for place in range(16))
-
-
-def test_a_note_ends_with_the_run_that_it_is_about():
-    with begun() as made:
-        assert made.state().note is None
-        done(made, "stop")
-        assert made.state().note == "STOP: zero currents until reset"
-        done(made, "reset")
-        assert made.state().note is None
 
 
 @pytest.mark.parametrize("current_A", [0.5, -1.5])

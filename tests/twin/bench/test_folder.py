@@ -9,7 +9,7 @@ from spheretwin import scenario as scenarios
 from spheretwin.bench import Bench
 from spheretwin.bench.folder import Folder
 from spheretwin.models.base.errors import InputError
-from tests.twin.bench.cases import QUIET, begun, done, said
+from tests.twin.bench.cases import FREE, begun, done, said
 
 LAW = """
 def still(t, reference, measurement, parameters, state, torque):
@@ -109,7 +109,7 @@ def test_two_benches_never_claim_the_same_name(folder):
 
 
 def test_a_second_recording_and_a_second_scenario_get_numbers(tmp_path):
-    scenario = scenarios.load("sinusoid", QUIET)
+    scenario = scenarios.load("sinusoid", FREE)
     with Bench(scenario, folder=Folder(tmp_path, scenario)) as bench:
         done(bench, "start")
         for _ in range(2):
@@ -129,9 +129,9 @@ FILES = (("run", "parquet"), ("mine", "toml"))
 
 def test_no_empty_file_is_left_of_what_was_refused(tmp_path):
     with begun() as bench:
-        assert "a separate path" in said(
-            bench, "record", recording=str(tmp_path / "a"), telemetry=str(tmp_path / "a")
-        )
+        for recording, refused in ((tmp_path / "a", "a separate path"), (tmp_path / "no" / "b", "writable")):
+            paths = {"recording": str(recording), "telemetry": str(tmp_path / "a")}
+            assert refused in said(bench, "record", **paths)
         done(bench, "record", telemetry=str(tmp_path / "run.parquet"))
         assert "expected keep before" in said(bench, "record", recording=str(tmp_path / "b.rrd"))
         bench.advance(10)

@@ -9,7 +9,6 @@ from spheretwin.bench.history import TEMPERATURE, History, LENGTH_s, RATE_Hz
 from spheretwin.metrics import CurrentVariation
 from spheretwin.models.telemetry.signals import Signal, common_signals, width
 from spheretwin.models.telemetry.table import Table
-from tests.twin.bench.cases import begun
 
 GROUPS = 18
 
@@ -19,24 +18,6 @@ def table(rows, more=()):
     made = Table(signals, np.zeros((rows, width(signals))))
     made["t_s"][:] = 1e-3 * np.arange(rows)
     return made
-
-
-def test_the_bins_are_independent_of_chunks():
-    results = []
-    for chunk in (1, 7, 600):
-        with begun() as made:
-            for _ in range(600 // chunk):
-                made.advance(chunk)
-            made.advance(600 % chunk)
-            results.append(made.bins())
-    np.testing.assert_allclose(results[0].rows["t_s"], 0.02 * np.arange(30), rtol=1e-12)
-    for other in results[1:]:
-        assert other.numbers == results[0].numbers
-        for field in ("rows", "low", "high"):
-            first = getattr(results[0], field)
-            assert {name: values.tobytes() for name, values in getattr(other, field).items()} == {
-                name: values.tobytes() for name, values in first.items()
-            }
 
 
 def test_the_history_is_bounded_and_read_from_a_number_on():

@@ -12,7 +12,7 @@ from spheretwin.bench.folder import Folder
 from spheretwin.bench.preparation import Preparation
 from spheretwin.cli.bench import read, settings_of
 from spheretwin.models.base.errors import InputError
-from tests.twin.bench.cases import QUIET, begun, done, said
+from tests.twin.bench.cases import FREE, begun, done, said
 from tests.waiting import PATIENCE_S, wait_for
 
 LAW = """
@@ -35,7 +35,7 @@ class Mine(LawParameters):
 
 def test_code_of_the_user_runs_only_in_threads_of_preparations(tmp_path):
     (file := tmp_path / "law.py").write_text(LAW)
-    scenario = scenarios.load("sinusoid", QUIET)
+    scenario = scenarios.load("sinusoid", FREE)
     with Bench(scenario, folder=Folder(tmp_path, scenario)) as bench:
         bench.begin()
         for name, arguments in (

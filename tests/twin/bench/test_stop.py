@@ -6,16 +6,20 @@ import pytest
 from spheretwin import scenario as scenarios
 from spheretwin.bench import Bench
 from spheretwin.bench.driver import HELD_s
-from tests.twin.bench.cases import begun, done, kept_rows, said, same_when_replayed
+from tests.twin.bench.cases import begun, bench, done, kept_rows, said, same_when_replayed
 
 # Enough to tip the rotor over from any pose, and some friction, so that it comes to rest.
 TIPPING = {"disturbance__load": 0.05, "plant__payload_kg": 0.05, "plant__viscous_Nm_s": [2e-3, 2e-3, 2e-3]}
 
 
+STOPS = pytest.mark.release("compiles a loop of its own for 10 s; tests/twin/plant has its rest")
+
+
+@STOPS
 @pytest.mark.parametrize("command", ["off", "manual", "stop"])
 def test_a_rotor_that_is_let_go_comes_to_rest_at_its_limit(command):
     arguments = {"group": 3, "current_A": 1.0} if command == "manual" else {}
-    with begun("hold", **TIPPING) as bench:
+    with begun("hold", plant__end_stops__on=True, **TIPPING) as bench:
         bench.advance(50)
         done(bench, command, **arguments)
         bench.advance(20_000)
@@ -32,6 +36,7 @@ def test_a_rotor_that_is_let_go_comes_to_rest_at_its_limit(command):
         assert bench.state().error_mrad < 50
 
 
+@STOPS
 def test_the_bench_that_starts_without_arguments_can_be_left_without_currents():
     """No constant load may accelerate the axis without an end until the watchdog ends the run."""
     with Bench(scenarios.load("bench", {"plant.engine": "lagrangian"})) as bench:
@@ -44,14 +49,16 @@ def test_the_bench_that_starts_without_arguments_can_be_left_without_currents():
 
 
 def test_end_stops_are_on_unless_the_scenario_says_otherwise():
-    for given, expected in ((None, True), (False, False), (True, True)):
-        changes = {} if given is None else {"plant__end_stops__on": given}
-        with begun(**changes) as bench:
-            assert ("plant.end_stops.on", expected) in [field[:2] for field in bench.fields()]
-    with begun() as bench:
-        done(bench, "load", source="tilt", overrides={"plant.engine": "lagrangian"})
-        assert ("plant.end_stops.on", True) in [field[:2] for field in bench.fields()]
-        assert "--plant.end-stops.on true" in bench.command_line()
+    for changes, expected in (
+        ({}, True),
+        ({"plant__end_stops__on": False}, False),
+        ({"plant__end_stops__on": True}, True),
+    ):
+        with bench(**changes) as made:
+            assert ("plant.end_stops.on", expected) in [field[:2] for field in made.fields()]
+            done(made, "load", source="tilt", overrides={"plant.engine": "lagrangian"})
+            assert ("plant.end_stops.on", True) in [field[:2] for field in made.fields()]
+            assert "--plant.end-stops.on true" in made.command_line()
 
 
 def test_a_stop_that_holds_brings_the_rotor_to_rest_and_then_switches_off(tmp_path):

@@ -4,7 +4,7 @@ import pytest
 
 from spheretwin.bench.command_queue import Outcome, Ticket, settled_ticket
 from spheretwin.models.base.errors import InputError, SpheretwinError
-from tests.twin.bench.cases import bench
+from tests.twin.bench.cases import paused
 
 
 def test_outcomes_of_waiting_are_distinct():
@@ -16,7 +16,7 @@ def test_outcomes_of_waiting_are_distinct():
 
 @pytest.mark.parametrize("in_thread", [False, True])
 def test_a_script_waits_for_commands_and_conditions(in_thread):
-    with bench() as made:
+    with paused() as made:
         if in_thread:
             made.begin()
         assert made.do("start").running
@@ -32,7 +32,7 @@ def test_a_script_waits_for_commands_and_conditions(in_thread):
 
 
 def test_until_ends_with_the_run_and_with_a_pause():
-    with bench(disturbance__load=1000.0) as made:
+    with paused(disturbance__load=1000.0) as made:
         with pytest.raises(SpheretwinError, match="received a pause"):
             made.until(lambda state: state.t_s > 1.0)
         made.do("start")
@@ -41,7 +41,7 @@ def test_until_ends_with_the_run_and_with_a_pause():
 
 
 def test_a_command_that_is_not_executed_in_time_is_no_refusal(monkeypatch):
-    with bench() as made:
+    with paused() as made:
         monkeypatch.setattr(made._processor, "process", lambda waits: None)
         with pytest.raises(SpheretwinError, match=r"expected hold to be executed within 0\.01 s") as caught:
             made.do("hold", timeout_s=0.01)
