@@ -51,7 +51,8 @@ def nearly(draw, handles):
     """What a page might send but for a detail."""
     kind = draw(KINDS)
     name = st.sampled_from([*handles, "/tip", "/coils", "no such"])
-    three = st.lists(st.floats(), min_size=3, max_size=3)
+    three, middle = st.lists(st.floats(), min_size=3, max_size=3), st.just([0.5, 0.5])
+    scene = {"name": name, "modifier": st.none()}
     fields = {
         "GuiUpdateMessage": {
             "uuid": name,
@@ -59,25 +60,12 @@ def nearly(draw, handles):
         },
         "CommandTriggerMessage": {"uuid": name},
         "GuiFormSubmitMessage": {"uuid": name},
-        "SceneNodeClickMessage": {
-            "name": name,
-            "instance_index": st.integers(-99, 99) | st.none(),
-            "ray_origin": three,
-            "ray_direction": three,
-            "screen_pos": st.just([0.5, 0.5]),
-            "modifier": st.none(),
-        },
-        "SceneNodeDragMessage": {
-            "phase": st.sampled_from(["start", "update", "end", "other"]),
-            "name": name,
-            "instance_index": st.none(),
-            "start_position": three,
-            "start_screen_pos": st.just([0.5, 0.5]),
-            "end_position": three,
-            "end_screen_pos": st.just([0.5, 0.5]),
-            "button": st.just("left"),
-            "modifier": st.none(),
-        },
+        "SceneNodeClickMessage": {"instance_index": st.integers(-99, 99) | st.none()}
+        | {"ray_origin": three, "ray_direction": three, "screen_pos": middle, **scene},
+        "SceneNodeDragMessage": {"phase": st.sampled_from(["start", "update", "end", "other"])}
+        | {"instance_index": st.none(), "button": st.just("left"), **scene}
+        | {f"{end}_position": three for end in ("start", "end")}
+        | {f"{end}_screen_pos": middle for end in ("start", "end")},
     }.get(kind, {"name": name, "uuid": name, "filename": ANYTHING})
     return {"type": kind} | {field: draw(drawn) for field, drawn in fields.items()}
 
@@ -141,18 +129,10 @@ def test_no_message_disables_stop(page, bench):
 
 def test_only_messages_of_a_page_pass():
     value = {"type": "GuiUpdateMessage", "uuid": "a", "updates": {"value": True}}
-    assert moved_thing(msgspec.msgpack.encode(value))
-    assert moved_thing(msgspec.msgpack.encode(CAMERA))
-    click = {
-        "type": "SceneNodeClickMessage",
-        "name": "/coils",
-        "instance_index": 3,
-        "ray_origin": [0.0, 0.0, 0.0],
-        "ray_direction": [0.0, 0.0, 1.0],
-        "screen_pos": [0.5, 0.5],
-        "modifier": None,
-    }
-    assert moved_thing(msgspec.msgpack.encode(click))
+    ray = {"ray_origin": [0.0, 0.0, 0.0], "ray_direction": [0.0, 0.0, 1.0], "screen_pos": [0.5, 0.5]}
+    click = {"type": "SceneNodeClickMessage", "name": "/coils", "instance_index": 3, **ray, "modifier": None}
+    for message in (value, CAMERA, click):
+        assert moved_thing(msgspec.msgpack.encode(message))
     for other in (
         {**click, "screen_pos": [0.5, 0.5, 0.5]},
         {**click, "ray_origin": [0.0, 0.0]},

@@ -13,7 +13,7 @@ from spheretwin.viz.layout.layout import VIEWS
 from spheretwin.viz.layout.view import STYLES, VALUES, VIEW_NAMES, View, application
 from spheretwin.viz.recording import plots
 from spheretwin.viz.recording.recorder import Recorder
-from tests.viz.recording.panels import panels
+from tests.viz.recording.panels import layouts, panels
 
 OPEN = {"target": "coil.00", "mode": "open", "start_s": 0.05, "detection": True}
 
@@ -58,23 +58,6 @@ def recorded(path, name, fields, view="overview"):
 @pytest.fixture(scope="module", params=RUNS)
 def path(request, tmp_path_factory):
     return recorded(tmp_path_factory.mktemp("views") / f"{request.param}.rrd", *RUNS[request.param])
-
-
-def columns(path, store):
-    """Every value of every component, by entity and component."""
-    results = {}
-    for chunk in RrdReader(path).stream(store=store):
-        batch = chunk.to_record_batch()
-        for name in batch.schema.names:
-            if ":" in name:
-                results.setdefault((chunk.entity_path, name), []).extend(batch.column(name).to_pylist())
-    return results
-
-
-def layouts(path):
-    """Layouts of a recording, a brief one of its beginning first."""
-    results = [columns(path, store) for store in RrdReader(path).blueprints()]
-    return sorted(results, key=len)
 
 
 def contents(layout):

@@ -63,13 +63,18 @@ def rows(path, entity, component, field):
     return t_ns[order], whole[order]
 
 
+def layouts(path):
+    """Values of every component of the layouts of a recording, a brief one of its beginning first."""
+    stores = [columns(path, store)[0] for store in RrdReader(path).blueprints()]
+    return [
+        {key: [value for column in parts for value in column.to_pylist()] for key, parts in store.items()}
+        for store in sorted(stores, key=len)
+    ]
+
+
 def panels(path):
     """Plots of the last layout of a recording."""
-    stores = [columns(path, store)[0] for store in RrdReader(path).blueprints()]
-    layout = {
-        key: [value for column in parts for value in column.to_pylist()]
-        for key, parts in max(stores, key=len).items()
-    }
+    *_, layout = layouts(path)
     results = []
     for (view, name), values in layout.items():
         if name != "ViewBlueprint:class_identifier" or values[-1] != ["TimeSeries"]:

@@ -17,6 +17,7 @@ from spheretwin.models.telemetry.table import Table
 from spheretwin.simulation import follow
 from spheretwin.viz.recording import recorder as recording
 from spheretwin.viz.recording.recorder import Recorder
+from spheretwin.viz.recording.stream import PENDING_CHUNKS
 from tests.viz.recording.recordings import recorded, session_and_facts, telemetry_of
 
 
@@ -26,10 +27,11 @@ def test_unwritable_path_is_bad_input(tmp_path, actuator):
         Recorder(actuator, session.signals, facts, path=tmp_path / "missing" / "run.rrd")
 
 
-def test_a_fault_while_recording_is_raised_not_lost(tmp_path):
+def test_a_fault_while_recording_keeps_no_run_waiting_and_is_raised(tmp_path):
     session, facts = session_and_facts()
     recorder = Recorder(session.actuator, session.signals, facts, path=tmp_path / "run.rrd")
-    recorder.write(Table(session.signals, np.full((2, width(session.signals)), np.nan)))
+    for _ in range(3 * PENDING_CHUNKS):
+        recorder.write(Table(session.signals, np.full((2, width(session.signals)), np.nan)))
     with pytest.raises(SpheretwinError, match=r"recording: .*run\.rrd could not be completed") as raised:
         recorder.close()
     (left_over,) = os.listdir(tmp_path)

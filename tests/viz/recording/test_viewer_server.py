@@ -81,17 +81,16 @@ def test_the_program_that_holds_the_files_keeps_nothing_of_its_own(served, home)
     assert list(home.rglob("*")) == []
 
 
-def test_a_missing_program_is_reported(monkeypatch, tmp_path):
-    monkeypatch.setattr(rerun_internals, "PROGRAM", tmp_path / "rerun")
-    with pytest.raises(SpheretwinError, match="expected Rerun's viewer at"):
-        rerun_internals.read_assets()
-
-
-def test_a_program_that_ends_at_once_is_reported(monkeypatch, tmp_path):
-    (program := tmp_path / "rerun").write_text("#!/bin/sh\nexit 1\n")
-    program.chmod(0o755)
-    monkeypatch.setattr(rerun_internals, "PROGRAM", tmp_path / "rerun")
-    with pytest.raises(SpheretwinError, match="expected the files of Rerun's viewer"):
+@pytest.mark.parametrize(
+    ("text", "complaint"),
+    [(None, "Rerun's viewer at"), ("#!/bin/sh\nexit 1\n", "the files of Rerun's viewer")],
+)
+def test_a_program_that_is_missing_or_ends_at_once_is_reported(monkeypatch, tmp_path, text, complaint):
+    monkeypatch.setattr(rerun_internals, "PROGRAM", program := tmp_path / "rerun")
+    if text:
+        program.write_text(text)
+        program.chmod(0o755)
+    with pytest.raises(SpheretwinError, match=f"expected {complaint}"):
         rerun_internals.read_assets()
 
 

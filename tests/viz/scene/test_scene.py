@@ -77,14 +77,6 @@ def test_a_tip_off_the_spin_axis_is_drawn_where_the_engine_has_it(off_axis, q):
     np.testing.assert_allclose(shaft_tip(q, bent)[0], data.site("shaft_tip").xpos, atol=4e-16)
 
 
-def test_a_tip_off_the_spin_axis_circles_as_the_rotor_spins(off_axis):
-    gamma = np.linspace(0, 2 * np.pi, 9)[:-1]
-    tips = shaft_tip(np.stack([0 * gamma, 0 * gamma, gamma], axis=1), off_axis[2])
-    np.testing.assert_allclose(tips[:, 2], 0.11, atol=1e-16)
-    np.testing.assert_allclose(np.hypot(tips[:, 0], tips[:, 1]), np.hypot(0.021, 0.013), rtol=1e-14)
-    np.testing.assert_allclose(tips.mean(axis=0)[:2], 0, atol=1e-16)
-
-
 def positions(drawn):
     """Vertices of a mesh or places of points, (n, 3) in m."""
     batch = drawn.vertex_positions if hasattr(drawn, "vertex_positions") else drawn.positions
