@@ -21,6 +21,7 @@ def test_the_response_of_the_loop_is_the_run():
     np.testing.assert_array_equal(response.outputs[3:].T, table["qdot_rad_s"])
 
 
+@pytest.mark.release("1.1 s; changes with python-control")
 @pytest.mark.uncompiled
 @pytest.mark.parametrize("name", ["sinusoid", "tilt"])
 def test_the_loop_as_a_function_of_its_state_is_the_run(name):

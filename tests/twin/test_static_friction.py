@@ -85,6 +85,9 @@ def test_the_rows_account_for_the_energy_of_friction_and_cable(engine, actuator)
     assert abs(left_J) < 0.3 * abs(unbalanced_J(1e-3)[0])
 
 
+@pytest.mark.release(
+    "compiles loops with static friction for 19 s; test_bristle_friction.py has the elements"
+)
 def test_both_engines_agree_on_a_loop_with_static_friction_and_a_cable():
     one, other = (
         table(1500, "tilt", BOTH | {"plant.engine": engine, "controller.law": "afsm_eso"})
@@ -116,6 +119,9 @@ def test_the_controller_does_not_know_of_them():
         assert stuck.scenario.nominal == free.scenario.nominal
 
 
+@pytest.mark.release(
+    "compiles loops with static friction for 19 s; test_bristle_friction.py has the elements"
+)
 def test_snapshots_and_chunks_continue_bit_for_bit():
     whole = table(400, "tilt", BOTH)
     with session("tilt", BOTH) as first:
@@ -144,6 +150,9 @@ def test_another_level_keeps_the_deflections_and_switching_off_drops_them():
         assert np.abs(run.advance(1)["presliding_rad"]).max() < 1e-5
 
 
+@pytest.mark.release(
+    "compiles loops with static friction for 19 s; test_bristle_friction.py has the elements"
+)
 def test_a_run_with_both_is_replayed_to_the_same_bytes(tmp_path, capsys):
     fields = [
         "--plant.stiction.on", "true", "--plant.coulomb-Nm", "2e-3", "2e-3", "2e-3",
@@ -194,6 +203,9 @@ def test_the_linear_model_has_the_spring_and_the_torque_of_the_cable(actuator):
     np.testing.assert_array_equal(nominal, other)
 
 
+@pytest.mark.release(
+    "compiles loops with static friction for 19 s; test_bristle_friction.py has the elements"
+)
 def test_table_columns_have_labels_and_units():
     run = table(5, "tilt", BOTH)
     assert isinstance(run, Table)

@@ -58,6 +58,7 @@ def tilt(**changes):
     return scenarios.load("tilt", fields | {"controller.law": "pid"} | changes)
 
 
+@pytest.mark.release("a run in plain Python of 3 s; shipped laws receive the same reference")
 @pytest.mark.parametrize("mine", LAWS)
 def test_a_law_of_a_user_s_is_handed_the_governed_reference(mine):
     run = simulate(tilt(**{"controller.governor.acceleration_rad_s2": 5.0}), law=mine)

@@ -61,6 +61,7 @@ class Way:
         return total
 
 
+@pytest.mark.release("1.4 s; the motion with the true model is compared in less")
 @pytest.mark.parametrize("delay_s", [4e-3, 5.2e-3])
 def test_it_is_the_motion_of_the_nominal_model_to_second_order(delay_s, actuator):
     def moving(t, state):

@@ -60,6 +60,7 @@ def test_every_law_imports_only_modules_open_to_user_laws(name):
     assert [module for module in ours if not module.startswith(OPEN_TO_ALL)] == []
 
 
+@pytest.mark.release("compiles every law again for 5 s; test_user_law.py runs laws of files")
 def test_a_shipped_law_runs_as_a_user_s_file():
     path = Path(laws.__file__).with_name("computed_torque.py")
     fields = {"duration": 0.2, "plant.engine": "lagrangian", "controller.stiffness": 2000.0}

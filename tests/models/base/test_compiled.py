@@ -83,7 +83,8 @@ def write_package(root):
     base.mkdir()
     for folder in (models, base):
         (folder / "__init__.py").write_text("")
-    for name in ("cache.py", "compiled.py", "errors.py", "files.py", "compilation.py"):
+    names = ("cache", "compiled", "compilation", "errors", "files", "function_identity")
+    for name in (f"{name}.py" for name in names):
         shutil.copy(SOURCE / name, base)
     shutil.copytree(SOURCE / "numba_internals", base / "numba_internals")
     (models / "callee.py").write_text(

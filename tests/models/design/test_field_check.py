@@ -162,6 +162,7 @@ def test_finer_sums_come_closer(actuator):
     assert distance[2] < distance[0] / 5
 
 
+@pytest.mark.release("sums over all windings for 2 s; content of design_direct_sums has their values")
 def test_wrong_polarity_is_found(compared, actuator):
     polarity = actuator.pole_polarity.copy()
     polarity[5] *= -1

@@ -31,6 +31,7 @@ def test_torque_is_told_by_tilt(surveyed):
     assert broken(verdict.checks) == verdict.warnings == []
 
 
+@pytest.mark.release("surveys the workspace for 1 s; content of design_workspaces has its values")
 def test_weakest_pose_is_the_worst_of_all_tilts(surveyed):
     verdict = torque_map.judge(surveyed)
     weakest = verdict.weakest[0]

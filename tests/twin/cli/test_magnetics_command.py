@@ -93,6 +93,7 @@ def test_user_s_curve_is_judged_in_a_table(capsys, user_csv, monkeypatch, result
     assert "leave-one-out" in out
 
 
+@pytest.mark.release("recomputes curves or fields for 1.4 to 4 s; content of command_magnetics has the texts")
 def test_user_s_curve_is_judged_in_json(capsys, user_csv, monkeypatch, results):
     computed_once(monkeypatch, results, curve_check, "judge")
     code, out, err = here(capsys, "curve", "--csv", user_csv(), "--json")
@@ -144,6 +145,7 @@ def test_computed_curve_gives_its_figures_as_json(capsys, monkeypatch, results):
     assert len(figures["checks"]) == len(computed.checks)
 
 
+@pytest.mark.release("recomputes curves or fields for 1.4 to 4 s; content of command_magnetics has the texts")
 @pytest.mark.usefixtures("few_samples")
 def test_computed_curve_is_written_and_judged(capsys, tmp_path, monkeypatch, results):
     computed_once(monkeypatch, results, curve_check, "compute")
@@ -205,6 +207,7 @@ def test_check_gives_its_verdict_as_json(capsys, one_check, monkeypatch):
     assert figures["sources"] == verdict.sources._asdict()
 
 
+@pytest.mark.release("recomputes curves or fields for 1.4 to 4 s; content of command_magnetics has the texts")
 def test_check_prints_a_table(capsys, one_check):
     code, out, err = here(capsys, "check", "--poses", 2, "--seed", 5)
     assert (code, err) == (0, "")
@@ -322,6 +325,7 @@ def test_page_of_a_map_names_a_need_that_is_not_met(capsys, tmp_path):
     assert "**Exceeded bounds: need.**" in (tmp_path / "magnetics_map.md").read_text(encoding="utf-8")
 
 
+@pytest.mark.release("recomputes curves or fields for 1.4 to 4 s; content of command_magnetics has the texts")
 def test_map_gives_its_verdict_as_json(capsys, actuator):
     code, out, err = here(capsys, "map", "--largest-tilt", 2, "--json")
     assert (code, err) == (0, "")

@@ -70,6 +70,7 @@ def test_reproduce(checker, capsys, monkeypatch, name):
     assert checker.tables >= 1
 
 
+@pytest.mark.release("0.7 s; the other verbs have the width in less")
 def test_magnetics_map(checker):
     cli.main(["magnetics", "map", "--largest-tilt", "6"])
     assert checker.tables >= 1

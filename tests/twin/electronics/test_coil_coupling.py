@@ -146,6 +146,7 @@ def test_all_groups_at_limits_are_the_matrix_exponential():
     np.testing.assert_allclose(orders(errors)[1:], 2, atol=0.1)
 
 
+@pytest.mark.release("1.2 s; two coils at a limit have an exact solution")
 def test_groups_that_reach_and_leave_limits_converge_to_a_solver_without_steps():
     generator = np.random.default_rng(5)
     groups = [0, 1, 2, 6, 12, 13]

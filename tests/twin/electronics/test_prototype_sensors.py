@@ -119,6 +119,7 @@ def test_hardware_that_is_none_is_refused():
         session.set("hardware", "ideal")
 
 
+@pytest.mark.release("1.3 s of plain Python; test_the_prototype_is_its_plain_copy has plain loops")
 @pytest.mark.uncompiled
 def test_a_plain_law_runs_under_it_too():
     from spheretwin.control.law import Law

@@ -102,6 +102,7 @@ HEAT = {
 }
 
 
+@pytest.mark.release("compiler, 2 s; test_steps_are_those_of_the_plant_step has the same code")
 @needs_c_compiler
 @pytest.mark.uncompiled
 @pytest.mark.parametrize(

@@ -139,6 +139,7 @@ def test_copied_data_goes_on_alone(model, simulations):
     np.testing.assert_array_equal(first.qpos, second.qpos)
 
 
+@pytest.mark.release("0.8 s; changes with MuJoCo")
 def test_memory_of_deleted_data_is_released(model):
     mujoco.MjData(model)
     gc.collect()

@@ -290,6 +290,7 @@ def test_full_current_is_below_what_any_law_reaches_with_bounded_allocation(shor
         assert min(reached) > 0.9 * limits["least_norm"]
 
 
+@pytest.mark.release("runs all rivals for 14 s; content of paper_rivals has the figure")
 def test_a_figure_has_a_line_a_law_and_the_floors(short):
     from spheretwin.paper import rivals
 

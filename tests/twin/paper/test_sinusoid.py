@@ -66,6 +66,7 @@ def test_rows_have_what_is_printed_and_a_lost_run_is_a_row(figure7):
         assert row["current_variation_A_s"] > 0
 
 
+@pytest.mark.release("1.4 s; content of figure 7 has the rows")
 def test_order_and_growth_of_the_paper_are_reproduced_and_its_sizes_are_not(figure7):
     order, sizes, lost, growth = EXPERIMENT_7.findings(figure7[1])
     assert order.reproduced

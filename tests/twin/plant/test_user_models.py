@@ -134,6 +134,7 @@ def test_a_run_is_what_the_stock_engine_makes_of_its_torques(written, case, para
     np.testing.assert_array_equal(finished.telemetry["q_rad"], replayed(path, finished.telemetry))
 
 
+@pytest.mark.release("4 s of plain Python; test_a_run_is_what_the_stock_engine_makes has compiled laws")
 def test_a_law_in_plain_python_meets_the_same_physics(written):
     path = written(models.CASES["frictionloss"].edits)
     law = Law("constant", constant_torque.py_func, TORQUE_Q, np.zeros(0))

@@ -153,6 +153,7 @@ def test_the_page_counts_rows_that_remain_and_rows_that_were_not_requested(
     assert re.findall(r"of the study's (\d+) rows", text) == beyond
 
 
+@pytest.mark.release("1 s; content of study pages has the text")
 def test_the_page_tells_of_a_study(tmp_path):
     chosen = loads(axis=[*LOADS, values("plant.payload_kg", 0.0, -1.0)])
     reported = run_rows(chosen, tmp_path)

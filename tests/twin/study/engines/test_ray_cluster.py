@@ -77,6 +77,9 @@ def test_a_node_that_is_killed_half_way_loses_nothing(study, machines, wanted, t
     assert stored.name == next((wanted / "telemetry").iterdir()).name
 
 
+@pytest.mark.release(
+    "a Ray cluster for 15 s and more; test_ray_batches.py and test_ray_refusals.py need none"
+)
 def test_a_fault_on_a_node_stops_the_study_and_keeps_what_is_finished(study, machines, tmp_path, monkeypatch):
     carried_out = ray_worker.run_batch
 
