@@ -158,9 +158,10 @@ def test_a_run_without_a_tick_is_reviewed(tmp_path):
         assert (reviewed["rows"], reviewed["max_abs_error_rad"], reviewed["energy_J"]) == (0, None, None)
 
 
-@pytest.mark.release(
-    "cuts recordings for 2 to 3 s; test_a_process_that_was_killed_leaves_both_files_readable has one"
-)
+OF_CUTS = pytest.mark.release("cuts recordings for 2 to 3 s; test_a_process_that_was_killed_* has one cut")
+
+
+@OF_CUTS
 def test_wherever_a_recording_is_cut_its_whole_ticks_are_read(files, tmp_path):
     """A killed process has no footer, and may have half a message."""
     whole, content = read(files[1]).table, files[1].read_bytes()
@@ -185,9 +186,7 @@ def test_wherever_a_recording_is_cut_its_whole_ticks_are_read(files, tmp_path):
     assert rows[-1] == len(whole)
 
 
-@pytest.mark.release(
-    "cuts recordings for 2 to 3 s; test_a_process_that_was_killed_leaves_both_files_readable has one"
-)
+@OF_CUTS
 def test_half_of_the_last_rows_are_no_rows(files, tmp_path):
     """Cut anywhere in the rows that were recorded last; behind them stands the layout."""
     content, sizes = files[1].read_bytes(), set()

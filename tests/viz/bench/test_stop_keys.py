@@ -8,6 +8,7 @@ from tests.viz.bench.on_page import at_rest, opened, show_tab
 from tests.waiting import wait_for
 
 pytestmark = needs_a_browser
+IN_A_BROWSER = pytest.mark.release("browser, 4 to 8 s; two tests of this file have STOP in a page")
 
 TABS = ("move", "law", "twin", "faults", "files")
 
@@ -39,9 +40,7 @@ def text_in(tab, place):
     return tab.evaluate(f"focusable[{place}].value")
 
 
-@pytest.mark.release(
-    "browser, 4 to 8 s; test_a_held_key_is_one_stop_and_the_button_acts_by_the_mouse has STOP in a page"
-)
+@IN_A_BROWSER
 @pytest.mark.parametrize("shown", TABS)
 def test_stop_acts_from_every_element_that_can_have_the_focus(tab, page, bench, shown):
     show_tab(tab, shown)
@@ -68,9 +67,7 @@ def test_stop_acts_from_every_element_that_can_have_the_focus(tab, page, bench, 
     assert not tab.evaluate("document.querySelector('[role=option]')?.getClientRects().length")
 
 
-@pytest.mark.release(
-    "browser, 4 to 8 s; test_a_held_key_is_one_stop_and_the_button_acts_by_the_mouse has STOP in a page"
-)
+@IN_A_BROWSER
 def test_stop_acts_over_a_dialog(tab, page, bench):
     gui = page._server.gui
     with gui.add_modal("a dialog"):
@@ -114,9 +111,7 @@ def test_stop_waits_for_a_channel_that_is_being_opened_again(browser):
         tab.close()
 
 
-@pytest.mark.release(
-    "browser, 4 to 8 s; test_a_held_key_is_one_stop_and_the_button_acts_by_the_mouse has STOP in a page"
-)
+@IN_A_BROWSER
 def test_heartbeats_state_the_page(browser):
     bench = fake.Bench()
     beats, command = [], bench.command

@@ -147,13 +147,6 @@ def test_the_map_is_the_mean_of_each_cell_and_its_lane_the_deviation(recording, 
         # A mean that is summed in another order may round to the next colour.
         difference = np.array([drawn[place] for place in order]) ^ np.array(packed(expected))
         assert np.mean(difference != 0) < 0.01
-    square, zero = (
-        theme.current_colours(mean[:, :1], LIMIT_A).astype(int),
-        theme.current_colours(np.zeros(1), 1.0),
-    )
-    # A square wave has a mean near zero: its cells are neutral, and the lane shows that it is not calm.
-    assert np.abs(square[2:-2] - zero).max() < 4
-    assert deviation[2:-2].min() > 0.1 * LIMIT_A
 
 
 @pytest.mark.parametrize("rate_Hz", [None, 60.0], ids=["every row", "60 Hz"])

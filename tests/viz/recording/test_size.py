@@ -23,20 +23,14 @@ def size_and_raw(path, duration_s, rate_Hz):
 
 # Shares of the raw numbers: 760 bytes a row that do not compress. Every row has 13 derived quantities
 # in single precision, 18 bars in half precision and 18 colours: 142 bytes, and some 40 of times and places.
-# Of 1000 rows a second, 60 and those that stand out are a tenth.
-@pytest.mark.parametrize(("rate_Hz", "share"), [(None, 1.2), (60.0, 0.15)])
-def test_pictures_take_a_bounded_share_of_the_numbers(tmp_path, monkeypatch, rate_Hz, share):
+# Of 1000 rows a second, 60 and those that stand out are a tenth. Telemetry, poses, traces, map and states fit
+# into what the compression of the numbers saves.
+@pytest.mark.parametrize(
+    ("rate_Hz", "share", "absent"), [(None, 1.2, ()), (60.0, 0.15, ()), (None, 1.0, (CoilCurrents, PlotData))]
+)
+def test_pictures_take_a_bounded_share_of_the_numbers(tmp_path, monkeypatch, rate_Hz, share, absent):
     monkeypatch.setattr(plots, "OPENED_AFTER_s", np.inf)  # a slow machine would add a layout
+    monkeypatch.setattr(stream, "PARTS", [part for part in stream.PARTS if part not in absent])
     brief, long = (size_and_raw(tmp_path / f"{each:g}.rrd", each, rate_Hz) for each in (10.0, 20.0))
     grown, raw = long - brief
     assert grown <= share * raw
-
-
-def test_all_but_what_every_tick_draws_grows_no_faster_than_the_numbers(tmp_path, monkeypatch):
-    """Telemetry, poses, traces, map and states fit into what the compression of the numbers saves."""
-    monkeypatch.setattr(
-        stream, "PARTS", [part for part in stream.PARTS if part not in (CoilCurrents, PlotData)]
-    )
-    brief, long = (size_and_raw(tmp_path / f"{each:g}.rrd", each, None) for each in (10.0, 20.0))
-    grown, raw = long - brief
-    assert grown <= raw

@@ -4,7 +4,6 @@ import io
 
 import numpy as np
 import pytest
-import rerun as rr
 import trimesh
 
 from spheretwin.models import actuator as actuators
@@ -33,16 +32,3 @@ def test_meshes_of_more_vertices_than_two_bytes_count_are_whole(count):
     result = read_back(gltf.binary(positions, triangles))
     np.testing.assert_array_equal(result.vertices, positions.astype(np.float32))
     np.testing.assert_array_equal(result.faces, triangles)
-
-
-def test_what_is_fixed_in_three_dimensions_takes_half_a_megabyte(tmp_path):
-    meshes = read_meshes(actuators.MJCF_PATH)
-    with rr.RecordingStream("meshes") as recording:
-        recording.set_sinks(rr.FileSink(tmp_path / "meshes.rrd"))
-        recording.log("coils", meshes.coils, static=True)
-        for entity, piece in meshes.others.items():
-            recording.log(entity, *piece.archetypes(), static=True)
-        recording.flush()
-        recording.disconnect()
-    # Half of what a recording may have beside its rows: layouts and texts need the rest.
-    assert (tmp_path / "meshes.rrd").stat().st_size < 500_000

@@ -2,6 +2,8 @@
 
 import sys
 
+import pytest
+
 from spheretwin.models.base.compilation import report
 from spheretwin.viz.terminal.compilation import PAUSE_s, announced
 
@@ -18,15 +20,10 @@ def test_a_terminal_gets_a_start_progress_and_an_end(monkeypatch, capsys):
     assert third.startswith("spheretwin: 3 functions were compiled")
 
 
-def test_nothing_is_said_of_machine_code_from_the_cache(monkeypatch, capsys):
-    monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
+@pytest.mark.parametrize(("terminal", "names"), [(True, []), (False, ["first"])])
+def test_nothing_is_said_of_machine_code_from_the_cache_or_to_a_pipe(monkeypatch, capsys, terminal, names):
+    monkeypatch.setattr(sys.stderr, "isatty", lambda: terminal)
     with announced():
-        pass
-    assert capsys.readouterr().err == ""
-
-
-def test_files_and_pipes_get_nothing(monkeypatch, capsys):
-    monkeypatch.setattr(sys.stderr, "isatty", lambda: False)
-    with announced():
-        report("first")
+        for name in names:
+            report(name)
     assert capsys.readouterr().err == ""

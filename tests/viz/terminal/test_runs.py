@@ -33,11 +33,6 @@ SUMMARY = {
 }
 
 
-@pytest.fixture(autouse=True)
-def piped(monkeypatch):
-    monkeypatch.delenv("COLUMNS", raising=False)
-
-
 def test_a_failure_stands_out_in_a_terminal(capsys, monkeypatch):
     monkeypatch.setenv("FORCE_COLOR", "1")
     monkeypatch.setenv("TERM", "xterm")

@@ -1,7 +1,6 @@
-"""Tables in a pipe and in a narrow terminal, and numbers of three digits."""
+"""Tables in a pipe and in a narrow terminal."""
 
 import numpy as np
-import pytest
 
 from spheretwin.models.base.checks import Check
 from spheretwin.viz.terminal import tables
@@ -15,23 +14,6 @@ def test_a_pipe_gets_plain_text_of_a_width_that_can_be_read(monkeypatch, capsys)
     assert "\x1b" not in out
     assert max(map(len, out.splitlines())) <= tables.WIDTH_WITHOUT_TERMINAL
     assert set("─━│┃").isdisjoint(out)
-
-
-@pytest.mark.parametrize(
-    ("value", "text"),
-    [
-        (1261.3, "1260"),
-        (30.24, "30.2"),
-        (0.10451, "0.105"),
-        (0.99951, "1.000"),  # rounding may add a place
-        (-2.5, "-2.50"),
-        (0.0, "0"),
-        (1e-9, "< 0.001"),
-        (np.inf, "–"),
-    ],
-)
-def test_figures_have_three_significant_digits(value, text):
-    assert tables.three_digits(value) == text
 
 
 def test_a_title_is_not_wrapped_to_a_narrow_table(monkeypatch, capsys):
