@@ -52,6 +52,14 @@ def compiled_law(name="mine"):
 OWN = {"plain": plain_law, "compiled": compiled_law}
 
 
+def write_curve(path, curve, factor=1.0):
+    """Write a torque curve times a factor to a file; return its path as text."""
+    samples = zip(np.degrees(curve.phi_rad).tolist(), (factor * curve.torque_Nm_per_A).tolist(), strict=True)
+    lines = ["phi_deg,torque_Nm_per_A", *(f"{phi!r},{torque!r}" for phi, torque in samples)]
+    path.write_text("\n".join(lines))
+    return str(path)
+
+
 def same_future(one, other, ticks=200):
     assert (one.tick, one.journal, one.scenario, one.signals) == (
         other.tick, other.journal, other.scenario, other.signals,
