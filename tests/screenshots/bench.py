@@ -20,7 +20,7 @@ from spheretwin.viz.bench import server
 from spheretwin.viz.bench.page import Page
 from tests.browser import Browser
 from tests.viz.bench.on_page import on_screen, opened
-from tests.waiting import PATIENCE_S
+from tests.waiting import UNLIMITED_S
 
 # The picture is drawn, its camera is told, and what is not of the bench is gone.
 READY_S = 2.0
@@ -42,7 +42,7 @@ def open_bench(
     ended = threading.Event()
     scenario = scenarios.load(run[0], reading.overrides(run[1:]))
     with (
-        Bench(scenario, Operators(silence_s=PATIENCE_S)) as bench,
+        Bench(scenario, Operators(silence_s=UNLIMITED_S)) as bench,
         Page(bench, choices_of(bench), server.listen(0)) as page,
     ):
         bench.begin()

@@ -114,8 +114,8 @@ class Ticket:
         """True if it no longer waits."""
         return self._done.is_set()
 
-    def wait(self, timeout_s: float = 5.0) -> Outcome:
-        """Wait until it is executed or refused; `refused` has the reason of a refusal."""
+    def wait(self, timeout_s: float | None = 5.0) -> Outcome:
+        """Wait until it is executed or refused, at most for a time; `refused` has the reason of a refusal."""
         if not self._done.wait(timeout_s):
             return Outcome.TIMED_OUT
         return Outcome.DONE if self.refused is None else Outcome.REFUSED

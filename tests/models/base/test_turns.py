@@ -6,7 +6,6 @@ from concurrent.futures import ThreadPoolExecutor
 import pytest
 
 from spheretwin.models.base.turns import outside_turn, turn
-from tests.waiting import PATIENCE_S
 
 
 def test_one_thread_at_a_time_has_the_turn():
@@ -33,18 +32,18 @@ def test_another_thread_has_the_turn_while_the_first_is_outside_of_its_own():
         with turn():
             with outside_turn:
                 first_is_outside.set()
-                assert second_is_done.wait(PATIENCE_S)
+                second_is_done.wait()
             order.append("first again")
 
     def second():
-        assert first_is_outside.wait(PATIENCE_S)
+        first_is_outside.wait()
         with turn():
             order.append("second")
         second_is_done.set()
 
     with ThreadPoolExecutor(2) as pool:
         for each in [pool.submit(first), pool.submit(second)]:
-            each.result(PATIENCE_S)
+            each.result()
     assert order == ["second", "first again"]
 
 
@@ -58,7 +57,7 @@ def test_a_thread_without_a_turn_waits_for_none_outside():
     with turn():
         thread = threading.Thread(target=other)
         thread.start()
-        assert entered.wait(PATIENCE_S)
+        entered.wait()
     thread.join()
 
 
@@ -68,7 +67,7 @@ def test_an_exception_ends_the_turn():
     with pytest.raises(ZeroDivisionError), turn(), outside_turn:
         raise ZeroDivisionError
     with ThreadPoolExecutor(1) as pool:
-        assert pool.submit(has_had_the_turn).result(PATIENCE_S)
+        assert pool.submit(has_had_the_turn).result()
 
 
 def has_had_the_turn():

@@ -3,9 +3,9 @@
 import pytest
 
 from spheretwin.bench import preparation
-from tests.waiting import PATIENCE_S
+from tests.waiting import UNLIMITED_S
 
 
 @pytest.fixture(autouse=True)
 def _patience(monkeypatch):
-    monkeypatch.setattr(preparation, "LIMIT_s", PATIENCE_S)
+    monkeypatch.setattr(preparation, "LIMIT_s", UNLIMITED_S)

@@ -21,7 +21,6 @@ from tests.twin.machine.link.lines import (
     heat,
     machine_channel,
 )
-from tests.waiting import PATIENCE_S
 
 TICKS, STOPPED = 60, 20
 
@@ -56,7 +55,7 @@ def test_the_page_s_commands_drive_a_machine():
         bench.advance(STOPPED)
         assert not any(bench.state().current_command_A)
     link.release()
-    thread.join(PATIENCE_S)
+    thread.join()
     (table,) = rows
     assert np.all(np.any(table["current_command_A"][:TICKS], axis=1))
     assert not np.any(table["current_command_A"][TICKS:])

@@ -13,7 +13,7 @@ from spheretwin.bench.preparation import Preparation
 from spheretwin.cli.bench import read, settings_of
 from spheretwin.models.base.errors import InputError
 from tests.twin.bench.cases import FREE, begun, done, said
-from tests.waiting import PATIENCE_S, wait_for
+from tests.waiting import wait_for
 
 LAW = """
 import threading
@@ -47,7 +47,7 @@ def test_code_of_the_user_runs_only_in_threads_of_preparations(tmp_path):
             ("hold", {}),
             ("reset", {}),
         ):
-            assert bench.command(name, **arguments).wait(PATIENCE_S) == "done"
+            assert bench.command(name, **arguments).wait(None) == "done"
         assert settings_of(bench.fields())  # what the page reads
         assert bench.state().law == f"{file}:Mine"
         module = bench._bench_state.driver.session.law.step.__globals__
@@ -93,7 +93,7 @@ def test_a_preparation_that_is_too_late_is_refused_and_its_result_closed():
     assert prepared.done
     assert not work.closed.is_set()
     work.go.set()
-    assert work.closed.wait(PATIENCE_S)
+    work.closed.wait()
 
 
 def test_a_preparation_in_time_gives_its_result_or_its_error():
@@ -116,12 +116,12 @@ def test_stop_does_not_wait_for_a_law_that_never_loads(tmp_path, monkeypatch):
         late = bench.command("set", name="controller.law", value=f"{tmp_path / 'law.py'}:Mine")
         wait_for(lambda: bench._processor._preparing)
         begun_s = time.monotonic()
-        assert bench.command("stop").wait(PATIENCE_S) == "done"
+        assert bench.command("stop").wait(None) == "done"
         assert not late.done or time.monotonic() - begun_s >= 0.5
         assert bench.state().stopped
-        assert late.wait(PATIENCE_S) == "refused"
+        assert late.wait(None) == "refused"
         assert "within 0.5 s" in late.refused
-        assert bench.command("reset").wait(PATIENCE_S) == "done"  # others follow it
+        assert bench.command("reset").wait(None) == "done"  # others follow it
 
 
 def test_a_pipe_is_refused_at_once(tmp_path):

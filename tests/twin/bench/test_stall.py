@@ -9,7 +9,7 @@ import pytest
 from spheretwin.bench import supervisor
 from spheretwin.bench.supervisor import PERIOD_s, Supervisor, TICKS_s, processor_time_s
 from tests.twin.bench.cases import begun, done, kept_rows
-from tests.waiting import PATIENCE_S, wait_for
+from tests.waiting import wait_for
 
 # It waits in its step until the test lets it go: a thread that never returns would stay in this process.
 LAW = """
@@ -33,7 +33,7 @@ def test_a_law_that_does_not_return_stalls_the_loop(tmp_path):
         done(bench, "record", telemetry=str(telemetry))
         bench.begin()
         try:
-            assert law["IN"].wait(PATIENCE_S)
+            assert law["IN"].wait()
             wait_for(lambda: bench.state().mode == "fault")
             state = bench.state()
             assert state.reason.startswith("LOOP STALLED: the law ")
@@ -51,11 +51,11 @@ def test_a_law_that_does_not_return_stalls_the_loop(tmp_path):
             law["GO"].set()
         wait_for(lambda: not bench.stalled)
         ticket = bench.command("hold")
-        assert ticket.wait(PATIENCE_S) == "refused"
+        assert ticket.wait(None) == "refused"
         assert "expected reset" in ticket.refused
-        assert bench.command("set", name="controller.law", value="pd").wait(PATIENCE_S) == "done"
-        assert bench.command("reset").wait(PATIENCE_S) == "done"
-        assert bench.command("start").wait(PATIENCE_S) == "done"
+        assert bench.command("set", name="controller.law", value="pd").wait(None) == "done"
+        assert bench.command("reset").wait(None) == "done"
+        assert bench.command("start").wait(None) == "done"
         wait_for(lambda: bench.state().t_s > 0.1)
         assert bench.state().mode != "fault"
 
@@ -147,7 +147,7 @@ def test_work_that_returns_is_no_stall_and_late_work_is_reported_as_returned():
     assert not returned.is_set()
     watching.begin()
     with watching.limited("work", 0.0):
-        assert in_time.wait(PATIENCE_S)
+        in_time.wait()
     assert returned.is_set()
     watching.end()
 

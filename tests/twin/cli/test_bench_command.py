@@ -20,7 +20,6 @@ from spheretwin.cli import bench
 from spheretwin.models.base.extras import install_command
 from spheretwin.models.telemetry.table import read_parquet
 from spheretwin.viz.bench.page import Page
-from tests.waiting import PATIENCE_S
 
 COMMAND = (sys.executable, "-m", "spheretwin", "bench", "hold", "--plant.engine", "lagrangian")
 
@@ -37,22 +36,6 @@ def test_a_port_in_use_is_told_in_one_line(capsys):
     out, err = capsys.readouterr()
     assert out == ""
     assert err.startswith(f"spheretwin: bench: expected a free port, received {port}")
-    assert err.count("\n") == 1
-
-
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        (["--port", "70000"], "expected a port from 0 to 65535, received 70000"),
-        (["--plant.step-s", "-1"], "plant.step_s: expected"),
-        (["--record", "/no/such/folder/a.rrd"], "/no/such/folder"),
-    ],
-)
-def test_bad_input_is_told_before_anything_is_served(arguments, message, capsys):
-    assert cli.main(["bench", "hold", "--no-browser", *arguments]) == 2
-    out, err = capsys.readouterr()
-    assert out == ""
-    assert message in err
     assert err.count("\n") == 1
 
 
@@ -78,7 +61,7 @@ def test_ctrl_c_ends_it_and_what_was_recorded_is_kept(tmp_path):
         assert again.startswith("bench: for another browser: http://127.0.0.1:")
         assert again.split()[-1] != address
         process.send_signal(signal.SIGINT)
-        out, err = process.communicate(timeout=PATIENCE_S)
+        out, err = process.communicate()
     # On a busy machine the end takes a while, and a line says what a second Ctrl-C would do.
     lines = [line for line in err.splitlines() if "a second Ctrl-C" not in line]
     assert (process.returncode, lines) == (0, ["bench: preparing hold"])
@@ -154,7 +137,7 @@ def test_a_compiled_law_that_never_returns_ends_by_one_ctrl_c_with_complete_file
             assert process.stdout.readline().startswith("bench: http://127.0.0.1:")
             assert process.stdout.readline() == "stalled\n"
             process.send_signal(signal.SIGINT)
-            out, err = process.communicate(timeout=PATIENCE_S)
+            out, err = process.communicate()
         finally:
             process.kill()
     assert process.returncode == 1
@@ -197,12 +180,3 @@ verb.Bench = Scripted
 arguments = ["bench", "hold", "--plant.engine", "lagrangian", "--no-browser", "--port", "0"]
 sys.exit(cli.main([*arguments, *sys.argv[1:]]))
 """
-
-
-def test_a_folder_that_is_none_is_refused(tmp_path, capsys):
-    (tmp_path / "file").write_text("")
-    code = cli.main(
-        ["bench", *COMMAND[4:], "--no-browser", "--port", "0", "--folder", str(tmp_path / "file")]
-    )
-    assert code == 2
-    assert f"bench: expected a folder, received {tmp_path / 'file'}" in capsys.readouterr().err

@@ -19,13 +19,13 @@ from spheretwin.viz.bench import server
 from spheretwin.viz.bench.page import Page
 from tests.browser import Browser, needs_a_browser
 from tests.viz.bench.on_page import STATUS, at_rest, choose, errors, on_screen, opened, show_tab, write
-from tests.waiting import PATIENCE_S, wait_for
+from tests.waiting import UNLIMITED_S, wait_for
 
 pytestmark = needs_a_browser
 
 
 @contextlib.contextmanager
-def driven(scenario, silence_s=PATIENCE_S):
+def driven(scenario, silence_s=UNLIMITED_S):
     """A bench, and a page of it that follows; on a busy machine a page is silent for long."""
     ended = threading.Event()
     with (
@@ -147,7 +147,7 @@ def test_a_frozen_page_is_lost_and_the_twin_holds():
         while bench.state().operator is None:  # a busy page may have been lost before
             bench.command("ask", client="page 0")
         for name, arguments in (("start", {}), ("jog", {"rates_rad_s": [0.0, 0.0, 0.5]})):
-            assert bench.command(name, **arguments).wait(PATIENCE_S) == "done"
+            assert bench.command(name, **arguments).wait(None) == "done"
         tab.evaluate(f"{FREEZE}, true")
         until(bench, lambda state: state.operator is None)
         until(bench, lambda state: state.mode == "hold")

@@ -40,6 +40,7 @@ def test_the_expected_deviation_is_that_of_the_identification(experiment):
         assert experiment.narrower[name] == pytest.approx(experiment.reference[name] / deviation)
 
 
+@pytest.mark.release("1 s; test_the_motion_keeps_the_limits has the design")
 def test_more_candidates_are_not_worse(experiment):
     """The first candidates are the same."""
     more = design(SCENARIO, WANTED, KNOWN, SMALL.model_copy(update={"candidates": 8}))

@@ -62,6 +62,7 @@ def test_the_cut_of_a_log_does_not_change_a_bit(log, model):
     assert running.log_likelihood == whole.log_likelihood
 
 
+@pytest.mark.release("2.2 s; test_identification.py finds delays in less")
 def test_the_delay_is_found(log, model):
     """The model does not know the delay of 1 ms: the fitted shift has it within its interval."""
     fit = fit_noise(log.rows(0, 1500), model._replace(delay_s=0.0))

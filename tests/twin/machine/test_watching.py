@@ -49,6 +49,7 @@ def test_the_sums_show_what_raised_an_alarm():
     assert watch.sums[alarms[0].what] > watch.threshold
 
 
+@pytest.mark.release("1.2 s; test_it_names_what_changed has the alarms")
 def test_a_healthy_machine_is_silent_for_any_cut_of_its_log():
     log = changing_log(8.0, seed=4)
     whole, cut = Watch(SCENARIO, KNOWN), Watch(SCENARIO, KNOWN)

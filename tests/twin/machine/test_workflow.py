@@ -28,6 +28,7 @@ def broken(result):
     return {check.name for check in checks_of(result) if not check.ok} - SHORT
 
 
+@pytest.mark.release("the whole laboratory for 7 s; each of its verbs has tests")
 def test_the_hidden_machine_is_found_followed_and_watched(result):
     """With an experiment of a second: the intervals are wider, and hold the true values all the same."""
     assert broken(result) == set()
@@ -55,6 +56,7 @@ def test_a_wrong_result_breaks_its_check(result):
     assert broken(result._replace(watched=(alarmed, torque, *others))) == {"false alarms"}
 
 
+@pytest.mark.release("1 s; needs the workflow of the test before")
 def test_the_page_has_the_numbers_of_the_results(result, tmp_path):
     paths = workflow_page.write(tmp_path, result, "spheretwin reproduce twin")
     assert {path.name for path in paths} == {"twin.md", "twin.html"}

@@ -10,7 +10,7 @@ import pytest
 
 from spheretwin import cli
 from tests.twin.study.cases import rows_of, run_rows, study, table, values
-from tests.waiting import PATIENCE_S, wait_for
+from tests.waiting import wait_for
 
 PROGRAM = [sys.executable, "-m", "spheretwin"]
 LOADS = [0.1 * place for place in range(60)]
@@ -87,7 +87,7 @@ def test_an_interruption_finishes_the_rows_in_flight_and_writes_the_table(
     folder = tmp_path / "out"
     process = begun([*command, "--threads", "2"], folder)
     process.send_signal(number)
-    out, err = process.communicate(timeout=PATIENCE_S)
+    out, err = process.communicate()
     assert process.returncode == cli.FAILED
     report = json.loads(out)
     assert (
@@ -110,7 +110,7 @@ def test_a_second_process_is_refused_and_the_first_goes_on(tmp_path, command, wh
     assert second == cli.BAD_INPUT
     assert printed.err.startswith("spheretwin: study: expected one process at a time")
     assert printed.err.count("\n") == 1
-    process.communicate(timeout=PATIENCE_S)
+    process.communicate()
     assert process.returncode == cli.DONE
     assert table(folder) == table(whole)
 

@@ -8,8 +8,6 @@ import msgspec
 import viser
 from websockets.sync.client import connect
 
-from tests.waiting import PATIENCE_S
-
 PROTOCOL = f"viser-v{viser.__version__}"
 
 
@@ -33,7 +31,7 @@ def port(page):
 
 def raw_get(page, path="/", **headers):
     """Status, headers and body of an answer; a header that is given takes the place of the usual."""
-    connection = http.client.HTTPConnection("127.0.0.1", port(page), timeout=PATIENCE_S)
+    connection = http.client.HTTPConnection("127.0.0.1", port(page))
     connection.putrequest("GET", path, skip_host="Host" in headers)
     for name, value in headers.items():
         connection.putheader(name, value)
@@ -73,7 +71,7 @@ def page_socket(page):
 def is_alive(page):
     """True if a page that comes now is served, and heard."""
     with page_socket(page) as visitor:
-        return len(visitor.recv(timeout=PATIENCE_S)) > 0
+        return len(visitor.recv()) > 0
 
 
 def handle_of(page, label):

@@ -18,7 +18,7 @@ from spheretwin.viz.bench.connections import CONTROL, MOST_MESSAGES_PER_S, MOST_
 from spheretwin.viz.bench.event_handlers import LATEST_INTERVAL_S
 from spheretwin.viz.bench.viser_internals import moved_thing
 from tests.viz.bench.clients import CAMERA, changed, handle_of, is_alive, page_socket, socket_to
-from tests.waiting import PATIENCE_S, wait_for
+from tests.waiting import wait_for
 
 PLAIN = st.none() | st.booleans() | st.integers(-(2**40), 2**40) | st.floats() | st.text(max_size=20)
 
@@ -72,7 +72,7 @@ def nearly(draw, handles):
 
 def read_for_ever(visitor):
     while True:
-        visitor.recv(timeout=PATIENCE_S)
+        visitor.recv()
 
 
 def handles(page):
@@ -162,7 +162,7 @@ def test_of_a_flood_the_last_move_acts_and_the_socket_stays_open(page, bench):
         # Of what is steered, the bench is told ten times a second.
         assert len(bench.commands()) - before <= 3 + passed_s / LATEST_INTERVAL_S
         assert is_alive(page)
-        flooding.ping().wait(PATIENCE_S)  # it is read to its end, and answers
+        flooding.ping().wait()  # it is read to its end, and answers
 
 
 def test_messages_that_are_no_moves_wait_in_their_socket(page, bench):

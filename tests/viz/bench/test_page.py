@@ -12,7 +12,7 @@ from spheretwin.viz.bench.page import FRAMES_A_SETTING
 from tests.browser import needs_a_browser
 from tests.viz.bench import fake
 from tests.viz.bench.on_page import STATUS, at_rest, on_screen, opened, show_tab, write
-from tests.waiting import PATIENCE_S, wait_for
+from tests.waiting import UNLIMITED_S, wait_for
 
 # Of two colours, as directions: light and shade change their length. Told as they are, they come out pale:
 # copper 0.982, blue 0.91, red 0.87.
@@ -132,7 +132,7 @@ def test_without_an_operator_the_pages_explain_how_to_take_over(browser):
 
 @pytest.mark.release("browser, 3 to 12 s; test_server.py and test_messages.py have the protocol without one")
 def test_a_reloaded_single_page_operates(browser, monkeypatch):
-    monkeypatch.setattr("spheretwin.viz.bench.page.FRESH_S", PATIENCE_S)  # a busy machine opens it slowly
+    monkeypatch.setattr("spheretwin.viz.bench.page.FRESH_S", UNLIMITED_S)  # a busy machine opens it slowly
     bench = fake.Bench(operator="page 7", watching=("page 0",))
     with fake.shown(bench) as page:
         tab = opened(browser, page)

@@ -16,7 +16,6 @@ from spheretwin.viz.bench.connections import CONTROL
 from spheretwin.viz.bench.viser_internals import ServerArguments
 from tests.viz.bench import fake
 from tests.viz.bench.clients import CAMERA, PROTOCOL, cookie, get, is_alive, port, raw_get, socket_to
-from tests.waiting import PATIENCE_S
 
 
 def test_the_page_is_served_to_this_machine(page):
@@ -42,7 +41,7 @@ def test_a_foreign_origin_is_refused(page, origin):
 
 def test_the_own_origin_is_admitted(page):
     with socket_to(page, origin=f"http://localhost:{port(page)}") as visitor:
-        assert visitor.recv(timeout=PATIENCE_S)
+        assert visitor.recv()
 
 
 def test_a_page_of_another_version_is_refused(page, capfd):
@@ -75,7 +74,7 @@ def test_fifty_pages_connect_and_disconnect(page):
     pages = [socket_to(page) for _ in range(50)]
     for visitor in pages:
         visitor.send(msgspec.msgpack.encode(CAMERA))
-    assert all(visitor.recv(timeout=PATIENCE_S) for visitor in pages)
+    assert all(visitor.recv() for visitor in pages)
     for visitor in pages[::2]:
         visitor.socket.shutdown(socket.SHUT_RDWR)  # as a process that is killed does
     assert is_alive(page)

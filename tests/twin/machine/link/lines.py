@@ -9,7 +9,6 @@ from spheretwin.machine.link import frame_format
 from spheretwin.machine.link.channel import Channel
 from spheretwin.machine.link.codec import Codec
 from spheretwin.machine.link.limits import CoilHeat, Limits
-from tests.waiting import PATIENCE_S
 
 GROUPS, PERIOD_s = 18, 1e-3
 OWN = frame_format.load("spheretwin")
@@ -32,7 +31,7 @@ class Line:
     def receive(self, timeout_s):
         try:
             # The tests do not depend on the timeout: it only bounds a hang.
-            return self.source.get(timeout=PATIENCE_S if timeout_s > 0 else 0.001)
+            return self.source.get(timeout=None if timeout_s > 0 else 0.001)
         except queue.Empty:
             return b""
 

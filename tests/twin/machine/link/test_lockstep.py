@@ -17,7 +17,6 @@ from spheretwin.machine.link.machine_server import MachineServer
 from spheretwin.models.base.errors import InputError
 from spheretwin.session import Session
 from tests.twin.machine.link.lines import GROUPS, Line, PERIOD_s, heat
-from tests.waiting import PATIENCE_S
 
 TICKS = 400
 
@@ -43,7 +42,7 @@ class Run:
             self.controller = session.advance(ticks)
             self.status = session.status
         self.link.release()
-        thread.join(PATIENCE_S)
+        thread.join()
 
     def serve(self, scenario, server, ticks):
         with Session(scenario, external=server) as session:
@@ -57,7 +56,7 @@ CONTROLLER = ("t_s", "q_ref_rad", "qdot_ref_rad_s", "torque_command_Nm", "curren
 PLANT = ("t_s", "q_rad", "qdot_rad_s", "error_rad", "torque_Nm", "disturbance_Nm", "current_command_A",
          "current_A", "mean_current_A")  # fmt: skip
 KALMAN = {"estimator.kind": "kalman"}
-PROTOTYPE = {"hardware": "prototype", "plant.engine": "lagrangian"}
+PROTOTYPE = {"hardware": "electronics", "plant.engine": "mujoco"}
 
 
 def check_bytes(run, measured, extra=()):

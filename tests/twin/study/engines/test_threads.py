@@ -8,7 +8,6 @@ from spheretwin.models.base.turns import turn
 from spheretwin.study.engines import threads
 from spheretwin.study.engines.threads import run_each
 from tests.twin.session_cases import session
-from tests.waiting import PATIENCE_S
 
 
 def test_loops_of_two_rows_run_at_the_same_time():
@@ -16,7 +15,7 @@ def test_loops_of_two_rows_run_at_the_same_time():
 
     def meeting(t, reference, measurement, parameters, state, torque):
         if t == 0:
-            both.wait(PATIENCE_S)  # raises if the other loop does not run
+            both.wait()  # raises if the other loop does not run
         torque[:] = 0
 
     def work(number):
@@ -52,10 +51,10 @@ def test_results_are_taken_in_blocks(monkeypatch):
     def pause(time_s):
         pauses.append(time_s)
         asleep.set()
-        assert finished.wait(PATIENCE_S)
+        finished.wait()
 
     def work(number):
-        assert asleep.wait(PATIENCE_S)
+        asleep.wait()
         if number == threads.AHEAD - 1:
             finished.set()
         return -number
