@@ -1,0 +1,50 @@
+"""Calls of the command line in the process of the test."""
+
+import contextlib
+import io
+import json
+from typing import NamedTuple
+
+from spheretwin import cli
+from spheretwin.models.base.errors import LONGEST_LINE
+
+
+class Call(NamedTuple):
+    """Exit code of a call and the text of its two streams."""
+
+    code: int
+    out: str
+    err: str
+
+    @property
+    def json(self):
+        """Return the figures on stdout, which nothing else is on."""
+        return json.loads(self.out)
+
+
+def call(*arguments):
+    """Run the command with these arguments."""
+    with contextlib.redirect_stdout(io.StringIO()) as out, contextlib.redirect_stderr(io.StringIO()) as err:
+        try:
+            code = cli.main([*map(str, arguments)])
+        except SystemExit as end:  # --help and --version end in argparse
+            code = end.code
+    return Call(code, out.getvalue(), err.getvalue())
+
+
+def succeeded(*arguments):
+    """Return the text on stdout of a call that writes nothing to stderr."""
+    result = call(*arguments)
+    assert (result.code, result.err) == (cli.DONE, "")
+    return result.out
+
+
+def refusal(*arguments):
+    """Return the message of a call that is refused: a printable line, alone on stderr."""
+    code, out, err = call(*arguments)
+    assert (code, out) == (cli.BAD_INPUT, "")
+    message = err.removeprefix("spheretwin: ").removesuffix("\n")
+    assert err == f"spheretwin: {message}\n"
+    assert message.isprintable()
+    assert len(message) < LONGEST_LINE + 20
+    return message
