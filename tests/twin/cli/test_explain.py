@@ -139,23 +139,3 @@ def test_the_text_has_the_same_facts_within_80_columns(capsys, monkeypatch):
     assert "plant.coulomb_Nm = 0 0 0 N·m" in lines
     assert "plant.coulomb_Nm = 0.002 0.002 0.002 N·m" in lines
     assert "    origin: default" in lines
-
-
-@pytest.mark.parametrize(
-    ("subject", "message"),
-    [
-        (
-            ["hardware", "proto"],
-            "expected a hardware set of ideal, electronics, prototype, received 'proto';"
-            " did you mean prototype?",
-        ),
-        (["plant.coulomb"], "received 'plant.coulomb'; did you mean plant.coulomb_Nm?"),
-        (["law", "afsm", "x"], "expected hardware NAME, scenario NAME or a field, received 'law afsm x'"),
-        (["scenario", "tylt"], "did you mean tilt?"),
-    ],
-)
-def test_what_is_unknown_is_refused_with_the_nearest_name(capsys, subject, message):
-    assert cli.main(["explain", *subject]) == cli.BAD_INPUT
-    out, err = capsys.readouterr()
-    assert (out, len(err.splitlines())) == ("", 1)
-    assert message in err

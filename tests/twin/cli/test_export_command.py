@@ -70,30 +70,6 @@ def test_c_files_of_both_parts_or_of_one(folder, capsys):
     assert not any("controller" in name or "example" in name for name in names)
 
 
-@pytest.mark.parametrize(
-    ("arguments", "said"),
-    [
-        (["fmu"], "expected SCENARIO, received none"),
-        (["fmu", "nutaton"], "did you mean nutation?"),
-        (["fmu", "hold", "--out", "hold.zip"], "expected --out FILE.fmu, received hold.zip"),
-        (["fmu", "hold", "--fmi", "1"], "expected --fmi 2, 3, received 1"),
-        (["fmu", "hold", "--kind", "cosimulation"], "did you mean co-simulation?"),
-        (["fmu", "hold", "--plant.stiction.on", "true"], "expected smoothed friction"),
-        (["fmu", "hold", "--twin", "none.toml"], "expected a readable TOML file"),
-        (["c", "hold", "--controller.law", "adrc"], "expected a law pd, pid, lqi, afsm, afsm_eso"),
-        (["c", "hold", "--inputs", "torques"], "expected --inputs currents, voltages"),
-        (["fmi", "hold"], "did you mean fmu?"),
-    ],
-)
-def test_bad_input_is_refused_in_one_line(arguments, said, folder, capsys):
-    assert cli.main(["export", *arguments]) == 2
-    printed = capsys.readouterr()
-    assert said in printed.err
-    assert printed.err.count("\n") == 1
-    assert printed.out == ""
-    assert list(folder.glob("*")) == []
-
-
 def test_targets_need_the_extra_and_a_known_name(folder, capsys, monkeypatch):
     monkeypatch.setattr(compiler, "find_spec", lambda name: None)
     assert cli.main(["export", "fmu", "hold", "--target", "x86_64-windows"]) == 2

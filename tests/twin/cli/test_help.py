@@ -64,35 +64,3 @@ def test_the_bench_has_the_same_help(capsys):
     assert len(lines) <= SCREEN
     assert {"--port", "--controller.law"} <= set(flags(lines))
     assert flags(printed(capsys, "bench", "--help", "watchdog"))[0].startswith("--watchdog.")
-
-
-@pytest.mark.parametrize(
-    ("arguments", "hint"),
-    [
-        (["simulte"], "did you mean simulate?"),
-        (["simulate", "sinsoid"], "did you mean sinusoid?"),
-        (["simulate", "hold", "--help", "controler"], "did you mean controller?"),
-        (["simulate", "hold", "--recrod", "a.rrd"], "did you mean --record?"),
-        (["simulate", "hold", "--durtion", "1"], "did you mean --duration?"),
-        (["simulate", "hold", "--view", "overvew"], "did you mean overview?"),
-        (["simulate", "hold", "--contoller.law", "pd"], "did you mean controller?"),
-        (["simulate", "hold", "--controller.lw", "pd"], "did you mean law?"),
-        (["simulate", "hold", "--plant.engine", "mujco"], "did you mean mujoco?"),
-        (["magnetics", "chek"], "did you mean check?"),
-        (["review", "a", "--tolerence", "gate"], "did you mean --tolerance?"),
-        (["sweep", "papr"], "did you mean paper?"),
-        (["reproduce", "figure12"], "did you mean figure11?"),
-        (["review", "a.rrd", "b.rrd", "--tolerance", "gat"], "did you mean gate?"),
-    ],
-)
-def test_a_misspelt_name_has_a_hint(capsys, arguments, hint):
-    assert cli.main(arguments) == cli.BAD_INPUT
-    out, err = capsys.readouterr()
-    assert out == ""
-    assert err.endswith(f"{hint}\n")
-
-
-@pytest.mark.parametrize("arguments", [["fly"], ["simulate", "hold", "--zzz", "1"], ["review", "a", "--zzz"]])
-def test_a_name_that_resembles_none_has_no_hint(capsys, arguments):
-    assert cli.main(arguments) == cli.BAD_INPUT
-    assert "did you mean" not in capsys.readouterr().err

@@ -69,21 +69,6 @@ def machine_column(truth, name):
     return pyarrow.parquet.read_table(truth.with_suffix(".parquet"))[name].to_numpy()
 
 
-@pytest.mark.parametrize(
-    ("flags", "said"),
-    [
-        (["--export-log", "a.csv"], "expected --export-log FILE.parquet"),
-        (["--export-truth", "a.txt"], "expected --export-truth FILE.json"),
-        (["--export-log", "a.parquet", "--export-truth", "a.json"], "expected a separate path"),
-    ],
-)
-def test_paths_of_exports_are_checked(flags, said, tmp_path, monkeypatch, capsys):
-    monkeypatch.chdir(tmp_path)
-    assert cli.main(["simulate", "hold", *flags]) == 2
-    assert said in capsys.readouterr().err
-    assert list(tmp_path.iterdir()) == []
-
-
 def test_an_exported_log_is_accepted(files, capsys):
     assert cli.main(["log", "check", str(files[0])]) == 0
     assert capsys.readouterr().out.startswith(f"{files[0]}: accepted, 1500 rows, 1000 Hz\n")
@@ -121,24 +106,6 @@ def test_a_column_map_is_applied(tmp_path, capsys):
     assert cli.main(["log", "check", str(path), "--columns", str(columns)]) == 0
     assert cli.main(["log", "check", str(path)]) == 2
     assert "expected a column map (--columns MAP.toml)" in capsys.readouterr().err
-
-
-@pytest.mark.parametrize(
-    ("arguments", "said"),
-    [
-        (["check", "missing.csv"], "expected columns of numbers"),
-        (["check", "a.txt"], "expected a file .parquet, .csv or .mcap"),
-        (["check", "a.csv", "--accept", "gap"], "did you mean gaps?"),
-        (["check", "a.csv", "--scenario", "hod"], "did you mean hold?"),
-        (["check", "a.csv", "--columns", "b.toml"], "expected a readable TOML file"),
-        (["chek", "a.csv"], "did you mean check?"),
-        (["check"], "FILE"),
-    ],
-)
-def test_bad_input_is_refused(arguments, said, tmp_path, monkeypatch, capsys):
-    monkeypatch.chdir(tmp_path)
-    assert cli.main(["log", *arguments]) == 2
-    assert said in capsys.readouterr().err
 
 
 @pytest.mark.release("1.2 s; changes with the library of MCAP")

@@ -201,24 +201,3 @@ def test_design_writes_a_scenario_and_its_currents(tmp_path, capsys):
     code, out, _ = run(capsys, "simulate", str(scenario), "--manual.file", str(currents), "--json")
     assert code == 0
     assert json.loads(out)["status"] == "completed"
-
-
-@pytest.mark.parametrize(
-    ("words", "said"),
-    [
-        (["identify", "LOG", "--candidates", "3"], "with --design"),
-        (["identify", "--design", "sinusoid", "hold"], "with one scenario"),
-        (["identify", "LOG", "--parameter", "plant.coulomb"], "did you mean plant.coulomb_Nm"),
-        (["shadow", "missing.parquet"], "missing.parquet"),
-        (["watch", "LOG", "--parameter", "torque"], "received torque"),
-        (["validate", "LOG", "--twin", "missing.toml"], "twin missing.toml"),
-        (["simulate", "hold", "--twin", "missing.toml"], "twin missing.toml"),
-        (["sweep", "paper", "--twin", "missing.toml"], "twin missing.toml"),
-        (["sweep", "paper", "--draws", "3"], "expected --draws with --twin"),
-    ],
-)
-def test_bad_input_is_one_line(log, words, said, capsys):
-    code, out, err = run(capsys, *[log if word == "LOG" else word for word in words])
-    assert (code, out) == (2, "")
-    assert said in err
-    assert err.count("\n") == 1

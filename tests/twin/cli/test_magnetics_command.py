@@ -378,41 +378,6 @@ def test_overlapping_coils_are_named(capsys, coarse, wrong_field, changed_model,
     assert code == (1 if arguments[0] == "check" else 0)
 
 
-# Bad input
-
-
-@pytest.mark.parametrize(
-    ("arguments", "parts"),
-    [
-        (["fly"], ["curve", "check", "map", "fly"]),
-        (["curve", "--csv", "missing.csv"], ["readable", "missing.csv"]),
-        (["curve", "--csv", "{csv}", "--out", "x.csv"], ["--out or --csv", "both"]),
-        (["curve", "--out", "missing/x.csv"], ["writable", "missing"]),
-        (["curve", "--mjcf", "missing.xml"], ["missing.xml"]),
-        (["check", "--poses", "0"], ["poses", "1 to 10000", "0"]),
-        (["check", "--poses", "many"], ["poses", "many"]),
-        (["check", "--seed", "-1"], ["seed"]),
-        (["check", "--csv", "missing.csv"], ["missing.csv"]),
-        (["check", "--colour"], ["--poses", "--colour"]),
-        (["map", "--largest-tilt", "90"], ["0 to 85", "90"]),
-        (["map", "--largest-tilt", "nan"], ["0 to 85", "nan"]),
-        (["map", "--need", "-1"], ["above 0", "-1"]),
-        (["map", "--need", "inf"], ["above 0", "inf"]),
-        (["map", "--out", "{csv}"], ["folder"]),
-        (["map", "now"], ["--largest-tilt", "now"]),
-    ],
-)
-def test_bad_input_is_one_line_and_exit_2(capsys, tmp_path, monkeypatch, user_csv, arguments, parts):
-    monkeypatch.chdir(tmp_path)
-    path = str(user_csv())
-    code, out, err = here(capsys, *(argument.replace("{csv}", path) for argument in arguments))
-    assert (code, out) == (2, "")
-    line = one_line(err)
-    for part in parts:
-        assert part in line
-    assert [each.name for each in tmp_path.iterdir()] == ["bench.csv"]
-
-
 def test_missing_matplotlib_is_named_before_the_work(capsys, tmp_path, monkeypatch):
     monkeypatch.setattr(markdown, "find_spec", lambda name: None)
     code, _, err = here(capsys, "map", "--out", tmp_path / "figures")

@@ -114,35 +114,6 @@ def test_a_run_that_ends_early_exits_1_and_is_named(capsys, monkeypatch):
     assert err == "spheretwin: reproduce: ended early: short: lost (left_workspace)\n"
 
 
-@pytest.mark.parametrize(
-    ("arguments", "parts"),
-    [
-        ([], ["NAME"]),
-        (["figure12"], ["figure11", "budget", "all", "'figure12'", "did you mean figure11?"]),
-        (["figure11", "tilted"], ["'tilted'"]),
-        (["figure11", "--seeds", "0"], ["--seeds", "from 1 to 1000", "0"]),
-        (["figure11", "--seeds", "1001"], ["--seeds", "1001"]),
-        (["figure11", "--limit", "few"], ["--limit", "few"]),
-        (
-            ["figure11", "--colour", "red"],
-            ["--out, --figure-format, --json, --verbose, --seeds, --limit or --plant", "--colour red"],
-        ),
-        (["figure11", "--plant", "water"], ["--plant", "mujoco", "lagrangian", "water"]),
-        (["figure11", "--out", "taken"], ["writable folder", "taken"]),
-    ],
-)
-def test_bad_input_is_one_line_exit_2_and_no_folder(tmp_path, monkeypatch, capsys, arguments, parts):
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "taken").write_text("a file")
-    assert cli.main(["reproduce", *arguments]) == cli.BAD_INPUT
-    out, err = capsys.readouterr()
-    assert out == ""
-    (line,) = err.splitlines()
-    for part in parts:
-        assert part in line
-    assert [path.name for path in tmp_path.iterdir()] == ["taken"]
-
-
 def test_a_law_without_what_a_figure_varies_is_bad_input(tmp_path, monkeypatch, capsys):
     case = IDEAL._replace(fields={"controller.law": "pd", "controller.surface_slope": 5.0})
     monkeypatch.setitem(reproduce.EXPERIMENTS, "short", experiment(case))

@@ -94,30 +94,6 @@ def test_plants_that_differ_are_told_in_one_line(source, tmp_path, capsys, monke
 
 
 @pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        (["papr"], "did you mean paper?"),
-        (["paper", "--threads", "0"], "expected a whole number from 1 to 1024, received 0"),
-        (["paper", "--threads", "5000"], "expected a whole number from 1 to 1024, received 5000"),
-        (["paper", "--limit", "x"], "expected a whole number from 1 to 1000000000000, received x"),
-        (["paper", "--row", "0", "--limit", "3"], "expected --row without --out, --threads or --limit"),
-        (["paper", "--row", "0"], "expected the key of one of its rows, received 0"),
-        (
-            ["paper", "--disturbance.load", "1"],
-            "expected STUDY, --out, --threads, --engine, --address, --limit, --row, --optimise, --trials,"
-            " --twin, --draws, --figure-format or --json, received",
-        ),
-    ],
-)
-def test_bad_input_is_one_line(arguments, message, capsys):
-    assert cli.main(["sweep", *arguments]) == cli.BAD_INPUT
-    out, err = capsys.readouterr()
-    assert out == ""
-    assert message in err
-    assert err.count("\n") == 1
-
-
-@pytest.mark.parametrize(
     ("load", "code", "status"), [("1.0", cli.DONE, "completed"), ("-1.0", cli.FAILED, "refused")]
 )
 def test_the_exit_code_of_one_row_is_that_of_its_run(source, tmp_path, capsys, load, code, status):

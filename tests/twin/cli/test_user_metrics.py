@@ -145,30 +145,6 @@ def test_a_replayed_run_shows_the_columns_that_came_on_its_way(file, tmp_path, c
     assert {"q_rad", "sliding_s"} <= set(stdout["columns"])
 
 
-@pytest.mark.parametrize(
-    ("specs", "message"),
-    [
-        (["mine.py:larges"], "received larges; did you mean largest?"),
-        (["mine.py"], "expected path/to/file.py:name"),
-        (
-            ["mine.py:largest", "mine.py:largest"],
-            "expected a different name for each function, received largest twice",
-        ),
-        (["other.py:status"], "expected another name than max_abs_error_rad"),
-    ],
-)
-def test_what_is_no_metric_is_bad_input_before_the_run(file, specs, message, capsys, monkeypatch):
-    (file.parent / "other.py").write_text("def status(run): pass")
-    monkeypatch.chdir(file.parent)
-    arguments = [part for spec in specs for part in ("--metric", spec)]
-    assert cli.main(["simulate", *HOLD, *arguments, "--telemetry", "run.parquet"]) == 2
-    stdout, stderr = capsys.readouterr()
-    assert stdout == ""
-    (line,) = stderr.splitlines()
-    assert message in line
-    assert not (file.parent / "run.parquet").exists()
-
-
 def test_telemetry_is_kept_for_own_metrics_alone(file, monkeypatch, capsys):
     """Rows of a run of ages do not fit in memory; without a function no memory is taken for rows."""
     assert cli.main(["simulate", "hold", "--duration", "1e9", "--metric", f"{file}:largest"]) == 2
