@@ -180,7 +180,7 @@ def test_a_coil_has_the_colour_of_its_current(tab, page, bench, tmp_path):
     for current in (-8.0, 0.0, 8.0):
         bench.now.current_A = (0.0,) * group + (current,) + (0.0,) * (fake.GROUPS - 1 - group)
         meant = theme.current_colours(np.array(current), 8.0).astype(float)
-        wait_for(lambda meant=meant: likeness(tab, tmp_path / "page.png", at, meant) > ALIKE, current)
+        wait_for(lambda meant=meant: likeness(tab, tmp_path / "page.png", at, meant) > ALIKE)
 
 
 @pytest.mark.release("browser, 3 to 12 s; test_server.py and test_messages.py have the protocol without one")

@@ -33,7 +33,7 @@ def pressed(tab, bench, key):
     """Press a key and wait until it has acted."""
     before = stops(bench)
     tab.key(key)
-    wait_for(lambda: stops(bench) == before + 1, key)
+    wait_for(lambda: stops(bench) == before + 1)
 
 
 def text_in(tab, place):
