@@ -25,6 +25,7 @@ from tests.twin.machine.link.lines import (
 TICKS, STOPPED = 60, 20
 
 
+@pytest.mark.uncompiled
 def test_the_page_s_commands_drive_a_machine():
     """In lockstep, with true rates: poses and commands have the bits of a bench with its own plant."""
     scenario = scenarios.load("nutation", {"plant.end_stops.on": False})

@@ -28,7 +28,10 @@ def broken(result):
     return {check.name for check in checks_of(result) if not check.ok} - SHORT
 
 
-@pytest.mark.release("the whole laboratory for 7 s; each of its verbs has tests")
+WHOLE = pytest.mark.release("the whole workflow for 7 s; each of its verbs has tests")
+
+
+@WHOLE
 def test_the_hidden_machine_is_found_followed_and_watched(result):
     """With an experiment of a second: the intervals are wider, and hold the true values all the same."""
     assert broken(result) == set()
@@ -42,6 +45,7 @@ def test_the_hidden_machine_is_found_followed_and_watched(result):
     assert [bool(one.alarms) for one in result.watched] == [False, True, True, True, True]
 
 
+@WHOLE
 def test_a_wrong_result_breaks_its_check(result):
     name = next(iter(result.true))
     estimate = result.identified.parameters[name]
@@ -56,7 +60,7 @@ def test_a_wrong_result_breaks_its_check(result):
     assert broken(result._replace(watched=(alarmed, torque, *others))) == {"false alarms"}
 
 
-@pytest.mark.release("1 s; needs the workflow of the test before")
+@WHOLE
 def test_the_page_has_the_numbers_of_the_results(result, tmp_path):
     paths = workflow_page.write(tmp_path, result, "spheretwin reproduce twin")
     assert {path.name for path in paths} == {"twin.md", "twin.html"}
@@ -78,6 +82,7 @@ def test_the_page_has_the_numbers_of_the_results(result, tmp_path):
     assert text.count(".svg)") == 3
 
 
+@WHOLE
 def test_the_command_writes_the_page_and_fails_with_a_check(result, tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(workflow, "run_workflow", lambda track: result._replace(after=result.before))
     folder = tmp_path / "page"

@@ -18,7 +18,7 @@ from spheretwin.models.base.errors import InputError
 from spheretwin.session import Session
 from tests.twin.machine.link.lines import GROUPS, Line, PERIOD_s, heat
 
-TICKS = 400
+TICKS = 60
 
 
 class Run:
@@ -55,8 +55,7 @@ CONTROLLER = ("t_s", "q_ref_rad", "qdot_ref_rad_s", "torque_command_Nm", "curren
               "allocation_scale")  # fmt: skip
 PLANT = ("t_s", "q_rad", "qdot_rad_s", "error_rad", "torque_Nm", "disturbance_Nm", "current_command_A",
          "current_A", "mean_current_A")  # fmt: skip
-KALMAN = {"estimator.kind": "kalman"}
-PROTOTYPE = {"hardware": "electronics", "plant.engine": "mujoco"}
+ELECTRONICS = {"hardware": "electronics", "estimator.kind": "kalman"}
 
 
 def check_bytes(run, measured, extra=()):
@@ -70,6 +69,7 @@ def check_bytes(run, measured, extra=()):
             assert table[column].tobytes() == run.simulated[column].tobytes(), column
 
 
+@pytest.mark.uncompiled
 @pytest.mark.parametrize("frame", ["spheretwin", "spheretwin_json"])
 def test_the_bytes_of_true_rates(frame):
     run = Run(frame)
@@ -78,17 +78,24 @@ def test_the_bytes_of_true_rates(frame):
     assert {signal.name for signal in run.simulated.signals} == {*PLANT, *CONTROLLER, *LAW}
 
 
-def test_the_bytes_of_an_estimator():
-    check_bytes(Run(changes=KALMAN), ("q_measured_rad", "qdot_estimated_rad_s"))
-
-
-def test_the_bytes_of_the_prototype_with_its_electronics():
-    run = Run(changes=PROTOTYPE | KALMAN)
+def check_electronics(ticks):
+    run = Run(changes=ELECTRONICS, ticks=ticks)
     measured = ("q_measured_rad", "qdot_estimated_rad_s")
     check_bytes(run, measured, ("coil_temperature_degC", "copper_loss_W", "friction_Nm"))
     np.testing.assert_array_equal(run.controller["q_rad"], run.simulated["q_measured_rad"])
 
 
+@pytest.mark.uncompiled
+def test_the_bytes_of_electronics_and_an_estimator():
+    check_electronics(TICKS)
+
+
+@pytest.mark.release("compiles two loops for 20 s; the same test in plain Python has the content")
+def test_compiled_loops_of_both_sides_have_the_bytes_of_one():
+    check_electronics(400)
+
+
+@pytest.mark.uncompiled
 def test_a_line_that_loses_and_repeats_frames_changes_no_byte():
     class Damaged(Line):
         """Three of four answers are lost, repeated, or follow noise; a lost one is empty."""

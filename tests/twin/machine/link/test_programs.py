@@ -57,6 +57,9 @@ SAME_PLANT = {
 }
 
 
+LOOPS = pytest.mark.release("compiles a loop of its own for 10 s; a run without arming has the firmware, too")
+
+
 def driven(firmware, capsys, *flags):
     with firmware() as port:
         common = ["drive", "sinusoid", "--controller.law", "pid", "--estimator.kind", "kalman", "--json"]
@@ -65,6 +68,7 @@ def driven(firmware, capsys, *flags):
     return code, json.loads(capsys.readouterr().out)
 
 
+@LOOPS
 def test_an_independent_firmware_tracks_as_the_twin_does(firmware, capsys, tmp_path):
     """Attitude by rotation matrices, Euler equations, other steps and another interpolation."""
     paths = {name: tmp_path / f"{name}.parquet" for name in ("telemetry", "log")}
@@ -95,6 +99,7 @@ def _log(path):
     return columns, table.schema.metadata
 
 
+@pytest.mark.uncompiled
 def test_without_arming_the_firmware_does_not_move(firmware, capsys):
     code, result = driven(firmware, capsys, "--duration", "0.2")
     assert (code, result["status"], result["link"]["armed"]) == (0, "completed", False)
@@ -103,6 +108,7 @@ def test_without_arming_the_firmware_does_not_move(firmware, capsys):
     assert result["max_abs_error_rad"] == pytest.approx([0.2 * np.sin(0.199 * np.pi)] * 3, rel=1e-3)
 
 
+@LOOPS
 def test_the_bench_drives_the_firmware(firmware, monkeypatch):
     """The verb itself, whose page presses start and stop: it tracks."""
     pytest.importorskip("viser")
@@ -140,6 +146,7 @@ LIMITS = [
 ]
 
 
+@LOOPS
 @pytest.mark.parametrize(("flags", "reason"), LIMITS, ids=[flags[0] for flags, _ in LIMITS])
 def test_a_limit_ends_the_run_without_currents(firmware, capsys, tmp_path, flags, reason):
     path = tmp_path / "run.parquet"
@@ -155,6 +162,7 @@ def test_a_limit_ends_the_run_without_currents(firmware, capsys, tmp_path, flags
     assert not np.any(rows["current_command_A"][trip + 1 :])
 
 
+@LOOPS
 def test_the_limit_of_the_current_holds(firmware, capsys):
     code, result = driven(
         firmware, capsys, "--arm", "--ramp-s", "0", "--duration", "0.3", "--limit-current-A", "0.5"
