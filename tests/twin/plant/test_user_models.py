@@ -90,6 +90,7 @@ def test_a_piece_of_physics_acts_as_in_the_stock_engine(written, case):
     np.testing.assert_array_equal(ours(path, CONSTANT), expected)
 
 
+@pytest.mark.release("4 s; test_a_piece_of_physics_acts_as_in_the_stock_engine has every piece under one")
 @pytest.mark.parametrize("integrator", ["Euler", "implicitfast"])
 @each_case
 def test_it_acts_under_the_other_integrators_too(written, case, integrator):
@@ -142,6 +143,7 @@ def test_a_law_in_plain_python_meets_the_same_physics(written):
     np.testing.assert_allclose(table["q_rad"], replayed(path, table), rtol=0, atol=1e-12)  # as above
 
 
+@pytest.mark.release("2 s; test_snapshot.py has snapshots of a model of a user's")
 @each_case
 def test_a_session_goes_on_from_a_snapshot_bit_for_bit(written, case):
     law = Law("constant", constant_torque, TORQUE_Q, np.zeros(0))
