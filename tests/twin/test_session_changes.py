@@ -1,15 +1,15 @@
 """What a session goes on from when something is changed: laws, beliefs, files, plans and names."""
 
+import os
 import pickle
+import re
 
 import numpy as np
 import pytest
 
-from spheretwin import cli
 from spheretwin import scenario as scenarios
 from spheretwin import snapshot as snapshots
 from spheretwin.control.law import Law
-from spheretwin.models.actuator import TORQUE_CURVE_PATH
 from spheretwin.models.base.errors import InputError
 from spheretwin.scenario import reading
 from spheretwin.session import Session
@@ -63,7 +63,6 @@ def see(t, reference, measurement, parameters, state, torque):
 asks = Law("asks", see, [], np.zeros(3), SEEN, True)
 silent = Law("silent", see, [], np.zeros(3), SEEN)
 clash = Law("clash", see, [], np.zeros(3), (Signal("seen", "1", 1, "something else"),))
-gains = [1.0, 2.0]
 
 
 class Broken(LawParameters):
@@ -94,27 +93,23 @@ def hold(**changes):
 
 
 @pytest.mark.parametrize(
-    "change",
-    [("plant.coulomb_Nm", [0.0, 0.0, 1e-9]), ("disturbance.load", 1.0), ("allocation", "bounded")],
-    ids=lambda each: each[0],
+    ("name", "value", "calls"),
+    [
+        ("plant.coulomb_Nm", [0.0, 0.0, 1e-9], 51.0),
+        ("disturbance.load", 1.0, 51.0),
+        ("allocation", "bounded", 51.0),
+        ("controller.integral", 5.0, 1.0),
+    ],
 )
-def test_a_law_whose_step_is_made_by_its_build_goes_on_through_other_changes(file, change):
+def test_a_law_whose_step_is_made_by_its_build_keeps_its_memory(file, name, value, calls):
+    """It takes its parameters from a change of its own fields alone: otherwise what it made of them stays."""
     with Session(hold(**{"controller.law": f"{file}:Pid"})) as session:
         before = session.advance(50)["integral"][-1]
-        session.set(*change)
+        session.set(name, value)
         after = session.advance(1)["integral"][0]
         # One more tick of an error of at most 0.3 rad over 1 ms.
         np.testing.assert_allclose(after, before, rtol=0, atol=3.1e-4)
-        assert (
-            session.snapshot().runtime.parts["the law's parameters"][0] == 51.0
-        )  # what it made of its parameters stays
-
-
-def test_with_other_gains_it_keeps_its_memory_and_takes_the_gains(file):
-    with Session(hold(**{"controller.law": f"{file}:Pid"})) as session:
-        before = session.advance(50)["integral"][-1]
-        session.set("controller.integral", 5.0)
-        np.testing.assert_allclose(session.advance(1)["integral"][0], before, rtol=0, atol=3.1e-4)
+        assert session.snapshot().runtime.parts["the law's parameters"][0] == calls
 
 
 def test_a_memory_of_another_size_begins_anew(file):
@@ -140,50 +135,6 @@ def test_a_belief_goes_on_under_another_delay(file, delay_s):
         after = session.advance(1)["seen"][0]
         # From one tick to the next the torque changes by little, as at any other tick.
         np.testing.assert_allclose(after, before, rtol=0.05, atol=2e-3)
-
-
-def test_events_within_one_tick_are_made_in_the_order_of_their_times():
-    planned = [
-        {"t_s": 0.0108, "set": "disturbance.load", "value": 5.0},
-        {"t_s": 0.0102, "set": "disturbance.load", "value": 1.5},
-    ]
-    with Session(hold(event=planned)) as session:
-        session.advance(20)
-        assert session.scenario.disturbance.load == 5.0
-
-
-def test_an_event_far_off_is_in_force_at_its_tick():
-    event = {"t_s": 3e5, "set": "disturbance.load", "value": 1.0}
-    with Session(hold(event=[event], duration=4e5)) as session:
-        assert session._planned[0].tick == 300_000_000
-
-
-@pytest.mark.parametrize(
-    "name", ["event", "event.0", "event.0.t_s", "controller.period_s", "controller.preset", "plant"]
-)
-def test_what_is_fixed_is_fixed_with_all_its_parts(name):
-    event = {"t_s": 0.1, "set": "disturbance.load", "value": 1.0}
-    with Session(hold(event=[event])) as session, pytest.raises(InputError, match="may change during a run"):
-        session.set(name, 0.05)
-
-
-@pytest.mark.parametrize("name", [3, None, "", "a..b", "0.a"])
-def test_a_name_that_is_none_is_refused_under_any_law(name):
-    own = Law("own", lambda *_: None, [], [])
-    with Session(hold(), own) as session, pytest.raises(InputError, match="expected a field such as"):
-        session.set(name, 1.0)
-
-
-def test_files_that_stay_are_not_read_again(tmp_path):
-    (true := tmp_path / "true.csv").write_bytes(TORQUE_CURVE_PATH.read_bytes())
-    (nominal := tmp_path / "nominal.csv").write_bytes(TORQUE_CURVE_PATH.read_bytes())
-    with Session(hold(**{"plant.torque_curve": str(true)})) as session:
-        true.write_text(
-            "phi_deg,torque_Nm_per_A\n" + "\n".join(f"{a},{0.1 * (0 < a < 180)}" for a in range(181))
-        )
-        session.set("nominal.torque_curve", str(nominal))
-        with Session(hold(**{"nominal.torque_curve": str(nominal)})) as other:
-            assert session.actuator.torque_curve.peak_Nm_per_A == other.actuator.torque_curve.peak_Nm_per_A
 
 
 def test_one_name_means_one_signal_throughout(file):
@@ -276,17 +227,22 @@ def tables(tmp_path):
     return path
 
 
-def test_tables_that_are_gone_do_not_hinder_other_changes(tables):
+def edit(path):
+    path.write_text(path.read_text().replace("0.1,0.1", "0.1,0.2").replace("0.02", "0.03"))
+
+
+@pytest.mark.parametrize("act", [os.remove, edit], ids=["removed", "edited"])
+def test_other_changes_leave_tables_as_they_were(tables, act):
     with Session(scenarios.load(str(tables))) as unchanged, Session(scenarios.load(str(tables))) as session:
-        for each in ("poses.csv", "torques.csv"):
-            (tables.parent / each).unlink()
         for each in (unchanged, session):
             each.advance(20)
-        for name, value in (("disturbance.load", 0.0), ("controller.law", "pd"), ("controller.law", "afsm")):
+        for name, value in (("disturbance.load", 0.5), ("controller.law", "pd"), ("controller.law", "afsm")):
+            unchanged.set(name, value)
+        for each in ("poses.csv", "torques.csv"):
+            act(tables.parent / each)
+        for name, value in (("disturbance.load", 0.5), ("controller.law", "pd"), ("controller.law", "afsm")):
             session.set(name, value)
-        unchanged.set("controller.law", "pd")
-        unchanged.set("controller.law", "afsm")
-        assert session.advance(50).values.tobytes() == unchanged.advance(50).values.tobytes()
+        assert session.advance(1000).values.tobytes() == unchanged.advance(1000).values.tobytes()
 
 
 def test_a_table_that_is_set_is_read_again(tables):
@@ -305,7 +261,8 @@ def test_a_pickled_session_needs_its_law_s_file_and_no_table(file, tables, tmp_p
         session.advance(10)
         taken = pickle.dumps((session.snapshot(), session.scenario.controller))
         ahead = session.advance(10).values.tobytes()
-        (tables.parent / "poses.csv").unlink()
+        for each in ("poses.csv", "torques.csv"):
+            (tables.parent / each).unlink()
         (elsewhere := tmp_path / "elsewhere").mkdir()
         monkeypatch.chdir(elsewhere)
         snapshot, controller = pickle.loads(taken)
@@ -323,17 +280,14 @@ def test_a_session_under_a_law_of_its_own_beside_one_from_a_file_is_pickled(file
 @pytest.mark.parametrize(
     ("name", "part"),
     [
-        ("gains", "a subclass of LawParameters, a Law, or a function, received [1.0, 2.0]"),
         ("Broken", "expected build(known) to make a Law, received ZeroDivisionError: division by zero"),
         ("Lazy", "expected a class with build(known), received one without"),
     ],
 )
-def test_a_law_that_cannot_be_built_is_told_in_one_line(file, capsys, name, part):
-    assert cli.main(["simulate", "hold", "--controller.law", f"{file}:{name}"]) == 2
-    assert part in capsys.readouterr().err
+def test_a_law_that_cannot_be_built_is_refused_and_the_other_stays(file, name, part):
     with Session(hold()) as session:
         session.advance(5)
-        with pytest.raises(InputError):
+        with pytest.raises(InputError, match=re.escape(part)):
             session.set("controller.law", f"{file}:{name}")
         assert session.scenario.controller.law == "afsm"
 
@@ -352,14 +306,6 @@ def test_an_event_that_would_fail_is_found_before_the_first_tick(file, event):
     planned = [{"t_s": 0.1, **event, "value": value}]
     with pytest.raises(InputError, match=r"as (the event at 0\.1 s|event\.0) sets it"):
         Session(hold(event=planned))
-
-
-def test_an_event_after_the_end_is_warned_of():
-    event = {"t_s": 0.2, "set": "disturbance.load", "value": 1.0}
-    with Session(hold(event=[event])) as session:
-        assert session.warnings() == [
-            "the event that sets disturbance.load does not occur: the run ends before"
-        ]
 
 
 @pytest.mark.parametrize(("start_s", "warns"), [(0.049, False), (0.0495, True), (0.05, True), (3.0, True)])
@@ -397,17 +343,3 @@ def test_nothing_of_the_caller_s_is_altered(tables, monkeypatch):
 def test_a_text_of_a_law_from_a_file_may_look_like_a_number(file):
     tokens = ["--controller.law", f"{file}:Pid", "--controller.mode", "12"]
     assert scenarios.load("hold", reading.overrides(tokens)).controller.mode == "12"
-
-
-def test_a_flag_nested_beyond_measure_is_refused():
-    value = "[" * 900 + "]" * 900
-    with pytest.raises(InputError):
-        scenarios.load(
-            "hold", reading.overrides(f"--event.0.t-s 0 --event.0.set plant --event.0.value {value}".split())
-        )
-
-
-def test_no_law_is_no_change(file):
-    for own in (None, Law("own", lambda *_: None, [], [])):
-        with Session(hold(), own) as session, pytest.raises(InputError, match=r"controller\.law"):
-            session.set("controller.law", None)

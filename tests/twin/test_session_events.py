@@ -6,9 +6,10 @@ import pytest
 from spheretwin import cli
 from spheretwin import scenario as scenarios
 from spheretwin import simulation as simulations
+from spheretwin.models.actuator import TORQUE_CURVE_PATH
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.telemetry.run_record import Change
-from spheretwin.scenario import reading
+from spheretwin.scenario.changes import scheduled_changes
 from spheretwin.session import Session
 from spheretwin.simulation import follow, simulate
 
@@ -40,14 +41,16 @@ def planned(tmp_path):
 @pytest.fixture
 def by_hand(tmp_path):
     (path := tmp_path / "by_hand.toml").write_text(HOLD)
+    changes = [
+        ("controller.law", "pd", 50),
+        ("sensors.angle_offset_rad", [0.01, 0.0, 0.0], 50),
+        ("disturbance.load", 2.0, 150),
+    ]
     with Session(scenarios.load(str(path))) as session:
         tables = [session.advance(50)]
-        session.set("controller.law", "pd")
-        tables.append(session.advance(50))
-        session.set("sensors.angle_offset_rad", [0.01, 0.0, 0.0])
-        tables.append(session.advance(50))
-        session.set("disturbance.load", 2.0)
-        tables.append(session.advance(150))
+        for name, value, ticks in changes:
+            session.set(name, value)
+            tables.append(session.advance(ticks))
         return tables
 
 
@@ -95,38 +98,6 @@ def test_a_snapshot_goes_on_with_the_events_to_come(planned, at):
         assert common(chunks(other, 40)) == common(chunks(session, 300))
 
 
-def test_flags_write_the_same_list(planned):
-    tokens = ["--event.0.t-s", "0.15", "--event.0.set", "disturbance.load", "--event.0.value", "2.0"]
-    scenario = scenarios.load("hold", reading.overrides(tokens))
-    assert scenario.event == planned.event[:1]
-    changed = scenarios.load("hold", reading.overrides([*tokens, "--event.0.value", "3.0"]))
-    assert changed.event[0].value == 3.0
-    rows = {flag: value for flag, value, _ in reading.field_descriptions(scenario)}
-    assert rows["--event.0.set"] == "disturbance.load"
-    assert "--event" in {flag for flag, *_ in reading.field_descriptions(scenarios.load("hold"))}
-
-
-@pytest.mark.parametrize(
-    ("tokens", "part"),
-    [
-        ("--event.1.t-s 0.1", "expected a list index from 0 to 0, received event.1.t_s"),
-        ("--event.0.t-s 0.1", "event.0.set: expected a value, received none"),
-        ("--event.0.t-s 1.001e9 --event.0.set seed --event.0.value 1", "event.0.t_s: expected a number less"),
-        ("--event.0.t-s -1 --event.0.set seed --event.0.value 1", "event.0.t_s: expected a number greater"),
-        ("--event.0.t-s 0 --event.0.set seed --event.0.value 1", "event.0.set: expected a field that may"),
-        ("--event.0.t-s 0 --event.0.set controller.law --event.0.value pdd", "as event.0 sets it"),
-        ("--event.0.t-s 0 --event.0.set disturbance.lod --event.0.value 1", "did you mean load"),
-        ("--event.0.t-s 0 --event.0.set seed --event.0.value 1 --event.0.at 0", "in event.0, received at"),
-        ("--event 3", "event: expected"),
-    ],
-)  # fmt: skip
-def test_an_event_that_is_none_is_refused_before_the_run(tokens, part):
-    with pytest.raises(InputError) as caught:
-        scenarios.load("hold", reading.overrides(tokens.split()))
-    assert part in str(caught.value)
-    assert "\n" not in str(caught.value)
-
-
 def test_replay_makes_them_again_and_nothing_twice(planned, tmp_path):
     (source := tmp_path / "again.toml").write_text(HOLD + EVENTS)
     first, again = tmp_path / "first.parquet", tmp_path / "second.parquet"
@@ -149,15 +120,6 @@ class Follower:
 
     def finish(self, status):
         pass
-
-
-def test_every_follower_is_told(planned):
-    simulate(planned, sinks=[follower := Follower()])
-    assert follower.noted == [
-        (0.05, "controller.law set to pd"),
-        (0.1, "sensors.angle_offset_rad set to [0.01, 0.0, 0.0]"),
-        (0.15, "disturbance.load set to 2.0"),
-    ]
 
 
 @pytest.mark.parametrize("chunk", [1, 10, 40])
@@ -190,8 +152,6 @@ def test_messages_at_the_edges_of_chunks_come_once_and_in_time(chunk, monkeypatc
 def test_a_file_that_an_event_names_is_taken_from_where_it_is_written(tmp_path):
     event = '\n[[event]]\nt_s = 0.1\nset = "plant.torque_curve"\nvalue = "weak.csv"\n'
     (tmp_path / "s.toml").write_text(HOLD + event)
-    from spheretwin.models.actuator import TORQUE_CURVE_PATH
-
     (tmp_path / "weak.csv").write_bytes(TORQUE_CURVE_PATH.read_bytes())
     scenario = scenarios.load(str(tmp_path / "s.toml"))
     assert scenario.event[0].value == f"{tmp_path}/weak.csv"
@@ -217,9 +177,13 @@ def test_events_are_checked_in_the_order_of_their_times():
         scenarios.load("hold", {**base, "event": [law | {"t_s": 0.3}, slope]})
 
 
-@pytest.mark.parametrize(("t_s", "tick"), [(0.01, 10), (0.0102, 11), (0.0108, 11)])
-def test_an_event_between_two_ticks_acts_at_the_later_one(t_s, tick):
-    event = {"t_s": t_s, "set": "disturbance.load", "value": 1.0}
-    with Session(scenarios.load("hold", {"event": [event]})) as session:
+def test_an_event_between_two_ticks_acts_at_the_later_one_in_the_order_of_times():
+    times_s = (3e5, 0.0108, 0.01, 0.0102)
+    events = [{"t_s": t_s, "set": "disturbance.load", "value": 100 * (t_s % 1)} for t_s in times_s]
+    scenario = scenarios.load("hold", {"event": events, "duration": 4e5})
+    changes = scheduled_changes(scenario)
+    assert [change.tick for change in changes] == [10, 11, 11, 300_000_000]
+    with Session(scenario) as session:
         session.advance(20)
-        assert [change.tick for change in session.events] == [tick]
+        assert session.scenario.disturbance.load == 100 * 0.0108
+        assert [change.tick for change in session.events] == [10, 11, 11]

@@ -11,7 +11,6 @@ from hypothesis import strategies as st
 from spheretwin import cli
 from spheretwin import scenario as scenarios
 from spheretwin.faults.targets import TARGETS
-from spheretwin.models.base.errors import InputError
 from spheretwin.models.telemetry.parquet import TelemetryFile
 from spheretwin.models.telemetry.table import read_parquet
 from spheretwin.provenance import record_of
@@ -60,15 +59,6 @@ def whole():
 def test_chunks_move_no_bit(whole, length):
     with Session(scenario()) as session:
         pieces = [session.advance(min(length, TICKS - tick)).values for tick in range(0, TICKS, length)]
-    assert np.concatenate(pieces).tobytes() == whole.tobytes()
-
-
-@settings(max_examples=12)
-@given(st.lists(st.integers(1, 700), min_size=1, max_size=6))
-def test_neither_do_random_chunks(whole, lengths):
-    lengths.append(TICKS)
-    with Session(scenario()) as session:
-        pieces = [session.advance(min(length, TICKS - session.tick)).values for length in lengths]
     assert np.concatenate(pieces).tobytes() == whole.tobytes()
 
 
@@ -173,19 +163,6 @@ def test_an_end_by_hand_is_a_planned_end(hardware):
         after = removed.advance(60)
         assert after.signals == healthy.signals
         assert same_columns(after, then) == []
-
-
-def test_what_cannot_fail_so_is_refused_by_hand_and_nothing_has_changed():
-    with Session(scenario()) as session, Session(scenario()) as other:
-        session.advance(50)
-        other.advance(50)
-        for bad in ({"target": "coil.18", "mode": "open"}, {"target": "coil.1", "mode": "stuck"}, {}):
-            with pytest.raises(InputError):
-                session.set("fault", bad)
-        with pytest.raises(InputError):
-            session.set("fault.13.end_s", 1.0)
-        assert session.journal == ()
-        assert session.advance(50).values.tobytes() == other.advance(50).values.tobytes()
 
 
 def test_a_run_of_faults_set_on_the_way_is_replayed(tmp_path):
