@@ -13,7 +13,6 @@ from spheretwin.models import mjcf
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.telemetry.table import read_parquet
 from spheretwin.outputs import Outputs
-from spheretwin.provenance import record_of
 from spheretwin.session import Session
 from spheretwin.simulation import follow
 
@@ -32,7 +31,7 @@ def folder(tmp_path, monkeypatch):
     return there
 
 
-def written(path, changes=()):
+def written(path, changes=(), meanwhile=lambda: None):
     """A run of 20 ticks, with changes after the tenth, as the command writes it."""
     session = Session(scenarios.load("hold", {"duration": 0.02, "controller.law": "pd", **PATHS}))
     files = Outputs(session, None, path, live=False)
@@ -40,27 +39,33 @@ def written(path, changes=()):
     for name, value in changes:
         session.set(name, value)
     follow(session, 20, files.sinks)
+    meanwhile()
     assert files.close() == []
     return path
 
 
-@pytest.mark.parametrize(
-    "changes",
-    [
-        [],
-        [("nominal.torque_curve", "later.csv"), ("plant.torque_curve", "later.csv")],
-        [("nominal", {"torque_curve": "later.csv"})],
-    ],
-    ids=["none", "fields", "section"],
-)
+def rewritten(path, change):
+    """Replace a part of the metadata of a run."""
+    table, metadata = read_parquet(path)
+    table.write_parquet(path, change(metadata))
+    return path
+
+
+CHANGES = {
+    "none": [],
+    "fields": [("nominal.torque_curve", "later.csv"), ("plant.torque_curve", "later.csv")],
+    "section": [("nominal", {"torque_curve": "later.csv"})],
+}
+
+
+@pytest.mark.parametrize("changes", CHANGES.values(), ids=CHANGES)
 def test_a_run_replays_from_another_folder(folder, changes, monkeypatch):
     first = written(folder / "a.parquet", changes)
     (elsewhere := folder.parent / "elsewhere").mkdir()
     monkeypatch.chdir(elsewhere)
     assert cli.main(["simulate", "--replay", str(first), "--telemetry", "b.parquet", "--json"]) == 0
     assert (elsewhere / "b.parquet").read_bytes() == first.read_bytes()
-    _, metadata = read_parquet(first)
-    fields = json.loads(metadata["scenario"])
+    fields = json.loads(read_parquet(first)[1]["scenario"])
     for dotted, name in PATHS.items():
         section, field = dotted.split(".")
         assert fields[section][field] == str(folder / name)
@@ -94,29 +99,21 @@ def test_an_edited_mesh_is_refused(folder):
 @pytest.mark.parametrize("edit", [add_a_comment, os.remove], ids=["edited", "removed"])
 def test_a_file_that_changes_under_a_run_is_told_as_the_run_had_it(folder, edit):
     before = (folder / "p.csv").read_bytes()
-    session = Session(scenarios.load("hold", {"duration": 0.02, "controller.law": "pd", **PATHS}))
-    files = Outputs(session, None, folder / "a.parquet", live=False)
-    follow(session, 20, files.sinks)
-    edit(folder / "p.csv")
-    assert files.close() == []
+    path = written(folder / "a.parquet", meanwhile=lambda: edit(folder / "p.csv"))
     with pytest.raises(InputError, match="as it was"):
-        replay.read(folder / "a.parquet")
+        replay.read(path)
     (folder / "p.csv").write_bytes(before)
-    assert replay.read(folder / "a.parquet").ticks == 20
+    assert replay.read(path).ticks == 20
 
 
 def test_a_file_of_a_version_that_told_no_files_replays(folder):
-    run = Session(scenarios.load("hold", {"controller.law": "pd", **PATHS}))
-    table, known = run.advance(5), record_of(run).metadata()
-    del known["files"]
-    table.write_parquet(folder / "old.parquet", known)
-    assert replay.read(folder / "old.parquet").ticks == 5
+    path = written(folder / "old.parquet")
+    rewritten(path, lambda known: {name: value for name, value in known.items() if name != "files"})
+    assert replay.read(path).ticks == 20
 
 
 def test_a_file_whose_end_is_none_is_refused_by_its_name(folder):
-    run = Session(scenarios.load("hold", {"controller.law": "pd", **PATHS}))
-    table = run.advance(5)
-    table.write_parquet(path := folder / "odd.parquet", {**record_of(run).metadata(), "status": "flying"})
+    path = rewritten(written(folder / "odd.parquet"), lambda known: known | {"status": "flying"})
     with pytest.raises(InputError, match=r"replay .*odd\.parquet: status: expected one of .*'flying'"):
         replay.read(path)
 
@@ -134,13 +131,11 @@ def test_a_model_with_the_same_contents_is_the_same_model(tmp_path):
 
 
 def test_a_file_that_the_run_could_not_read_and_that_exists_now_is_refused(folder):
-    path = written(folder / "a.parquet")
-    (folder / "p.csv").rename(folder / "later")
-    record = replay.read_parquet(path)[1]
-    files = json.loads(record["files"]) | {str(folder / "p.csv"): None}
-    table, _ = read_parquet(path)
-    table.write_parquet(path, record | {"files": json.dumps(files)})
-    (folder / "later").rename(folder / "p.csv")
+    missing = str(folder / "p.csv")
+    path = rewritten(
+        written(folder / "a.parquet"),
+        lambda known: known | {"files": json.dumps(json.loads(known["files"]) | {missing: None})},
+    )
     with pytest.raises(InputError, match=r"plant\.torque_curve .*p\.csv as it was at the start of the run"):
         replay.read(path)
 

@@ -6,13 +6,14 @@ import numpy as np
 import pytest
 
 from spheretwin import cli, replay
+from spheretwin.models.base.errors import InputError
 from spheretwin.models.telemetry import parquet as telemetry_file
 from spheretwin.models.telemetry.parquet import TelemetryFile
 from spheretwin.models.telemetry.table import read_parquet
 from spheretwin.provenance import record_of
 from spheretwin.session import Session
 from spheretwin.simulation import follow
-from tests.twin.session_cases import ENGINES, plain_law, recorded, rows, scenario, session
+from tests.twin.session_cases import ENGINES, plain_law, recorded, rows, session
 
 CHANGES = [
     (0, "disturbance.load", 1.0),
@@ -87,47 +88,40 @@ def test_a_run_that_ended_by_itself_replays_to_its_end(changes, tmp_path, reques
     assert second.read_bytes() == first.read_bytes()
 
 
-def refused(path, capsys):
-    assert cli.main(["simulate", "--replay", str(path)]) == 2
-    out, err = capsys.readouterr()
-    assert out == ""
-    (line,) = err.splitlines()
-    assert line.startswith("spheretwin: ")
-    return line
+def refused(path):
+    with pytest.raises(InputError) as refusal:
+        replay.read(path)
+    assert "\n" not in str(refusal.value)
+    return str(refusal.value)
 
 
-def test_what_holds_no_run_is_refused_on_one_line(tmp_path, capsys):
-    import pyarrow as pa
-    import pyarrow.parquet
-
-    run = session().advance(10)
-    run.write_parquet(bare := tmp_path / "bare.parquet", {})
-    assert "expected scenario, journal and ticks" in refused(bare, capsys)
-    known = record_of(Session(scenario())).metadata()
-    run.write_parquet(path := tmp_path / "none.parquet", known)
-    assert "at least one tick, received 0" in refused(path, capsys)
-    for name, text in [
-        ("journal", "[[1, 2]]"), ("journal", "null"), ("journal", "[[1e999, \"a\", 1]]"),
-        ("scenario", "[]"), ("scenario", '"afsm"'), ("scenario", '{"controller": "afsm"}'), ("scenario", "{"),
-        ("ticks", "many"), ("journal", "[" * 100_000),
-    ]:  # fmt: skip
-        run.write_parquet(path := tmp_path / "odd.parquet", {**known, "ticks": "10", name: text})
-        assert "replay" in refused(path, capsys), (name, text)
-    pyarrow.parquet.write_table(pa.table({"a": [1.0]}), foreign := tmp_path / "foreign.parquet")
-    assert "expected a telemetry file (.parquet) of a run" in refused(foreign, capsys)
-    (text := tmp_path / "text.parquet").write_text("no parquet")
-    assert "expected a telemetry file (.parquet) of a run" in refused(text, capsys)
-    assert "missing.parquet" in refused(tmp_path / "missing.parquet", capsys)
+@pytest.mark.parametrize(
+    ("name", "text"),
+    [
+        ("journal", "[[1, 2]]"),
+        ("journal", "null"),
+        ("journal", '[[1e999, "a", 1]]'),
+        ("journal", "[" * 100_000),
+        ("scenario", "[]"),
+        ("scenario", '"afsm"'),
+        ("scenario", '{"controller": "afsm"}'),
+        ("scenario", "{"),
+        ("ticks", "many"),
+    ],
+)
+def test_a_record_that_is_none_is_refused(tmp_path, name, text):
+    with session() as live:
+        table, metadata = live.advance(10), record_of(live).metadata()
+    table.write_parquet(path := tmp_path / "odd.parquet", {**metadata, name: text})
+    assert "replay" in refused(path)
 
 
-def test_a_law_that_a_file_does_not_hold_is_refused_on_one_line(tmp_path, capsys):
+def test_a_law_that_a_file_does_not_hold_is_refused(tmp_path):
     recorded(path := tmp_path / "mine.parquet", law=plain_law(), ticks=20)
-    assert "received one under mine" in refused(path, capsys)
-    recorded(path := tmp_path / "later.parquet", [(10, "controller.law", plain_law())], ticks=20)
-    assert "received one to mine at tick 10" in refused(path, capsys)
+    assert "received one under mine" in refused(path)
     # One of the user's that has the name of a shipped one is still the user's.
-    for law in ("pd", "afsm"):
-        recorded(path := tmp_path / "named.parquet", law=plain_law(law), ticks=20)
-        refused(path, capsys)
+    recorded(path := tmp_path / "named.parquet", law=plain_law("pd"), ticks=20)
+    assert "received one under pd of the user's" in refused(path)
+    for law, name in (("mine", "mine"), ("afsm", "afsm of the user's")):
         recorded(path, [(10, "controller.law", plain_law(law))], ticks=20)
-        assert f"received one to {law} of the user's" in refused(path, capsys)
+        assert f"received one to {name} at tick 10" in refused(path)
