@@ -14,7 +14,7 @@ from spheretwin.control.allocation.least_norm import allocate
 from spheretwin.control.law import Law
 from spheretwin.models import actuator as actuators
 from spheretwin.models.lagrangian import loaded_inertia
-from spheretwin.scenario.fields import every_field, kind_of
+from spheretwin.scenario.fields import every_field, fields_of, kind_of
 from spheretwin.scenario.sections import ResolvedScenario, Scenario
 from spheretwin.scenario.writing import as_command, as_toml
 from spheretwin.session import Session
@@ -22,6 +22,7 @@ from spheretwin.simulation import simulate
 from spheretwin.study.grid import Grid
 from spheretwin.study.row import Rows
 from spheretwin.study.study import load
+from tests.twin.session_cases import write_curve
 
 # Every part of a controller is at work: estimator, governor, prediction, feed-forward, detector, watchdog.
 WHOLE = {
@@ -31,106 +32,48 @@ WHOLE = {
     "sensors.potentiometer.hysteresis_rad": 2e-4,
 }  # fmt: skip
 
-# Another value of everything that is true of plant, drive and sensors.
-TRUTH = {
-    "plant.modelling_error": 0.4,
-    "plant.modelling_torque_Nm": [0.01, 0.0, 0.0],
-    "plant.gravity_m_s2": 5.0,
-    "plant.coulomb_Nm": [5e-3, 5e-3, 5e-3],
-    "plant.viscous_Nm_s": [3e-4, 3e-4, 3e-4],
-    "plant.friction_smoothing_rad_s": 0.1,
-    "plant.group_gain": [0.9] * 18,
-    "plant.payload_kg": 0.04,
-    **{
-        f"plant.{part}.{name}": value
-        for part, count in (("poles", 16), ("coils", 36))
-        for name, value in {
-            "gain_error": 0.03,
-            "angle_error_rad": 5e-3,
-            "distance_error_m": 1e-4,
-            "errors": [[0.01, 1e-3, 1e-3, 1e-4]] * count,
-        }.items()
-    },
-    "plant.mass.centre_m": [1e-4, 2e-4, -1e-4],
-    "plant.mass.centre_error_m": 2e-4,
-    "plant.mass.products_kg_m2": [1e-5, -1e-5, 2e-5],
-    "plant.mass.product_error_kg_m2": 2e-5,
-    "plant.mass.ring_inertia_kg_m2": [[2e-4, 1e-4, 1e-4], [1e-4, 2e-4, 1e-4]],
-    "plant.mass.axis_tilt_rad": [[1e-3, 0.0], [0.0, 1e-3], [1e-3, 1e-3]],
-    "plant.mass.axis_tilt_error_rad": 2e-3,
-    "plant.mass.axis_offset_m": [[1e-4, 0.0], [0.0, 1e-4], [1e-4, 1e-4]],
-    "plant.mass.axis_offset_error_m": 5e-5,
-    "plant.stiction.on": True,
-    "plant.stiction.break_away": 2.0,
-    "plant.stiction.presliding_rad": 5e-3,
-    "plant.stiction.damping_ratio": 0.5,
-    "plant.stiction.stribeck_rad_s": 0.2,
-    "plant.end_stops.on": True,
-    "plant.end_stops.travel_rad": 0.08,
-    "plant.end_stops.stiffness_Nm_rad": 1200.0,
-    "plant.end_stops.damping_ratio": 0.5,
-    "plant.cable.stiffness_Nm_rad": [2e-3, 2e-3, 1e-3],
-    "plant.cable.neutral_rad": [0.1, 0.0, 0.0],
-    "plant.cable.torque_Nm": [1e-3, 0.0, 0.0],
-    "plant.cable.torque_error_Nm": [1e-3, 1e-3, 1e-3],
-    "plant.cable.hysteresis_Nm": [3e-4, 3e-4, 3e-4],
-    "plant.cable.hysteresis_rad": 0.1,
-    "plant.thermal.on": True,
-    "plant.thermal.remanence_per_K": -0.002,
-    "plant.thermal.knee_degC": 60.0,
-    "plant.thermal.rotor_degC": 60.0,
-    "plant.thermal.stator_heat_capacity_J_K": 500.0,
-    "plant.thermal.rotor_heat_capacity_J_K": 500.0,
-    "plant.thermal.stator_to_ambient_K_W": 0.5,
-    "plant.thermal.air_gap_K_W": 1.0,
-    "plant.thermal.rotor_to_ambient_K_W": 2.0,
-    "drive.coil_coupling": 1.0,
-    "drive.delay_s": 5e-3,
-    "drive.time_constant_s": None,
-    "drive.dac_bits": 12,
-    "drive.dac_range_V": 12.0,
-    "drive.dac_offset_V": 1e-2,
-    "drive.dac_gain_error": 1e-2,
-    "drive.dac_inl_lsb": 8.0,
-    "drive.supply_V": 12.0,
-    "drive.drop_up_V": 9.0,
-    "drive.drop_down_V": 9.0,
-    "drive.bandwidth_rad_s": 1e3,
-    "drive.transconductance_A_V": 0.5,
-    "drive.amplifier_offset_V": 1e-2,
-    "drive.current_limit_A": 4.0,
-    "drive.resistance_ohm": 2.0,
-    "drive.inductance_H": 2e-3,
-    "drive.resistance_per_K": 0.0,
-    "drive.heat_capacity_J_K": 10.0,
-    "drive.thermal_resistance_K_W": 1.0,
-    "drive.ambient_degC": 40.0,
-    "drive.shutdown_degC": 100.0,
-    "sensors.angle_offset_rad": [0.01, 0.0, 0.0],
-    "sensors.potentiometer.electrical_angle_rad": 6.0,
-    "sensors.potentiometer.supply_V": 4.0,
-    "sensors.potentiometer.nonlinearity_rad": 1e-3,
-    "sensors.potentiometer.noise_rad": 2e-3,
-    "sensors.adc.bits": 12,
-    "sensors.adc.range_V": 5.0,
-    "sensors.adc.offset_V": 1e-2,
-    "sensors.adc.gain_error": 1e-2,
-    "sensors.adc.noise_V": 1e-2,
-    "sensors.adc.oversampling": 4,
-    "sensors.encoder.counts": 500,
-    "sensors.encoder.eccentricity_rad": 1e-3,
-    "sensors.encoder.start_error_rad": 0.1,
-    "sensors.encoder.index_rad": 0.5,
-    "sensors.potentiometer.hysteresis_rad": 4e-4,
-    "sensors.potentiometer.repeatability_rad": 5e-5,
-    "sensors.adc.skew_s": 1e-5,
-    "sensors.current.noise_A": 0.2,
-}
 # Numerics and the start are no knowledge; a model file is another machine; the curve has a test of its own.
 NOT_TRUTH = {
     f"plant.{name}"
     for name in ("engine", "step_s", "integrator", "initial_rad", "initial_rad_s", "mjcf", "torque_curve")
 }
+
+
+def other_value(value):
+    """Return another value of a field."""
+    if isinstance(value, tuple):
+        return [other_value(inside) for inside in value]
+    if isinstance(value, bool | int):
+        return not value if isinstance(value, bool) else value + 1
+    return 1.25 * value if value else 1e-5
+
+
+def other_truth():
+    """Return another value of everything that is true of plant, drive and sensors."""
+    truth = {
+        name: other_value(value)
+        for name, value, _ in fields_of(scenarios.load("tilt", WHOLE))
+        if name.partition(".")[0] in ("plant", "drive", "sensors") and name not in NOT_TRUTH
+    }
+    return truth | STATED
+
+
+# Fields that the scenario gives no number, and one that is a multiple of the step.
+STATED = {
+    "plant.end_stops.on": True,
+    "drive.delay_s": 5e-3,
+    "plant.poles.errors": [[0.01, 1e-3, 1e-3, 1e-4]] * 16,
+    "plant.coils.errors": [[0.01, 1e-3, 1e-3, 1e-4]] * 36,
+    "plant.gravity_m_s2": 5.0,
+    "plant.group_gain": [0.9] * 18,
+    "plant.thermal.rotor_degC": 60.0,
+    "drive.time_constant_s": None,
+    "drive.shutdown_degC": 100.0,
+    "drive.current_limit_A": 4.0,
+    "drive.resistance_ohm": 2.0,
+    "drive.inductance_H": 2e-3,
+}
+TRUTH = other_truth()
 
 
 def resolved(name="tilt", **changes):
@@ -217,8 +160,16 @@ def test_where_the_sheet_is_right_it_equals_the_truth(hardware):
 
 
 def test_a_nominal_model_that_equals_the_truth_is_recorded_with_its_values(actuator):
-    fields = WHOLE | TRUTH | {"drive.dac_bits": 16, "nominal.equals_truth": True, "nominal.delay_s": 2e-3}
-    scenario = resolved(**fields)
+    fields = {
+        "plant.modelling_error": 0.4, "plant.payload_kg": 0.04, "plant.coulomb_Nm": [5e-3] * 3,
+        "drive.supply_V": 12.0, "drive.drop_up_V": 9.0, "drive.drop_down_V": 9.0,
+        "drive.bandwidth_rad_s": 1e3, "drive.transconductance_A_V": 0.5, "drive.amplifier_offset_V": 1e-2,
+        "drive.current_limit_A": 4.0, "drive.dac_bits": 16, "drive.dac_range_V": 12.0,
+        "drive.dac_offset_V": 1e-2, "drive.dac_inl_lsb": 8.0, "drive.dac_gain_error": 1e-2,
+        "drive.resistance_ohm": 2.0, "drive.inductance_H": 2e-3,
+        "sensors.current.noise_A": 0.2, "sensors.encoder.counts": 500,
+    }  # fmt: skip
+    scenario = resolved(**WHOLE | fields | {"nominal.equals_truth": True, "nominal.delay_s": 2e-3})
     nominal, height_m = scenario.nominal, actuator.payload_mount_m[2]
     assert nominal.equals_truth
     inertia = loaded_inertia(1.4 * actuator.inertia, 0.04, height_m)
@@ -275,11 +226,7 @@ def test_a_resolved_scenario_written_down_is_the_same_when_it_is_read_again(know
 
 @pytest.fixture
 def half(tmp_path, actuator):
-    curve = actuator.torque_curve
-    pairs = zip(np.degrees(curve.phi_rad).tolist(), (0.5 * curve.torque_Nm_per_A).tolist(), strict=True)
-    path = tmp_path / "half.csv"
-    path.write_text("\n".join(["phi_deg,torque_Nm_per_A", *(f"{phi!r},{torque!r}" for phi, torque in pairs)]))
-    return str(path)
+    return write_curve(tmp_path / "half.csv", actuator.torque_curve, 0.5)
 
 
 def first_row(changes):
