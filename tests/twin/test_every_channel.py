@@ -18,11 +18,7 @@ SIGNALS = [signal for columns in CHANNELS for signal in columns.signals(18)]
     "changes",
     [
         {},
-        {
-            "sensors.angle_offset_rad": [0.01, 0.0, -0.02],
-            "plant.viscous_Nm_s": [1e-3, 1e-3, 1e-3],
-            "drive.supply_V": 12.0,
-        },
+        {"hardware": "prototype", "plant.engine": "lagrangian"},
     ],
     ids=["nothing acts", "stages act"],
 )

@@ -5,11 +5,11 @@ import shutil
 import numpy as np
 import pytest
 
-from spheretwin.control.law import Law
 from spheretwin.models import actuator as actuators
 from spheretwin.models.kinematics import rate_jacobian
 from spheretwin.models.magnetics import torque_matrix
 from tests.twin.passive_cases import ASKEW, ENGINES, OFFSET, PD, STILL, session, table
+from tests.twin.session_cases import write_curve
 
 # --- the nominal torque matrix
 
@@ -25,14 +25,6 @@ def test_a_scale_of_the_nominal_matrix_divides_the_currents(engine, scale):
     np.testing.assert_array_equal(assumed["current_command_A"][0], true["current_command_A"][0] / scale)
     np.testing.assert_array_equal(assumed["torque_command_Nm"], true["torque_command_Nm"])
     np.testing.assert_array_equal(assumed["torque_Nm"][0], true["torque_Nm"][0] / scale)
-
-
-def test_a_scale_that_is_no_power_of_two_divides_to_rounding():
-    true = table(1, "hold", PD)["current_command_A"][0]
-    for scale in (0.7, 1.1, 3.0):
-        assumed = table(1, "hold", PD | {"nominal.torque_scale": scale})["current_command_A"][0]
-        # Some hundred products and sums round, at currents below 1 A.
-        np.testing.assert_allclose(assumed, true / scale, rtol=0, atol=1e-14)
 
 
 def test_a_scale_and_a_stiffness_are_the_same_to_a_pd_law():
@@ -70,12 +62,6 @@ def test_a_wrong_sign_may_spin_the_rotor_instead(law):
     assert np.abs(run["error_rad"][-1, 2]) > 100
 
 
-def written(path, curve, factor=1.0):
-    pairs = zip(np.degrees(curve.phi_rad).tolist(), (factor * curve.torque_Nm_per_A).tolist(), strict=True)
-    path.write_text("\n".join(["phi_deg,torque_Nm_per_A", *(f"{phi!r},{torque!r}" for phi, torque in pairs)]))
-    return str(path)
-
-
 @pytest.mark.parametrize("engine", ENGINES)
 def test_a_nominal_curve_of_the_same_content_changes_no_byte(engine, tmp_path):
     path = shutil.copy(actuators.TORQUE_CURVE_PATH, tmp_path / "same.csv")
@@ -86,7 +72,7 @@ def test_a_nominal_curve_of_the_same_content_changes_no_byte(engine, tmp_path):
 
 
 def test_a_nominal_curve_of_half_the_torque_is_a_scale_of_a_half(actuator, tmp_path):
-    half = written(tmp_path / "half.csv", actuator.torque_curve, 0.5)
+    half = write_curve(tmp_path / "half.csv", actuator.torque_curve, 0.5)
     by_curve = table(300, changes=PD | {"nominal.torque_curve": half})
     by_scale = table(300, changes=PD | {"nominal.torque_scale": 0.5})
     # Samples are halved without rounding; the spline through them rounds anew.
@@ -127,16 +113,6 @@ def test_the_lower_of_two_limits_binds(allocation):
     np.testing.assert_array_equal(ideal["current_A"], np.clip(ideal["current_command_A"], -0.2, 0.2))
 
 
-def test_a_limit_that_the_controller_does_not_know_cannot_be_exceeded_by_any_command():
-    def huge(t, reference, measurement, parameters, state, torque):
-        torque[:] = 50.0
-
-    law = Law("huge", huge, [], [])
-    pushed = table(20, "hold", STILL | {"nominal.current_limit_A": 100.0}, law)
-    assert np.abs(pushed["current_command_A"]).max() == 100.0
-    assert 7.9 < np.abs(pushed["current_A"]).max() <= 8.0
-
-
 # --- sensors
 
 
@@ -158,18 +134,6 @@ def test_measured_columns_are_what_the_controller_has():
     np.testing.assert_allclose(run["sliding_s"], s, rtol=0, atol=1e-13)  # of some 10 rad/s
 
 
-def test_measured_columns_are_there_only_where_they_differ():
-    def names(changes):
-        return [signal.name for signal in session(changes=changes).signals]
-
-    for changes in ({}, {"sensors.angle_offset_rad": [0.0, 0.0, 0.0]}):
-        assert not {"q_measured_rad", "qdot_estimated_rad_s"} & set(names(changes))
-    for axis in range(3):
-        offset = [0.0, 0.0, 0.0]
-        offset[axis] = 1e-6
-        assert {"q_measured_rad", "qdot_estimated_rad_s"} <= set(names({"sensors.angle_offset_rad": offset}))
-
-
 @pytest.mark.parametrize("scale", [1.0, 0.8])
 @pytest.mark.parametrize("allocation", ["least_norm", "bounded"])
 def test_currents_are_allocated_at_the_measured_pose_by_the_nominal_matrix(allocation, scale, actuator):
@@ -186,11 +150,3 @@ def test_currents_are_allocated_at_the_measured_pose_by_the_nominal_matrix(alloc
     at_the_true_pose = rate_jacobian(q).T @ (scale * torque_matrix(q, actuator))
     wanted = run["allocation_scale"][50] * run["torque_command_Nm"][50]
     assert np.abs(at_the_true_pose @ run["current_command_A"][50] - wanted).max() > 1e-4
-
-
-def test_coils_pull_at_the_true_pose(actuator):
-    run = table(500, changes=ASKEW)
-    for row in range(0, 500, 13):
-        middle = run["q_rad"][row] + 0.25e-3 * run["qdot_rad_s"][row]  # of the first physics step
-        torque = torque_matrix(middle, actuator) @ run["current_A"][row]
-        np.testing.assert_allclose(run["torque_Nm"][row], torque, rtol=0, atol=1e-14)
