@@ -151,9 +151,3 @@ def test_a_file_that_cannot_be_read_is_refused(tmp_path, suffix):
 def test_another_suffix_is_refused(tmp_path):
     with pytest.raises(InputError, match=r"expected a file .parquet, .csv or .mcap"):
         machine.write(LOG, tmp_path / "log.txt")
-
-
-def test_names_of_findings_are_checked(tmp_path):
-    machine.write(LOG, path := tmp_path / "log.csv")
-    with pytest.raises(InputError, match="did you mean gaps"):
-        machine.read(path, accepted=("gap",))

@@ -137,27 +137,20 @@ def test_a_counted_angle_is_known_at_the_edges_of_its_counts():
     assert deviation[1, 2] == pytest.approx(np.hypot(count_rad / np.sqrt(12), jitter))
 
 
-def test_friction_alone_needs_no_payload(empty):
-    """With torque scale and inertia known."""
-    known = {**KNOWN, "plant.modelling_error": 0.06, "plant.group_gain": TRUE["plant.group_gain"]}
-    outcome = identify(empty, SCENARIO, ["plant.coulomb_Nm"], known)
-    assert outcome.accepted, outcome.reasons
-    for name, value in zip(FRICTION, TRUE["plant.coulomb_Nm"], strict=True):
-        low, high = outcome.parameters[name].interval
-        assert abs(outcome.parameters[name].value - value) < high - low
-        assert high - low < 0.15 * value
+SIGNS = pytest.mark.release("1 s; test_verdict.py finds signs, too")
 
 
 @pytest.mark.parametrize(
-    ("wrong", "wanted"),
+    ("order", "sign", "wanted"),
     [
-        pytest.param(lambda log: log, "plant.viscous_Nm_s", id="missing friction"),
-        pytest.param(lambda log: _swapped(log), "plant.coulomb_Nm", id="swapped axes"),
-        pytest.param(lambda log: _negated(log), "plant.coulomb_Nm", id="sign of the currents"),
+        pytest.param([0, 1, 2], 1, "plant.viscous_Nm_s", id="missing friction"),
+        pytest.param([1, 0, 2], 1, "plant.coulomb_Nm", id="swapped axes"),
+        pytest.param([0, 1, 2], -1, "plant.coulomb_Nm", id="sign of the currents", marks=SIGNS),
     ],
 )
-def test_a_wrong_model_is_never_accepted(empty, wrong, wanted):
-    outcome = identify(wrong(empty), SCENARIO, [wanted], KNOWN)
+def test_a_wrong_model_is_never_accepted(empty, order, sign, wanted):
+    log = Log(empty.t_s, sign * empty.current_A, empty.angle_rad[:, order], conditions=empty.conditions)
+    outcome = identify(log, SCENARIO, [wanted], KNOWN)
     assert not outcome.accepted
     assert outcome.reasons
 
@@ -174,14 +167,6 @@ def test_a_dead_group_is_never_accepted(empty):
     name = f"plant.group_gain.{group}"
     low, high = identify(log, SCENARIO, [name], {**known, **TRUE}).parameters[name].interval
     assert abs(low + high) / 2 < high - low < 0.2
-
-
-def _swapped(log):
-    return Log(log.t_s, log.current_A, log.angle_rad[:, [1, 0, 2]], conditions=log.conditions)
-
-
-def _negated(log):
-    return Log(log.t_s, -log.current_A, log.angle_rad, conditions=log.conditions)
 
 
 def test_a_result_that_is_no_better_is_not_accepted(empty):

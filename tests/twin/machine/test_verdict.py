@@ -161,14 +161,6 @@ def changed_times(row, t_s):
     return replace(log, t_s=times)
 
 
-def test_times_out_of_order_and_repeated_ones_are_found():
-    assert stated("time-order", changed_times(700, 0.5)) == [("error", "log: 1 times, first after 0.699 s")]
-    assert stated("time-order", changed_times(700, np.nan)) == [("error", "t_s: 1 rows without a time")]
-    assert stated("duplicates", changed_times(900, 0.899)) == [("error", "log: 1 rows, first at 0.899 s")]
-    for name in ("time-order", "duplicates", "gaps", "jitter", "rate", "time-unit", "missing-values"):
-        assert stated(name, multisine()) == []
-
-
 def without(rows):
     log = multisine()
     return machine.Log(
@@ -183,33 +175,64 @@ def test_gaps_are_found_and_nothing_is_computed_across_them():
     )
     assert parts < 2 * whole  # 700 times if the angles are interpolated
     assert list(errors(without(np.s_[600:800]))) == ["gaps"]
-    large = "log: 1, 0.13 of the time, longest 0.201 s at 0.599 s"
-    assert stated("gaps", without(np.s_[600:800])) == [("error", large)]
-    small = "log: 1, 0.0033 of the time, longest 0.005 s at 0.599 s"
-    assert stated("gaps", without(np.s_[600:604])) == [("warning", small)]
 
 
-def test_rate_and_jitter_are_found():
+def every(step):
     log = multisine()
-    assert stated("rate", log.rows(0, 1500)) == []
-    slow, half = (machine.Log(log.t_s[::n], log.current_A[::n], log.angle_rad[::n]) for n in (20, 2))
-    assert list(errors(slow)) == ["rate"]
-    assert stated("rate", half) == [("warning", "t_s: 500 Hz, control at 1000 Hz")]
-    for size_s, severity in ((3e-4, "warning"), (2e-3, "error")):
-        times = log.t_s + RANDOM.uniform(-size_s, size_s, 1500)
-        assert [result[0] for result in stated("jitter", replace(log, t_s=np.sort(times)))] == [severity]
+    return machine.Log(log.t_s[::step], log.current_A[::step], log.angle_rad[::step])
 
 
-def test_missing_values_are_found():
+def jittered(size_s):
     log = multisine()
-    currents = log.current_A.copy()
-    currents[100, 4] = np.nan
-    one = [("warning", "currents: 1 rows lack some numbers")]
-    assert stated("missing-values", replace(log, current_A=currents)) == one
-    currents[:, 4] = np.inf
-    column = [("error", "currents: no number in column 4")]
-    assert stated("missing-values", replace(log, current_A=currents)) == column
-    assert "missing-values" in errors(replace(log, current_A=currents))
+    return replace(log, t_s=np.sort(log.t_s + RANDOM.uniform(-size_s, size_s, 1500)))
+
+
+def lacking(rows, value):
+    currents = multisine().current_A.copy()
+    currents[rows, 4] = value
+    return replace(multisine(), current_A=currents)
+
+
+def largest(current_A, **changes):
+    log = multisine()
+    return replace(log, current_A=current_A / np.abs(log.current_A).max() * log.current_A, **changes)
+
+
+ABOUT_TIME = ("time-order", "duplicates", "gaps", "jitter", "rate", "time-unit", "missing-values")
+
+
+@pytest.mark.parametrize(
+    ("name", "log", "severity", "where"),
+    [
+        ("time-order", lambda: changed_times(700, 0.5), "error", "log: 1 times, first after 0.699 s"),
+        ("time-order", lambda: changed_times(700, np.nan), "error", "t_s: 1 rows without a time"),
+        ("duplicates", lambda: changed_times(900, 0.899), "error", "log: 1 rows, first at 0.899 s"),
+        ("gaps", lambda: without(np.s_[600:800]), "error",
+         "log: 1, 0.13 of the time, longest 0.201 s at 0.599 s"),
+        ("gaps", lambda: without(np.s_[600:604]), "warning",
+         "log: 1, 0.0033 of the time, longest 0.005 s at 0.599 s"),
+        ("rate", lambda: every(20), "error", ""),
+        ("rate", lambda: every(2), "warning", "t_s: 500 Hz, control at 1000 Hz"),
+        ("jitter", lambda: jittered(3e-4), "warning", ""),
+        ("jitter", lambda: jittered(2e-3), "error", ""),
+        ("missing-values", lambda: lacking(100, np.nan), "warning", "currents: 1 rows lack some numbers"),
+        ("missing-values", lambda: lacking(slice(None), np.inf), "error", "currents: no number in column 4"),
+        ("saturation", lambda: largest(12), "error", "currents: commands up to 12 A, limit 8 A"),
+        ("saturation", lambda: replace(largest(40), current_A=np.clip(largest(40).current_A, -8, 8)),
+         "warning", "currents: at the limit of 8 A in"),
+    ],
+)  # fmt: skip
+def test_rows_that_are_wrong_are_found(name, log, severity, where):
+    ((result, place),) = stated(name, log())
+    assert (result, place[: len(where)]) == (severity, where)
+    if severity == "error":
+        assert name in errors(log())
+
+
+def test_correct_rows_have_no_finding():
+    for name in (*ABOUT_TIME, "saturation"):
+        assert stated(name, multisine()) == []
+    assert stated("saturation", largest(12, currents="measured")) == []
 
 
 def test_angles_and_currents_may_have_rows_of_their_own():
@@ -221,17 +244,6 @@ def test_angles_and_currents_may_have_rows_of_their_own():
 
 
 # --- content
-
-
-def test_saturation_is_found():
-    log = multisine()
-    at_limit = replace(log, current_A=np.clip(40 * log.current_A, -8, 8))
-    ((severity, where),) = stated("saturation", at_limit)
-    assert (severity, where[:32]) == ("warning", "currents: at the limit of 8 A in")
-    beyond = replace(log, current_A=12 / np.abs(log.current_A).max() * log.current_A)
-    assert stated("saturation", beyond) == [("error", "currents: commands up to 12 A, limit 8 A")]
-    assert stated("saturation", log) == []
-    assert stated("saturation", replace(beyond, currents="measured")) == []
 
 
 def test_a_log_without_motion_lacks_excitation():

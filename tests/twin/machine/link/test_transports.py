@@ -121,28 +121,25 @@ def test_standard_output_is_for_frames_alone():
     assert (done.stdout, done.stderr.strip()) == (b"frame", b"for people")
 
 
+FORM = "expected udp://HOST:PORT, serial:DEVICE@BAUD, or - for standard"
+LINE = "expected a serial line that can be opened, received /dev/"
+WRONG = ["", "udp", "udp://", "udp://host", "udp://:x", "udp://:99999", "tcp://:5", "serial:",
+         "serial:/dev/x@fast", "udp://:5/path", "udp://:0", "--"]  # fmt: skip
+
+
 @pytest.mark.parametrize(
-    "address",
-    ["", "udp", "udp://", "udp://host", "udp://:x", "udp://:99999", "tcp://:5", "serial:",
-     "serial:/dev/x@fast", "udp://:5/path", "udp://:0", "--"],
-)  # fmt: skip
-def test_a_wrong_address_is_refused(address):
-    with pytest.raises(InputError, match="expected udp://HOST:PORT, serial:DEVICE@BAUD, or - for standard"):
-        open_transport(address)
-
-
-@pytest.mark.parametrize("address", ["serial:/dev/no-such-line@9600", "serial:/dev/null"])
-def test_a_line_that_cannot_be_opened_is_refused(address):
-    with pytest.raises(InputError, match="expected a serial line that can be opened, received /dev/"):
-        open_transport(address)
-
-
-def test_an_address_of_another_machine_cannot_be_bound():
-    # TEST-NET-1 of RFC 5737: no machine has it.
-    with pytest.raises(
-        InputError, match=r"expected an address that can be used, received udp://192\.0\.2\.1"
-    ):
-        open_transport("udp://192.0.2.1:5005", listening=True)
+    ("address", "listening", "message"),
+    [
+        *((address, False, FORM) for address in WRONG),
+        ("serial:/dev/no-such-line@9600", False, LINE),
+        ("serial:/dev/null", False, LINE),
+        # TEST-NET-1 of RFC 5737: no machine has it.
+        ("udp://192.0.2.1:5005", True, r"expected an address that can be used, received udp://192\.0\.2\.1"),
+    ],
+)
+def test_an_address_that_cannot_be_used_is_refused(address, listening, message):
+    with pytest.raises(InputError, match=message):
+        open_transport(address, listening=listening)
 
 
 def test_without_pyserial_the_message_names_the_extra(monkeypatch):
