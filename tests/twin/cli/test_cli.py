@@ -57,37 +57,36 @@ def test_a_refused_process_says_so_on_one_line_and_exits_2():
     assert done.stderr.startswith("spheretwin: ")
 
 
-TALKING = """
+LAW = """
+import os
 import sys
 
 
-def talking(t, reference, measurement, parameters, state, torque):
+def holding(t, reference, measurement, parameters, state, torque):
     torque[:] = -0.5 * (measurement[0] - reference[0]) - 0.03 * measurement[1]
-    if t > 0.1 and not TOLD:
-        TOLD.append(t)
-        print("it runs", file=sys.stderr, flush=True)
+    if t > 0.1 and not DONE:
+        DONE.append(t)
+        ONCE
 
 
-TOLD = []
+DONE = []
 """
 
 
-@contextlib.contextmanager
-def running(folder, *arguments):
-    """Start a run of a minute at the pace of the clock; wait until some ticks are done."""
-    (folder / "law.py").write_text(TALKING)
-    law = ["--controller.law", folder / "law.py:talking", "--plant.engine", "lagrangian"]
-    with started("simulate", "hold", "--live", "--duration", "60", *law, *arguments) as process:
-        try:
-            assert any("it runs" in line for line in process.stderr)
-            yield process
-        finally:
-            process.kill()
+def with_law(folder, once, *arguments):
+    """Return the arguments of a run of a minute under a law that does something once, after 0.1 s."""
+    path = folder / "law.py"
+    path.write_text(LAW.replace("ONCE", once))
+    law = ["--controller.law", f"{path}:holding", "--plant.engine", "lagrangian"]
+    return ["simulate", "hold", "--duration", "60", *law, *arguments]
 
 
 def test_ctrl_c_keeps_the_run(tmp_path):
     telemetry, recording = tmp_path / "run.parquet", tmp_path / "run.rrd"
-    with running(tmp_path, "--telemetry", telemetry, "--record", recording, "--json") as process:
+    outputs = ["--telemetry", telemetry, "--record", recording, "--json"]
+    once = "print('it runs', file=sys.stderr, flush=True)"
+    with started(*with_law(tmp_path, once, "--live", *outputs)) as process:
+        assert any("it runs" in line for line in process.stderr)
         process.send_signal(signal.SIGINT)
         stdout, stderr = process.communicate()
     assert process.returncode == 1
@@ -97,27 +96,10 @@ def test_ctrl_c_keeps_the_run(tmp_path):
     assert recording.exists()
 
 
-STOPPING = """
-import os
-
-
-def stopping(t, reference, measurement, parameters, state, torque):
-    torque[:] = 0.0
-    if t > 0.1 and not SENT:
-        SENT.append(t)
-        os.kill(os.getpid(), NUMBER)
-
-
-SENT = []
-"""
-
-
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_a_signal_ends_a_run_and_keeps_its_rows(tmp_path, number):
-    (tmp_path / "law.py").write_text(STOPPING.replace("NUMBER", str(int(number))))
-    law = ["--controller.law", f"{tmp_path / 'law.py'}:stopping", "--plant.engine", "lagrangian"]
-    telemetry = tmp_path / "run.parquet"
-    result = call("simulate", "hold", "--duration", "60", *law, "--telemetry", telemetry, "--json")
+    telemetry, once = tmp_path / "run.parquet", f"os.kill(os.getpid(), {int(number)})"
+    result = call(*with_law(tmp_path, once, "--telemetry", telemetry, "--json"))
     assert (result.code, result.json["status"]) == (1, "interrupted")
     assert 100 < len(read_parquet(telemetry)[0]) < 60_000
 
@@ -129,34 +111,22 @@ def test_live_serves_on_this_machine_alone_at_the_printed_address():
         line = process.stderr.readline()
         page = re.fullmatch(r"watch: http://127\.0\.0\.1:(\d+)/\n", line)
         assert page, line
-        assert _listening_hosts(int(page[1])) == {"127.0.0.1"}
-        assert _ports_of(process.pid) == {int(page[1])}
+        assert _addresses_of(process.pid) == {("0100007F", int(page[1]))}  # 127.0.0.1, in network order
     finally:
         process.send_signal(signal.SIGINT)
         process.communicate()
 
 
-def _ports_of(pid):
-    """Ports on which a process listens, from the kernel's tables."""
+def _addresses_of(pid):
+    """Hexadecimal hosts and ports on which a process listens, from the kernel's tables."""
     own = set()
     for link in Path(f"/proc/{pid}/fd").iterdir():
         with contextlib.suppress(FileNotFoundError):  # it has closed it
             own.add(os.readlink(link))
     tables = [Path("/proc/net", name).read_text().splitlines()[1:] for name in ("tcp", "tcp6")]
     rows = [row.split() for table in tables for row in table]
-    return {int(row[1].split(":")[1], 16) for row in rows if row[3] == "0A" and f"socket:[{row[9]}]" in own}
-
-
-def _listening_hosts(port):
-    """Addresses on which some process listens at a port, from the kernel's table."""
-    hosts = set()
-    for table in ("tcp", "tcp6"):
-        for row in Path("/proc/net", table).read_text().splitlines()[1:]:
-            address, state = row.split()[1], row.split()[3]
-            host, hexadecimal = address.split(":")
-            if state == "0A" and int(hexadecimal, 16) == port:
-                hosts.add("127.0.0.1" if host == "0100007F" else host)
-    return hosts
+    listening = [row[1].split(":") for row in rows if row[3] == "0A" and f"socket:[{row[9]}]" in own]
+    return {(host, int(port, 16)) for host, port in listening}
 
 
 def test_reader_that_leaves_is_no_error():
@@ -177,6 +147,7 @@ NOT_FOR_A_RUN = (
 # Prints the modules that one run imports, and the entries of the compile cache that it compiles or loads.
 ONE_RUN = """
 import json, sys
+from spheretwin import cli
 from spheretwin.models.base import cache
 
 folder, opened = str(cache.cache_folder()), set()
