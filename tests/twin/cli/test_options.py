@@ -80,50 +80,30 @@ def test_options_have_their_defaults(received, command):
     assert options["has_fields"] == (command.split()[0] in ("simulate", "bench"))
 
 
-@pytest.mark.parametrize(
-    ("command", "flag", "name"),
-    [
-        ("simulate hold", "--record", "record"),
-        ("simulate hold", "--telemetry", "telemetry"),
-        ("simulate", "--replay", "replay"),
-        ("simulate hold", "--export-log", "export_log"),
-        ("simulate hold", "--export-truth", "export_truth"),
-        ("log check a", "--columns", "columns"),
-        ("bench", "--record", "record"),
-        ("crosscheck", "--out", "out"),
-        ("crosscheck", "--mjcf", "mjcf"),
-        ("reproduce figure6", "--out", "out"),
-        ("sweep paper", "--out", "out"),
-        ("review a", "--export", "export"),
-        ("review a", "--merge", "merge"),
-        ("review a", "--figures", "figures"),
-        ("magnetics curve", "--out", "out"),
-        ("magnetics curve", "--csv", "csv"),
-        ("magnetics check", "--csv", "csv"),
-        ("magnetics map", "--out", "out"),
-    ],
-)
-def test_files_and_folders_are_paths(received, command, flag, name):
-    assert received(*command.split(), flag, "a/b")[name] == Path("a/b")
+GIVEN = [
+    "simulate hold --record a/b --telemetry a/b --export-log a/b --export-truth a/b --live --json",
+    "simulate --replay a/b",
+    "log check a --columns a/b --json",
+    "bench --record a/b --no-browser",
+    "crosscheck --out a/b --mjcf a/b --json --verbose",
+    "reproduce figure6 --out a/b --json --verbose",
+    "sweep paper --out a/b --optimise --json",
+    "review a --export a/b --merge a/b --figures a/b --json",
+    "explain x --all --json",
+    "magnetics curve --out a/b --csv a/b",
+    "magnetics check --csv a/b",
+    "magnetics map --out a/b --json --verbose",
+]
 
 
-@pytest.mark.parametrize(
-    ("command", "flags"),
-    [
-        ("simulate hold", "--live --json"),
-        ("bench", "--no-browser"),
-        ("crosscheck", "--json --verbose"),
-        ("reproduce all", "--json --verbose"),
-        ("sweep paper", "--optimise --json"),
-        ("review a", "--json"),
-        ("explain x", "--all --json"),
-        ("log check a", "--json"),
-        ("magnetics map", "--json --verbose"),
-    ],
-)
-def test_switches_are_on_where_they_are_given(received, command, flags):
-    options = received(*command.split(), *flags.split())
-    assert all(options[flag.strip("-").replace("-", "_")] is True for flag in flags.split())
+@pytest.mark.parametrize("command", GIVEN)
+def test_files_are_paths_and_switches_are_on(received, command):
+    words = command.split()
+    options = received(*words)
+    for word, after in zip(words, [*words[1:], "--"], strict=True):
+        if word.startswith("--"):
+            expected = True if after.startswith("--") else Path(after)
+            assert options[word[2:].replace("-", "_")] == expected
 
 
 @pytest.mark.parametrize(
