@@ -17,8 +17,10 @@ from spheretwin.simulation import follow
 
 PLANT = {"plant.engine": "lagrangian"}
 # Under a law without columns of its own from 1.5 s on, and with a part that fails: events of every kind.
+# Ideal hardware with a fault has a loop of its own, which no other test needs; the prototype allows faults.
 WITH_EVENTS = {
     **PLANT,
+    "hardware": "prototype",
     "duration": 2.2,
     "fault": [{"target": "coil.07", "mode": "open", "start_s": 0.3, "detection": True}],
     "event": [{"t_s": 1.5, "set": "controller.law", "value": "pd"}],

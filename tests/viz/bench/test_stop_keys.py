@@ -8,7 +8,7 @@ from tests.viz.bench.on_page import at_rest, opened, show_tab
 from tests.waiting import wait_for
 
 pytestmark = needs_a_browser
-IN_A_BROWSER = pytest.mark.release("browser, 4 to 8 s; two tests of this file have STOP in a page")
+IN_A_BROWSER = pytest.mark.release("browser, 2 to 8 s; the button and a held key have STOP in a page")
 
 TABS = ("move", "law", "twin", "faults", "files")
 
@@ -98,6 +98,7 @@ def test_a_held_key_is_one_stop_and_the_button_acts_by_the_mouse(tab, bench):
     wait_for(lambda: stops(bench) == 2)
 
 
+@IN_A_BROWSER
 def test_stop_waits_for_a_channel_that_is_being_opened_again(browser):
     bench = fake.Bench()
     with fake.shown(bench) as page:

@@ -51,6 +51,7 @@ for path in sys.argv[1:]:
 """
 
 
+@pytest.mark.release("reads 24 files for 2.3 s; test_a_reader_that_dies_is_damage has the end of a reader")
 def test_no_damage_ends_the_process_or_says_more_than_a_line(tmp_path):
     """Bits, bytes, blocks, wherever they are; a damaged number may stay a number."""
     whole = tmp_path / "whole.rrd"

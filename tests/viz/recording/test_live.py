@@ -119,6 +119,7 @@ def test_plots_follow_the_cursor_over_the_chosen_window():
         assert encoded.field(end).type_codes.to_pylist() == [1]  # relative to the cursor
 
 
+@pytest.mark.release("1.2 s; test_viewer_server.py has a server of a killed process")
 def test_a_killed_run_leaves_no_server():
     """Nothing that it started goes on: the kernel closes its ports, and no process has its mark."""
     mark = f"LIVE_MARK_{os.getpid()}"
