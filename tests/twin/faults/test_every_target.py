@@ -8,7 +8,6 @@ import pytest
 
 from spheretwin import scenario as scenarios
 from spheretwin.faults.fault import MODES
-from spheretwin.faults.schedule import part_names
 from spheretwin.faults.targets import TARGETS
 from spheretwin.models.base.errors import InputError
 from spheretwin.session import Session
@@ -93,28 +92,6 @@ def test_only_of_groups_may_the_controller_know_and_only_of_those_that_there_are
     if target.each_group:
         with pytest.raises(InputError, match="expected a fault of a group from 0 to 17"):
             Session(planned({**fault(name, mode), "target": f"{name}.18"}))
-
-
-@EACH
-def test_it_acts_from_its_tick_on_and_leaves_numbers(name):
-    """Before its start, not a bit of a healthy run's columns is another; all that is logged is finite."""
-    with Session(planned()) as session:
-        healthy = session.advance(30)
-    part = part_names(GROUPS).index(TARGETS[name].names(GROUPS)[-1])
-    for mode, what in TARGETS[name].modes.items():
-        with Session(planned(fault(name, mode, start_s=0.01, end_s=0.02))) as session:
-            table = session.advance(30)
-        assert np.isfinite(table.values).all()
-        for signal in healthy.signals:
-            before, same = table[signal.name][:10], healthy[signal.name][:10]
-            assert before.tobytes() == same.tobytes(), (mode, signal.name)
-        marks = table["fault"][:, part]
-        assert set(marks[10:20]) <= {0.0, 1.0 + MODES.index(mode)}
-        if not what.intermittent:
-            assert marks[10:20].all()
-        assert not marks[:10].any()
-        assert not marks[20:].any()
-        assert not np.delete(table["fault"], part, axis=1).any()
 
 
 @EACH

@@ -1,7 +1,5 @@
 """The plan of faults: which act at a tick, as a function of plan, seed, part and tick alone."""
 
-import math
-
 import numpy as np
 import pytest
 from hypothesis import given
@@ -96,34 +94,19 @@ def test_what_acts_is_a_function_of_tick_and_part_alone(faults, seed):
         assert [place in acting for acting in forwards] == [bool(alone.active(tick)) for tick in range(80)]
 
 
-def test_coins_are_fair_and_each_part_s_own():
-    stretches = 4000
-    parts = [coil(group, mode="intermittent", value=3e-3) for group in range(3)]
-    heads = np.array(
-        [
-            [bool(plan(each, seed=4).active(3 * stretch)) for stretch in range(stretches)]
-            for each in parts
-        ]
-    )  # fmt: skip
-    # Five standard errors of a fair coin, of agreement between parts, and of runs of two.
-    bound = 5 * 0.5 / math.sqrt(stretches)
-    assert np.all(np.abs(heads.mean(axis=1) - 0.5) < bound)
-    for one, other in ((0, 1), (0, 2), (1, 2)):
-        assert abs(np.mean(heads[one] == heads[other]) - 0.5) < bound
-    assert np.all(np.abs(np.mean(heads[:, 1:] == heads[:, :-1], axis=1) - 0.5) < bound)
-    other_seed = [bool(plan(parts[0], seed=5).active(3 * stretch)) for stretch in range(stretches)]
-    assert abs(np.mean(heads[0] == other_seed) - 0.5) < bound
-
-
-def test_a_stretch_is_whole_ticks_counted_from_the_start_of_the_run():
-    acts = plan(coil(mode="intermittent", value=4e-3, start_s=0.002), seed=1)
+@pytest.mark.parametrize(("group", "seed"), [(0, 1), (0, 2), (5, 1)])
+def test_a_stretch_is_whole_ticks_counted_from_the_start_of_the_run(group, seed):
+    """A fair coin of the part's own for each stretch."""
+    acts = plan(coil(group, mode="intermittent", value=4e-3, start_s=0.002), seed=seed)
     heads = [bool(acts.active(tick)) for tick in range(400)]
-    coins = [
-        np.random.default_rng([1, stream_key("coil.00 intermittent"), k]).random() < 0.5 for k in range(100)
-    ]
+    stream = stream_key(f"coil.{group:02d} intermittent")
+    coins = [np.random.default_rng([seed, stream, k]).random() < 0.5 for k in range(100)]
     assert heads[2:] == [coin for coin in coins for _ in range(4)][2:]
     assert not any(heads[:2])
-    shortest = plan(coil(mode="intermittent", value=1e-6))  # no stretch is shorter than a period
+
+
+def test_no_stretch_is_shorter_than_a_period():
+    shortest = plan(coil(mode="intermittent", value=1e-6))
     assert {shortest.next_change(tick) - tick for tick in range(50)} == {1}
 
 
