@@ -3,23 +3,18 @@
 import numpy as np
 import pytest
 
+import spheretwin as st
 from spheretwin import scenario as scenarios
 from spheretwin.cli import main
 from spheretwin.linear import linearise
-from spheretwin.models.base.errors import InputError
 from spheretwin.models.lagrangian import inertia_matrix
-from spheretwin.models.telemetry.table import Table
-from spheretwin.session import Session
 from tests.twin.passive_cases import ENGINES, FREE, STILL, session, table
 
 COULOMB_Nm, BREAK_AWAY = np.array([2e-3, 3e-3, 4e-3]), 1.5
 STICTION = {"plant.stiction.on": True, "plant.coulomb_Nm": COULOMB_Nm.tolist()}
 STIFFNESS_Nm_rad = BREAK_AWAY * COULOMB_Nm / 0.75e-3
-SPRING_Nm_rad, NEUTRAL_rad, CONSTANT_Nm = (
-    np.array([0.05, 0.03, 0.02]),
-    np.array([0.1, -0.1, 0.3]),
-    np.array([1e-3, 0, -2e-3]),
-)
+SPRING_Nm_rad, NEUTRAL_rad = np.array([[0.05, 0.03, 0.02], [0.1, -0.1, 0.3]])
+CONSTANT_Nm = np.array([1e-3, 0, -2e-3])
 CABLE = {
     "plant.cable.stiffness_Nm_rad": SPRING_Nm_rad.tolist(),
     "plant.cable.neutral_rad": NEUTRAL_rad.tolist(),
@@ -29,20 +24,27 @@ HYSTERESIS = {"plant.cable.hysteresis_Nm": [1e-3, 1e-3, 1e-3], "plant.cable.hyst
 BOTH = STICTION | CABLE | HYSTERESIS | {"plant.viscous_Nm_s": [1e-4, 1e-4, 1e-4]}
 
 
+COMPILES = pytest.mark.release(
+    "compiles loops with static friction for 19 s; test_bristle_friction.py has the elements"
+)
+LOAD_Nm = 0.4 * BREAK_AWAY * COULOMB_Nm
+"""At once, with an overshoot of 0.37, it remains in the elastic range."""
+
+
+@COMPILES
 @pytest.mark.parametrize("engine", ENGINES)
 def test_a_rotor_under_less_than_the_break_away_torque_rests(engine):
-    # 0.4 of break-away, at once: with an overshoot of 0.37 it remains in the elastic range.
-    load = 0.4 * BREAK_AWAY * COULOMB_Nm
-    changes = STILL | STICTION | {"plant.modelling_torque_Nm": (-load).tolist(), "plant.engine": engine}
+    changes = STILL | STICTION | {"plant.modelling_torque_Nm": (-LOAD_Nm).tolist(), "plant.engine": engine}
     run = table(3000, "hold", changes, FREE)
-    deflection = load / STIFFNESS_Nm_rad
+    deflection = LOAD_Nm / STIFFNESS_Nm_rad
     # The elastic motion decays with 0.08 s: by exp(-37) within 3 s.
     np.testing.assert_allclose(run["q_rad"][-1], deflection, rtol=1e-9)
     np.testing.assert_allclose(run["presliding_rad"][-1], deflection, rtol=1e-9)
-    np.testing.assert_allclose(run["friction_Nm"][-1], -load, rtol=1e-9)
+    np.testing.assert_allclose(run["friction_Nm"][-1], -LOAD_Nm, rtol=1e-9)
     np.testing.assert_allclose(run["qdot_rad_s"][-1], 0, atol=1e-11)
 
 
+@COMPILES
 @pytest.mark.parametrize("engine", ENGINES)
 def test_a_cable_swings_the_rotor_about_its_neutral_pose(engine, actuator):
     """Hinge γ of the upright rotor: a harmonic oscillation about the equilibrium."""
@@ -61,44 +63,40 @@ def test_a_cable_swings_the_rotor_about_its_neutral_pose(engine, actuator):
     assert not run["cable_Nm"][:, :2].any()
 
 
+@pytest.mark.uncompiled
 @pytest.mark.parametrize("engine", ENGINES)
 def test_the_rows_account_for_the_energy_of_friction_and_cable(engine, actuator):
     """A row each physics step: kinetic energy, and the works of all torques over the path."""
-    rates = [1.0, -0.8, 2.0]
 
     def unbalanced_J(step_s):
-        changes = STILL | BOTH | {"plant.engine": engine, "plant.initial_rad_s": rates}
+        changes = STILL | BOTH | {"plant.engine": engine, "plant.initial_rad_s": [1.0, -0.8, 2.0]}
         changes |= {"plant.step_s": step_s, "controller.period_s": step_s}
-        run = table(round(0.4 / step_s) + 1, "hold", changes, FREE)
+        run = table(round(0.1 / step_s) + 1, "hold", changes, FREE)
         kinetic = [
             0.5 * v @ inertia_matrix(q, actuator.inertia) @ v
             for q, v in zip(run["q_rad"][[0, -1]], run["qdot_rad_s"][[0, -1]], strict=True)
         ]
         moved = np.diff(run["q_rad"], axis=0)
-        dissipated_J = [np.sum(run[name][:-1] * moved) for name in ("friction_Nm", "cable_Nm")]
-        return kinetic[1] - kinetic[0] - sum(dissipated_J), dissipated_J, kinetic[0]
+        work_J = [np.sum(run[name][:-1] * moved) for name in ("friction_Nm", "cable_Nm")]
+        return kinetic[1] - kinetic[0] - sum(work_J), work_J, kinetic[0]
 
-    left_J, dissipated_J, first_J = unbalanced_J(5e-4)
-    assert max(dissipated_J) < -0.02 * first_J  # each takes energy here
-    assert abs(left_J) < 1e-4 * first_J
+    left_J, work_J, first_J = unbalanced_J(5e-4)
+    assert min(map(abs, work_J)) > 0.02 * first_J  # each counts here
+    assert abs(left_J) < 1e-5 * first_J
     # Torques are held over each step, so that the works are nearly exact: at least second order.
     assert abs(left_J) < 0.3 * abs(unbalanced_J(1e-3)[0])
 
 
-@pytest.mark.release(
-    "compiles loops with static friction for 19 s; test_bristle_friction.py has the elements"
+@pytest.mark.parametrize(
+    "ticks", [pytest.param(150, marks=pytest.mark.uncompiled), pytest.param(1500, marks=COMPILES)]
 )
-def test_both_engines_agree_on_a_loop_with_static_friction_and_a_cable():
+def test_both_engines_agree_on_a_loop_with_static_friction_and_a_cable(ticks):
     one, other = (
-        table(1500, "tilt", BOTH | {"plant.engine": engine, "controller.law": "afsm_eso"})
+        table(ticks, "tilt", BOTH | {"plant.engine": engine, "controller.law": "afsm_eso"})
         for engine in ENGINES
     )
-    for name, bound in (
-        ("q_rad", 1e-9),
-        ("presliding_rad", 1e-9),
-        ("friction_Nm", 1e-8),
-        ("cable_Nm", 1e-10),
-    ):
+    bounds = {"q_rad": 1e-9, "presliding_rad": 1e-9, "friction_Nm": 1e-8, "cable_Nm": 1e-10}
+    for name, bound in bounds.items():
         np.testing.assert_allclose(one[name], other[name], rtol=0, atol=bound)
     assert np.abs(one["presliding_rad"]).max() > 0.6e-3
     level = BREAK_AWAY * COULOMB_Nm + 1e-4 * np.abs(one["qdot_rad_s"]).max(axis=0)
@@ -114,30 +112,22 @@ def test_fields_without_effect_change_no_bit_and_add_no_column():
     np.testing.assert_array_equal(plain.values, other.values)
 
 
-def test_the_controller_does_not_know_of_them():
-    with session("tilt", BOTH) as stuck, session("tilt") as free:
-        assert stuck.scenario.nominal == free.scenario.nominal
-
-
-@pytest.mark.release(
-    "compiles loops with static friction for 19 s; test_bristle_friction.py has the elements"
-)
+@pytest.mark.uncompiled
 def test_snapshots_and_chunks_continue_bit_for_bit():
-    whole = table(400, "tilt", BOTH)
+    whole = table(60, "tilt", BOTH)
     with session("tilt", BOTH) as first:
-        start = first.advance(150)
+        start = first.advance(25)
         snapshot = first.snapshot()
-        first.advance(100)
+        first.advance(10)
         first.restore(snapshot)
-        rest = first.advance(250)
+        rest = first.advance(35)
     np.testing.assert_array_equal(np.vstack([start.values, rest.values]), whole.values)
 
 
+@COMPILES
 def test_another_level_keeps_the_deflections_and_switching_off_drops_them():
-    # 0.4 of break-away, at once: with an overshoot of 0.37 it remains in the elastic range.
-    load = 0.4 * BREAK_AWAY * COULOMB_Nm
-    changes = STILL | STICTION | {"plant.modelling_torque_Nm": (-load).tolist()}
-    with Session(scenarios.load("hold", changes), FREE) as run:
+    changes = STILL | STICTION | {"plant.modelling_torque_Nm": (-LOAD_Nm).tolist()}
+    with session("hold", changes, FREE) as run:
         before = run.advance(2000)["presliding_rad"][-1]
         run.set("plant.coulomb_Nm", (2 * COULOMB_Nm).tolist())
         after = run.advance(2000)["presliding_rad"]
@@ -150,39 +140,12 @@ def test_another_level_keeps_the_deflections_and_switching_off_drops_them():
         assert np.abs(run.advance(1)["presliding_rad"]).max() < 1e-5
 
 
-@pytest.mark.release(
-    "compiles loops with static friction for 19 s; test_bristle_friction.py has the elements"
-)
-def test_a_run_with_both_is_replayed_to_the_same_bytes(tmp_path, capsys):
-    fields = [
-        "--plant.stiction.on", "true", "--plant.coulomb-Nm", "2e-3", "2e-3", "2e-3",
-        "--plant.cable.stiffness-Nm-rad", "0.01", "0.01", "0",
-        "--plant.cable.hysteresis-Nm", "0", "1e-3", "0",
-    ]  # fmt: skip
+@pytest.mark.uncompiled
+def test_a_run_with_both_is_replayed_to_the_same_bytes(tmp_path):
     first, second = tmp_path / "first.parquet", tmp_path / "second.parquet"
-    assert main(["simulate", "tilt", "--duration", "0.2", *fields, "--telemetry", str(first)]) == 0
+    st.simulate("tilt", BOTH | {"duration": 0.03}).save(first)
     assert main(["simulate", "--replay", str(first), "--telemetry", str(second)]) == 0
-    capsys.readouterr()
     assert first.read_bytes() == second.read_bytes()
-
-
-@pytest.mark.parametrize(
-    ("name", "value", "message"),
-    [
-        ("plant.stiction.break_away", 0.9, r"plant\.stiction\.break_away.*greater than or equal to 1"),
-        ("plant.stiction.presliding_rad", 0.0, r"plant\.stiction\.presliding_rad"),
-        ("plant.stiction.damping_ratio", -0.1, r"plant\.stiction\.damping_ratio"),
-        ("plant.stiction.stribeck_rad_s", 0.0, r"plant\.stiction\.stribeck_rad_s"),
-        ("plant.stiction.level", 1.0, r"plant\.stiction, received level"),
-        ("plant.cable.stiffness_Nm_rad", [-1.0, 0.0, 0.0], r"plant\.cable\.stiffness_Nm_rad"),
-        ("plant.cable.hysteresis_rad", 0.0, r"plant\.cable\.hysteresis_rad"),
-        ("plant.cable.hysteresis_Nm", [0.0, 0.0], r"plant\.cable\.hysteresis_Nm"),
-    ],
-)
-def test_bad_values_are_refused_in_one_line(name, value, message):
-    with pytest.raises(InputError, match=message) as refused:
-        scenarios.load("hold", {name: value})
-    assert "\n" not in str(refused.value)
 
 
 def test_the_linear_model_has_the_spring_and_the_torque_of_the_cable(actuator):
@@ -201,14 +164,3 @@ def test_the_linear_model_has_the_spring_and_the_torque_of_the_cable(actuator):
         for changes in (STILL, STILL | CABLE)
     )
     np.testing.assert_array_equal(nominal, other)
-
-
-@pytest.mark.release(
-    "compiles loops with static friction for 19 s; test_bristle_friction.py has the elements"
-)
-def test_table_columns_have_labels_and_units():
-    run = table(5, "tilt", BOTH)
-    assert isinstance(run, Table)
-    units = {signal.name: (signal.unit, signal.size) for signal in run.signals}
-    assert units["presliding_rad"] == ("rad", 3)
-    assert units["cable_Nm"] == ("N·m", 3)
