@@ -1,6 +1,5 @@
 """``spheretwin sweep``: its two streams, its exit codes, its folder."""
 
-import json
 import shlex
 from pathlib import Path
 
@@ -14,6 +13,7 @@ from spheretwin.study import agreement, report
 from spheretwin.study.grid import Grid
 from spheretwin.study.runner import run as run_study
 from spheretwin.study.study import load as load_study
+from tests.twin.cli.calls import call, succeeded
 
 
 @pytest.fixture
@@ -26,117 +26,105 @@ def source(tmp_path):
     return str(path)
 
 
-def test_people_get_a_table_and_a_page(source, tmp_path, capsys, monkeypatch):
+@pytest.fixture
+def with_metric(source, tmp_path):
+    """Add a function of a file to the metrics of the study."""
+
+    def add(name, statement):
+        (tmp_path / "mine.py").write_text(f"def {name}(run):\n    {statement}\n")
+        path = Path(source)
+        path.write_text(f'metrics = ["rms_error_rad", "mine.py:{name}"]\n' + path.read_text())
+
+    return add
+
+
+def test_a_study_without_a_folder_has_one_of_its_name(source, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    assert cli.main(["sweep", source]) == cli.DONE
-    out, err = capsys.readouterr()
-    assert "short: 3 of 3 rows" in out
-    assert "completed" in out
-    assert err == ""
+    assert "short: 3 of 3 rows" in succeeded("sweep", source)
     names = {path.name for path in (tmp_path / "short_study").iterdir()}
     assert {"journal.jsonl", "table.parquet", "report.md", "report.html", "report_axis.svg"} <= names
 
 
-def test_json_stands_alone(source, tmp_path, capsys):
-    (tmp_path / "mine.py").write_text("def loud(run):\n    print('here')\n    return 1\n")
-    path = Path(source)
-    path.write_text('metrics = ["rms_error_rad", "mine.py:loud"]\n' + path.read_text())
-    assert cli.main(["sweep", source, "--out", str(tmp_path / "out"), "--json", "--limit", "2"]) == cli.DONE
-    out, err = capsys.readouterr()
-    reported = json.loads(out)
-    assert (reported["rows"], reported["of"], reported["failed"], reported["resumed"]) == (2, 2, 0, 0)
-    assert reported["summary"]["afsm"]["loud"] == {"median": 1.0, "range_95": [1.0, 1.0]}
-    assert err == "here\nhere\n"
+def test_json_stands_alone(source, tmp_path, with_metric):
+    with_metric("loud", "return print('here') or 1")
+    result = call("sweep", source, "--out", tmp_path / "out", "--json", "--limit", "2")
+    assert (result.code, result.err) == (cli.DONE, "here\nhere\n")
+    assert result.json["summary"]["afsm"]["loud"] == {"median": 1.0, "range_95": [1.0, 1.0]}
 
 
-def test_damage_to_the_journal_is_told(source, tmp_path, capsys):
-    arguments = ["sweep", source, "--out", str(tmp_path), "--json"]
-    cli.main(arguments)
+def test_damage_to_the_journal_is_told(source, tmp_path):
+    arguments = ["sweep", source, "--out", tmp_path, "--json"]
+    call(*arguments)
     path = tmp_path / "journal.jsonl"
     path.write_bytes(path.read_bytes().replace(b"completed", b"cmopleted", 1)[:-9])
-    capsys.readouterr()
-    assert cli.main(arguments) == cli.DONE
-    out, err = capsys.readouterr()
-    assert json.loads(out)["resumed"] == 1
-    assert "the journal ended in a torn line, which was dropped" in err
-    assert "1 damaged lines of the journal were skipped, and their rows run again" in err
+    result = call(*arguments)
+    assert (result.code, result.json["resumed"]) == (cli.DONE, 1)
+    assert "the journal ended in a torn line, which was dropped" in result.err
+    assert "1 damaged lines of the journal were skipped, and their rows run again" in result.err
 
 
-def test_the_first_of_several_failed_rows_is_named(source, tmp_path, capsys):
-    (tmp_path / "mine.py").write_text(
-        "def fragile(run):\n    return 1 / (1 - min(run.scenario.disturbance.load, 1))\n"
-    )
-    path = Path(source)
-    path.write_text('metrics = ["mine.py:fragile"]\n' + path.read_text())
-    assert cli.main(["sweep", source, "--out", str(tmp_path / "out")]) == cli.FAILED
+def test_the_first_of_several_failed_rows_is_named(source, tmp_path, with_metric):
+    with_metric("fragile", "return 1 / (1 - min(run.scenario.disturbance.load, 1))")
+    result = call("sweep", source, "--out", tmp_path / "out")
+    assert result.code == cli.FAILED
     keys = [row.key for row in Grid(load_study(source))]
-    err = capsys.readouterr().err
-    assert [place for place, key in enumerate(keys) if key in err] == [1]
-    assert "2 of 3 rows failed" in err
+    assert [place for place, key in enumerate(keys) if key in result.err] == [1]
+    assert "2 of 3 rows failed" in result.err
 
 
-def test_without_matplotlib_there_is_a_table_and_a_word(source, tmp_path, capsys, monkeypatch):
+def test_without_matplotlib_there_is_a_table_and_a_word(source, tmp_path, monkeypatch):
     monkeypatch.setattr(report, "can_be_drawn", lambda: False)
-    assert cli.main(["sweep", source, "--out", str(tmp_path / "out")]) == cli.DONE
-    assert f"no report was written: {install_command('plots')}" in capsys.readouterr().err
+    result = call("sweep", source, "--out", tmp_path / "out")
+    assert result.code == cli.DONE
+    assert f"no report was written: {install_command('plots')}" in result.err
     assert {path.name for path in (tmp_path / "out").iterdir()} == {"journal.jsonl", "table.parquet"}
 
 
-def test_plants_that_differ_are_told_in_one_line(source, tmp_path, capsys, monkeypatch):
+def test_plants_that_differ_are_told_in_one_line(source, tmp_path, monkeypatch):
+    message = "study short: expected row 0 to be the same on both plants"
+
     def differ(*_):
-        raise SpheretwinError("study short: expected row 0 to be the same on both plants")
+        raise SpheretwinError(message)
 
     monkeypatch.setattr(agreement, "check", differ)
-    assert cli.main(["sweep", source, "--out", str(tmp_path / "out")]) == cli.FAILED
-    assert (
-        capsys.readouterr().err == "spheretwin: study short: expected row 0 to be the same on both plants\n"
-    )
+    result = call("sweep", source, "--out", tmp_path / "out")
+    assert (result.code, result.err) == (cli.FAILED, f"spheretwin: {message}\n")
 
 
 @pytest.mark.parametrize(
     ("load", "code", "status"), [("1.0", cli.DONE, "completed"), ("-1.0", cli.FAILED, "refused")]
 )
-def test_the_exit_code_of_one_row_is_that_of_its_run(source, tmp_path, capsys, load, code, status):
+def test_the_exit_code_of_one_row_is_that_of_its_run(source, load, code, status):
     path = Path(source)
     path.write_text(path.read_text().replace("disturbance.load", "plant.payload_kg").replace("1.0", load))
     key = Grid(load_study(source))[1].key
-    assert cli.main(["sweep", source, "--row", key, "--json"]) == code
-    assert json.loads(capsys.readouterr().out)["status"] == status
+    result = call("sweep", source, "--row", key, "--json")
+    assert (result.code, result.json["status"]) == (code, status)
 
 
 @pytest.mark.parametrize(
     ("rows", "of", "startup_s", "code"),
     [(3, 3, 1.26, cli.DONE), (2, 3, None, cli.FAILED), (4, 3, 0.0, cli.DONE)],
 )
-def test_a_study_that_is_not_complete_exits_1(
-    source, tmp_path, capsys, monkeypatch, rows, of, startup_s, code
-):
+def test_a_study_that_is_not_complete_exits_1(source, tmp_path, monkeypatch, rows, of, startup_s, code):
     def run(*arguments, **options):
         result = run_study(*arguments, **options)
         return result._replace(rows=rows, of=of, wall_s=12.34, startup_s=startup_s)
 
     monkeypatch.setattr(sweep, "run_study", run)
     monkeypatch.setattr(report, "can_be_drawn", lambda: True)
-    monkeypatch.setattr(report, "write", lambda *_: [tmp_path / "a", tmp_path / "b"])
-    assert cli.main(["sweep", source, "--out", str(tmp_path / "out")]) == code
-    out, err = capsys.readouterr()
-    lines = out.splitlines()
+    monkeypatch.setattr(report, "write", lambda *_: ["a", "b"])
+    result = call("sweep", source, "--out", tmp_path / "out")
+    lines = result.out.splitlines()
     took = [] if startup_s is None else [f"took   12.3 s, {startup_s:.1f} s of it to start"]
     table = f"table  {tmp_path / 'out' / 'table.parquet'}"
     assert lines[0].startswith(f"short: {rows} of {of} rows")
-    assert lines[-3 - len(took) :] == [
-        *took,
-        table,
-        f"written  {tmp_path / 'a'}",
-        f"written  {tmp_path / 'b'}",
-    ]
-    left = (
-        f"spheretwin: sweep: interrupted after {rows} of {of} rows; the same command continues from there\n"
-    )
-    assert err == (left if code else "")
+    assert lines[-3 - len(took) :] == [*took, table, "written  a", "written  b"]
+    left = f"interrupted after {rows} of {of} rows; the same command continues from there"
+    assert (result.code, result.err) == (code, f"spheretwin: sweep: {left}\n" if code else "")
 
 
-def test_a_study_is_run_with_its_options(source, tmp_path, capsys, monkeypatch):
+def test_a_study_is_run_with_its_options(source, tmp_path, monkeypatch):
     def refuse(study, folder, **options):
         del options["done"], options["stop_requested"]
         received.append((study.name, folder, options))
@@ -146,29 +134,25 @@ def test_a_study_is_run_with_its_options(source, tmp_path, capsys, monkeypatch):
     monkeypatch.setattr(sweep, "run_study", refuse)
     plain = {"engine": "local", "address": None, "threads": None, "limit": None}
     chosen = {"engine": "ray", "address": "auto", "threads": 3, "limit": 2}
-    flags = [text for name, value in chosen.items() for text in (f"--{name}", str(value))]
-    assert cli.main(["sweep", source]) == cli.FAILED
-    assert cli.main(["sweep", source, "--out", str(tmp_path / "out"), *flags]) == cli.FAILED
+    flags = [text for name, value in chosen.items() for text in (f"--{name}", value)]
+    assert call("sweep", source).code == cli.FAILED
+    assert call("sweep", source, "--out", tmp_path / "out", *flags).code == cli.FAILED
     assert received == [("short", None, plain), ("short", tmp_path / "out", chosen)]
 
 
-def test_one_row_is_printed_with_its_values_its_figures_and_its_command(source, capsys, monkeypatch):
+def test_one_row_is_printed_with_its_values_its_figures_and_its_command(source, monkeypatch):
     monkeypatch.setenv("COLUMNS", "200")
     row = Grid(load_study(source))[2]
-    assert cli.main(["sweep", source, "--row", row.key, "--json"]) == cli.DONE
-    reported = json.loads(capsys.readouterr().out)
-    assert (reported["row"], reported["key"], reported["seed"]) == (2, row.key, row.seed)
-    assert (reported["values"], reported["law"], reported["reason"], reported["error"]) == (
-        {"disturbance.load": 2.0}, None, None, None,
-    )  # fmt: skip
-    assert cli.main([*shlex.split(reported["command"])[1:], "--json"]) == cli.DONE
-    assert json.loads(capsys.readouterr().out)["rms_error_rad"] == reported["rms_error_rad"]
-    assert cli.main(["sweep", source, "--row", row.key]) == cli.DONE
-    out, err = capsys.readouterr()
-    title, *lines, command = out.splitlines()
-    assert (title.strip(), command, err) == ("row 2 of short", f"command  {reported['command']}", "")
+    result = call("sweep", source, "--row", row.key, "--json").json
+    assert (result["row"], result["key"], result["seed"]) == (2, row.key, row.seed)
+    assert result["values"] == {"disturbance.load": 2.0}
+    assert [result[name] for name in ("law", "reason", "error")] == [None] * 3
+    again = call(*shlex.split(result["command"])[1:], "--json").json
+    assert again["rms_error_rad"] == result["rms_error_rad"]
+    title, *lines, command = succeeded("sweep", source, "--row", row.key).splitlines()
+    assert (title.strip(), command) == ("row 2 of short", f"command  {result['command']}")
     cells = [[cell.strip() for cell in line.split("|")[1:-1]] for line in lines if line.startswith("| ")]
-    assert cells == [["", "value"], *([name, str(reported[name])] for name in reported if name != "command")]
+    assert cells == [["", "value"], *([name, str(result[name])] for name in result if name != "command")]
 
 
 @pytest.mark.parametrize(
