@@ -1,4 +1,4 @@
-"""What faults do to currents, torques and energies: differential equations, identities, moments."""
+"""What faults do to currents, torques and energies: differential equations and identities."""
 
 import numpy as np
 import pytest

@@ -4,22 +4,10 @@ import numpy as np
 
 import spheretwin
 from spheretwin.machine import Log
+from spheretwin.machine.workflow import NOMINAL
 
 SCENARIO = "sinusoid"
-KNOWN = {
-    "hardware": "electronics",
-    "controller.law": "pid",
-    "disturbance.load": 0.0,
-    "disturbance.random_bound_Nm": 0.0,
-    "plant.modelling_error": 0.0,
-    "plant.modelling_torque_Nm": [0.0, 0.0, 0.0],
-    "plant.payload_kg": 0.1,
-    "sensors.potentiometer.nonlinearity_rad": 0.0,
-    "sensors.adc.offset_V": 0.0,
-    "sensors.adc.gain_error": 0.0,
-    "drive.dac_bits": 0,
-    "drive.amplifier_offset_V": 0.0,
-}
+KNOWN = {**NOMINAL, "plant.payload_kg": 0.1}
 
 
 def changing_log(duration_s, *changes, seed=0):

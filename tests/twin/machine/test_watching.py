@@ -1,5 +1,7 @@
 """Watch over a machine: what changed, how large, how fast, and silence without a change."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
@@ -11,23 +13,18 @@ CHANGED_s = 2.5
 ONE_WEAK = [1.0] * 5 + [0.8] + [1.0] * 12
 
 
+OFFSET_rad = np.radians(0.1)
+
+
 @pytest.mark.parametrize(
     ("field", "value", "what", "size", "within_s"),
     [
-        pytest.param("plant.group_gain", [0.97] * 18, "torque_scale", -0.03, 0.8, id="torque"),
-        pytest.param("plant.group_gain", ONE_WEAK, "plant.group_gain.5", -0.2, 0.8, id="one group"),
-        pytest.param(
-            "sensors.angle_offset_rad",
-            [np.radians(0.1), 0.0, 0.0],
-            "sensors.angle_offset_rad.0",
-            np.radians(0.1),
-            0.2,
-            id="offset",
-        ),
-        pytest.param(
-            "plant.coulomb_Nm", [4e-3] * 3, "plant.coulomb_Nm of all hinges", 2e-3, 0.3, id="friction"
-        ),
+        ("plant.group_gain", [0.97] * 18, "torque_scale", -0.03, 0.8),
+        ("plant.group_gain", ONE_WEAK, "plant.group_gain.5", -0.2, 0.8),
+        ("sensors.angle_offset_rad", [OFFSET_rad, 0.0, 0.0], "sensors.angle_offset_rad.0", OFFSET_rad, 0.2),
+        ("plant.coulomb_Nm", [4e-3] * 3, "plant.coulomb_Nm of all hinges", 2e-3, 0.3),
     ],
+    ids=["torque", "one group", "offset", "friction"],
 )
 def test_it_names_what_changed(field, value, what, size, within_s):
     log = changing_log(CHANGED_s + 1.0, (CHANGED_s, field, value))
@@ -76,16 +73,16 @@ def test_the_sums_of_pure_noise_exceed_a_threshold_as_rarely_as_stated():
     for _ in range(20_000):
         slopes = generator.normal(0, 3, (rows, count)) / watch._changes[:count]
         residual = generator.normal(0, 1, rows)
-        part = PartOfNoise(slopes.T @ slopes, slopes.T @ residual, residual @ residual, rows)
+        part = SimpleNamespace(
+            information=slopes.T @ slopes,
+            gradient=slopes.T @ residual,
+            squares=residual @ residual,
+            used=rows,
+        )
         alarms += len(watch._add(part, 0.0))
         watch._values[:] = 1.0
     # 200 at most on average; named after some windows at times, so fewer.
     assert 0 < alarms <= 200
-
-
-class PartOfNoise:
-    def __init__(self, information, gradient, squares, used):
-        self.information, self.gradient, self.squares, self.used = information, gradient, squares, used
 
 
 def test_a_gap_is_not_judged():
