@@ -1,0 +1,145 @@
+"""The prototype's sensors and drive in the loop: estimated rates, delay, supply, energy, heat, snapshots."""
+
+import numpy as np
+import pytest
+
+from spheretwin import assembly
+from spheretwin import scenario as scenarios
+from spheretwin.control.estimators import ESTIMATORS
+from spheretwin.control.estimators.estimator import estimates
+from spheretwin.control.law import Law
+from spheretwin.electronics.amplifier import AmplifierSection
+from spheretwin.electronics.coil import CoilSection
+from spheretwin.electronics.converters import DacSection
+from spheretwin.electronics.delay import DelaySection
+from spheretwin.electronics.random_streams import noise_table
+from spheretwin.electronics.sensor_chain import noise_streams, sense, sensor_chain
+from spheretwin.models.lagrangian import inertia_matrix
+from spheretwin.scenario.hardware import HARDWARE, PROTOTYPE_DRIVE
+from spheretwin.session import Session
+from spheretwin.simulation import simulate
+
+MADE = [kind for kind in ESTIMATORS if kind != "ideal"]
+L_H = 0.9e-3
+
+
+def prototype(name="hold", **changes):
+    return scenarios.load(name, {"hardware": "electronics", "duration": 0.1, "seed": 5, **changes})
+
+
+@pytest.mark.parametrize("kind", MADE)
+def test_the_law_is_handed_what_the_stages_make_of_the_true_state(kind):
+    """Sensors and estimator called one after the other, outside the loop, give the logged columns."""
+    run = simulate(prototype("tilt", **{"estimator.kind": kind, "duration": 0.5}))
+    table, resolved = run.telemetry, run.scenario
+    chain = sensor_chain(resolved.sensors, resolved.seed)
+    noise = noise_table(resolved.seed, 0, len(table), noise_streams(resolved.sensors))
+    measurement, angles = np.empty((3, 3)), np.empty((len(table), 3))
+    for tick, (q, qdot) in enumerate(zip(table["q_rad"], table["qdot_rad_s"], strict=True)):
+        sense(chain, q.copy(), qdot.copy(), noise[tick], measurement)
+        angles[tick] = measurement[0]
+    np.testing.assert_array_equal(table["q_measured_rad"], angles)
+    rates = estimates(assembly.estimator_of(resolved), angles)
+    # The same machine code, but for products and sums that are fused in one place and not in the other.
+    np.testing.assert_allclose(table["qdot_estimated_rad_s"], rates, rtol=1e-9, atol=1e-9)
+    assert np.abs(table["q_measured_rad"] - table["q_rad"]).max() > 1e-4
+
+
+@pytest.mark.parametrize("kind", MADE)
+def test_snapshots_and_changes_keep_commands_on_their_way_warm_coils_and_memory(kind):
+    scenario = prototype("nutation", **{"estimator.kind": kind, "drive.delay_s": 2e-3, "duration": 1.0})
+    with Session(scenario) as session, Session(prototype()) as other, Session(scenario) as changed:
+        session.advance(150)
+        other.restore(session.snapshot())
+        changed.advance(100)
+        changed.set("disturbance.load", scenario.disturbance.load)
+        changed.set("plant.group_gain", [1.0] * 18)  # builds the plant anew
+        changed.advance(50)
+        expected = session.advance(100).values.tobytes()
+        assert other.advance(100).values.tobytes() == expected
+        assert changed.advance(100).values.tobytes() == expected
+
+
+def test_nothing_flows_before_the_delay_is_over():
+    quiet = {"drive.dac_offset_V": 0.0, "drive.amplifier_offset_V": 0.0, "drive.dac_inl_lsb": 0.0}
+    table = simulate(prototype(**quiet, **{"drive.delay_s": 2.5e-3, "drive.dac_bits": 0})).telemetry
+    assert np.abs(table["current_command_A"][0]).max() > 0.1
+    np.testing.assert_array_equal(table["current_A"][:3], 0.0)  # the row of 2 ms is of its first half
+    assert np.abs(table["current_A"][3]).max() > 0.1
+
+
+def test_work_at_the_coils_is_heat_motion_and_field():
+    """Energy: what goes into the coils is copper loss, the rotor's kinetic energy, and ½ L i²."""
+    still = {
+        "disturbance.load": 0.0, "drive.resistance_per_K": 0.0, "plant.modelling_error": 0.0,
+        "drive.delay_s": 0.0, "plant.coulomb_Nm": [0.0] * 3, "plant.viscous_Nm_s": [0.0] * 3,
+        "controller.law": "pd", "controller.stiffness": 400.0, "watchdog.on": False,
+    }  # fmt: skip
+    left = []
+    for step_s in (5e-4, 2.5e-4, 1.25e-4):
+        with Session(prototype(duration=0.06, **still, **{"plant.step_s": step_s})) as session:
+            table, inertia = session.advance(60), session.actuator.inertia
+            current = session._runtime._plant.current
+            q, qdot = session.q_rad, session._runtime._rotor.data.qdot
+            work = table["coil_power_W"].sum() * 1e-3
+            heat = table["copper_loss_W"].sum() * 1e-3
+            kinetic = 0.5 * qdot @ inertia_matrix(q, inertia) @ qdot
+            field = 0.5 * L_H * float(np.sum(current**2))
+        left.append(abs(work - heat - kinetic - field) / kinetic)
+    # The EMF of the middle of a physics step is held over it: what is left is of second order in the step, or
+    # smaller where the errors of its parts cancel.
+    assert left[0] < 2e-4
+    assert left[0] / left[1] > 3.8, left
+    assert left[1] / left[2] > 3.8, left
+
+
+def test_a_supply_limits_how_fast_a_current_rises():
+    weak, strong = (
+        simulate(prototype(**{"drive.supply_V": volts, "drive.delay_s": 0.0})).telemetry
+        for volts in (8.0, 100.0)
+    )
+    assert weak["voltage_limited"].max() > 0.5
+    assert strong["voltage_limited"].max() < 0.2
+    rise = np.abs(np.diff(weak["current_A"], axis=0)).max() / 1e-3
+    # No faster than the whole swing over L, whatever is asked; R i and EMF may help a falling current.
+    assert rise < 2 * (8.0 + 1.3 * 8.0) / L_H
+
+
+def test_a_coil_too_hot_ends_the_run_safely_without_a_watchdog_too():
+    run = simulate(prototype(**{"drive.shutdown_degC": 20.05, "duration": 3.0, "watchdog.on": False}))
+    assert run.status == "failsafe"
+    hottest = run.telemetry["coil_temperature_degC"].max(axis=1)
+    assert hottest[-2] <= 20.05 < hottest[-1]
+
+
+def test_neutral_stages_move_no_bit():
+    neutral = {
+        "drive.delay_s": 0.0,
+        "drive.dac_bits": 0,
+        "drive.dac_offset_V": 1e-3,
+        "drive.bandwidth_rad_s": 10.0,
+    }
+    plain, named = (
+        simulate(scenarios.load("hold", {"duration": 0.1, **changes})).telemetry for changes in ({}, neutral)
+    )
+    assert named.values.tobytes() == plain.values.tobytes()
+
+
+def test_the_prototype_s_figures_are_fields_of_one_stage_each():
+    kinds = (DelaySection, DacSection, AmplifierSection, CoilSection)
+    fields = [name for kind in kinds for name in kind.model_fields]
+    assert len(set(fields)) == len(fields)
+    for name, figures in (("electronics", PROTOTYPE_DRIVE), ("prototype", HARDWARE["prototype"])):
+        drive = {dotted.removeprefix("drive.") for dotted in figures if dotted.startswith("drive.")}
+        assert drive | {"coil_coupling"} == {*fields, "coil_coupling", "current_limit_A"}, name
+
+
+@pytest.mark.release("1.3 s of plain Python; laws in plain Python run with ideal hardware in less")
+@pytest.mark.uncompiled
+def test_a_law_in_plain_python_runs_with_the_electronics():
+    def step(t, reference, measurement, parameters, state, torque):
+        torque[:] = -0.5 * (measurement[0] - reference[0]) - 0.03 * measurement[1]
+
+    run = simulate(prototype("tilt", duration=0.05), law=Law("plain", step, [], []))
+    assert run.status == "completed"
+    assert np.isfinite(run.telemetry.values).all()
