@@ -28,42 +28,37 @@ def test_runs_on_threads_are_those_made_one_after_the_other():
     assert len(set(serial)) == 36
 
 
-class BlockingLaw:
-    """A plain Python law that stays within its call until it is let go."""
+def blocking(entered, go):
+    """A plain Python law that stays within its call until it may go on."""
 
-    def __init__(self):
-        self.entered, self.go = threading.Event(), threading.Event()
+    def step(t, reference, measurement, parameters, state, torque):
+        torque[:] = -0.5 * (measurement[0] - reference[0]) - 0.05 * (measurement[1] - reference[1])
+        entered.set()
+        go.wait()
 
-    def law(self):
-        def step(t, reference, measurement, parameters, state, torque):
-            torque[:] = -0.5 * (measurement[0] - reference[0]) - 0.05 * (measurement[1] - reference[1])
-            self.entered.set()
-            assert self.go.wait(30)
-
-        return Law("blocking", step, [], [])
+    return Law("blocking", step, [], [])
 
 
 def test_a_second_thread_is_refused_while_the_first_is_at_work():
-    blocked = BlockingLaw()
-    busy = session(blocked.law(), name="hold")
+    entered, go = threading.Event(), threading.Event()
+    busy = session(blocking(entered, go), name="hold")
     with ThreadPoolExecutor(1) as pool:
         advancing = pool.submit(busy.advance, 20)
-        assert blocked.entered.wait(30)
+        entered.wait()
         try:
-            taken = [
+            for call in (
                 lambda: busy.advance(1),
                 lambda: busy.advance(0),
                 lambda: busy.set("disturbance.load", 2.0),
-                lambda: busy.snapshot(),
+                busy.snapshot,
                 lambda: busy.restore(None),
-            ]
-            for call in taken:
+            ):
                 with pytest.raises(SpheretwinError, match="one thread at a time"):
                     call()
         finally:
-            blocked.go.set()
+            go.set()
         first = advancing.result()
-    alone = session(blocked.law(), name="hold")
+    alone = session(blocking(entered, go), name="hold")
     assert rows(first) == rows(alone.advance(20))
     assert busy.journal == ()
     assert same_future(busy, alone)

@@ -9,22 +9,9 @@ import sys
 import numpy as np
 import pytest
 
-from spheretwin.control.law import Law
 from spheretwin.inputs import BLOCK_TICKS
 from spheretwin.models.base.errors import InputError
-from tests.twin.session_cases import (
-    ASKEW,
-    CALLS,
-    ENGINES,
-    OWN,
-    SHIPPED,
-    WORN,
-    plain_law,
-    proportional,
-    rows,
-    same_future,
-    session,
-)
+from tests.twin.session_cases import ASKEW, ENGINES, OWN, SHIPPED, WORN, plain_law, rows, same_future, session
 
 
 @pytest.mark.parametrize("engine", ENGINES)
@@ -44,14 +31,6 @@ def test_a_restored_session_goes_on_bit_for_bit(law, engine, at):
     other.restore(pickle.loads(pickle.dumps(taken)))
     assert rows(other.advance(BLOCK_TICKS + 100)) == expected
     assert other.initial_scenario == original.initial_scenario
-
-
-@pytest.mark.parametrize("bad", [None, 3, "snapshot", {}, object()])
-def test_what_is_no_snapshot_is_refused(bad):
-    running = session(name="hold")
-    with pytest.raises(InputError, match="session: expected a snapshot of a session, received"):
-        running.restore(bad)
-    assert len(running.advance(2)) == 2
 
 
 def test_a_snapshot_is_not_moved_by_what_the_session_does_next():
@@ -132,7 +111,7 @@ def continued(path, law="law = None", **options):
     return subprocess.run(command, capture_output=True, check=True, **options).stdout
 
 
-@pytest.mark.parametrize("model", [*ENGINES, "sticky"])
+@pytest.mark.parametrize("model", ["lagrangian", "sticky"])
 def test_another_process_goes_on_bit_for_bit(model, tmp_path, sticky):
     changes = {"plant.mjcf": sticky} if model == "sticky" else {"plant.engine": model}
     original = session(**changes | WORN)
@@ -182,24 +161,6 @@ def test_a_snapshot_under_a_law_that_is_missing_is_refused_and_nothing_changes()
         untouched.advance(5)
         with pytest.raises(InputError, match="received one under mine"):
             other.restore(taken)
-        assert same_future(other, untouched)
-
-
-def test_a_snapshot_that_does_not_fit_is_refused_and_nothing_changes(sticky):
-    mine = session(plain_law(), name="hold")
-    mine.advance(10)
-    taken = mine.snapshot()
-    longer = Law("mine", proportional, np.array([0.5, 0.05]), np.zeros(2), CALLS)
-    fitting = dataclasses.replace(taken, runtime=taken.runtime._replace(rotor=taken.runtime.rotor[:-1]))
-    for law, snapshot, part in [
-        (longer, taken, "the law's memory, received 1"),
-        (plain_law(), fitting, "the engine's state"),
-    ]:
-        other, untouched = session(law, name="hold"), session(law, name="hold")
-        other.advance(5)
-        untouched.advance(5)
-        with pytest.raises(InputError, match=part):
-            other.restore(snapshot)
         assert same_future(other, untouched)
 
 
