@@ -48,7 +48,6 @@ def test_a_value_is_refused_in_the_words_of_the_command_line(common, name, value
         ("steer", {}, "bench: expected one of start, "),
         ("stpo", {}, "did you mean stop?"),
         (3, {}, "received 3"),
-        ("speed", {"factor": math.nan}, "bench: speed: factor: expected"),
         ("speed", {"factor": 0.01}, "bench: speed: factor: expected"),
         ("speed", {}, "factor: expected a value, received none"),
         ("speed", {"factor": 1.0, "colour": "red"}, "bench: speed: expected factor, received colour"),
@@ -56,7 +55,6 @@ def test_a_value_is_refused_in_the_words_of_the_command_line(common, name, value
         ("off", {"now": True}, "expected no arguments, received now"),
         ("off", {"now": {1, 2}}, "received now"),
         ("point", {"pose_rad": [0, 1]}, "pose_rad"),
-        ("point", {"pose_rad": "up"}, "pose_rad"),
         (
             "point",
             {"pose_rad": [0.0, 1.39, 0.0]},
@@ -72,7 +70,6 @@ def test_a_value_is_refused_in_the_words_of_the_command_line(common, name, value
             "disturbance.load: expected a finite number",
         ),
         ("set", {"name": "trajectory.approach.start_s", "value": 1.0}, "expected a mode instead"),
-        ("trajectory", {"fields": {"shape": "spiral"}}, "expected one of sinusoid"),
         ("clear_faults", {"place": 0}, "expected the place of a fault below 0"),
         ("record", {}, "expected a file to record into"),
         ("record", {"telemetry": "/no/such/folder/run.parquet"}, "expected a writable path"),

@@ -1,4 +1,4 @@
-"""What every kind of part that can fail owes: its modes and no others, in their ranges, from their tick on.
+"""What every kind of part that can fail owes: its modes and no others, in their ranges.
 
 What each mode does is held against a copy in tests/twin/electronics/test_prototype.py.
 """

@@ -81,21 +81,21 @@ def test_the_tested_readings_are_all_orders_and_signs():
     assert set(AXES) == set(product(permutations(range(3)), product((1, -1), repeat=3)))
 
 
-@pytest.mark.parametrize("case", ["exchange", "sign", "all signs", "reversed", "any"])
+EXCHANGED = [*range(3), 7, *range(4, 7), 3, *range(8, 18)]
+GROUP_CASES = {
+    "exchange": (EXCHANGED, np.ones(18, int)),
+    "sign": (np.arange(18), np.where(np.arange(18) == 5, -1, 1)),
+    "all signs": (np.arange(18), -np.ones(18, int)),
+    "reversed": (np.arange(18)[::-1], np.ones(18, int)),
+    "any": (RANDOM.permutation(18), RANDOM.choice([-1, 1], 18)),
+}
+
+
+@pytest.mark.parametrize("case", GROUP_CASES)
 def test_order_and_signs_of_groups_are_found(case):
     # Without friction, a negative inertia would explain currents with all signs changed.
     log = multisine("ideal" if case == "all signs" else "electronics")
-    order, signs = np.arange(18), np.ones(18, int)
-    if case == "exchange":
-        order[[3, 7]] = 7, 3
-    elif case == "sign":
-        signs[5] = -1
-    elif case == "all signs":
-        signs = -signs
-    elif case == "reversed":
-        order = order[::-1].copy()
-    else:
-        order, signs = RANDOM.permutation(18), RANDOM.choice([-1, 1], 18)
+    order, signs = map(np.array, GROUP_CASES[case])
     currents = np.empty_like(log.current_A)
     currents[:, order] = log.current_A * signs
     result = errors(replace(log, current_A=currents))
@@ -106,13 +106,10 @@ def test_order_and_signs_of_groups_are_found(case):
 
 
 def test_axes_and_groups_are_found_together():
-    log, order = multisine(), np.arange(18)
-    order[[3, 7]] = 7, 3
+    log = multisine()
     angles = relabelled(log, (1, 0, 2), (1, 1, 1))
-    assert list(errors(replace(log, current_A=log.current_A[:, order], angle_rad=angles))) == [
-        "axes",
-        "groups",
-    ]
+    both = replace(log, current_A=log.current_A[:, EXCHANGED], angle_rad=angles)
+    assert list(errors(both)) == ["axes", "groups"]
 
 
 # --- units

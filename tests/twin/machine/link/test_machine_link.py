@@ -158,14 +158,6 @@ def test_a_missing_measurement_removes_the_currents_after_the_timeout(machine):
     assert link.figures()["frames"]["late"] == 4
 
 
-def test_a_late_measurement_within_the_timeout_is_used(machine):
-    link = linked(machine)
-    machine.delay_s = 2.5e-3  # each answer is two periods late
-    assert reasons(link, 20) == [Reason.NONE] * 20
-    assert link.late_ticks == {1, 2}
-    assert link.figures()["latency"]["p50_ms"] == pytest.approx(2.5)
-
-
 def test_a_delay_that_grows_slowly_removes_the_currents(machine):
     """Each tick has a new measurement, but of an ever earlier time."""
     link = linked(machine)
