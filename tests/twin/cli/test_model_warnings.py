@@ -1,8 +1,5 @@
-"""What a user is told where model, torque curve and scenario do not say the same."""
+"""Warnings where model, torque curve and scenario do not agree."""
 
-import contextlib
-import io
-import json
 import re
 
 import pytest
@@ -11,6 +8,7 @@ from spheretwin import cli
 from spheretwin import scenario as scenarios
 from spheretwin.models import actuator as actuators
 from spheretwin.session import Session
+from tests.twin.cli.calls import call, refusal
 
 # A copy finds its meshes where they are.
 TEXT = actuators.MJCF_PATH.read_text(encoding="utf-8").replace(
@@ -34,20 +32,19 @@ def written(tmp_path):
     return write
 
 
-def told_by_a_session(path, overrides):
+def warnings(path, overrides):
+    """Return the warnings of a session."""
     with Session(scenarios.load("hold", {"plant.mjcf": str(path)} | overrides)) as session:
         return session.warnings()
 
 
-def told_by_the_command(path, overrides):
-    flags = [text for name, value in overrides.items() for text in (f"--{name}", str(value))]
+def warnings_of_a_run(path, *flags):
+    """Return the warnings among the figures of a run, which prints nothing else."""
     # Started where it is to be held, the rotor needs no torque that would be worth a warning.
-    pose_options = ["--plant.initial-rad", "0.2", "-0.1", "0.3", "--controller.law", "pd"]
-    arguments = ["simulate", "hold", "--duration", "0.003", "--plant.mjcf", str(path), *pose_options, *flags]
-    stdout = io.StringIO()
-    with contextlib.redirect_stdout(stdout):
-        assert cli.main([*arguments, "--json"]) == cli.DONE
-    return json.loads(stdout.getvalue())["warnings"]
+    pose = ["--plant.initial-rad", "0.2", "-0.1", "0.3", "--controller.law", "pd"]
+    result = call("simulate", "hold", "--duration", "0.003", "--plant.mjcf", path, *pose, *flags, "--json")
+    assert (result.code, result.err) == (cli.DONE, "")
+    return result.json["warnings"]
 
 
 GEOMETRY = {
@@ -60,14 +57,10 @@ GEOMETRY = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("message", [told_by_a_session, told_by_the_command])
-@pytest.mark.parametrize(("old", "new", "line"), GEOMETRY.values(), ids=GEOMETRY)
-def test_geometry_that_the_curve_was_not_computed_for_is_told(written, message, old, new, line):
-    assert message(written((old, new)), {}) == [CURVE + line]
-
-
-def test_each_disagreement_has_its_line(written):
-    lines = told_by_a_session(written(*((old, new) for old, new, _ in GEOMETRY.values())), {})
+def test_each_difference_of_the_geometry_has_its_line(written):
+    for old, new, line in GEOMETRY.values():
+        assert warnings(written((old, new)), {}) == [CURVE + line]
+    lines = warnings(written(*((old, new) for old, new, _ in GEOMETRY.values())), {})
     assert sorted(lines) == sorted(CURVE + line for _, _, line in GEOMETRY.values())
 
 
@@ -92,10 +85,9 @@ OVERRIDDEN = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("message", [told_by_a_session, told_by_the_command])
 @pytest.mark.parametrize(("edits", "overrides", "line"), OVERRIDDEN.values(), ids=OVERRIDDEN)
-def test_an_option_of_the_model_that_the_scenario_overrides_is_told(written, message, edits, overrides, line):
-    assert message(written(*edits), overrides) == [f"the model's own {line}"]
+def test_an_option_of_the_model_that_the_scenario_overrides_is_named(written, edits, overrides, line):
+    assert warnings(written(*edits), overrides) == [f"the model's own {line}"]
 
 
 SILENT = {
@@ -114,10 +106,16 @@ SILENT = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("message", [told_by_a_session, told_by_the_command])
 @pytest.mark.parametrize(("edits", "overrides"), SILENT.values(), ids=SILENT)
-def test_nothing_is_told_where_nothing_is_lost(written, message, edits, overrides):
-    assert message(written(*edits), overrides) == []
+def test_without_a_difference_there_is_no_warning(written, edits, overrides):
+    assert warnings(written(*edits), overrides) == []
+
+
+def test_a_run_has_the_warnings_of_its_session(written):
+    (old, new, line), (edits, _, own) = GEOMETRY["turns"], OVERRIDDEN["timestep"]
+    path = written((old, new), *edits)
+    assert warnings_of_a_run(path) == warnings(path, {}) == [CURVE + line, f"the model's own {own}"]
+    assert warnings_of_a_run(written()) == []
 
 
 def test_a_change_during_the_run_is_told_from_then_on(written):
@@ -146,14 +144,17 @@ COMPILER = {
 }
 
 
-@pytest.mark.parametrize("message", [told_by_a_session, told_by_the_command])
 @pytest.mark.parametrize(("edit", "line"), COMPILER.values(), ids=COMPILER)
-def test_a_warning_of_the_compiler_is_one_line_of_ours(written, message, edit, line, capfd):
-    """The engine's Python package raises it as a warning at each of three compilations, in several lines."""
-    path = written(edit)
-    (received,) = message(path, {"plant.engine": "mujoco"})
-    assert received.startswith(f"model {path}: {line}")
-    assert "\n" not in received
+def test_a_warning_of_the_compiler_is_one_line_of_ours(written, edit, line, capfd, tmp_path):
+    """The engine's Python package raises it as a warning at each of three compilations, in several lines.
+
+    A recording adds none, though meshes are read by a compilation of their own.
+    """
+    path, record = written(edit), ["--record", tmp_path / "run.rrd"]
+    for received in (warnings(path, {"plant.engine": "mujoco"}), warnings_of_a_run(path, *record)):
+        (text,) = received
+        assert text.startswith(f"model {path}: {line}")
+        assert "\n" not in text
     assert capfd.readouterr() == ("", "")
 
 
@@ -162,27 +163,14 @@ def test_a_flexible_grid_has_no_line_but_the_refusal(written, capfd):
         '<flexcomp name="cloth" type="grid" count="3 3 1" spacing="0.05 0.05 0.05" dim="2" mass="0.1"'
         ' pos="0 0 1"/></worldbody>'
     )
-    path = written(("</worldbody>", grid))
-    assert cli.main(["simulate", "hold", "--plant.mjcf", str(path)]) == cli.BAD_INPUT
-    printed = capfd.readouterr()
-    (line,) = printed.err.splitlines()
-    assert line.startswith("spheretwin: model: expected three degrees of freedom, received 30")
-    assert printed.out == ""
-
-
-def test_a_recording_adds_no_second_line(written, capfd, tmp_path):
-    """Meshes are read by a compilation of their own."""
-    text = TEXT.replace('meshdir="assets"', f'meshdir="{actuators.MJCF_PATH.parent / "assets"}"')
-    (path := tmp_path / "drawn.xml").write_text(text.replace(*DEPRECATED), encoding="utf-8")
-    (line,) = told_by_the_command(path, {"record": tmp_path / "run.rrd"})
-    printed = capfd.readouterr()
-    assert "settotalmass" in line
-    assert printed.err == ""
+    message = refusal("simulate", "hold", "--plant.mjcf", written(("</worldbody>", grid)))
+    assert message.startswith("model: expected three degrees of freedom, received 30")
+    assert capfd.readouterr() == ("", "")
 
 
 def test_other_verbs_print_it_once(written, capfd):
-    assert (
-        cli.main(["magnetics", "map", "--largest-tilt", "0", "--mjcf", str(written(DEPRECATED))]) == cli.DONE
-    )
-    (line,) = capfd.readouterr().err.splitlines()
+    result = call("magnetics", "map", "--largest-tilt", "0", "--mjcf", written(DEPRECATED))
+    assert result.code == cli.DONE
+    (line,) = result.err.splitlines()
     assert line.startswith("spheretwin: warning: model ")
+    assert capfd.readouterr() == ("", "")
