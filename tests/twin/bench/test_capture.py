@@ -7,7 +7,7 @@ from spheretwin.bench.capture import Capture, Trigger
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.telemetry.signals import Signal, common_signals, width
 from spheretwin.models.telemetry.table import Table
-from tests.twin.bench.cases import begun, done, said
+from tests.twin.bench.cases import done, said
 
 GROUPS = 18
 FAULT = Signal("fault", "1", 2, "failure mode", ("coil.00", "coil.01"))
@@ -89,19 +89,16 @@ def test_a_trigger_that_cannot_act_is_refused(trigger, message):
         Capture(trigger, GROUPS, 1e-3)
 
 
-def test_a_bench_captures_every_row_and_arms_again_after_reset():
-    with begun() as made:
-        done(
-            made, "capture", on="level", signal="q_ref_rad", entry=1, level=0.05, before_s=0.02, length_s=0.1
-        )
-        made.advance(400)
-        assert made.state().capture == "complete"
-        rows = made.captured()
-        np.testing.assert_allclose(np.diff(rows["t_s"].reshape(-1)), 1e-3, rtol=1e-9)
-        assert len(rows["t_s"]) == 100
-        np.testing.assert_array_equal(rows["q_ref_rad"][:, 1] > 0.05, np.arange(100) >= 20)
-        assert "expected one of t_s" in said(made, "capture", on="level", signal="height")
-        done(made, "reset")
-        assert (made.state().capture, made.state().capture_t_s, made.captured()) == ("armed", None, {})
-        done(made, "capture", on="off")
-        assert made.state().capture == "off"
+def test_a_bench_captures_every_row_and_arms_again_after_reset(made):
+    done(made, "capture", on="level", signal="q_ref_rad", entry=1, level=0.05, before_s=0.02, length_s=0.1)
+    made.advance(400)
+    assert made.state().capture == "complete"
+    rows = made.captured()
+    np.testing.assert_allclose(np.diff(rows["t_s"].reshape(-1)), 1e-3, rtol=1e-9)
+    assert len(rows["t_s"]) == 100
+    np.testing.assert_array_equal(rows["q_ref_rad"][:, 1] > 0.05, np.arange(100) >= 20)
+    assert "expected one of t_s" in said(made, "capture", on="level", signal="height")
+    done(made, "reset")
+    assert (made.state().capture, made.state().capture_t_s, made.captured()) == ("armed", None, {})
+    done(made, "capture", on="off")
+    assert made.state().capture == "off"

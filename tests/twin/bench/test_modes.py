@@ -61,16 +61,15 @@ def test_every_change_of_mode_is_bumpless(recorded, before, after):
     assert np.abs(np.diff(rates[tick:], axis=0)).max() < 1e-3 * (5 + 2 * 2)
 
 
-def test_a_pose_is_reached_within_the_limits(recorded):
+def test_a_pose_is_reached_within_the_limits(made, recorded):
     rows, (tick,) = recorded("point")
     limits = Limits()
     # The limits hold for the way; the rate that it began with, 0.63 rad/s of the sine, comes on top.
     assert np.abs(rows["qdot_ref_rad_s"][tick:]).max() < limits.rate_rad_s + 0.63
-    with begun() as bench:
-        done(bench, "point", pose_rad=[0.3, -0.2, 2.0])
-        bench.advance(6000)
-        np.testing.assert_array_equal(bench.state().q_ref_rad, [0.3, -0.2, 2.0])
-        assert bench.state().error_mrad < 1
+    done(made, "point", pose_rad=[0.3, -0.2, 2.0])
+    made.advance(6000)
+    np.testing.assert_array_equal(made.state().q_ref_rad, [0.3, -0.2, 2.0])
+    assert made.state().error_mrad < 1
 
 
 def test_hold_comes_to_rest_without_turning_back(recorded):
@@ -81,26 +80,24 @@ def test_hold_comes_to_rest_without_turning_back(recorded):
     assert (rates * np.sign(rates[0])).min() > -1e-3 * np.abs(rates[0]).max()
 
 
-def test_jogging_ends_at_the_edge_of_the_workspace():
-    with begun() as bench:
-        done(bench, "jog", rates_rad_s=[0.8, -0.8, 0.5])
-        bench.advance(4000)
-        state = bench.state()
-        edge = 80 * np.pi / 180 - modes.EDGE_rad
-        np.testing.assert_allclose(state.q_ref_rad[:2], [edge, -edge], atol=1e-9)
-        assert state.mode == "jog"
-        done(bench, "jog", rates_rad_s=[0.5, 0.0, 0.0])  # there is no room
-        bench.advance(300)
-        np.testing.assert_allclose(bench.state().q_ref_rad[0], edge, atol=1e-9)
+def test_jogging_ends_at_the_edge_of_the_workspace(made):
+    done(made, "jog", rates_rad_s=[0.8, -0.8, 0.5])
+    made.advance(4000)
+    state = made.state()
+    edge = 80 * np.pi / 180 - modes.EDGE_rad
+    np.testing.assert_allclose(state.q_ref_rad[:2], [edge, -edge], atol=1e-9)
+    assert state.mode == "jog"
+    done(made, "jog", rates_rad_s=[0.5, 0.0, 0.0])  # there is no room
+    made.advance(300)
+    np.testing.assert_allclose(made.state().q_ref_rad[0], edge, atol=1e-9)
 
 
-def test_a_changed_field_of_the_trajectory_keeps_its_phase():
-    with begun() as bench:
-        bench.advance(300)
-        done(bench, "set", name="trajectory.amplitude_rad", value=[0.1, 0.1, 0.1])
-        bench.advance(2000)
-        t = bench.state().t_s
-        np.testing.assert_allclose(bench.state().q_ref_rad, 0.1 * np.sin(np.pi * t), atol=1e-12)
+def test_a_changed_field_of_the_trajectory_keeps_its_phase(made):
+    made.advance(300)
+    done(made, "set", name="trajectory.amplitude_rad", value=[0.1, 0.1, 0.1])
+    made.advance(2000)
+    t = made.state().t_s
+    np.testing.assert_allclose(made.state().q_ref_rad, 0.1 * np.sin(np.pi * t), atol=1e-12)
 
 
 def test_the_time_that_a_way_takes_keeps_rates_and_accelerations():

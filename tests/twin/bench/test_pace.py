@@ -34,26 +34,24 @@ def test_stop_sets_zero_currents_from_the_next_tick_until_reset(tmp_path, mode):
         assert np.abs(rows["current_A"][120]).max() < 1e-11
 
 
-def test_stop_does_not_wait_for_what_is_being_prepared():
-    with begun() as made:
-        for _ in range(20):
-            made.command("step")
-            made.command("load", source="nowhere")
-        stop = made.command("stop")
-        made.advance(1)
-        assert stop.done
-        assert made.state().stopped
+def test_stop_does_not_wait_for_what_is_being_prepared(made):
+    for _ in range(20):
+        made.command("step")
+        made.command("load", source="nowhere")
+    stop = made.command("stop")
+    made.advance(1)
+    assert stop.done
+    assert made.state().stopped
 
 
-def test_commands_before_stop_do_not_undo_it():
-    with begun() as made:
-        before = [made.command(name) for name in ("pause", "reset", "start")]
-        made.command("stop")
-        made.advance(1)
-        assert [bool(ticket.refused) for ticket in before] == [False, True, True]
-        assert made.state().stopped
-        done(made, "reset")
-        assert not made.state().stopped
+def test_commands_before_stop_do_not_undo_it(made):
+    before = [made.command(name) for name in ("pause", "reset", "start")]
+    made.command("stop")
+    made.advance(1)
+    assert [bool(ticket.refused) for ticket in before] == [False, True, True]
+    assert made.state().stopped
+    done(made, "reset")
+    assert not made.state().stopped
 
 
 def test_stop_wakes_the_thread():

@@ -12,7 +12,7 @@ from spheretwin.bench.folder import Folder
 from spheretwin.bench.preparation import Preparation
 from spheretwin.cli.bench import read, settings_of
 from spheretwin.models.base.errors import InputError
-from tests.twin.bench.cases import FREE, begun, done, said
+from tests.twin.bench.cases import FREE, done, said
 from tests.waiting import wait_for
 
 LAW = """
@@ -56,19 +56,18 @@ def test_code_of_the_user_runs_only_in_threads_of_preparations(tmp_path):
     assert set(names) <= {"prepare set", "prepare reset"}
 
 
-def test_a_file_that_has_changed_meanwhile_is_not_read_in_the_loop(tmp_path, monkeypatch):
+def test_a_file_that_has_changed_meanwhile_is_not_read_in_the_loop(made, tmp_path, monkeypatch):
     """The preparation has read it; a pipe in its place would block the loop for ever."""
     (file := tmp_path / "law.py").write_text(LAW)
-    with begun() as bench:
-        ticket = bench.command("set", name="controller.law", value=f"{file}:Mine")
-        with monkeypatch.context() as patch:
-            patch.setattr(Preparation, "done", False)  # however fast it is, the loop has not used it yet
-            bench._processor.process(waits=False)
-        bench._processor._preparing[1]._thread.join()
-        file.unlink()
-        bench.advance(1)
-        assert ticket.refused is None
-        assert bench.state().law == f"{file}:Mine"
+    ticket = made.command("set", name="controller.law", value=f"{file}:Mine")
+    with monkeypatch.context() as patch:
+        patch.setattr(Preparation, "done", False)  # however fast it is, the loop has not used it yet
+        made._processor.process(waits=False)
+    made._processor._preparing[1]._thread.join()
+    file.unlink()
+    made.advance(1)
+    assert ticket.refused is None
+    assert made.state().law == f"{file}:Mine"
 
 
 class BlockingWork:
@@ -107,40 +106,38 @@ def test_a_preparation_in_time_gives_its_result_or_its_error():
         Preparation("load", exit).result()
 
 
-def test_stop_does_not_wait_for_a_law_that_never_loads(tmp_path, monkeypatch):
+def test_stop_does_not_wait_for_a_law_that_never_loads(made, tmp_path, monkeypatch):
     (tmp_path / "law.py").write_text("import time\nwhile True:\n    time.sleep(0.01)\n")
     monkeypatch.setattr(preparation, "LIMIT_s", 0.5)
     monkeypatch.setattr(preparation, "END_s", 0.0)
-    with begun() as bench:
-        bench.begin()
-        late = bench.command("set", name="controller.law", value=f"{tmp_path / 'law.py'}:Mine")
-        wait_for(lambda: bench._processor._preparing)
-        begun_s = time.monotonic()
-        assert bench.command("stop").wait(None) == "done"
-        assert not late.done or time.monotonic() - begun_s >= 0.5
-        assert bench.state().stopped
-        assert late.wait(None) == "refused"
-        assert "within 0.5 s" in late.refused
-        assert bench.command("reset").wait(None) == "done"  # others follow it
+    made.begin()
+    late = made.command("set", name="controller.law", value=f"{tmp_path / 'law.py'}:Mine")
+    wait_for(lambda: made._processor._preparing)
+    begun_s = time.monotonic()
+    assert made.command("stop").wait(None) == "done"
+    assert not late.done or time.monotonic() - begun_s >= 0.5
+    assert made.state().stopped
+    assert late.wait(None) == "refused"
+    assert "within 0.5 s" in late.refused
+    assert made.command("reset").wait(None) == "done"  # others follow it
 
 
-def test_a_pipe_is_refused_at_once(tmp_path):
+def test_a_pipe_is_refused_at_once(made, tmp_path):
     os.mkfifo(tmp_path / "pipe")
     pipe = str(tmp_path / "pipe")
-    with begun() as bench:
-        for name, arguments in (
-            ("replay", {"file": pipe}),
-            ("set", {"name": "plant.mjcf", "value": pipe}),
-            ("set", {"name": "plant.torque_curve", "value": pipe}),
-            ("trajectory", {"fields": {"shape": "waypoints", "file": pipe}}),
-            ("set", {"name": "trajectory", "value": {"shape": "waypoints", "file": pipe}}),
-            ("load", {"source": "hold", "overrides": {"plant.mjcf": pipe}}),
-            ("record", {"telemetry": pipe}),
-            ("save", {"file": pipe}),
-        ):
-            assert "expected a regular file" in said(bench, name, **arguments), name
-        os.rename(pipe, tmp_path / "pipe.py")
-        os.mkfifo(tmp_path / "pipe.toml")
-        assert "regular" in said(bench, "set", name="controller.law", value=f"{pipe}.py:Mine")
-        assert "regular" in said(bench, "load", source=f"{pipe}.toml")
-        done(bench, "start")
+    for name, arguments in (
+        ("replay", {"file": pipe}),
+        ("set", {"name": "plant.mjcf", "value": pipe}),
+        ("set", {"name": "plant.torque_curve", "value": pipe}),
+        ("trajectory", {"fields": {"shape": "waypoints", "file": pipe}}),
+        ("set", {"name": "trajectory", "value": {"shape": "waypoints", "file": pipe}}),
+        ("load", {"source": "hold", "overrides": {"plant.mjcf": pipe}}),
+        ("record", {"telemetry": pipe}),
+        ("save", {"file": pipe}),
+    ):
+        assert "expected a regular file" in said(made, name, **arguments), name
+    os.rename(pipe, tmp_path / "pipe.py")
+    os.mkfifo(tmp_path / "pipe.toml")
+    assert "regular" in said(made, "set", name="controller.law", value=f"{pipe}.py:Mine")
+    assert "regular" in said(made, "load", source=f"{pipe}.toml")
+    done(made, "start")

@@ -76,32 +76,31 @@ def test_an_error_of_a_file_is_reported_and_the_run_continues(tmp_path, monkeypa
 
 
 @pytest.mark.parametrize("place", [0, 1], ids=["recording", "telemetry"])
-def test_a_replay_pauses_the_twin(files, place):
+def test_a_replay_pauses_the_twin(made, files, place):
     rows = kept_rows(files[1])
-    with begun() as made:
-        made.advance(100)
-        q_rad = made.state().q_rad
-        done(made, "replay", file=str(files[place]))
+    made.advance(100)
+    q_rad = made.state().q_rad
+    done(made, "replay", file=str(files[place]))
+    state = made.state()
+    assert (state.mode, state.tick, state.t_s) == ("replay", 1, rows["t_s"][0])
+    for shown in (50, 300):
+        made.advance(shown - made.state().tick)
         state = made.state()
-        assert (state.mode, state.tick, state.t_s) == ("replay", 1, rows["t_s"][0])
-        for shown in (50, 300):
-            made.advance(shown - made.state().tick)
-            state = made.state()
-            for name in ("q_rad", "q_ref_rad", "error_rad", "torque_Nm", "current_A"):
-                assert getattr(state, name) == tuple(rows[name][shown - 1])
-            assert state.t_s == rows["t_s"][shown - 1]
-        np.testing.assert_array_equal(made.bins().rows["q_rad"], rows["q_rad"][:300:20])
-        assert made.advance(1000) == 200
-        assert not made.state().running
-        # Back at the twin, which did not move.
-        done(made, "hold")
-        state = made.state()
-        assert (state.mode, state.tick, state.q_rad) == ("hold", 100, q_rad)
-        done(made, "start")
-        assert made.advance(10) == 10
-        done(made, "replay", file=str(files[place]))
-        done(made, "stop")
-        assert (made.state().mode, made.state().stopped) == ("off", True)
+        for name in ("q_rad", "q_ref_rad", "error_rad", "torque_Nm", "current_A"):
+            assert getattr(state, name) == tuple(rows[name][shown - 1])
+        assert state.t_s == rows["t_s"][shown - 1]
+    np.testing.assert_array_equal(made.bins().rows["q_rad"], rows["q_rad"][:300:20])
+    assert made.advance(1000) == 200
+    assert not made.state().running
+    # Back at the twin, which did not move.
+    done(made, "hold")
+    state = made.state()
+    assert (state.mode, state.tick, state.q_rad) == ("hold", 100, q_rad)
+    done(made, "start")
+    assert made.advance(10) == 10
+    done(made, "replay", file=str(files[place]))
+    done(made, "stop")
+    assert (made.state().mode, made.state().stopped) == ("off", True)
 
 
 SETTINGS = [

@@ -24,40 +24,39 @@ def waits(t, reference, measurement, parameters, state, torque):
 """
 
 
-def test_a_law_that_does_not_return_stalls_the_loop(tmp_path):
+def test_a_law_that_does_not_return_stalls_the_loop(made, tmp_path):
     (file := tmp_path / "law.py").write_text(LAW)
     telemetry = tmp_path / "run.parquet"
-    with begun() as bench:
-        done(bench, "set", name="controller.law", value=f"{file}:waits")
-        law = bench._bench_state.driver.session.law.step.__globals__
-        done(bench, "record", telemetry=str(telemetry))
-        bench.begin()
-        try:
-            assert law["IN"].wait()
-            wait_for(lambda: bench.state().mode == "fault")
-            state = bench.state()
-            assert state.reason.startswith("LOOP STALLED: the law ")
-            assert (state.stopped, state.running, bench.stalled) == (True, False, True)
-            assert not any(state.current_command_A)
-            assert not any(state.current_A)
-            # The files are completed while the law still waits.
-            wait_for(lambda: bench.state().completed_files == (str(telemetry),))
-            assert len(kept_rows(telemetry)) > 0
-            assert bench.command("stop").wait() == "done"  # it has happened
-            ticket = bench.command("hold")
-            assert ticket.wait() == "refused"
-            assert "expected Ctrl-C, as the loop has stalled" in ticket.refused
-        finally:
-            law["GO"].set()
-        wait_for(lambda: not bench.stalled)
-        ticket = bench.command("hold")
-        assert ticket.wait(None) == "refused"
-        assert "expected reset" in ticket.refused
-        assert bench.command("set", name="controller.law", value="pd").wait(None) == "done"
-        assert bench.command("reset").wait(None) == "done"
-        assert bench.command("start").wait(None) == "done"
-        wait_for(lambda: bench.state().t_s > 0.1)
-        assert bench.state().mode != "fault"
+    done(made, "set", name="controller.law", value=f"{file}:waits")
+    law = made._bench_state.driver.session.law.step.__globals__
+    done(made, "record", telemetry=str(telemetry))
+    made.begin()
+    try:
+        assert law["IN"].wait()
+        wait_for(lambda: made.state().mode == "fault")
+        state = made.state()
+        assert state.reason.startswith("LOOP STALLED: the law ")
+        assert (state.stopped, state.running, made.stalled) == (True, False, True)
+        assert not any(state.current_command_A)
+        assert not any(state.current_A)
+        # The files are completed while the law still waits.
+        wait_for(lambda: made.state().completed_files == (str(telemetry),))
+        assert len(kept_rows(telemetry)) > 0
+        assert made.command("stop").wait() == "done"  # it has happened
+        ticket = made.command("hold")
+        assert ticket.wait() == "refused"
+        assert "expected Ctrl-C, as the loop has stalled" in ticket.refused
+    finally:
+        law["GO"].set()
+    wait_for(lambda: not made.stalled)
+    ticket = made.command("hold")
+    assert ticket.wait(None) == "refused"
+    assert "expected reset" in ticket.refused
+    assert made.command("set", name="controller.law", value="pd").wait(None) == "done"
+    assert made.command("reset").wait(None) == "done"
+    assert made.command("start").wait(None) == "done"
+    wait_for(lambda: made.state().t_s > 0.1)
+    assert made.state().mode != "fault"
 
 
 def test_a_bench_whose_loop_never_returns_can_be_closed(tmp_path):

@@ -89,37 +89,34 @@ def test_a_stop_that_holds_brings_the_rotor_to_rest_and_then_switches_off(tmp_pa
     assert same_when_replayed(path)
 
 
-def test_a_second_stop_switches_off_at_once_and_stops_do_not_fill_the_journal():
-    with begun() as bench:
-        done(bench, "stop_mode", mode="hold")
-        done(bench, "stop")
-        assert bench.state().mode == "hold"
-        done(bench, "stop")
-        assert bench.state().mode == "off"
-        journal = bench.state().journal
-        for _ in range(1000):
-            bench.command("stop")
-        bench.advance(1)
-        assert bench.state().journal == journal
-        assert not np.any(bench.state().current_command_A)
+def test_a_second_stop_switches_off_at_once_and_stops_do_not_fill_the_journal(made):
+    done(made, "stop_mode", mode="hold")
+    done(made, "stop")
+    assert made.state().mode == "hold"
+    done(made, "stop")
+    assert made.state().mode == "off"
+    journal = made.state().journal
+    for _ in range(1000):
+        made.command("stop")
+    made.advance(1)
+    assert made.state().journal == journal
+    assert not np.any(made.state().current_command_A)
 
 
-def test_a_stop_that_holds_leaves_a_free_rotor_free():
-    with begun() as bench:
-        done(bench, "stop_mode", mode="hold")
-        done(bench, "off")
-        bench.advance(10)
-        done(bench, "stop")
-        assert bench.state().mode == "off"
+def test_a_stop_that_holds_leaves_a_free_rotor_free(made):
+    done(made, "stop_mode", mode="hold")
+    done(made, "off")
+    made.advance(10)
+    done(made, "stop")
+    assert made.state().mode == "off"
 
 
-def test_a_reset_releases_a_stop_that_holds():
-    with begun() as bench:
-        done(bench, "stop_mode", mode="hold")
-        done(bench, "stop")
-        done(bench, "reset")
-        done(bench, "start")
-        bench.advance(3000)
-        state = bench.state()
-        assert (state.mode, state.stopped) == ("trajectory", False)
-        assert state.stop_mode == "hold"  # it is a choice of the person, not of the run
+def test_a_reset_releases_a_stop_that_holds(made):
+    done(made, "stop_mode", mode="hold")
+    done(made, "stop")
+    done(made, "reset")
+    done(made, "start")
+    made.advance(3000)
+    state = made.state()
+    assert (state.mode, state.stopped) == ("trajectory", False)
+    assert state.stop_mode == "hold"  # it is a choice of the person, not of the run
