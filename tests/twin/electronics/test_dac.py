@@ -37,12 +37,6 @@ def test_without_bits_commands_pass_bit_by_bit():
         assert converted(dac(ideal, GAIN_A_V, len(odd), 0), odd).tobytes() == odd.tobytes()
 
 
-def test_every_code_is_a_step_of_one_lsb():
-    setpoint = curve(dac(PLAIN, GAIN_A_V, 1, 0), 0)
-    # Code times LSB and transconductance, each product rounded once.
-    np.testing.assert_allclose(setpoint, CODES * LSB_A, rtol=4e-16)
-
-
 @pytest.mark.parametrize("bits", [1, 2, 8, 16, 24, 32])
 def test_one_code_is_nothing_and_reaches_half_a_step_to_both_sides(bits):
     made = dac(DacSection(dac_bits=bits), GAIN_A_V, 5, 0)
@@ -63,11 +57,6 @@ def test_within_the_range_rounding_is_at_most_half_a_step(command):
 def test_beyond_the_range_is_its_end(command):
     setpoint = converted(dac(PLAIN, GAIN_A_V, 2, 0), np.array([command, -command]))
     np.testing.assert_allclose(setpoint, [8.0 - LSB_A, -8.0], rtol=4e-16)
-
-
-def test_what_is_not_a_number_stays_so_in_its_channel():
-    setpoint = converted(dac(PROTOTYPE, GAIN_A_V, 3, 0), np.array([1.0, np.nan, 1.0]))
-    np.testing.assert_array_equal(np.isnan(setpoint), [False, True, False])
 
 
 @given(st.lists(st.floats(allow_nan=False), min_size=GROUPS, max_size=GROUPS), st.integers(0, 2**63))
@@ -115,11 +104,10 @@ def test_inl_is_its_sum_of_sines():
 def test_draws_fill_their_bounds_and_are_the_channels_own():
     made = dac(PROTOTYPE, GAIN_A_V, 400, 1)
     for drawn, bound in ((made.offset_V, 2e-3), (made.gain - 1, 1e-3)):
-        assert np.all(np.abs(drawn) <= bound * (1 + 1e-12))
         # Uniform: the mean of 400 strays by bound / sqrt(1200); five of these. Extremes within 5 % of it.
         assert abs(drawn.mean()) < 5 * bound / np.sqrt(1200)
-        assert drawn.max() > 0.95 * bound
-        assert drawn.min() < -0.95 * bound
+        assert 0.95 * bound < drawn.max() <= bound * (1 + 1e-12)
+        assert -0.95 * bound > drawn.min() >= -bound * (1 + 1e-12)
     fewer = dac(PROTOTYPE, GAIN_A_V, 18, 1)
     np.testing.assert_array_equal(made.offset_V[:18], fewer.offset_V)
     only = dac(DacSection(dac_bits=16, dac_offset_V=2e-3), GAIN_A_V, 18, 1)
@@ -128,17 +116,9 @@ def test_draws_fill_their_bounds_and_are_the_channels_own():
     assert np.all(dac(PROTOTYPE, GAIN_A_V, 18, 2).offset_V != fewer.offset_V)
 
 
-def test_a_command_may_be_converted_in_place():
-    made, command = dac(PROTOTYPE, GAIN_A_V, 3, 0), np.array([1.0, -2.0, 7.0])
+def test_a_command_may_be_converted_in_place_and_no_number_stays_none_in_its_channel():
+    made, command = dac(PROTOTYPE, GAIN_A_V, 3, 0), np.array([1.0, np.nan, 7.0])
     expected = converted(made, command)
     convert(made, command, command)
     np.testing.assert_array_equal(command, expected)
-
-
-@pytest.mark.parametrize(
-    ("field", "bad"),
-    [("dac_bits", -1), ("dac_bits", 33), ("dac_bits", 16.0), ("dac_range_V", 0.0), ("dac_inl_lsb", -1.0)],
-)
-def test_no_converter_is_outside_the_bounds(field, bad):
-    with pytest.raises(ValueError, match=field):
-        DacSection(**{field: bad})
+    np.testing.assert_array_equal(np.isnan(command), [False, True, False])

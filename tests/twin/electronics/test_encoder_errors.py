@@ -8,7 +8,6 @@ from pydantic import ValidationError
 
 from spheretwin import scenario as scenarios
 from spheretwin.electronics.sensor_chain import SensorsSection, sense, sensor_chain
-from spheretwin.models.base.errors import InputError
 from spheretwin.session import Session
 
 LINE = 2 * np.pi / 2000
@@ -23,28 +22,29 @@ def measured(q, seed=0, rates=None, **section):
     return np.array(angles)
 
 
-def spun(angles):
-    return np.stack([0 * angles, 0 * angles, angles], axis=1)
+def spun(angles, seed=0, **encoder):
+    """Measured angle of hinge γ alone."""
+    q = np.stack([0 * angles, 0 * angles, angles], axis=1)
+    return measured(q, seed, encoder=encoder)[:, 2]
 
 
 @pytest.mark.parametrize("seed", range(5))
 def test_eccentricity_is_one_harmonic_of_the_turn(seed):
     turn = 2 * np.pi * np.arange(256) / 256
-    error = measured(spun(turn), seed, encoder={"eccentricity_rad": 2e-3})[:, 2] - turn
+    error = spun(turn, seed, eccentricity_rad=2e-3) - turn
     spectrum = np.fft.fft(error) / 256
     assert 2 * abs(spectrum[1]) == pytest.approx(2e-3, rel=1e-12)
     assert np.abs(np.delete(spectrum, [1, 255])).max() < 1e-15  # rounding of angles of 6 rad
-    over = measured(spun(turn + 6 * np.pi), seed, encoder={"eccentricity_rad": 2e-3})[:, 2] - turn - 6 * np.pi
+    over = spun(turn + 6 * np.pi, seed, eccentricity_rad=2e-3) - turn - 6 * np.pi
     np.testing.assert_allclose(over, error, rtol=0, atol=1e-14)
 
 
 def test_phase_of_the_eccentricity_belongs_to_the_seed_and_counts_round_after_it():
-    turn = np.linspace(0, 7, 1000)
-    phases = []
+    turn, phases = np.linspace(0, 7, 200), []
     for seed in range(50):
-        error = measured(spun(turn), seed, encoder={"eccentricity_rad": 0.01})[:, 2] - turn
+        error = spun(turn, seed, eccentricity_rad=0.01) - turn
         phases.append(np.angle(np.exp(-1j * turn) @ error))
-        lines = measured(spun(turn), seed, encoder={"eccentricity_rad": 0.01, "counts": 2000})[:, 2]
+        lines = spun(turn, seed, eccentricity_rad=0.01, counts=2000)
         np.testing.assert_allclose(lines, np.rint((turn + error) / LINE) * LINE, rtol=0, atol=1e-12)
     # 50 phases leave a quarter of the turn empty with a probability of 50 * 0.75**49, 4e-5.
     assert np.diff(np.sort(phases)).max() < np.pi / 2
@@ -69,24 +69,18 @@ def slow_count(angles, start, index, counts=2000):
 def test_count_is_wrong_by_a_constant_until_the_index_passes(steps, index, seed):
     angles = 0.37 + np.cumsum(steps)
     section = {"counts": 2000, "start_error_rad": 0.2, "index_rad": index}
-    start = measured(spun(np.array([index + 1.0])), seed, encoder=section)[0, 2] - index - 1.0
-    got = measured(spun(angles), seed, encoder=section)[:, 2]
+    start = spun(np.array([index + 1.0]), seed, **section)[0] - index - 1.0
     expected = slow_count(angles, round(start / LINE), index)
-    np.testing.assert_allclose(got, expected, rtol=0, atol=1e-12)
+    np.testing.assert_allclose(spun(angles, seed, **section), expected, rtol=0, atol=1e-12)
 
 
 def test_error_of_the_start_fills_its_bound_and_counters_differ():
     section = {"counts": 2000, "start_error_rad": 0.5}
-    errors = [measured(spun(np.array([1.0])), seed, encoder=section)[0, 2] - 1.0 for seed in range(200)]
+    errors = [spun(np.array([1.0]), seed, **section)[0] - 1.0 for seed in range(200)]
     assert np.abs(errors).max() <= 0.5 + LINE  # half a line each of the error and of the count
     # Uniform: 200 numbers all miss the outer tenth on one side with a probability of 0.95**200, 4e-5.
     assert max(errors) > 0.45
     assert min(errors) < -0.45
-
-
-def test_start_error_without_counts_is_refused():
-    with pytest.raises(ValidationError, match=r"expected counts for a start_error_rad of 0\.1, received 0"):
-        SensorsSection(encoder={"start_error_rad": 0.1})
 
 
 def test_telemetry_shows_the_error_until_the_index_and_snapshots_hold_it():
@@ -96,7 +90,6 @@ def test_telemetry_shows_the_error_until_the_index_and_snapshots_hold_it():
         "sensors.encoder.index_rad": 0.1,
         "seed": 3,
         "duration": 2.0,
-        "plant.engine": "lagrangian",
     }
     with Session(scenarios.load("sinusoid", fields)) as session:
         session.advance(20)
@@ -133,7 +126,6 @@ def test_skew_samples_beta_later_to_first_order():
     np.testing.assert_array_equal(got[:, 2], q[:, 2])
 
 
-def test_skew_of_a_period_is_refused():
-    message = r"expected sensors\.adc\.skew_s below controller\.period_s of 0\.001 s, received 0\.001 s"
-    with pytest.raises(InputError, match=message):
-        scenarios.load("hold", {"sensors.adc.skew_s": 1e-3})
+def test_start_error_without_counts_is_refused():
+    with pytest.raises(ValidationError, match=r"expected counts for a start_error_rad of 0\.1, received 0"):
+        SensorsSection(encoder={"start_error_rad": 0.1})

@@ -25,17 +25,6 @@ def test_neither_blocks_nor_further_columns_move_a_bit(whole, first, ticks, widt
     np.testing.assert_array_equal(rows, whole[first : first + ticks, :width])
 
 
-def test_a_number_is_that_of_its_tick_alone(whole):
-    for tick, column in ((0, 0), (3, 1), (250, 6), (399, 10)):
-        block, place = divmod(column, 4)
-        stream = np.random.Philox(np.random.SeedSequence([SEED, stream_key(NAME), block])).advance(tick)
-        uniform = np.random.Generator(stream).random(4)
-        pair = place % 2
-        radius = np.sqrt(-2 * np.log(1 - uniform[pair]))
-        turn = (np.cos, np.sin)[place // 2](2 * np.pi * uniform[2 + pair])
-        assert whole[tick, column] == pytest.approx(radius * turn, rel=1e-14)
-
-
 def test_numbers_are_normal_and_independent():
     rows = noise_table(1, 0, 50_000, ((NAME, 8),))
     for column in rows.T:

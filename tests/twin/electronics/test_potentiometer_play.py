@@ -119,7 +119,6 @@ def test_telemetry_has_the_lead_of_the_wiper_and_snapshots_hold_it():
     fields = {
         "sensors.potentiometer.hysteresis_rad": WIDTH,
         "sensors.potentiometer.repeatability_rad": SPREAD,
-        "plant.engine": "lagrangian",
         "duration": 1.0,
     }
     with Session(scenarios.load("nutation", {"hardware": "electronics", **fields})) as session:
