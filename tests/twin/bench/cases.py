@@ -5,7 +5,10 @@ import numpy as np
 from spheretwin import cli
 from spheretwin import scenario as scenarios
 from spheretwin.bench import Bench
-from spheretwin.models.telemetry.table import read_parquet
+from spheretwin.models.telemetry.signals import common_signals, width
+from spheretwin.models.telemetry.table import Table, read_parquet
+
+GROUPS = 18
 
 # No load: a rotor that is let go then stays within its workspace for the length of a test.
 QUIET = {
@@ -70,3 +73,12 @@ def same_when_replayed(path):
 
 def as_arrays(state):
     return {name: np.array(getattr(state, name)) for name in ("q_rad", "q_ref_rad", "error_rad")}
+
+
+def table(first, last, more=()):
+    """Rows of the ticks of a run at rest, with the signals that all runs have, and more."""
+    signals = (*common_signals(GROUPS), *more)
+    rows = Table(signals, np.zeros((last - first, width(signals))))
+    rows["t_s"][:] = 1e-3 * np.arange(first, last)
+    rows["allocation_scale"][:] = 1.0
+    return rows

@@ -5,20 +5,10 @@ import pytest
 
 from spheretwin.bench.capture import Capture, Trigger
 from spheretwin.models.base.errors import InputError
-from spheretwin.models.telemetry.signals import Signal, common_signals, width
-from spheretwin.models.telemetry.table import Table
-from tests.twin.bench.cases import done, said
+from spheretwin.models.telemetry.signals import Signal
+from tests.twin.bench.cases import GROUPS, done, said, table
 
-GROUPS = 18
 FAULT = Signal("fault", "1", 2, "failure mode", ("coil.00", "coil.01"))
-
-
-def table(first, last, more=()):
-    signals = (*common_signals(GROUPS), *more)
-    rows = Table(signals, np.zeros((last - first, width(signals))))
-    rows["t_s"][:] = 1e-3 * np.arange(first, last)
-    rows["allocation_scale"][:] = 1.0
-    return rows
 
 
 def captured(trigger, rows, chunk):

@@ -7,21 +7,12 @@ from hypothesis import strategies as st
 
 from spheretwin.bench.history import TEMPERATURE, History, LENGTH_s, RATE_Hz
 from spheretwin.metrics import CurrentVariation
-from spheretwin.models.telemetry.signals import Signal, common_signals, width
-from spheretwin.models.telemetry.table import Table
-
-GROUPS = 18
-
-
-def table(rows, more=()):
-    signals = (*common_signals(GROUPS), *more)
-    made = Table(signals, np.zeros((rows, width(signals))))
-    made["t_s"][:] = 1e-3 * np.arange(rows)
-    return made
+from spheretwin.models.telemetry.signals import Signal
+from tests.twin.bench.cases import GROUPS, table
 
 
 def test_the_history_is_bounded_and_read_from_a_number_on():
-    history, rows = History(GROUPS, 1e-3), table(1000)
+    history, rows = History(GROUPS, 1e-3), table(0, 1000)
     seconds = round(LENGTH_s) + 5
     for second in range(seconds):
         history.write(1000 * second, rows)
@@ -35,7 +26,7 @@ def test_the_history_is_bounded_and_read_from_a_number_on():
 @given(st.sets(st.integers(1, 299)))
 def test_bounds_are_those_of_all_rows_in_any_chunks(cuts):
     """A 250 Hz square wave, which rows at 50 Hz show as a constant, and a spike of one row."""
-    rows, tick = table(300), np.arange(300)
+    rows, tick = table(0, 300), np.arange(300)
     rows["current_A"][:, 3] = np.where(tick // 2 % 2, 4.0, -4.0)
     rows["error_rad"][137, 1] = 0.2
     history = History(GROUPS, 1e-3)
@@ -53,8 +44,8 @@ def test_bounds_are_those_of_all_rows_in_any_chunks(cuts):
 
 def test_temperatures_are_nan_where_a_run_has_none():
     history = History(GROUPS, 1e-3)
-    history.write(0, table(20))
-    warm = table(20, (Signal(TEMPERATURE, "°C", GROUPS, "at the end of the period"),))
+    history.write(0, table(0, 20))
+    warm = table(0, 20, (Signal(TEMPERATURE, "°C", GROUPS, "at the end of the period"),))
     warm[TEMPERATURE][:] = 33.0
     history.write(20, warm)
     temperature = history.read().high[TEMPERATURE]
@@ -66,7 +57,7 @@ def test_temperatures_are_nan_where_a_run_has_none():
 def test_chatter_is_the_variation_of_the_commands_in_the_last_second(chunk):
     """The metric `current_variation` divides by one period less: a run has one difference less than rows."""
     random = np.random.default_rng(3)
-    rows = table(1000)
+    rows = table(0, 1000)
     rows["current_command_A"][:] = random.normal(size=(1000, GROUPS)).cumsum(axis=0)
     history = History(GROUPS, 1e-3)
     for first in range(0, 1000, chunk):
@@ -74,5 +65,5 @@ def test_chatter_is_the_variation_of_the_commands_in_the_last_second(chunk):
     variation = np.abs(np.diff(rows["current_command_A"], axis=0)).sum(axis=0).mean()
     assert CurrentVariation.reads == ("current_command_A",)
     assert history.chatter_A_s == pytest.approx(variation, rel=1e-12)  # over 1 s; rounding
-    history.write(1000, table(1000))  # the second before is forgotten; one step back to zero remains
+    history.write(1000, table(0, 1000))  # the second before is forgotten; one step back to zero remains
     assert history.chatter_A_s == pytest.approx(np.abs(rows["current_command_A"][-1]).mean(), rel=1e-12)

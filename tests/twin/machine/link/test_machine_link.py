@@ -55,6 +55,16 @@ def linked(machine, *, limits=LIMITS, shadow=None, report=None, stop_requested=l
     return link
 
 
+@pytest.fixture
+def link(machine):
+    return linked(machine)
+
+
+@pytest.fixture
+def locked(machine):
+    return linked(machine, lockstep=True, timeout_s=1.0)
+
+
 def reasons(link, ticks, first=0, current=ONES):
     return [link.advance(PERIOD_s * tick, current)[1] for tick in range(first, first + ticks)]
 
@@ -148,8 +158,7 @@ def test_a_machine_without_a_thermometer_has_an_estimate(machine):
     assert reasons(link, 1, current=6 * ONES) == [Reason.TEMPERATURE]
 
 
-def test_a_missing_measurement_removes_the_currents_after_the_timeout(machine):
-    link = linked(machine)
+def test_a_missing_measurement_removes_the_currents_after_the_timeout(machine, link):
     reasons(link, 2)
     machine.silent = True
     # The last measurement arrived 0.8 ms before the end of its period: 3.5 ms later is within the third one.
@@ -158,9 +167,8 @@ def test_a_missing_measurement_removes_the_currents_after_the_timeout(machine):
     assert link.figures()["frames"]["late"] == 4
 
 
-def test_a_delay_that_grows_slowly_removes_the_currents(machine):
+def test_a_delay_that_grows_slowly_removes_the_currents(machine, link):
     """Each tick has a new measurement, but of an ever earlier time."""
-    link = linked(machine)
     results = []
     for tick in range(60):
         machine.delay_s = 2e-4 + 1e-4 * tick
@@ -170,8 +178,7 @@ def test_a_delay_that_grows_slowly_removes_the_currents(machine):
     assert len(link.late_ticks) < 10
 
 
-def test_a_machine_that_hears_nothing_is_given_up(machine):
-    link = linked(machine)
+def test_a_machine_that_hears_nothing_is_given_up(machine, link):
     reasons(link, 2)
     machine.silent = True
 
@@ -184,8 +191,7 @@ def test_a_machine_that_hears_nothing_is_given_up(machine):
     assert not link.late_ticks
 
 
-def test_in_lockstep_a_lost_frame_is_requested_again(machine):
-    link = linked(machine, lockstep=True, timeout_s=1.0)
+def test_in_lockstep_a_lost_frame_is_requested_again(machine, locked):
     machine.silent = True
     heard = []
 
@@ -195,28 +201,26 @@ def test_in_lockstep_a_lost_frame_is_requested_again(machine):
         machine.answer(content)
 
     machine.script.answer = lose_two
-    assert reasons(link, 2) == [Reason.NONE] * 2
+    assert reasons(locked, 2) == [Reason.NONE] * 2
     assert len(heard) == 4
     assert heard[0] == heard[1] == heard[2] != heard[3]
 
 
-def test_in_lockstep_a_silent_machine_is_given_up_at_the_timeout(machine):
-    link = linked(machine, lockstep=True, timeout_s=1.0)
+def test_in_lockstep_a_silent_machine_is_given_up_at_the_timeout(machine, locked):
     machine.silent = True
     start_s = machine.script.t_s
-    assert reasons(link, 1) == [Reason.STALE]
+    assert reasons(locked, 1) == [Reason.STALE]
     assert machine.script.t_s - start_s == pytest.approx(1.0)
-    assert reasons(link, 50, first=1) == [Reason.STALE] * 50
+    assert reasons(locked, 50, first=1) == [Reason.STALE] * 50
     assert machine.script.t_s - start_s == pytest.approx(1.0)  # nothing is waited for any more
     assert machine.commands[-1]["flags"] == 0
 
 
-def test_in_lockstep_an_older_answer_is_no_reply(machine):
-    link = linked(machine, lockstep=True, timeout_s=1.0)
-    first = link.advance(0.0, ONES)[0]
+def test_in_lockstep_an_older_answer_is_no_reply(machine, locked):
+    first = locked.advance(0.0, ONES)[0]
     machine.silent = True
     machine.script.plan(measurement(1000, echo=1, angle=(1.0, 0.0, 0.0)))
-    answer, reason = link.advance(PERIOD_s, ONES)
+    answer, reason = locked.advance(PERIOD_s, ONES)
     assert reason == Reason.STALE
     assert np.array_equal(answer.angle_rad, first.angle_rad)
 
@@ -244,8 +248,7 @@ def test_a_bad_line_changes_the_counts_and_not_the_measurement(machine):
     }  # fmt: skip
 
 
-def test_frames_from_before_the_start_are_not_used(machine):
-    link = linked(machine)
+def test_frames_from_before_the_start_are_not_used(machine, link):
     machine.delay_s = 0.9e-3
     for place in range(200):
         machine.script.plan(measurement(100 + place, angle=(place / 1000, 0.0, 0.0)))
@@ -268,8 +271,7 @@ def test_the_end_of_the_machine_and_a_stop_end_the_run(machine, by):
     assert link.ending == by
 
 
-def test_the_release_is_without_currents_and_repeated(machine):
-    link = linked(machine)
+def test_the_release_is_without_currents_and_repeated(machine, link):
     link.advance(0.0, ONES)
     machine.commands.clear()
     link.release()
@@ -277,8 +279,7 @@ def test_the_release_is_without_currents_and_repeated(machine):
     assert not any(np.any(command["current"]) for command in machine.commands)
 
 
-def test_a_pause_of_the_system_is_not_made_up_for(machine):
-    link = linked(machine)
+def test_a_pause_of_the_system_is_not_made_up_for(machine, link):
     reasons(link, 2)
     machine.script.t_s += 0.1
     link.advance(2 * PERIOD_s, ONES)

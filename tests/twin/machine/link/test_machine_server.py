@@ -15,13 +15,21 @@ def serve(script, **options):
     return MachineServer(machine_channel(script), "test", GROUPS, PERIOD_s, now=script.now, **options)
 
 
+@pytest.fixture
+def script():
+    return Script()
+
+
+@pytest.fixture
+def server(script):
+    return serve(script)
+
+
 def replies(script):
     return [MEASUREMENT.decode(content) for content in script.sent]
 
 
-def test_each_command_is_one_tick_and_its_echo_is_in_the_reply():
-    script = Script()
-    server = serve(script)
+def test_each_command_is_one_tick_and_its_echo_is_in_the_reply(script, server):
     for sequence in (7, 8, 9):
         script.plan(command(sequence, current=sequence))
         applied = server.command(0.0, Measurement(np.full(3, sequence / 10), None, np.zeros(GROUPS), 30.0))
@@ -35,18 +43,14 @@ def test_each_command_is_one_tick_and_its_echo_is_in_the_reply():
     assert replies(script)[-1]["flags"] & Flags.END
 
 
-def test_a_hello_is_answered_and_does_not_advance():
-    script = Script()
+def test_a_hello_is_answered_and_does_not_advance(script, server):
     script.plan(command(1, flags=Flags.HELLO))
     script.plan(command(2, current=3.0), delay_s=1.0)
-    server = serve(script)
     assert np.all(server.command(0.0, AT_REST) == 3.0)
     assert [(reply["echo"], reply["time"]) for reply in replies(script)] == [(1, 0.0)]
 
 
-def test_a_command_that_arrives_twice_is_answered_twice_and_applied_once():
-    script = Script()
-    server = serve(script)
+def test_a_command_that_arrives_twice_is_answered_twice_and_applied_once(script, server):
     script.plan(command(1))
     server.command(0.0, AT_REST)
     for content in (command(1), command(1), command(2, current=2.0)):
@@ -56,25 +60,21 @@ def test_a_command_that_arrives_twice_is_answered_twice_and_applied_once():
     assert server.figures()["frames"]["duplicated"] == 2
 
 
-def test_no_current_flows_unless_it_is_armed():
-    script = Script()
+def test_no_current_flows_unless_it_is_armed(script):
     script.plan(command(1, current=5.0, flags=0))
     assert not np.any(serve(script).command(0.0, AT_REST))
 
 
 @pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
-def test_a_current_that_is_no_number_is_no_command(bad):
-    script = Script()
+def test_a_current_that_is_no_number_is_no_command(bad, script, server):
     script.plan(command(1, current=bad))
     script.plan(command(2, current=1.0))
-    server = serve(script)
     assert np.all(server.command(0.0, AT_REST) == 1.0)
     assert server.figures()["frames"]["corrupt"] == 1
 
 
 @pytest.mark.parametrize("real_time", [False, True])
-def test_the_end_of_the_controller_ends_the_run(real_time):
-    script = Script()
+def test_the_end_of_the_controller_ends_the_run(real_time, script):
     server = serve(script, real_time=real_time)
     script.plan(command(1))
     assert server.command(0.0, AT_REST) is not None
@@ -83,8 +83,7 @@ def test_the_end_of_the_controller_ends_the_run(real_time):
     assert server.ending == "the controller ended the run"
 
 
-def test_silence_ends_the_run():
-    script = Script()
+def test_silence_ends_the_run(script):
     server = serve(script, idle_s=2.0)
     assert server.command(0.0, AT_REST) is None
     assert server.ending == "no command in 2 s"
@@ -97,10 +96,8 @@ def test_a_stop_ends_the_wait():
     assert server.ending == "a stop was requested"
 
 
-def test_a_closed_connection_ends_the_run_after_the_pending_commands():
-    script = Script()
+def test_a_closed_connection_ends_the_run_after_the_pending_commands(script, server):
     script.plan(command(1) + command(2, current=2.0))
-    server = serve(script)
     server.command(0.0, AT_REST)
     script.is_closed = True
     assert np.all(server.command(PERIOD_s, AT_REST) == 2.0)
@@ -115,8 +112,7 @@ def real_time(script, ticks, **options):
     return server, currents
 
 
-def test_in_real_time_the_newest_command_applies_until_the_next():
-    script = Script()
+def test_in_real_time_the_newest_command_applies_until_the_next(script):
     for delay_ms, sequence in ((0, 1), (0.5, 2), (2.2, 3), (2.4, 4)):
         script.plan(command(sequence, current=sequence), delay_s=1e-3 * delay_ms)
     server, currents = real_time(script, 5)
@@ -127,8 +123,7 @@ def test_in_real_time_the_newest_command_applies_until_the_next():
     assert server.figures()["jitter"]["max_ms"] == pytest.approx(0.0, abs=1e-9)
 
 
-def test_in_real_time_the_currents_are_removed_when_commands_are_missing():
-    script = Script()
+def test_in_real_time_the_currents_are_removed_when_commands_are_missing(script):
     script.plan(command(1, current=2.0))
     script.plan(command(2, current=3.0), delay_s=9.5e-3)
     _, currents = real_time(script, 12, timeout_s=4.5e-3)
@@ -137,8 +132,7 @@ def test_in_real_time_the_currents_are_removed_when_commands_are_missing():
     assert [bool(flag & Flags.FAILSAFE) for flag in flags] == [False] * 6 + [True] * 5 + [False]
 
 
-def test_in_real_time_a_pause_of_the_system_is_not_made_up_for():
-    script = Script()
+def test_in_real_time_a_pause_of_the_system_is_not_made_up_for(script):
     script.plan(command(1))
     server, _ = real_time(script, 2)
     script.t_s += 0.1
