@@ -6,10 +6,9 @@ import numpy as np
 import pytest
 
 from spheretwin import cli
-from spheretwin import scenario as scenarios
+from spheretwin.analysis.recorded_run import read
 from spheretwin.models import actuator as actuators
 from spheretwin.models.magnetics import torque_matrix
-from spheretwin.models.telemetry.table import read_parquet
 from spheretwin.simulation import simulate
 
 MIDDLE_RING = re.compile(
@@ -26,7 +25,6 @@ def groups(request):
 def model(tmp_path, groups):
     """The shipped actuator without its middle ring of coils, or with twice as many in it."""
     text = actuators.MJCF_PATH.read_text()
-    assert MIDDLE_RING.search(text)
     ring = MIDDLE_RING.search(text)[0].replace('count="12" euler="0 0 30"', 'count="24" euler="0 0 15"')
     text = MIDDLE_RING.sub(ring if groups == 24 else "", text)
     path = tmp_path / f"groups_{groups}.xml"
@@ -54,12 +52,10 @@ def test_the_matrix_has_a_column_for_each_group(model, groups):
 @pytest.mark.parametrize("allocation", ["least_norm", "bounded"])
 def test_a_run_tracks_with_the_groups_there_are(model, groups, engine, allocation):
     changes = {"plant.mjcf": str(model), "duration": 0.4, "plant.engine": engine, "allocation": allocation}
-    run = simulate(scenarios.load("hold", changes))
+    run = simulate("hold", changes | {"plant.group_gain": [1.0] * groups})
     table = run.telemetry
     assert run.status == "completed"
     assert table["current_A"].shape == table["current_command_A"].shape == (400, groups)
-    signal = next(each for each in table.signals if each.name == "current_A")
-    assert signal.labels[-1] == f"group {groups - 1}"
     actuator = actuators.load(model)
     for row in (1, 200, 399):  # what is logged is what the currents give, G_t(q) I (15), amid the first step
         middle = table["q_rad"][row] + 0.25e-3 * table["qdot_rad_s"][row]
@@ -70,17 +66,10 @@ def test_a_run_tracks_with_the_groups_there_are(model, groups, engine, allocatio
 
 
 def test_a_run_is_written_recorded_and_replayed(model, groups, tmp_path, capsys):
-    first, again = tmp_path / "run.parquet", tmp_path / "again.parquet"
-    flags = ["--plant.mjcf", str(model), "--duration", "0.1"]
-    record = ["--record", str(tmp_path / "run.rrd")]
-    assert cli.main(["simulate", "nutation", *flags, "--telemetry", str(first), *record]) == 0
-    assert (tmp_path / "run.rrd").stat().st_size > 0
-    assert read_parquet(first)[0]["current_A"].shape == (100, groups)
+    again, run = tmp_path / "again.parquet", simulate("nutation", {"plant.mjcf": str(model), "duration": 0.1})
+    for name in ("run.rrd", "run.parquet"):
+        first = run.save(tmp_path / name)
+        assert read(first).table["current_A"].shape == (100, groups)
     assert cli.main(["simulate", "--replay", str(first), "--telemetry", str(again)]) == 0
     assert first.read_bytes() == again.read_bytes()
     assert capsys.readouterr().err == ""
-
-
-def test_gains_of_groups_are_as_many(model, groups):
-    changes = {"plant.mjcf": str(model), "duration": 0.01, "plant.group_gain": [1.0] * groups}
-    assert simulate(scenarios.load("hold", changes)).status == "completed"

@@ -7,58 +7,30 @@ import spheretwin as st
 from spheretwin import cli, plant
 from spheretwin.crosscheck import coil_driven
 from spheretwin.models import actuator as actuators
-from spheretwin.models import torque_field
 from spheretwin.models.base.errors import InputError
-from spheretwin.models.kinematics import rate_jacobian
 from spheretwin.models.magnetics import torque_matrix
-from spheretwin.models.torque_field import TorqueField, directions
 from spheretwin.plant.plant_step import step
 from spheretwin.scenario.reading import FOLDER
 
 SECOND = FOLDER / "ventusff" / "actuator.xml"
 
 
-@pytest.fixture(scope="module")
-def runs():
-    return {
-        engine: st.simulate("ventusff", {"plant.engine": engine, "duration": 2.0})
-        for engine in ("mujoco", "lagrangian")
-    }
-
-
-def test_both_engines_track_and_agree(runs):
-    for run in runs.values():
+def test_both_engines_track_and_agree():
+    runs, actuator = [], actuators.load(SECOND)
+    for engine in ("mujoco", "lagrangian"):
+        run = st.simulate("ventusff", {"plant.engine": engine, "duration": 2.0})
+        table = run.telemetry
         assert run.status == "completed"
-        assert run.telemetry["current_A"].shape == (400, 8)
+        assert table["current_A"].shape == (400, 8)
         # PID of 40 rad/s against the jerk of 0.2 sin(pi t) at the start: 0.17 degrees; later less.
-        assert np.abs(run.telemetry["error_rad"]).max() < np.radians(0.2)
-        assert np.abs(run.telemetry["error_rad"][200:]).max() < np.radians(0.02)
-    q = [run.telemetry["q_rad"] for run in runs.values()]
-    np.testing.assert_allclose(q[0], q[1], rtol=0, atol=1e-9)  # two RK4 of the same motion, rounded otherwise
-
-
-def test_the_logged_torque_is_that_of_the_logged_currents(runs):
-    table, actuator = runs["mujoco"].telemetry, actuators.load(SECOND)
-    for row in (1, 100, 399):
-        middle = table["q_rad"][row] + 0.25e-3 * table["qdot_rad_s"][row]
-        torque = torque_matrix(middle, actuator) @ table["current_A"][row]
-        np.testing.assert_allclose(torque, table["torque_Nm"][row], rtol=0, atol=1e-15)
-
-
-@pytest.mark.parametrize("allocation", ["least_norm", "bounded"])
-def test_the_currents_of_eight_groups_give_the_commanded_torque(allocation):
-    run = st.simulate("ventusff", {"allocation": allocation, "duration": 1.0, "plant.engine": "lagrangian"})
-    table, actuator = run.telemetry, actuators.load(SECOND)
-    current = table["current_command_A"]
-    assert np.abs(current).max() <= 1.5
-    for row in (0, 50, 199):
-        G = torque_matrix(table["q_rad"][row], actuator)
-        generalised = rate_jacobian(table["q_rad"][row]).T @ G @ current[row]
-        # Rounding of a system with a condition number below 10.
-        np.testing.assert_allclose(generalised, table["torque_command_Nm"][row], rtol=0, atol=1e-12)
-        # Within the limit both allocations are the least-norm currents (16).
-        least = np.linalg.pinv(G) @ (G @ current[row])
-        np.testing.assert_allclose(current[row], least, rtol=0, atol=1e-9)
+        assert np.abs(table["error_rad"]).max() < np.radians(0.2)
+        assert np.abs(table["error_rad"][200:]).max() < np.radians(0.02)
+        for row in (1, 100, 399):
+            middle = table["q_rad"][row] + 0.25e-3 * table["qdot_rad_s"][row]
+            torque = torque_matrix(middle, actuator) @ table["current_A"][row]
+            np.testing.assert_allclose(torque, table["torque_Nm"][row], rtol=0, atol=1e-15)
+        runs.append(table["q_rad"])
+    np.testing.assert_allclose(*runs, rtol=0, atol=1e-9)  # two RK4 of the same motion, rounded otherwise
 
 
 def test_plants_in_lanes_move_as_alone():
@@ -108,53 +80,15 @@ def test_coil_driven_motion_agrees_with_dop853(engine, monkeypatch):
     np.testing.assert_allclose(np.log2(np.array(errors[:-1]) / errors[1:]), 2, atol=0.2)
 
 
-@pytest.mark.release("1.3 s; test_coil_driven_motion_agrees_with_dop853 has a field")
-def test_the_first_actuator_runs_as_a_field(tmp_path, actuator):
-    axes = directions(181, 360).reshape(-1, 3)
-    torque = np.zeros_like(axes)
-    for r, polarity in zip(actuator.pole_axes, actuator.pole_polarity, strict=True):
-        torque += polarity * actuator.torque_curve.over_sine(axes @ r)[:, None] * np.cross(r, axes)
-    field = TorqueField(torque.reshape(181, 360, 3))
-    (path := tmp_path / "field.csv").write_text(torque_field.to_csv(field, []))
-    changes = {"duration": 1.0, "plant.engine": "lagrangian", "plant.torque_curve": str(path)}
-    as_field, as_curve = (
-        st.simulate("nutation", changes),
-        st.simulate("nutation", {**changes, "plant.torque_curve": None}),
-    )
-    assert as_field.status == as_curve.status == "completed"
-    apart = np.abs(as_field.telemetry["torque_Nm"] - as_curve.telemetry["torque_Nm"]).max()
-    # 1e-4 of the peak in every column, with currents that give some 0.3 N·m in all.
-    assert 0 < apart < 2e-4 * np.abs(as_curve.telemetry["torque_Nm"]).max()
-
-
 def test_a_run_is_recorded_and_replayed(tmp_path, capsys):
-    first, again = tmp_path / "run.parquet", tmp_path / "again.parquet"
-    flags = ["--duration", "0.1", "--telemetry", str(first), "--record", str(tmp_path / "run.rrd")]
-    assert cli.main(["simulate", "ventusff", *flags]) == 0
+    again, run = tmp_path / "again.parquet", st.simulate("ventusff", {"duration": 0.1})
+    run.save(tmp_path / "run.rrd")
+    first = run.save(tmp_path / "run.parquet")
     assert cli.main(["simulate", "--replay", str(first), "--telemetry", str(again)]) == 0
     assert first.read_bytes() == again.read_bytes()
     assert capsys.readouterr().err == ""
 
 
-def test_errors_of_poles_are_refused_in_one_line(capsys):
-    assert cli.main(["simulate", "ventusff", "--duration", "0.1", "--plant.poles.gain-error", "0.01"]) == 2
-    error = capsys.readouterr().err
-    assert "expected errors of the coils' gain and angle alone" in error
-    assert error.count("\n") == 1
-
-
 def test_linear_models_use_the_field():
     linear = st.linearise(st.load("ventusff"), [0.1, -0.1, 0.1])
     assert np.all(np.isfinite(linear.system.A))
-
-
-def test_the_torque_scale_of_the_data_sheet_scales_the_field():
-    one, two = (
-        st.simulate(
-            "ventusff", {"nominal.torque_scale": scale, "duration": 0.005, "plant.engine": "lagrangian"}
-        )
-        for scale in (1.0, 2.0)
-    )
-    first, halved = (run.telemetry["current_command_A"][0] for run in (one, two))
-    np.testing.assert_allclose(halved, first / 2, rtol=1e-12)
-    assert np.abs(first).max() > 0.1
