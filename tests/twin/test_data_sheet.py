@@ -118,30 +118,6 @@ def test_a_change_of_the_truth_does_not_reach_the_controller(dotted, whole):
     same_controller(controller(other), whole)
 
 
-@pytest.mark.release("2.6 s; test_a_change_of_the_truth_does_not_reach_the_controller has every field")
-@pytest.mark.uncompiled
-def test_nor_does_a_change_during_the_run():
-    with Session(scenarios.load("tilt", WHOLE)) as session:
-        known = session.scenario.nominal
-        session.advance(3)
-        for dotted in ("plant.coulomb_Nm", "drive.delay_s", "sensors.current.noise_A", "drive.supply_V"):
-            if dotted == "drive.supply_V":
-                session.set("drive.drop_up_V", 0.0)
-            session.set(dotted, TRUTH[dotted])
-        assert session.scenario.nominal == known
-
-
-def test_friction_that_is_not_known_is_not_fed_forward():
-    def feed_forward_Nm(**changes):
-        scenario = scenarios.load("tilt", WHOLE | {"detector.detect": False} | changes)
-        return simulate(scenario).telemetry["feed_forward_Nm"]
-
-    known, stiff = feed_forward_Nm(), feed_forward_Nm(**{"plant.coulomb_Nm": [5e-3] * 3})
-    assert np.abs(known).max() > 1e-3
-    np.testing.assert_array_equal(stiff, known)
-    assert not np.array_equal(feed_forward_Nm(**{"nominal.coulomb_Nm": [5e-3] * 3}), known)
-
-
 def test_the_controller_knows_nothing_of_what_the_robustness_study_draws():
     study = load("robustness")
     rows = Rows(study)

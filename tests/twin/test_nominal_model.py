@@ -35,15 +35,6 @@ def test_a_scale_and_a_stiffness_are_the_same_to_a_pd_law():
     np.testing.assert_array_equal(assumed["q_rad"], true["q_rad"])
 
 
-def test_a_weaker_or_stronger_actuator_than_assumed_tracks_otherwise():
-    error = {
-        scale: np.abs(table(2000, changes=PD | {"nominal.torque_scale": scale})["error_rad"]).max()
-        for scale in (0.5, 1.0, 2.0)
-    }
-    assert error[2.0] > 1.2 * error[1.0]  # half the torque asked for
-    assert error[0.5] < error[1.0] / 1.2
-
-
 @pytest.mark.parametrize("law", ["pd", "adaptive_fuzzy", "afsm"])
 @pytest.mark.parametrize("engine", ENGINES)
 def test_a_wrong_sign_loses_the_rotor(engine, law):
@@ -51,15 +42,6 @@ def test_a_wrong_sign_loses_the_rotor(engine, law):
     lost = session("sinusoid", changes)
     assert len(lost.advance(1000)) < 200
     assert lost.status == "left_workspace"
-
-
-@pytest.mark.parametrize("law", ["adaptive_fuzzy", "afsm"])
-def test_a_wrong_sign_may_spin_the_rotor_instead(law):
-    # The third hinge has no end, and a rotor that spins keeps its axis.
-    run = table(1000, "hold", {"nominal.torque_scale": -1.0, "controller.law": law})
-    assert len(run) == 1000
-    assert np.abs(run["qdot_rad_s"][-1, 2]) > 200
-    assert np.abs(run["error_rad"][-1, 2]) > 100
 
 
 @pytest.mark.parametrize("engine", ENGINES)

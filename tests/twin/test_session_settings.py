@@ -179,6 +179,8 @@ REFUSED = [
     ("plant.group_gain", [1.0, 1.0], "18 groups, received 2"),
     ("plant.integrator", "Verlet", "'RK4'"),
     ("fault", {"target": "coil.18", "mode": "open"}, "a fault of a group from 0 to 17"),
+    ("state", {"current_A": [1.0] * 17}, "expected current_A of 18 groups, received 17"),
+    ("state", {"q_rad": [0.0, 2.0, 0.0]}, "expected a pose with beta from"),
     ("", 1.0, "expected a field"),
     (None, 1.0, "expected a field"),
     *[

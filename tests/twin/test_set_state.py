@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from spheretwin import scenario as scenarios
-from spheretwin.models.base.errors import InputError
 from spheretwin.session import Session
 from spheretwin.simulation import simulate
 
@@ -65,22 +64,3 @@ def test_it_is_an_entry_of_the_journal(scenario):
         session.advance(20)
         session.set(change.name, change.value)
         assert session.advance(30).values.tobytes() == after.tobytes()
-
-
-@pytest.mark.parametrize(
-    ("changes", "message"),
-    [
-        ({"q_rad": [0.1, 0.2]}, "q_rad"),
-        ({"qdot_rad_s": [0.0, np.nan, 0.0]}, "qdot_rad_s"),
-        ({"current_A": [1.0] * 17}, "expected current_A of 18 groups, received 17"),
-        ({"q_rad": [0.0, 2.0, 0.0]}, "expected a pose with beta from"),
-    ],
-)
-def test_what_is_no_state_is_refused_and_changes_nothing(scenario, changes, message):
-    with Session(scenario) as session:
-        before = session.q_rad
-        with pytest.raises(InputError, match=message) as refusal:
-            session.set_state(**changes)
-        assert "\n" not in str(refusal.value)
-        np.testing.assert_array_equal(session.q_rad, before)
-        assert session.journal == ()

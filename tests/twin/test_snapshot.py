@@ -1,7 +1,6 @@
 """A snapshot goes on bit for bit: here, in another process, under laws of a user's."""
 
 import dataclasses
-import importlib
 import pickle
 import subprocess
 import sys
@@ -120,35 +119,6 @@ def test_another_process_goes_on_bit_for_bit(model, tmp_path, sticky):
     path = tmp_path / "taken.pickle"
     path.write_bytes(pickle.dumps(original.snapshot()))
     assert continued(path) == rows(original.advance(1100))
-
-
-MODULE = """
-import numba, numpy as np
-from spheretwin.control.law import Law
-
-def step(t, reference, measurement, parameters, state, torque):
-    for axis in range(3):
-        error = measurement[0, axis] - reference[0, axis]
-        state[axis] += error  # integral
-        torque[axis] = -parameters[0] * error - 0.05 * measurement[1, axis] - 1e-3 * state[axis]
-
-plain = Law("mine", step, np.array([0.5]), np.zeros(3))
-fast = Law("mine", numba.njit(step), np.array([0.5]), np.zeros(3))
-"""
-
-
-@pytest.mark.release("two processes of 3 s; test_another_process_goes_on_bit_for_bit has one")
-@pytest.mark.parametrize("kind", ["plain", "fast"])
-def test_another_process_goes_on_under_a_law_that_both_have(kind, tmp_path, monkeypatch):
-    (tmp_path / f"of_the_user_{kind}.py").write_text(MODULE)
-    monkeypatch.syspath_prepend(tmp_path)
-    law = getattr(importlib.import_module(f"of_the_user_{kind}"), kind)
-    original = session(law, name="hold")
-    original.advance(413)
-    path = tmp_path / "taken.pickle"
-    path.write_bytes(pickle.dumps(original.snapshot()))
-    law_there = f"from of_the_user_{kind} import {kind} as law"
-    assert continued(path, law_there, cwd=tmp_path) == rows(original.advance(1100))
 
 
 def test_a_snapshot_under_a_law_that_is_missing_is_refused_and_nothing_changes():

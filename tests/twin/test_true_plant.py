@@ -30,17 +30,6 @@ def test_torque_is_that_of_the_currents_times_their_gains(engine, actuator):
     assert np.abs(bare - run["torque_Nm"][300]).max() > 1e-3
 
 
-def test_an_open_group_is_one_that_the_controller_does_not_know_of():
-    open_group = [0.0] + 17 * [1.0]
-    healthy, broken = table(400), table(400, changes={"plant.group_gain": open_group})
-    np.testing.assert_array_equal(broken["current_command_A"][0], healthy["current_command_A"][0])
-    assert np.abs(broken["current_command_A"][:, 0]).max() > 0.01
-    assert not np.array_equal(broken["q_rad"], healthy["q_rad"])
-    none = table(30, "hold", STILL | {"plant.group_gain": 18 * [0.0]})
-    np.testing.assert_array_equal(none["torque_Nm"], 0)
-    np.testing.assert_array_equal(none["q_rad"], 0)
-
-
 # --- gravity and rates at the start
 
 

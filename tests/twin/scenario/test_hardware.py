@@ -2,7 +2,6 @@
 
 import pytest
 
-from spheretwin.scenario import load
 from spheretwin.scenario.hardware import HARDWARE
 from spheretwin.scenario.sections import Scenario
 
@@ -20,13 +19,3 @@ def test_what_the_controller_knows_of_plant_and_drive_is_in_the_set(name):
     assert len(shared) >= 5
     for dotted, nominal in shared.items():
         assert fields[nominal] == fields[dotted], dotted
-
-
-@pytest.mark.parametrize("name", HARDWARE)
-def test_a_scenario_has_every_value_of_its_set(name):
-    scenario = load("hold", {"hardware": name})
-    for dotted, value in HARDWARE[name].items():
-        inside = scenario
-        for part in dotted.split("."):
-            inside = getattr(inside, part)
-        assert inside == value, dotted
