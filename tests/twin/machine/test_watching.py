@@ -13,6 +13,11 @@ CHANGED_s = 2.5
 ONE_WEAK = [1.0] * 5 + [0.8] + [1.0] * 12
 
 
+@pytest.fixture
+def watch():
+    return Watch(SCENARIO, KNOWN)
+
+
 OFFSET_rad = np.radians(0.1)
 
 
@@ -35,9 +40,8 @@ def test_it_names_what_changed(field, value, what, size, within_s):
     assert alarm.confidence > 0.9
 
 
-def test_the_sums_show_what_raised_an_alarm():
+def test_the_sums_show_what_raised_an_alarm(watch):
     log = changing_log(3.0, (CHANGED_s, "plant.coulomb_Nm", [4e-3] * 3))
-    watch = Watch(SCENARIO, KNOWN)
     assert watch.advance(log.rows(0, 2500)) == []
     assert 0 <= max(watch.sums.values()) < watch.threshold
     alarms, row = [], 2500
@@ -92,9 +96,8 @@ def test_a_gap_is_not_judged():
     assert Watch(SCENARIO, KNOWN).advance(gap) == []
 
 
-def test_what_does_not_fit_is_refused():
+def test_what_does_not_fit_is_refused(watch):
     log = changing_log(0.5)
-    watch = Watch(SCENARIO, KNOWN)
     watch.advance(log.rows(0, 300))
     measured = Log(log.t_s[300:], log.current_A[300:], log.angle_rad[300:], "measured")
     with pytest.raises(InputError, match="expected commanded currents as before, received measured"):
