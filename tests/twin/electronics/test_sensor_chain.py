@@ -1,19 +1,14 @@
 """The whole way in: ideal bits, a plain copy of the chain, and numbers of every kind at every input."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from numba.core.runtime import _nrt_python, rtsys
 
-from spheretwin import electronics
 from spheretwin.electronics.random_streams import noise_table, stream_key, width_of
 from spheretwin.electronics.sensor_chain import SensorsSection, noise_streams, sense, sensor_chain
-from spheretwin.models.base.compiled import compiled
-from spheretwin.scenario.fields import every_field
-from spheretwin.scenario.hardware import HARDWARE, PROTOTYPE_SENSORS
+from spheretwin.scenario.hardware import PROTOTYPE_SENSORS
+from tests.twin.plant.allocations import allocates_nothing
 from tests.twin.electronics.slow_residual import residual_of
 
 NO_NOISE = np.empty(0)
@@ -82,27 +77,20 @@ def test_a_stage_touches_its_own_angles_alone(stage):
 
 
 def test_one_stage_moves_no_draw_of_another():
-    together, alone = sensor_chain(SensorsSection(**STAGES), 3), {}
-    for stage, fields in STAGES.items():
-        alone[stage] = sensor_chain(SensorsSection(**{stage: fields}), 3)
-    for channel in range(2):
-        for got, expected in zip(
-            alone["potentiometer"].stage("potentiometer").channels[channel],
-            together.stage("potentiometer").channels[channel],
-            strict=True,
-        ):
-            np.testing.assert_array_equal(got, expected)
-        assert alone["adc"].stage("adc").channels[channel] == together.stage("adc").channels[channel]
+    together = sensor_chain(SensorsSection(**STAGES), 3)
     tracks, converters = together.stage("potentiometer").channels, together.stage("adc").channels
+    for stage, channels in (("potentiometer", tracks), ("adc", converters)):
+        alone = sensor_chain(SensorsSection(**{stage: STAGES[stage]}), 3).stage(stage).channels
+        for number in range(2):
+            for got, expected in zip(alone[number], channels[number], strict=True):
+                np.testing.assert_array_equal(got, expected)
     assert np.all(np.array(tracks[0].cosine_rad) != np.array(tracks[1].cosine_rad))
     assert converters[0].offset_V != converters[1].offset_V
 
 
 def test_a_mounting_error_alone_is_added_to_each_angle():
     offset, q = (0.01, -0.02, 0.03), poses(50)
-    assert (
-        measured(SensorsSection(angle_offset_rad=offset), 0, q).tobytes() == (q + np.array(offset)).tobytes()
-    )
+    np.testing.assert_array_equal(measured(SensorsSection(angle_offset_rad=offset), 0, q), q + offset)
 
 
 def test_rates_are_the_true_ones_and_what_was_handed_over_is_kept():
@@ -110,14 +98,6 @@ def test_rates_are_the_true_ones_and_what_was_handed_over_is_kept():
     rates = np.array([1.0, -2.0, 3.0])
     sense(sensors, np.array([0.1, 0.2, 0.3]), rates, np.zeros(2), measurement)
     np.testing.assert_array_equal(measurement[1], rates)
-
-
-def slow_residual(fields, seed, channel, angle):
-    """Residual of a channel at an angle, with the phases of its random stream."""
-    stream = np.random.default_rng([seed, stream_key("sensors.potentiometer"), channel])
-    residual = residual_of(stream.uniform(0, 2 * np.pi, 4))
-    turn = 2 * np.pi * angle / fields.electrical_angle_rad
-    return fields.nonlinearity_rad * residual(turn)
 
 
 def slow_chain(section, seed, q):
@@ -132,7 +112,9 @@ def slow_chain(section, seed, q):
     for channel in range(2):
         end = track.electrical_angle_rad / 2
         angle = np.clip(turned[:, channel], -end, end)
-        angle = angle + slow_residual(track, seed, channel, angle)
+        stream = np.random.default_rng([seed, stream_key("sensors.potentiometer"), channel])
+        residual = residual_of(stream.uniform(0, 2 * np.pi, 4))
+        angle = angle + track.nonlinearity_rad * residual(2 * np.pi * angle / track.electrical_angle_rad)
         volts = np.clip(slope * angle, -track.supply_V / 2, track.supply_V / 2)
         volts = volts[:, None] + noise * draws[:, :, channel]
         shares = np.random.default_rng([seed, stream_key("sensors.adc"), channel]).uniform(-1, 1, 2)
@@ -166,41 +148,6 @@ def test_the_chain_is_its_plain_copy(more, seed):
     q = poses(2000, seed)
     # Rounding: 1e-16 of 500 rad in γ, and of 2.5 V over 1 V/rad; a code that it flips would be 1e-5 off.
     np.testing.assert_allclose(measured(section, seed, q), slow_chain(section, seed, q), rtol=0, atol=1e-12)
-
-
-@pytest.mark.release("1.6 s; test_session_chunks.py has the same with all parts")
-@given(st.lists(st.integers(1, 60), min_size=1, max_size=8))
-def test_the_same_seed_gives_the_same_bytes_at_any_chunks(lengths):
-    section, q = prototype(**{"sensors.adc.oversampling": 3}), poses(sum(lengths))
-    starts = np.cumsum([0, *lengths[:-1]]).tolist()
-    chunks = [
-        measured(section, 5, q[start : start + length], start)
-        for start, length in zip(starts, lengths, strict=True)
-    ]
-    whole = measured(section, 5, q)
-    assert np.concatenate(chunks).tobytes() == whole.tobytes()
-    assert measured(section, 6, q).tobytes() != whole.tobytes()
-
-
-@pytest.mark.parametrize("oversampling", [1, 10])
-def test_the_noise_of_an_angle_is_the_root_of_the_sum_of_squares(oversampling):
-    section, ticks = prototype(**{"sensors.adc.oversampling": oversampling}), 20_000
-    noise = measured(section, 2, np.tile([0.3, -0.4, 0.0], (ticks, 1)))[:, :2].std(axis=0)
-    code = np.radians(300) / 2**16
-    # Wiper, a code of the converter's own, and a twelfth of its square of quantisation; gain adds 1e-3.
-    expected = np.sqrt((np.radians(0.02) ** 2 + code**2 * (1 + 1 / 12)) / oversampling)
-    np.testing.assert_allclose(noise, expected, rtol=4 / np.sqrt(2 * ticks) + 1e-3)
-
-
-@pytest.mark.parametrize("seed", range(10))
-def test_what_is_constant_in_the_error_keeps_within_the_stated_bounds(seed):
-    silent = {"sensors.potentiometer.noise_rad": 0.0, "sensors.adc.noise_V": 0.0}
-    q = poses(500, seed)
-    off = measured(prototype(**silent), seed, q) - q
-    volts_per_rad, code = 5 / np.radians(300), np.radians(300) / 2**16
-    bound = np.radians(0.02) * 1.001 + 1e-3 / volts_per_rad + 1e-3 * np.abs(q[:, :2]) + code / 2
-    assert np.all(np.abs(off[:, :2]) <= bound)
-    assert np.all(np.abs(off[:, 2]) <= np.radians(0.09) + 1e-12)
 
 
 ANY = st.floats()
@@ -275,39 +222,5 @@ def test_a_short_row_of_noise_is_no_number_either():
 
 def test_sensing_allocates_nothing():
     section = prototype(**{"sensors.adc.oversampling": 4})
-    arguments = (sensor_chain(section, 0), np.zeros(3), np.zeros(3), np.zeros(8), np.zeros((3, 3)))
-    _nrt_python.memsys_enable_stats()
-
-    def allocations(count):
-        before = rtsys.get_allocation_stats().alloc
-        repeated(count, *arguments)
-        return rtsys.get_allocation_stats().alloc - before
-
-    # What is left is the wrapping of the arguments, once a call from Python.
-    assert allocations(1000) == allocations(1)
-
-
-@compiled
-def repeated(count, sensors, q, qdot, noise, measurement):
-    for _ in range(count):
-        sense(sensors, q, qdot, noise, measurement)
-
-
-def test_every_field_has_its_value_and_its_origin():
-    leaves = {
-        name
-        for name, _ in every_field(SensorsSection)
-        if name not in ("potentiometer", "adc", "encoder", "current")
-    }
-    named = {name.removeprefix("sensors.") for name in HARDWARE["prototype"] if name.startswith("sensors.")}
-    # Zeroed and referenced before an experiment; a converter with a sample-and-hold for each channel.
-    assert named == leaves - {
-        "angle_offset_rad",
-        "adc.skew_s",
-        "encoder.start_error_rad",
-        "encoder.index_rad",
-    }
-    text = (Path(electronics.__file__).parent / "README.md").read_text(encoding="utf-8")
-    for name in leaves:
-        row = next(line for line in text.splitlines() if line.startswith(f"| `{name}` |"))
-        assert "sheet" in row or "assumed" in row
+    arguments = np.zeros(3), np.zeros(3), np.zeros(8), np.zeros((3, 3))
+    assert allocates_nothing(sense, sensor_chain(section, 0), *arguments)

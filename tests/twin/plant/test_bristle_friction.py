@@ -6,11 +6,9 @@ import numpy as np
 import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
-from numba.core.runtime import _nrt_python, rtsys
 
 from spheretwin.models import actuator as actuators
 from spheretwin.models import mjcf
-from spheretwin.models.base.compiled import compiled
 from spheretwin.models.lagrangian import inertia_matrix
 from spheretwin.plant.bristle_friction import (
     CABLE,
@@ -21,57 +19,19 @@ from spheretwin.plant.bristle_friction import (
     bristle_friction,
 )
 from spheretwin.plant.cable import CableSection, constant_torque_Nm
-from spheretwin.plant.friction import friction, slow_down
 from spheretwin.plant.lagrangian_rotor import LagrangianRotor
 from spheretwin.plant.mujoco_rotor import MujocoRotor
-from spheretwin.plant.plant_tick import step_rotor
+from tests.twin.plant.allocations import allocates_nothing
+from tests.twin.plant.motions import UPRIGHT, STEP_s, motion, on_gamma, order
 
-STEP_s = 5e-4
 COULOMB_Nm, RATIO, PRESLIDING_rad = 2e-3, 1.5, 1e-3
 BREAK_AWAY_Nm = RATIO * COULOMB_Nm
 COULOMB = (COULOMB_Nm,) * 3
 STICTION = StictionSection(on=True, break_away=RATIO, presliding_rad=PRESLIDING_rad)
-STIFFNESS_Nm_rad = BREAK_AWAY_Nm / (
-    0.75 * PRESLIDING_rad
-)  # of the hinge at rest: both springs of k (y1 + y2) = T
+# Of the hinge at rest: both springs of k (y1 + y2) = T.
+STIFFNESS_Nm_rad = BREAK_AWAY_Nm / (0.75 * PRESLIDING_rad)
 NO_CABLE = CableSection()
-UPRIGHT, STILL = np.zeros(3), np.zeros(3)
 TILTED = np.array([0.3, -0.4, 0.2])
-
-
-def on_gamma(values):
-    return np.multiply.outer(np.asarray(values, float), [0.0, 0.0, 1.0])
-
-
-@compiled
-def moving(plant, bristles, viscous, torque, q, qdot, bearing, every):
-    """Steps of the plant as `plant_tick` takes them; states before each step, torque of the bearing in it."""
-    middle_q, middle_qdot, last_qdot, unused = np.zeros(3), np.zeros(3), plant.qdot.copy(), np.zeros(3)
-    for row in range(torque.shape[0]):
-        for i in range(3):
-            if row % every == 0:
-                q[row // every, i], qdot[row // every, i] = plant.q[i], plant.qdot[i]
-            middle_q[i] = plant.q[i] + 0.5 * bristles.step_s * plant.qdot[i]
-            middle_qdot[i] = plant.qdot[i] + 0.5 * (plant.qdot[i] - last_qdot[i])
-            last_qdot[i] = plant.qdot[i]
-            plant.torque_q[i] = torque[row, i]
-        slow_down(viscous, plant.q, plant.qdot, unused)
-        begin_bristles(bristles, middle_q, plant.q, plant.qdot, plant.torque_q)
-        step_rotor(plant)
-        apply_bristles(bristles, middle_q, middle_qdot, last_qdot, plant.q, plant.qdot)
-        slow_down(viscous, plant.q, plant.qdot, unused)
-        for i in range(3):
-            bearing[row // every, i] = bristles.torque_q[0, i]
-
-
-def motion(rotor, bristles, torque, start=UPRIGHT, rates=STILL, viscous_Nm_s=0.0, every=1):
-    """Pose, rates and torque of the bearing (n, 3) of a rotor under torques (n, 3)."""
-    resistance = friction(
-        np.zeros(3), np.full(3, viscous_Nm_s), 0.01, np.array(bristles.inertia), bristles.step_s
-    )
-    q, qdot, bearing = np.empty((3, -(-len(torque) // every), 3))
-    moving(rotor.start(start, rates), bristles, resistance, torque, q, qdot, bearing, every)
-    return q, qdot, bearing
 
 
 def elements(actuator, stiction=STICTION, cable=NO_CABLE, coulomb=COULOMB, step_s=STEP_s):
@@ -91,15 +51,10 @@ ROTORS = {
 def spin(actuator, torque, step_s=STEP_s, stiction=STICTION, cable=NO_CABLE, rate=0.0, viscous_Nm_s=0.0):
     """Angles, rates and torque of the bearing of the third hinge alone, upright, with the inertia J3."""
     bristles = elements(actuator, stiction, cable, step_s=step_s)
-    result = motion(
-        lagrangian(actuator, step_s), bristles, on_gamma(torque), UPRIGHT, on_gamma(rate), viscous_Nm_s
-    )
+    rotor, torque_q, rates = lagrangian(actuator, step_s), on_gamma(torque), on_gamma(rate)
+    result = motion(rotor, bristles, torque_q, UPRIGHT, rates, viscous_Nm_s)
     assert not np.any([part[:, :2] for part in result])
     return [part[:, 2] for part in result]
-
-
-def order(steps, errors):
-    return np.polyfit(np.log(steps), np.log(errors), 1)[0]
 
 
 # Rest
@@ -224,10 +179,12 @@ def test_a_minor_loop_ends_where_it_began(actuator):
 
 def test_a_cable_has_hysteresis_of_its_own_level(actuator):
     level, range_rad, amplitude = 1e-3, 0.02, 0.1
-    cable = CableSection(hysteresis_Nm=(0.0, 0.0, level), hysteresis_rad=range_rad)
+    cable, plant = (
+        CableSection(hysteresis_Nm=(0.0, 0.0, level), hysteresis_rad=range_rad),
+        lagrangian(actuator),
+    )
     bristles = elements(actuator, StictionSection(), cable)
     swing = level * 1.2 * np.sin(2 * np.pi * 0.5 * STEP_s * np.arange(round(6 / STEP_s)))
-    plant = lagrangian(actuator)
     q, _, bearing = motion(plant, bristles, on_gamma(swing))
     assert not bearing.any()
     assert np.ptp(q[:, 2]) > amplitude
@@ -257,18 +214,6 @@ def test_coasting_ends_as_coulomb_and_viscous_friction_do(actuator):
     # While it slides: friction rises within one step, and the splitting has (decay h)²/12 of the rate.
     assert np.abs(rates - exact)[exact > 0.01].max() < 1e-5
     assert np.abs(rates[-100:]).max() < 1e-12
-
-
-def test_viscous_friction_alone_is_the_same_with_and_without_elements(actuator):
-    viscous = 1e-2
-    bristles = elements(actuator, coulomb=(0.0, 0.0, 0.0))
-    still = on_gamma(np.zeros(1600))
-    _, rates, _ = motion(lagrangian(actuator), bristles, still, UPRIGHT, on_gamma(10.0), viscous)
-    rates = rates[:, 2]
-    decay = viscous / actuator.inertia[2]
-    exact = 10.0 * np.exp(-decay * STEP_s * np.arange(1600))
-    # As for `slow_down`: (decay h)²/24e.
-    assert np.abs(rates - exact).max() < (decay * STEP_s) ** 2 * 10.0 / (24 * np.e)
 
 
 def test_the_elastic_motion_is_a_damped_oscillation(actuator):
@@ -302,33 +247,15 @@ exponent = st.floats(0, 1)
     "1.2 s; test_the_rows_account_for_the_energy_of_friction_and_cable has the balance of a run"
 )
 @example(
-    pose=np.array([0.0, 1.0, 1.0]),
-    direction=np.array([0.0, 0.5, 1.0]),
-    deflection=[np.zeros(3), np.zeros(3), np.array([0.0, 0.125, 0.0])],
-    ratio=3.0,
-    range_=-6.0,
-    damping=0.0,
-    stribeck=0.0,
-    levels=(0.0, 0.59375, 1.0),
-    step_=-3.0,
-    speed=-1.75,
-    ahead=np.zeros(3),
-    slips=False,
-)
+    pose=np.array([0.0, 1.0, 1.0]), direction=np.array([0.0, 0.5, 1.0]),
+    deflection=[np.zeros(3), np.zeros(3), np.array([0.0, 0.125, 0.0])], ratio=3.0, range_=-6.0, damping=0.0,
+    stribeck=0.0, levels=(0.0, 0.59375, 1.0), step_=-3.0, speed=-1.75, ahead=np.zeros(3), slips=False,
+)  # fmt: skip
 @given(
-    three,
-    three,
-    st.lists(three, min_size=3, max_size=3),
-    st.floats(1, 10),
-    st.floats(-9, 0),
-    st.floats(0, 10),
-    st.floats(-6, 3),
-    st.tuples(exponent, exponent, exponent),
-    st.floats(-6, -2),
-    st.floats(-3, 2),
-    three,
-    st.booleans(),
-)
+    three, three, st.lists(three, min_size=3, max_size=3), st.floats(1, 10), st.floats(-9, 0),
+    st.floats(0, 10), st.floats(-6, 3), st.tuples(exponent, exponent, exponent), st.floats(-6, -2),
+    st.floats(-3, 2), three, st.booleans(),
+)  # fmt: skip
 def test_the_elements_neither_create_energy_nor_lose_their_own_balance(
     actuator,
     pose,
@@ -346,13 +273,8 @@ def test_the_elements_neither_create_energy_nor_lose_their_own_balance(
 ):
     q, h = 1.3 * pose, 10**step_
     qdot = 10**speed * direction
-    stiction = StictionSection(
-        on=True,
-        break_away=ratio,
-        presliding_rad=10**range_,
-        damping_ratio=damping,
-        stribeck_rad_s=10**stribeck,
-    )
+    fields = {"presliding_rad": 10**range_, "damping_ratio": damping, "stribeck_rad_s": 10**stribeck}
+    stiction = StictionSection(on=True, break_away=ratio, **fields)
     cable = CableSection(hysteresis_Nm=(1e-3, 5e-2, 1.0), hysteresis_rad=0.3)
     coulomb = tuple(10 ** (-6 + 6 * share) for share in levels)
     bristles = bristle_friction(stiction, coulomb, cable, actuator.inertia, h)
@@ -360,10 +282,7 @@ def test_the_elements_neither_create_energy_nor_lose_their_own_balance(
     if slips:
         bristles.deflection_rad[:2] = np.sign(direction) * bristles.slip_rad[:2, None]
     before = bristles.deflection_rad.copy()
-    after_q, after = (
-        q + h * qdot,
-        qdot.copy(),
-    )  # of a rotor without torque, and with a constant inertia matrix
+    after_q, after = q + h * qdot, qdot.copy()  # of a rotor without torque, and with constant inertia
     begin_bristles(bristles, q, q, qdot, np.zeros(3))
     apply_bristles(bristles, q, 10**speed * ahead, qdot, after_q, after)
     M = inertia_matrix(q, actuator.inertia)
@@ -431,22 +350,8 @@ def test_smooth_slip_is_of_second_order(actuator):
 
 def test_the_elements_allocate_nothing(actuator):
     bristles, (q, qdot, torque) = elements(actuator), np.zeros((3, 3))
-    _nrt_python.memsys_enable_stats()
-
-    def allocations(count):
-        before = rtsys.get_allocation_stats().alloc
-        repeated(count, bristles, q, qdot, torque)
-        return rtsys.get_allocation_stats().alloc - before
-
-    # What is left is the wrapping of the arguments, once a call from Python.
-    assert allocations(1000) == allocations(1)
-
-
-@compiled
-def repeated(count, bristles, q, qdot, torque):
-    for _ in range(count):
-        begin_bristles(bristles, q, q, qdot, torque)
-        apply_bristles(bristles, q, qdot, qdot, q, qdot)
+    assert allocates_nothing(begin_bristles, bristles, q, q, qdot, torque)
+    assert allocates_nothing(apply_bristles, bristles, q, qdot, qdot, q, qdot)
 
 
 def test_there_are_elements_only_with_static_friction_or_a_cable(actuator):

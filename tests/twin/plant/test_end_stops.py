@@ -17,9 +17,11 @@ from spheretwin.plant.bristle_friction import (
 )
 from spheretwin.plant.cable import CableSection
 from spheretwin.plant.end_stops import EndStopsSection, end_stops
+from spheretwin.plant.friction import friction
 from spheretwin.plant.lagrangian_rotor import LagrangianRotor
 from spheretwin.session import Session
-from tests.twin.plant.test_bristle_friction import STEP_s, motion, order, three
+from tests.twin.plant.motions import NONE, STEP_s, motion, on_gamma, order, steps
+from tests.twin.plant.test_bristle_friction import three
 
 ON = EndStopsSection(on=True)
 # Hinge γ has no end in the shipped model; upright and alone it has the inertia J3, and exact solutions.
@@ -33,16 +35,13 @@ def stopped(actuator, section=ON, step_s=STEP_s):
     return bristle_friction(*nothing, actuator.inertia, step_s, stops=stops)
 
 
-def spin(actuator, duration_s, rate, start=0.0, load=0.0, section=ON, step_s=STEP_s):
+def spin(actuator, duration_s, rate, load=0.0, section=ON, step_s=STEP_s):
     """Angle and rate of hinge γ before each step."""
-    torque = np.tile([0.0, 0.0, load], (round(duration_s / step_s), 1))
-    q, qdot, _ = motion(
+    rotor, torque = (
         LagrangianRotor(actuator, step_s),
-        stopped(actuator, section, step_s),
-        torque,
-        np.array([0.0, 0.0, start]),
-        np.array([0.0, 0.0, rate]),
+        np.tile(on_gamma(load), (round(duration_s / step_s), 1)),
     )
+    q, qdot, _ = motion(rotor, stopped(actuator, section, step_s), torque, NONE, on_gamma(rate))
     assert not np.any(q[:, :2])
     return q[:, 2], qdot[:, 2]
 
@@ -58,18 +57,19 @@ def bounce(actuator, rate, section=ON):
     def speed(t):
         return rate * np.exp(-decay * t) * (np.cos(damped * t) - decay / damped * np.sin(damped * t))
 
-    end = brentq(
-        lambda t: natural**2 * penetration(t) + 2 * decay * speed(t), np.pi / 2 / damped, np.pi / damped
-    )
+    def pull(t):
+        return natural**2 * penetration(t) + 2 * decay * speed(t)
+
+    end = brentq(pull, np.pi / 2 / damped, np.pi / damped)
     turn = np.arctan2(damped, decay) / damped
     return end, penetration(turn), speed(end)
 
 
 @pytest.mark.parametrize("side", [1.0, -1.0])
 def test_a_bounce_is_the_exact_one_of_a_damped_spring(actuator, side):
-    rate, steps, errors = 10.0, np.array([5e-4, 2.5e-4, 1.25e-4, 6.25e-5]), []
+    rate, sizes, errors = 10.0, np.array([5e-4, 2.5e-4, 1.25e-4, 6.25e-5]), []
     _, depth, after = bounce(actuator, rate)
-    for h in steps:
+    for h in sizes:
         q, qdot = spin(actuator, 0.06, side * rate, section=ON, step_s=h)
         errors.append(abs(side * qdot[-1] - after))
         assert np.all(np.abs(q) < 0.5)
@@ -78,7 +78,7 @@ def test_a_bounce_is_the_exact_one_of_a_damped_spring(actuator, side):
     # Each step has the exact momentum of the damper; the spring has (natural h)² / 12, and the end of the
     # contact falls within a step.
     natural = np.sqrt(ON.stiffness_Nm_rad / actuator.inertia[2])
-    assert np.all(errors < (natural * steps) ** 2 * rate / 6), errors
+    assert np.all(errors < (natural * sizes) ** 2 * rate / 6), errors
     assert errors[-1] < 0.1 * errors[0], errors
 
 
@@ -103,14 +103,9 @@ pose = st.floats(-1.45, 1.45)
 
 @pytest.mark.release("1.2 s; test_a_bounce_is_the_exact_one_of_a_damped_spring is exact")
 @given(
-    st.tuples(pose, pose, st.floats(-0.55, 0.55)).map(np.array),
-    three,
-    st.floats(-3, 2),
-    st.floats(0, 6),
-    st.floats(0, 10),
-    st.floats(-6, -2),
-    st.booleans(),
-)
+    st.tuples(pose, pose, st.floats(-0.55, 0.55)).map(np.array), three, st.floats(-3, 2), st.floats(0, 6),
+    st.floats(0, 10), st.floats(-6, -2), st.booleans(),
+)  # fmt: skip
 @example(np.array([1.38, 1.39, 0.48]), np.array([1.0, -1.0, 1.0]), 2.0, 6.0, 0.3, -3.3, True)
 def test_a_contact_never_adds_energy_and_never_pulls(
     actuator, q, direction, speed, stiffness, ratio, step, sticks
@@ -119,19 +114,15 @@ def test_a_contact_never_adds_energy_and_never_pulls(
     h, qdot = 10**step, 10**speed * direction
     section = ON.model_copy(update={"stiffness_Nm_rad": 10**stiffness, "damping_ratio": ratio})
     stops = end_stops(section, RANGE_rad, actuator.inertia, h)
-    stiction = StictionSection(on=sticks)
-    bristles = bristle_friction(
-        stiction, (2e-3, 2e-3, 2e-3), CableSection(), actuator.inertia, h, stops=stops
-    )
+    other = StictionSection(on=sticks), (2e-3, 2e-3, 2e-3), CableSection()
+    bristles = bristle_friction(*other, actuator.inertia, h, stops=stops)
     after_q, after = q + h * qdot, qdot.copy()  # of a rotor without torque, and with constant inertia
     begin_bristles(bristles, q, q, qdot, np.zeros(3))
     apply_bristles(bristles, q, qdot, qdot, after_q, after)
     M = inertia_matrix(q, actuator.inertia)
 
     def energy(rates, angles):
-        beyond = np.maximum(angles - stops.contact_rad[:, 1], 0) + np.maximum(
-            stops.contact_rad[:, 0] - angles, 0
-        )
+        beyond = angles - np.clip(angles, *stops.contact_rad.T)
         return 0.5 * rates @ M @ rates + 0.5 * section.stiffness_Nm_rad * np.sum(beyond**2)
 
     springs = 0.5 * np.sum(bristles.stiffness_Nm_rad * bristles.deflection_rad**2)
@@ -148,52 +139,51 @@ def test_a_contact_never_adds_energy_and_never_pulls(
 
 
 FREE = {
-    "plant.engine": "lagrangian",
     "trajectory.shape": "hold",
     "manual.currents_A": [0.0] * 18,
     "disturbance.load": 0.0,
     "disturbance.random_bound_Nm": 0.0,
     "plant.modelling_torque_Nm": [0.0, 0.0, 0.0],
+    "plant.initial_rad": [0.4, -0.3, 0.2],
+    "plant.initial_rad_s": [6.0, -5.0, 2.0],
 }
-THROWN = {"plant.initial_rad": [0.4, -0.3, 0.2], "plant.initial_rad_s": [6.0, -5.0, 2.0]}
 
 
-def run(ticks, **changes):
-    given = FREE | {name.replace("__", "."): value for name, value in changes.items()}
-    with Session(scenarios.load("tilt", given)) as session:
-        return session.advance(ticks), session
-
-
+@pytest.mark.release("compiles two loops for 20 s; test_a_bounce_converges has the bounce of two hinges")
 def test_a_thrown_rotor_stays_within_its_range_on_both_engines():
     """Without end stops the run ends at the end of the range."""
-    on = THROWN | {"plant.end_stops.on": True, "plant.viscous_Nm_s": [2e-3, 2e-3, 2e-3]}
+    on = FREE | {"plant.end_stops.on": True, "plant.viscous_Nm_s": [2e-3, 2e-3, 2e-3]}
     tables = {}
     for engine in ("lagrangian", "mujoco"):
-        table, session = run(3000, **on, plant__engine=engine)
+        with Session(scenarios.load("tilt", on | {"plant.engine": engine})) as session:
+            table = session.advance(3000)
         assert str(session.status) == "running"
         assert np.all(np.abs(table["q_rad"][:, :2]) < np.radians(80))
         assert np.any(table["end_stop_Nm"][:, 0]) or np.any(table["end_stop_Nm"][:, 1])
         tables[engine] = table["q_rad"]
     # Both are of fourth order; contacts amplify differences of 1e-13 by the mass ratio, 30, a bounce.
     np.testing.assert_allclose(tables["mujoco"], tables["lagrangian"], rtol=0, atol=1e-6)
-    table, session = run(3000, **THROWN)
+
+
+def test_without_stops_the_run_ends_at_the_end_of_the_range():
+    with Session(scenarios.load("tilt", FREE)) as session:
+        table = session.advance(3000)
     assert str(session.status) == "left_workspace"
     assert "end_stop_Nm" not in [signal.name for signal in table.signals]
 
 
-def test_stops_that_are_not_touched_leave_the_motion():
-    rates = {"plant.initial_rad_s": [0.4, -0.3, 0.5]}
-    free, _ = run(300, **rates)
-    with_stops, _ = run(300, **rates, plant__end_stops__on=True)
+def test_stops_that_are_not_touched_leave_the_motion(actuator):
+    start, rates, torque = np.array([0.1, 0.0, -0.2]), np.array([0.4, -0.3, 0.5]), np.zeros((600, 3))
+    rotor, stops = LagrangianRotor(actuator, STEP_s), stopped(actuator)
+    resistance = friction(NONE, NONE, 0.01, actuator.inertia, STEP_s)
+    free, with_stops = (steps(rotor, of, resistance, torque, start, rates) for of in (None, stops))
     # The correction of a step adds and subtracts the pose: one rounding of the angle a step.
-    np.testing.assert_allclose(with_stops["q_rad"], free["q_rad"], rtol=0, atol=1e-12)
-    assert not with_stops["end_stop_Nm"].any()
+    np.testing.assert_allclose(with_stops, free, rtol=0, atol=1e-12)
 
 
 def test_there_are_no_stops_unless_they_are_on(actuator):
-    assert end_stops(EndStopsSection(), RANGE_rad, actuator.inertia, STEP_s) is None
-    assert end_stops(EndStopsSection(on=False), RANGE_rad, actuator.inertia, STEP_s) is None
-    assert scenarios.load("hold").plant.end_stops.on is None
+    for section in (EndStopsSection(), EndStopsSection(on=False)):
+        assert end_stops(section, RANGE_rad, actuator.inertia, STEP_s) is None
     with pytest.raises(InputError, match="expected a travel_rad below half of each hinge's range"):
         end_stops(ON.model_copy(update={"travel_rad": 0.6}), RANGE_rad, actuator.inertia, STEP_s)
 
@@ -202,14 +192,13 @@ def test_a_bounce_converges(actuator):
     """Rate after an impact on two hinges that are coupled, against a fine step."""
 
     def final(h):
-        rotor, bristles = LagrangianRotor(actuator, h), stopped(actuator, step_s=h)
-        q, qdot, _ = motion(
-            rotor, bristles, np.zeros((round(0.05 / h), 3)), np.array([1.2, -0.9, 0.0]), np.array([8.0, 3, 0])
-        )
+        rotor, torque = LagrangianRotor(actuator, h), np.zeros((round(0.05 / h), 3))
+        start = np.array([1.2, -0.9, 0.0]), np.array([8.0, 3.0, 0.0])
+        q, qdot, _ = motion(rotor, stopped(actuator, step_s=h), torque, *start)
         assert q[:, 0].max() > 1.35
         return qdot[-1]
 
-    steps = np.array([5e-4, 2.5e-4, 1.25e-4])
+    sizes = np.array([5e-4, 2.5e-4, 1.25e-4])
     reference = final(5e-4 / 64)
-    errors = [np.abs(final(h) - reference).max() for h in steps]
-    assert order(steps, errors) > 1.5, errors
+    errors = [np.abs(final(h) - reference).max() for h in sizes]
+    assert order(sizes, errors) > 1.5, errors

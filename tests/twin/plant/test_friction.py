@@ -7,45 +7,25 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from numba.core.runtime import _nrt_python, rtsys
 
 from spheretwin.models import actuator as actuators
 from spheretwin.models import mjcf
-from spheretwin.models.base.compiled import compiled
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.lagrangian import inertia_matrix, loaded_inertia
-from spheretwin.plant import lagrangian_rotor
 from spheretwin.plant.friction import friction, slow_down
 from spheretwin.plant.lagrangian_rotor import LagrangianRotor
+from tests.twin.plant.allocations import allocates_nothing
+from tests.twin.plant.motions import NONE, STEP_s, on_gamma, order, steps
 
-NONE = np.zeros(3)
-STEP_S, COULOMB_Nm, SMOOTHING_rad_s = 5e-4, 5e-3, 1e-3
+COULOMB_Nm, SMOOTHING_rad_s = 5e-3, 1e-3
 START = np.array([0.2, -0.3, 0.5, 3.0, -2.0, 20.0])
 
 
-def on_gamma(value):
-    return np.array([0.0, 0.0, value])
-
-
-@compiled
-def moving(plant, friction, torque, q, qdot):
-    """Steps with friction and a constant torque on the hinges; every state is written."""
-    on_hinges = np.zeros(3)
-    for row in range(q.shape[0]):
-        for i in range(3):
-            q[row, i], qdot[row, i] = plant.q[i], plant.qdot[i]
-            plant.torque_q[i] = torque[i]
-        slow_down(friction, plant.q, plant.qdot, on_hinges)
-        lagrangian_rotor.step(plant)
-        slow_down(friction, plant.q, plant.qdot, on_hinges)
-
-
 def motion(actuator, resistance, duration, start=START, torque=NONE):
-    """Pose and rates at the end of every step of the Lagrangian plant, and at its start."""
-    plant = LagrangianRotor(actuator, resistance.step_s).start(start[:3], start[3:])
-    q, qdot = np.empty((2, round(duration / resistance.step_s) + 1, 3))
-    moving(plant, resistance, torque, q, qdot)
-    return q, qdot
+    """Pose and rates at the start of every step of the Lagrangian plant, and at the end of the last."""
+    rotor = LagrangianRotor(actuator, resistance.step_s)
+    torques = np.tile(torque, (round(duration / resistance.step_s) + 1, 1))
+    return steps(rotor, None, resistance, torques, start[:3], start[3:])[:2]
 
 
 def spin(actuator, resistance, duration, rate, torque=0.0):
@@ -56,29 +36,27 @@ def spin(actuator, resistance, duration, rate, torque=0.0):
     return q[:, 2], qdot[:, 2]
 
 
-def order(steps, errors):
-    return np.polyfit(np.log(steps), np.log(errors), 1)[0]
-
-
 def test_viscous_friction_is_an_exponential_decay(actuator):
     viscous, rate, duration = 1e-2, 10.0, 0.8
     decay = viscous / actuator.inertia[2]
-    steps, errors = np.array([4e-3, 2e-3, 1e-3, STEP_S]), []
-    for h in steps:
+    step_sizes, errors = np.array([4e-3, 2e-3, 1e-3, STEP_s]), []
+    for h in step_sizes:
         resistance = friction(NONE, on_gamma(viscous), SMOOTHING_rad_s, actuator.inertia, h)
         _, rates = spin(actuator, resistance, duration, rate)
         errors.append(np.abs(rates - rate * np.exp(-decay * h * np.arange(len(rates)))).max())
     # Half a step is off by x³/6 of the rate, x = decay h/2; summed up, by (decay h)²/24e at 1/decay.
-    np.testing.assert_array_less(errors, (decay * steps) ** 2 * rate / (24 * np.e))
+    np.testing.assert_array_less(errors, (decay * step_sizes) ** 2 * rate / (24 * np.e))
     assert errors[-1] < 8e-7  # rad/s, at 0.5 ms
-    assert 1.98 < order(steps, errors) < 2.02, errors  # the next power of the step adds a share of decay h
+    assert 1.98 < order(step_sizes, errors) < 2.02, (
+        errors
+    )  # the next power of the step adds a share of decay h
 
 
 def test_coulomb_friction_is_a_ramp_to_rest(actuator):
     rate, duration = 5.0, 3.3
     slope = COULOMB_Nm / actuator.inertia[2]  # at rest after 2.26 s
     errors = []
-    for h in (4 * STEP_S, 2 * STEP_S, STEP_S):
+    for h in (4 * STEP_s, 2 * STEP_s, STEP_s):
         resistance = friction(on_gamma(COULOMB_Nm), NONE, SMOOTHING_rad_s, actuator.inertia, h)
         angles, rates = spin(actuator, resistance, duration, rate)
         t = h * np.arange(len(rates))
@@ -117,7 +95,7 @@ def test_below_its_level_coulomb_friction_creeps_as_slowly_as_it_is_smooth(actua
 
 def test_above_its_level_coulomb_friction_leaves_the_rest_of_the_torque(actuator):
     torque, duration, rate = 2 * COULOMB_Nm, 0.1, 10.0
-    resistance = friction(on_gamma(COULOMB_Nm), NONE, SMOOTHING_rad_s, actuator.inertia, STEP_S)
+    resistance = friction(on_gamma(COULOMB_Nm), NONE, SMOOTHING_rad_s, actuator.inertia, STEP_s)
     _, rates = spin(actuator, resistance, duration, rate, torque)
     mean = (rates[-1] - rate) / duration
     # Half a step takes the share r = 5.5e-5 of the rate and is off by r²/2 of that; smoothing takes 5e-9.
@@ -186,13 +164,13 @@ def test_friction_is_what_a_library_solves(actuator):
 
 
 def test_without_coefficients_there_is_no_friction(actuator):
-    nothing = friction(NONE, NONE, SMOOTHING_rad_s, actuator.inertia, STEP_S)
+    nothing = friction(NONE, NONE, SMOOTHING_rad_s, actuator.inertia, STEP_s)
     rates, torque = START[3:].copy(), np.zeros(3)
     slow_down(nothing, START[:3], rates, torque)
     np.testing.assert_allclose(rates, START[3:], rtol=1e-14)  # of one solution, condition 2
     assert not nothing.acts
     for coulomb, viscous in ((on_gamma(1e-3), NONE), (NONE, on_gamma(1e-3))):
-        assert friction(coulomb, viscous, SMOOTHING_rad_s, actuator.inertia, STEP_S).acts
+        assert friction(coulomb, viscous, SMOOTHING_rad_s, actuator.inertia, STEP_s).acts
 
 
 VISCOUS_Nm_s = np.array([2e-3, 1e-3, 5e-4])
@@ -215,11 +193,6 @@ def by_mujoco(step_s, damping, resistance=None):
     return np.concatenate([data.qpos, data.qvel])
 
 
-def by_lagrangian(actuator, step_s):
-    q, qdot = motion(actuator, viscous_friction(actuator, step_s), DURATION_s)
-    return np.concatenate([q[-1], qdot[-1]])
-
-
 def viscous_friction(actuator, step_s):
     return friction(NONE, VISCOUS_Nm_s, SMOOTHING_rad_s, actuator.inertia, step_s)
 
@@ -232,10 +205,12 @@ def test_a_free_motion_is_that_under_mujoco_s_own_damping(actuator, engine):
     expected = by_mujoco(1e-4, VISCOUS_Nm_s)
     errors = []
     for step_s in STEPS_s:
+        resistance = viscous_friction(actuator, step_s)
         if engine == "mujoco":
-            result = by_mujoco(step_s, 0.0, viscous_friction(actuator, step_s))
+            result = by_mujoco(step_s, 0.0, resistance)
         else:
-            result = by_lagrangian(actuator, step_s)
+            q, qdot = motion(actuator, resistance, DURATION_s)
+            result = np.concatenate([q[-1], qdot[-1]])
         errors.append(np.abs(result - expected).max())
     # Split symmetrically around the rotor's step: second order.
     assert errors[-1] < 1e-6, errors
@@ -243,22 +218,7 @@ def test_a_free_motion_is_that_under_mujoco_s_own_damping(actuator, engine):
 
 
 def test_friction_allocates_nothing(actuator):
-    resistance, (q, qdot, torque) = viscous_friction(actuator, STEP_S), np.zeros((3, 3))
-    _nrt_python.memsys_enable_stats()
-
-    def allocations(count):
-        before = rtsys.get_allocation_stats().alloc
-        repeated(count, resistance, q, qdot, torque)
-        return rtsys.get_allocation_stats().alloc - before
-
-    # What is left is the wrapping of the arguments, once a call from Python.
-    assert allocations(1000) == allocations(1)
-
-
-@compiled
-def repeated(count, friction, q, qdot, torque):
-    for _ in range(count):
-        slow_down(friction, q, qdot, torque)
+    assert allocates_nothing(slow_down, viscous_friction(actuator, STEP_s), *np.zeros((3, 3)))
 
 
 @pytest.mark.parametrize(
@@ -273,4 +233,4 @@ def repeated(count, friction, q, qdot, torque):
 )
 def test_coefficients_that_are_none_are_refused(actuator, coulomb, viscous, smoothing, message):
     with pytest.raises(InputError, match=message):
-        friction(coulomb, viscous, smoothing, actuator.inertia, STEP_S)
+        friction(coulomb, viscous, smoothing, actuator.inertia, STEP_s)
