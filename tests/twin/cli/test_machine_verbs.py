@@ -6,14 +6,12 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
-from spheretwin.cli import main
 from spheretwin.machine import write
 from spheretwin.models.telemetry.table import read_parquet
 from spheretwin.viz.recording.live import LivePage
+from tests.twin.cli.calls import call, refusal, succeeded
 from tests.twin.machine.machine_logs import KNOWN, SCENARIO, changing_log
 from tests.viz.recording.panels import columns
-
-pytestmark = pytest.mark.usefixtures("capsys")
 
 
 def flags(fields):
@@ -33,18 +31,10 @@ def log(tmp_path_factory):
     return str(path)
 
 
-def run(capsys, *words):
-    code = main(list(words))
-    captured = capsys.readouterr()
-    return code, captured.out, captured.err
-
-
-def test_shadow(log, tmp_path, capsys):
+def test_shadow(log, tmp_path):
     telemetry, recording = tmp_path / "shadow.parquet", tmp_path / "shadow.rrd"
-    words = ["--telemetry", str(telemetry), "--record", str(recording), "--accept", "jitter"]
-    code, out, err = run(capsys, "shadow", log, *MACHINE, *words, "--json")
-    figures = json.loads(out)
-    assert (code, err) == (0, "")
+    words = ["--telemetry", telemetry, "--record", recording, "--accept", "jitter"]
+    figures = json.loads(succeeded("shadow", log, *MACHINE, *words, "--json"))
     assert figures["rows"] == 2000
     assert figures["consistent"]
     assert 0 < figures["cpu_s_per_s"] < 10
@@ -56,91 +46,88 @@ def test_shadow(log, tmp_path, capsys):
     assert len(metadata["log_sha256"]) == 64
     assert figures["accepted_findings"] == json.loads(metadata["accepted_findings"]) == ["jitter"]
     assert recording.stat().st_size > 10_000
-    code, out, _ = run(capsys, "shadow", log, *MACHINE, "--offsets")
-    assert code == 0
-    assert out.count("|") > 20
+    result = call("shadow", log, *MACHINE, "--offsets")
+    assert result.code == 0
+    assert result.out.count("|") > 20
 
 
-def test_shadow_with_the_wrong_machine_is_not_consistent(log, capsys):
+def test_shadow_with_the_wrong_machine_is_not_consistent(log):
     wrong = ["--plant.group_gain", *["-1"] * 18]
-    code, _, err = run(capsys, "shadow", log, *MACHINE, *wrong, "--accept", "sign-of-groups")
-    assert code in (1, 2)
-    assert "not consistent" in err or "expected" in err
+    refused = call("shadow", log, *MACHINE, *wrong)
+    assert (refused.code, refused.out) == (1, "")
+    assert "expected one that `spheretwin log check` accepts, received groups" in refused.err
+    result = call("shadow", log, *MACHINE, *wrong, "--accept", "groups")
+    assert (result.code, result.err) == (1, f"spheretwin: shadow: model and log {log} are not consistent\n")
 
 
-def test_identify_refuses_and_writes_nothing(log, tmp_path, capsys):
-    twin = tmp_path / "twin.toml"
-    wanted = ["--parameter", "torque_scale", "--parameter", "plant.group_gain"]
-    code, out, err = run(capsys, "identify", log, *MACHINE, *wanted, "--out", str(twin), "--json")
-    figures = json.loads(out)
-    assert code == 1
-    assert not figures["accepted"]
-    assert "torque_scale" in figures["refused"][0]["parameters"]
-    assert "cannot be distinguished" in err
+def test_identify_refuses_and_writes_nothing(log, tmp_path):
+    twin, wanted = tmp_path / "twin.toml", ["--parameter", "torque_scale", "--parameter", "plant.group_gain"]
+    result = call("identify", log, *MACHINE, *wanted, "--out", twin, "--json")
+    assert (result.code, result.json["accepted"]) == (1, False)
+    assert "torque_scale" in result.json["refused"][0]["parameters"]
+    assert "cannot be distinguished" in result.err
     assert not twin.exists()
 
 
-def test_a_twin_is_identified_validated_and_simulated(log, tmp_path, capsys):
-    twin, wrong = str(tmp_path / "twin.toml"), ["--plant.coulomb_Nm", "0.003", "0.003", "0.003"]
-    words = ["--parameter", "plant.coulomb_Nm", "--out", twin]
-    code, out, _ = run(capsys, "identify", log, *MACHINE, *wrong, *words)
-    assert code == 0
-    assert "plant.coulomb_Nm.2" in out
-    assert "smaller" in out
+def test_a_twin_is_identified_validated_and_simulated(log, tmp_path):
+    twin, wrong = tmp_path / "twin.toml", ["--plant.coulomb_Nm", "0.003", "0.003", "0.003"]
+    result = call("identify", log, *MACHINE, *wrong, "--parameter", "plant.coulomb_Nm", "--out", twin)
+    assert result.code == 0
+    assert "plant.coulomb_Nm.2" in result.out
+    assert "smaller" in result.out
     accepted = ["--accept", "jitter", "--json"]
-    code, out, _ = run(capsys, "validate", log, "--scenario", SCENARIO, "--twin", twin, *accepted)
-    figures = json.loads(out)
+    figures = call("validate", log, "--scenario", SCENARIO, "--twin", twin, *accepted).json
     assert figures["accepted_findings"] == ["jitter"]
     assert figures["chi2"]["all"] == pytest.approx(1.0, abs=0.1)
-    assert (
-        33 <= len(figures["bins"]) <= 36
-    )  # six of three hinges by angle and by rate, if a count changes there
-    _sweep_over(twin, tmp_path, capsys)
-    code, out, err = run(capsys, "validate", log, *MACHINE, *wrong)
-    assert code == 1
-    assert "the residuals show plant.coulomb_Nm" in err
-    words = ["--twin", twin, "--duration", "0.01", "--json"]
-    code, out, _ = run(capsys, "simulate", SCENARIO, *words)
-    assert code == 0
-    assert json.loads(out)["status"] == "completed"
+    # Six of three hinges by angle and by rate, if a count changes there.
+    assert 33 <= len(figures["bins"]) <= 36
+    _sweep_over(twin, tmp_path)
+    result = call("validate", log, *MACHINE, *wrong)
+    assert result.code == 1
+    assert "the residuals show plant.coulomb_Nm" in result.err
+    run = call("simulate", SCENARIO, "--twin", twin, "--duration", "0.01", "--json")
+    assert (run.code, run.json["status"]) == (0, "completed")
 
 
-def _sweep_over(twin, folder, capsys):
+def _sweep_over(twin, folder):
     study = folder / "study.toml"
     study.write_text(f'name = "study"\nscenario = "{SCENARIO}"\n[fields]\nduration = 0.002\n')
-    words = ["--twin", twin, "--draws", "3", "--out", str(folder / "study"), "--json"]
-    code, out, _ = run(capsys, "sweep", str(study), *words)
-    figures = json.loads(out)
-    assert (code, figures["rows"]) == (0, 3)
-    friction_Nm = pq.read_table(figures["table"]).column("plant.coulomb_Nm").to_pylist()
+    words = ["sweep", study, "--twin", twin, "--draws", "3", "--out", folder / "study", "--json"]
+    result = call(*words)
+    assert (result.code, result.json["rows"]) == (0, 3)
+    friction_Nm = pq.read_table(result.json["table"]).column("plant.coulomb_Nm").to_pylist()
     assert len({tuple(row) for row in friction_Nm}) == 3
     axis = '[[axis]]\nkind = "values"\nfield = "plant.coulomb_Nm.0"\nvalues = [0.001]\n'
     study.write_text(study.read_text() + axis)
-    code, _, err = run(capsys, "sweep", str(study), *words)
-    assert code == 2
-    assert "expected no axis over a parameter of the twin, received plant.coulomb_Nm.0" in err
+    message = "expected no axis over a parameter of the twin, received plant.coulomb_Nm.0"
+    assert message in refusal(*words)
 
 
-@pytest.mark.release("1 s and a viewer's server; tests/twin/machine has the figures")
-def test_a_watch_without_alarms_and_one_that_is_too_short(log, tmp_path, capsys):
+def log_with_offset(path, duration_s):
+    """Write a log of a machine whose sensor of alpha has an offset after 2.4 s."""
+    write(changing_log(duration_s, (2.4, "sensors.angle_offset_rad", [2e-3, 0.0, 0.0])), path)
+    return path
+
+
+@pytest.mark.release("1 s; tests/twin/machine/test_watching.py has the alarms")
+def test_a_watch_without_alarms_and_one_that_is_too_short(log, tmp_path):
     short = tmp_path / "short.parquet"
     write(changing_log(2.4, seed=2), short)
-    assert run(capsys, "watch", str(short), *MACHINE, "--json") == (0, "", "")
-    code, out, err = run(capsys, "watch", log, *MACHINE)
-    assert (code, out) == (1, "")
-    assert "expected more than 2.1 s of data" in err
+    assert succeeded("watch", short, *MACHINE, "--json") == ""
+    result = call("watch", log, *MACHINE)
+    assert (result.code, result.out) == (1, "")
+    assert "expected more than 2.1 s of data" in result.err
 
 
-def test_watch_prints_a_line_of_json_for_each_alarm(tmp_path, capsys):
-    path = tmp_path / "log.parquet"
-    write(changing_log(3.0, (2.4, "sensors.angle_offset_rad", [2e-3, 0.0, 0.0])), path)
-    code, out, err = run(capsys, "watch", str(path), *MACHINE, "--accept", "jitter")
-    alarms = [json.loads(line) for line in out.splitlines()]
-    assert code == 1
+def test_watch_prints_a_line_of_json_for_each_alarm(tmp_path):
+    path = log_with_offset(tmp_path / "log.parquet", 3.0)
+    result = call("watch", path, *MACHINE, "--accept", "jitter")
+    alarms = [json.loads(line) for line in result.out.splitlines()]
+    assert result.code == 1
     assert alarms[0]["what"] == "sensors.angle_offset_rad.0"
     assert set(alarms[0]) == {"t_s", "what", "size", "unit", "confidence", "accepted_findings"}
     assert alarms[0]["accepted_findings"] == ["jitter"]
-    assert "fewer than 0.1 in an hour" in err
+    assert "fewer than 0.1 in an hour" in result.err
 
 
 @pytest.fixture
@@ -157,12 +144,11 @@ def pages(monkeypatch):
 
 
 @pytest.mark.release("1 s and a viewer's server; tests/twin/machine has the figures")
-def test_a_live_shadow_shows_the_log_and_has_the_figures_of_the_others(log, tmp_path, capsys, pages):
-    words, received = [log, *MACHINE, "--json"], tmp_path / "live.rrd"
-    _, plain, _ = run(capsys, "shadow", *words)
-    _, live, err = run(capsys, "shadow", *words, "--live")
-    assert err.startswith("watch: http://127.0.0.1:")
-    plain, live = json.loads(plain), json.loads(live)
+def test_a_live_shadow_shows_the_log_and_has_the_figures_of_the_others(log, tmp_path, pages):
+    words, received = ["shadow", log, *MACHINE, "--json"], tmp_path / "live.rrd"
+    result = call(*words, "--live")
+    assert result.err.startswith("watch: http://127.0.0.1:")
+    plain, live = call(*words).json, result.json
     assert {**live, "cpu_s_per_s": 0} == {**plain, "cpu_s_per_s": 0}
     received.write_bytes(b"".join(*pages))
     values, times = columns(received)
@@ -172,32 +158,29 @@ def test_a_live_shadow_shows_the_log_and_has_the_figures_of_the_others(log, tmp_
 
 
 @pytest.mark.release("1 s and a viewer's server; tests/twin/machine has the figures")
-def test_a_live_watch_shows_windows_and_alarms(tmp_path, capsys, pages):
-    path, received = tmp_path / "log.parquet", tmp_path / "live.rrd"
-    write(changing_log(2.6, (2.4, "sensors.angle_offset_rad", [2e-3, 0.0, 0.0])), path)
-    code, out, _ = run(capsys, "watch", str(path), *MACHINE, "--live")
-    alarms = [json.loads(line) for line in out.splitlines()]
+def test_a_live_watch_shows_windows_and_alarms(tmp_path, pages):
+    path, received = log_with_offset(tmp_path / "log.parquet", 2.6), tmp_path / "live.rrd"
+    result = call("watch", path, *MACHINE, "--live")
+    alarms = [json.loads(line) for line in result.out.splitlines()]
     received.write_bytes(b"".join(*pages))
     values, times = columns(received)
     texts = [row[0] for part in values["/watch/alarms", "TextLog:text"] for row in part.to_pylist()]
-    assert code == 1
+    assert result.code == 1
     assert [text.split()[0] for text in texts] == [alarm["what"] for alarm in alarms]
     assert "sensors.angle_offset_rad.0" in texts[0]
     assert len(np.concatenate(times["/watch/windows", "Scalars:scalars"])) == 25  # all complete ones
-    windows = np.array(
-        [row for part in values["/watch/windows", "Scalars:scalars"] for row in part.to_pylist()]
-    )
+    parts = values["/watch/windows", "Scalars:scalars"]
+    windows = np.array([row for part in parts for row in part.to_pylist()])
     assert windows[:, 1].argmax() >= 23  # the sum exceeds its threshold after the change
     assert windows[:, 1].max() > 1
 
 
-def test_design_writes_a_scenario_and_its_currents(tmp_path, capsys):
+def test_design_writes_a_scenario_and_its_currents(tmp_path):
     scenario, currents = tmp_path / "design.toml", tmp_path / "design.csv"
     words = ["--parameter", "plant.coulomb_Nm", "--window", "1", "--candidates", "2"]
-    files = ["--out", str(scenario), "--currents", str(currents)]
-    code, out, _ = run(capsys, "identify", "--design", SCENARIO, *words, *files, *flags(KNOWN))
-    assert code == 0
-    assert "times narrower" in out
-    code, out, _ = run(capsys, "simulate", str(scenario), "--manual.file", str(currents), "--json")
-    assert code == 0
-    assert json.loads(out)["status"] == "completed"
+    files = ["--out", scenario, "--currents", currents]
+    result = call("identify", "--design", SCENARIO, *words, *files, *flags(KNOWN))
+    assert result.code == 0
+    assert "times narrower" in result.out
+    run = call("simulate", scenario, "--manual.file", currents, "--json")
+    assert (run.code, run.json["status"]) == (0, "completed")
