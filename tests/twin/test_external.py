@@ -3,10 +3,12 @@
 import numpy as np
 import pytest
 
+from spheretwin import replay
 from spheretwin import scenario as scenarios
 from spheretwin.control.supervision.watchdog import Reason
 from spheretwin.external import Measurement
 from spheretwin.models.base.errors import InputError
+from spheretwin.provenance import record_of
 from spheretwin.session import Session
 from spheretwin.simulation import follow
 
@@ -37,9 +39,7 @@ class Plant:
 
 
 def session(external, **changes):
-    return Session(
-        scenarios.load("sinusoid", {k.replace("__", "."): v for k, v in changes.items()}), external=external
-    )
+    return Session(scenarios.load("sinusoid", changes), external=external)
 
 
 def at_rest(_):
@@ -53,7 +53,7 @@ def constant(_):
 def test_the_currents_of_a_controller_are_those_of_manual_currents():
     controller = Controller(constant)
     rows = session(controller).advance(20)
-    manual = session(None, manual__currents_A=[0.5] * GROUPS).advance(20)
+    manual = session(None, **{"manual.currents_A": [0.5] * GROUPS}).advance(20)
     assert rows.values.tobytes() == manual.values.tobytes()
     np.testing.assert_array_equal(controller.times, rows["t_s"])
     # Each command answers the measurement of its own tick.
@@ -75,8 +75,8 @@ def test_the_authority_scales_what_is_sent_and_what_is_expected():
     plant = Plant(at_rest)
     plant.authority = 0.25
     # The estimate of the applied torque follows the currents that are sent.
-    reduced = session(plant, controller__prediction__on=False, detector__detect=True)
-    full = session(Plant(at_rest), detector__detect=True)
+    reduced = session(plant, **{"detector.detect": True})
+    full = session(Plant(at_rest), **{"detector.detect": True})
     rows = reduced.advance(3)["current_command_A"]
     np.testing.assert_allclose(rows[0], 0.25 * full.advance(3)["current_command_A"][0], rtol=1e-15)
     expected = reduced._runtime._controller.applied_torque.current
@@ -137,15 +137,8 @@ def test_both_parts_in_plain_python():
 
 
 def test_the_journal_names_the_part_and_a_replay_is_refused(tmp_path):
-    from spheretwin import replay
-    from spheretwin.models.telemetry.parquet import TelemetryFile
-    from spheretwin.provenance import record_of
-
     twin = session(Controller(constant))
-    path = tmp_path / "run.parquet"
-    file = TelemetryFile(path, twin.signals, record_of(twin).metadata())
-    file.write(twin.advance(5))
-    file.finish("completed")
-    file.close(record_of(twin).metadata())
+    rows = twin.advance(5)
+    rows.write_parquet(path := tmp_path / "run.parquet", record_of(twin).metadata())
     with pytest.raises(InputError, match="expected a run of the twin alone, received one with a test"):
         replay.read(path)

@@ -60,16 +60,6 @@ def test_a_live_view_has_the_tab_and_the_window_that_were_requested(session, mon
     assert requested == [{"shown": "control", "window_s": 3.0}]
 
 
-def test_a_recording_has_the_rate_that_was_requested(session, tmp_path):
-    files = Outputs(session, tmp_path / "x.rrd", tmp_path / "x.parquet", record_rate_Hz=50.0)
-    follow(session, 50, files.sinks)
-    assert files.close() == []
-    recording = read(tmp_path / "x.rrd")
-    assert recording.rate_Hz == 50.0
-    assert len(recording.table) < 50
-    assert len(read_parquet(tmp_path / "x.parquet")[0]) == 50
-
-
 def test_signals_that_the_parent_has_ignored_stay_ignored():
     before = {number: signal.getsignal(number) for number in (signal.SIGHUP, signal.SIGTERM)}
     try:

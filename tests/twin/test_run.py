@@ -32,11 +32,9 @@ def test_a_summary_has_the_metrics_and_what_stands_beside_them(run):
     written = followed(200)
     assert set(written) == {*METRICS, *OTHER_KEYS}
     assert (written["status"], written["simulated_s"]) == ("completed", 0.2)
-    figures = figures_of(run)
-    assert {name: written[name] for name in METRICS} == figures  # followed or kept, it is one run
-    assert json.loads(json.dumps(written)) == written | {
-        "scenario": json.loads(json.dumps(written["scenario"]))
-    }
+    assert written["realtime_factor"] == written["simulated_s"] / written["wall_s"]
+    assert {name: written[name] for name in METRICS} == figures_of(run)  # followed or kept, it is one run
+    json.dumps(written, allow_nan=False)
 
 
 def test_a_run_without_a_row_has_no_figures():
@@ -75,11 +73,6 @@ def test_what_fails_or_is_no_json_is_told_with_its_name(run):
         figures_of(run, {"mine": failing})
     with pytest.raises(InputError, match="metric mine: expected a value in JSON types, received <function"):
         figures_of(run, {"mine": lambda run: failing})
-
-
-def test_the_realtime_factor_is_simulated_time_per_wall_time():
-    written = followed(200)
-    assert written["realtime_factor"] == written["simulated_s"] / written["wall_s"]
 
 
 def test_an_event_at_the_end_of_a_run_is_not_in_its_log(tmp_path):
