@@ -39,18 +39,16 @@ def test_compiled_step_is_the_binding_s_step():
     assert one.data.time == pytest.approx(0.05)
 
 
-def test_modelling_error_scales_the_inertia_matrix(actuator):
-    q = np.array([0.3, -0.5, 1.0])
-    expected = 1.2 * inertia_matrix(q, actuator.inertia)
-    np.testing.assert_allclose(inertia_of(rotor(modelling_error=0.2), q), expected, atol=1e-14)
-
-
-def test_payload_adds_a_point_mass_on_the_shaft(actuator):
+def test_modelling_error_scales_the_inertia_matrix_and_a_payload_adds_a_point_mass_on_the_shaft(actuator):
     q, mass = np.array([0.3, -0.5, 1.0]), 0.05
     x, y, z = actuator.payload_mount_m
     point = mass * np.array([y * y + z * z, x * x + z * z, x * x + y * y])
-    expected = inertia_matrix(q, actuator.inertia + point)
-    np.testing.assert_allclose(inertia_of(rotor(payload_kg=mass), q), expected, atol=1e-14)
+    for changes, inertia in (
+        ({"modelling_error": 0.2}, 1.2 * actuator.inertia),
+        ({"payload_kg": mass}, actuator.inertia + point),
+    ):
+        expected = inertia_matrix(q, inertia)
+        np.testing.assert_allclose(inertia_of(rotor(**changes), q), expected, atol=1e-14)
 
 
 def test_payload_weighs(actuator):
