@@ -20,40 +20,33 @@ from spheretwin.cli import bench
 from spheretwin.models.base.extras import install_command
 from spheretwin.models.telemetry.table import read_parquet
 from spheretwin.viz.bench.page import Page
+from tests.twin.cli.calls import call, refusal
 
 COMMAND = (sys.executable, "-m", "spheretwin", "bench", "hold", "--plant.engine", "lagrangian")
 
 
-def test_a_port_in_use_is_told_in_one_line(capsys):
+def test_a_port_in_use_is_told_in_one_line():
     with socket.socket() as taken:
         taken.bind(("127.0.0.1", 0))
         taken.listen()
         port = taken.getsockname()[1]
-        code = cli.main(
-            ["bench", "hold", "--plant.engine", "lagrangian", "--no-browser", "--port", str(port)]
-        )
-    assert code == 2
-    out, err = capsys.readouterr()
-    assert out == ""
-    assert err.startswith(f"spheretwin: bench: expected a free port, received {port}")
-    assert err.count("\n") == 1
+        message = refusal(*COMMAND[3:], "--no-browser", "--port", port)
+    assert message.startswith(f"bench: expected a free port, received {port}")
 
 
 def test_ctrl_c_ends_it_and_what_was_recorded_is_kept(tmp_path):
     recording = tmp_path / "bench.rrd"
     with subprocess.Popen(
         [*COMMAND, "--no-browser", "--port", "0", "--record", str(recording)],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
         env={**os.environ, "PYTHONWARNINGS": "error"},
-    ) as process:
+    ) as process:  # fmt: skip
         address = process.stdout.readline().split()[1]
         assert address.startswith("http://127.0.0.1:")
-        with pytest.raises(urllib.error.HTTPError) as refusal:
+        with pytest.raises(urllib.error.HTTPError) as unauthorised:
             urllib.request.urlopen(address.partition("?")[0])
-        with refusal.value:  # the answer, with its connection
-            assert refusal.value.code == 403
+        with unauthorised.value:  # the answer, with its connection
+            assert unauthorised.value.code == 403
         browser = urllib.request.build_opener(urllib.request.HTTPCookieProcessor())
         with browser.open(address) as answer:  # it is said once the page answers
             assert answer.status == 200
@@ -69,10 +62,9 @@ def test_ctrl_c_ends_it_and_what_was_recorded_is_kept(tmp_path):
     assert recording.stat().st_size > 0
 
 
-def test_without_viser_it_says_what_brings_it(monkeypatch, capsys):
-    monkeypatch.setattr("spheretwin.cli.bench.find_spec", lambda name: None)
-    assert cli.main(["bench", "hold", "--no-browser"]) == 2
-    assert install_command("bench") in capsys.readouterr().err
+def test_without_viser_it_says_what_brings_it(monkeypatch):
+    monkeypatch.setattr(bench, "find_spec", lambda name: None)
+    assert install_command("bench") in refusal("bench", "hold", "--no-browser")
 
 
 def redirection(file):
@@ -82,7 +74,7 @@ def redirection(file):
 
 
 @pytest.mark.parametrize("flags", [[], ["--no-browser", "--hold-after", "7"]], ids=["browser", "none"])
-def test_a_browser_is_opened_at_the_printed_address_unless_it_is_not_to(capsys, monkeypatch, flags):
+def test_a_browser_is_opened_at_the_printed_address_unless_it_is_not_to(monkeypatch, flags):
     opened, silences = [], []
 
     def operators(*silence_s):
@@ -92,13 +84,12 @@ def test_a_browser_is_opened_at_the_printed_address_unless_it_is_not_to(capsys, 
     monkeypatch.setattr(bench, "Operators", operators)
     monkeypatch.setattr(Page, "show", lambda page, ended: None)
     monkeypatch.setattr(bench.webbrowser, "open", lambda file: opened.append(redirection(file)))
-    assert cli.main(["bench", *COMMAND[4:], "--port", "0", *flags]) == cli.DONE
-    out, err = capsys.readouterr()
+    code, out, err = call(*COMMAND[3:], "--port", "0", *flags)
     address = re.fullmatch(r"bench: (http://127\.0\.0\.1:\d+/\?token=[\w-]+) \(Ctrl-C ends it\)\n", out)[1]
     assert not list(Path.home().glob("bench-*.html"))
     assert opened == ([] if flags else [(address, 0o600)])
     assert silences == [(7.0 if flags else 2.0,)]
-    assert err == "bench: preparing hold\n"
+    assert (code, err) == (cli.DONE, "bench: preparing hold\n")
 
 
 @pytest.mark.parametrize(("recording", "line"), [((), ""), (("c", "d"), "spheretwin: not completed: c, d\n")])
@@ -129,10 +120,8 @@ def test_a_compiled_law_that_never_returns_ends_by_one_ctrl_c_with_complete_file
     driver.write_text(DRIVER)
     with subprocess.Popen(
         [sys.executable, str(driver), "--folder", str(tmp_path)],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-    ) as process:
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+    ) as process:  # fmt: skip
         try:
             assert process.stdout.readline().startswith("bench: http://127.0.0.1:")
             assert process.stdout.readline() == "stalled\n"

@@ -123,29 +123,29 @@ def test_a_compiled_law_that_never_returns_ends_by_the_second_signal(laws, tmp_p
 BENCH = ["bench", "hold", "--no-browser", "--port", "0"]
 
 
-@pytest.mark.release(
-    "a process that is interrupted twice, 1.6 to 2.3 s; a compiled law that never returns has one, too"
+TWICE = pytest.mark.release(
+    "a process that is interrupted twice, 2 s; a compiled law that never returns has one, too"
 )
+
+
+@TWICE
 @pytest.mark.parametrize(
-    ("command", "law"),
-    [(["simulate", "hold"], "Slow"), (BENCH, "Slow")],
-    ids=["build", "bench"],
+    ("command", "law", "number"),
+    [
+        (["simulate", "hold"], "Slow", signal.SIGINT),
+        (BENCH, "Slow", signal.SIGINT),
+        (["simulate", "hold", "--telemetry", "run.parquet", "--record", "run.rrd"], "plain", signal.SIGTERM),
+    ],
+    ids=["build", "bench", "law"],
 )
-def test_python_that_never_returns_ends_by_the_second_signal(laws, command, law):
-    assert ended(started(*command, *ALWAYS, f"{laws}:{law}"), signal.SIGINT) == []
+def test_python_that_never_returns_ends_too_and_files_without_rows_are_not_named(
+    laws, monkeypatch, command, law, number
+):
+    monkeypatch.chdir(laws.parent)
+    assert ended(started(*command, *ALWAYS, f"{laws}:{law}"), number) == []
 
 
-@pytest.mark.release(
-    "a process that is interrupted twice, 1.6 to 2.3 s; a compiled law that never returns has one, too"
-)
-def test_a_plain_law_that_never_returns_ends_too_and_what_has_no_rows_is_not_named(laws, tmp_path):
-    outputs = ["--telemetry", tmp_path / "run.parquet", "--record", tmp_path / "run.rrd"]
-    assert ended(started("simulate", "hold", *ALWAYS, f"{laws}:plain", *outputs), signal.SIGTERM) == []
-
-
-@pytest.mark.release(
-    "a process that is interrupted twice, 1.6 to 2.3 s; a compiled law that never returns has one, too"
-)
+@TWICE
 def test_rows_that_never_return_end_by_the_second_signal_and_the_study_goes_on(laws, tmp_path):
     source = tmp_path / "study.toml"
     source.write_text(
