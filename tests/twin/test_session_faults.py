@@ -11,11 +11,10 @@ from hypothesis import strategies as st
 from spheretwin import cli
 from spheretwin import scenario as scenarios
 from spheretwin.faults.targets import TARGETS
-from spheretwin.models.telemetry.parquet import TelemetryFile
 from spheretwin.models.telemetry.table import read_parquet
-from spheretwin.provenance import record_of
 from spheretwin.session import Session
 from spheretwin.simulation import simulate
+from tests.twin.session_cases import recorded
 
 TICKS = 1500
 PLAN = [
@@ -110,8 +109,8 @@ def same_columns(one, other, ticks=slice(None)):
 def test_by_hand_or_by_event_is_as_planned(kind, mode, hardware):
     """And before its start, a planned one leaves every bit of a healthy run's columns as it is.
 
-    By hand, columns of faults come with the first fault. Of a delay, only a planned one has kept what was on
-    its way: by hand the first rows are those of the value that repeats.
+    By hand also after a restore. Then columns of faults come with the first fault. Of a delay, only a
+    planned one has kept what was on its way: by hand the first rows are those of the value that repeats.
     """
     if TARGETS[kind].needs_supply and hardware == "ideal":
         return
@@ -122,13 +121,16 @@ def test_by_hand_or_by_event_is_as_planned(kind, mode, hardware):
         Session(scenario(**{**none, "fault": [{**fault(kind, mode), "start_s": start_s}]})) as planned,
         Session(scenario(**none)) as by_hand,
         Session(scenario(**{**none, "event": [event]})) as by_event,
+        Session(scenario(**none)) as restored,
     ):
         expected = planned.advance(START), planned.advance(80)
         for session in (by_hand, by_event):
             before = session.advance(START)
             assert len(before) == START
             assert same_columns(before, expected[0]) == []
-            if session is by_hand:
+        restored.restore(pickle.loads(pickle.dumps(by_hand.snapshot())))
+        for session in (by_hand, restored, by_event):
+            if session is not by_event:
                 session.set("fault", fault(kind, mode))
             after = session.advance(80)
             assert after.signals == expected[1].signals
@@ -167,18 +169,14 @@ def test_an_end_by_hand_is_a_planned_end(hardware):
 
 def test_a_run_of_faults_set_on_the_way_is_replayed(tmp_path):
     path, again = tmp_path / "a.parquet", tmp_path / "b.parquet"
-    with Session(scenario(fault=[], **{"detector.detect": False})) as session:
-        file = TelemetryFile(path, session.signals, record_of(session).metadata())
-        file.write(session.advance(100))
-        session.set("fault", {"target": "amplifier.03", "mode": "stuck"})
-        file.write(session.advance(100))
-        session.set("fault", {"target": "adc", "mode": "noise", "value": 1e-3, "end_s": 0.28})
-        file.write(session.advance(50))
-        session.set("fault.0.end_s", session.t_s)
-        file.write(session.advance(50))
-        session.set("fault", [])
-        file.write(session.advance(50))
-        file.close(record_of(session).metadata())
+    changes = [
+        (100, "fault", {"target": "amplifier.03", "mode": "stuck"}),
+        (200, "fault", {"target": "adc", "mode": "noise", "value": 1e-3, "end_s": 0.28}),
+        (250, "fault.0.end_s", 0.25),
+        (300, "fault", []),
+    ]
+    electronics = {"hardware": "electronics", "plant.engine": "lagrangian"}
+    recorded(path, changes, ticks=350, name="nutation", **electronics)
     assert cli.main(["simulate", "--replay", str(path), "--telemetry", str(again)]) == 0
     first, second = read_parquet(path)[0], read_parquet(again)[0]
     assert second.signals == first.signals
@@ -186,20 +184,3 @@ def test_a_run_of_faults_set_on_the_way_is_replayed(tmp_path):
     marks = first["fault"]
     assert np.isnan(marks).any() or not marks[0].any()
     assert np.count_nonzero(np.nansum(marks, axis=1)) == 180
-
-
-@pytest.mark.parametrize("hardware", ["electronics", "ideal"])
-@pytest.mark.parametrize("kind", ["amplifier", "dac", "pot", "encoder", "adc", "controller"])
-def test_what_is_held_after_a_restore_is_what_it_was(kind, hardware):
-    none = {"hardware": hardware, "fault": [], "detector.detect": False, "duration": 0.2}
-    stuck = {"target": TARGETS[kind].names(18)[-1], "mode": "stuck"}
-    with (
-        Session(scenario(**{**none, "fault": [{**stuck, "start_s": 0.12}]})) as planned,
-        Session(scenario(**none)) as session,
-        Session(scenario(**none)) as other,
-    ):
-        planned.advance(START)
-        session.advance(START)
-        other.restore(pickle.loads(pickle.dumps(session.snapshot())))
-        other.set("fault", stuck)
-        assert same_columns(other.advance(50), planned.advance(50)) == []
