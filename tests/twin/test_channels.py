@@ -53,9 +53,14 @@ def lagged_currents(command, time_constant_s, period_s):
 def test_the_mean_current_is_that_of_all_physics_steps_of_the_tick():
     """Against the exact solution of a first-order lag over the whole tick, which has four steps."""
     table = run(LAG)
-    _, mean = lagged_currents(table["current_command_A"], 4e-4, 1e-3)
+    command = table["current_command_A"]
+    start, mean = lagged_currents(command, 4e-4, 1e-3)
     # Sums of a few currents of at most 8 A.
     np.testing.assert_allclose(table["mean_current_A"], mean, rtol=0, atol=1e-13)
+    share = 4e-4 / 2.5e-4 * (1 - np.exp(-2.5e-4 / 4e-4))  # of what is left, over the first step
+    np.testing.assert_allclose(
+        table["current_A"], command + share * (start[:-1] - command), rtol=0, atol=1e-13
+    )
     assert np.abs(table["mean_current_A"] - table["current_A"]).max() > 0.1
     one_step = run({**LAG, "plant.step_s": 1e-3})
     np.testing.assert_array_equal(one_step["mean_current_A"], one_step["current_A"])
