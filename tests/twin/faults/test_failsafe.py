@@ -15,8 +15,7 @@ from spheretwin.session import Session
 from spheretwin.simulation import follow, simulate
 
 RUNDOWN = 30
-WATCHED = {"plant.engine": "mujoco", "watchdog.on": True, "seed": 4}
-WATCHED["watchdog.rundown_s"] = (RUNDOWN + 0.4) * 1e-3  # a number of ticks, to the nearest
+WATCHED = {"plant.engine": "mujoco", "watchdog.on": True, "watchdog.rundown_s": RUNDOWN * 1e-3, "seed": 4}
 
 
 def scenario(name="nutation", hardware="electronics", **changes):
@@ -62,11 +61,11 @@ def failed_safely(run, reason, at=None):
     return tripped
 
 
-@pytest.mark.parametrize("action", ["release", "short"])
+@pytest.mark.parametrize(("action", "ticks"), [("release", RUNDOWN + 0.4), ("short", RUNDOWN - 0.4)])
 @pytest.mark.parametrize("how", list(PROVOKED))
-def test_each_reason_by_what_provokes_it(how, action):
+def test_each_reason_by_what_provokes_it(how, action, ticks):
     reason, changes, at = PROVOKED[how]
-    run = simulate(scenario(**changes, **{"watchdog.action": action}))
+    run = simulate(scenario(**changes, **{"watchdog.action": action, "watchdog.rundown_s": ticks * 1e-3}))
     tripped = failed_safely(run, reason, at)
     assert len(run.telemetry) == tripped + 1 + RUNDOWN
     assert Reason.NONE not in run.telemetry["failsafe_reason"][tripped:]
