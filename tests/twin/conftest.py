@@ -1,8 +1,9 @@
-"""A model of a user's, for every test of sessions."""
+"""A model of a user's and a table of torques, for the tests of sessions and disturbances."""
 
 import pytest
 
 from spheretwin.models import actuator as actuators
+from tests.twin.disturbance_cases import TORQUES
 
 
 @pytest.fixture(scope="session")
@@ -20,4 +21,10 @@ def sticky(tmp_path_factory):
         text = text.replace(before, after)
     path = tmp_path_factory.mktemp("model") / "sticky.xml"
     path.write_text(text.replace('meshdir="', f'meshdir="{actuators.MJCF_PATH.parent}/'))
+    return str(path)
+
+
+@pytest.fixture
+def torques(tmp_path):
+    (path := tmp_path / "torques.csv").write_text(TORQUES)
     return str(path)

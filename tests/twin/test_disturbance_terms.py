@@ -12,21 +12,7 @@ from spheretwin.disturbances import (
     term_draws,
 )
 from spheretwin.models.base.errors import InputError
-
-TORQUES = "t_s,alpha_Nm,beta_Nm,gamma_Nm\n0.5,0.1,0,0\n1.5,0.3,-0.2,0\n2.0,0,0,0.4\n"
-PERIOD = 1e-3
-
-
-@pytest.fixture
-def torques(tmp_path):
-    path = tmp_path / "torques.csv"
-    path.write_text(TORQUES)
-    return str(path)
-
-
-def sampled(term, first, ticks, seed=3, place=2):
-    t = PERIOD * np.arange(first, first + ticks, dtype=np.float64)
-    return term.sample(t, lambda: term_draws(seed, first, ticks, place))
+from tests.twin.disturbance_cases import PERIOD, TORQUES, sampled
 
 
 def test_constant_and_steps_hold_on_each_axis_by_itself():

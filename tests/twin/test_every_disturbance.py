@@ -7,12 +7,10 @@ import pytest
 from pydantic import TypeAdapter
 
 from spheretwin import scenario as scenarios
-from spheretwin.disturbances import KINDS, AnyDisturbance, term_draws
+from spheretwin.disturbances import KINDS, AnyDisturbance
 from spheretwin.models.telemetry.status import Status
 from spheretwin.simulation import simulate
-
-TORQUES = "t_s,alpha_Nm,beta_Nm,gamma_Nm\n0.5,0.1,0,0\n1.5,0.3,-0.2,0\n2.0,0,0,0.4\n"
-PERIOD = 1e-3
+from tests.twin.disturbance_cases import sampled
 
 # Beside every kind as it is when nothing is said of it.
 OTHERS = [
@@ -27,13 +25,6 @@ OTHERS = [
 ]
 
 
-@pytest.fixture
-def torques(tmp_path):
-    path = tmp_path / "torques.csv"
-    path.write_text(TORQUES)
-    return str(path)
-
-
 @pytest.fixture(
     params=[*((name, {}) for name in KINDS), *OTHERS], ids=lambda case: "-".join([case[0], *case[1]])
 )
@@ -41,11 +32,6 @@ def term(request, torques):
     name, fields = request.param
     kind = KINDS[name]
     return kind(**({"file": torques} if "file" in kind.model_fields else {}), **fields)
-
-
-def sampled(term, first, ticks, seed=3, place=2):
-    t = PERIOD * np.arange(first, first + ticks, dtype=np.float64)
-    return term.sample(t, lambda: term_draws(seed, first, ticks, place))
 
 
 def test_samples_are_finite_and_as_many_as_asked_for(term):
