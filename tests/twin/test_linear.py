@@ -1,5 +1,7 @@
 """The linear model against differences of the equations of motion that both engines step, and identities."""
 
+import re
+
 import numpy as np
 import pytest
 from scipy.signal import cont2discrete
@@ -32,10 +34,6 @@ def gradient(function, at, h=1e-3):
     near = np.array([function(at + d) - function(at - d) for d in steps])
     far = np.array([function(at + 2 * d) - function(at - 2 * d) for d in steps])
     return np.moveaxis((8 * near - far) / (12 * h), 0, -1)
-
-
-def inverse(matrix):
-    return np.linalg.pinv(matrix)
 
 
 @pytest.mark.parametrize("engine", ["mujoco", "lagrangian"])
@@ -116,7 +114,7 @@ def test_a_mistaken_controller_is_part_of_the_true_model(actuator):
 
     def given(q):
         matrix = rate_jacobian(q).T @ torque_matrix(q, actuator)
-        return (matrix * UNEVEN) @ inverse(1.25 * matrix)
+        return (matrix * UNEVEN) @ np.linalg.pinv(1.25 * matrix)
 
     np.testing.assert_allclose(given(TILTED) @ command, plain.input_at_rest, rtol=1e-6, atol=1e-9)
     expected = plain.system.B[3:] @ given(TILTED)
@@ -136,9 +134,8 @@ def test_a_scale_that_is_wrong_alone_scales_the_input_alone():
     np.testing.assert_allclose(model.system.A, plain.system.A, rtol=0, atol=1e-8)
 
 
-def responses(system, at_rad_s=(1.0, 30.0, 300.0)):
-    A, B, C = system.A, system.B, system.C
-    return np.array([C @ np.linalg.solve(1j * w * np.eye(len(A)) - A, B) for w in at_rad_s])
+def responses(A, B, C):
+    return np.array([C @ np.linalg.solve(1j * w * np.eye(len(A)) - A, B) for w in (1.0, 30.0, 300.0)])
 
 
 @pytest.mark.parametrize(("inputs", "states"), [("torque", 9), ("currents", 24)])
@@ -149,82 +146,69 @@ def test_a_lag_is_one_more_pole_of_every_response(inputs, states):
     assert late.system.A.shape == (states, states)
     pole = 1 + 4e-3j * np.array([1.0, 30.0, 300.0])
     np.testing.assert_allclose(
-        responses(late.system) * pole[:, None, None], responses(plain.system), rtol=1e-9, atol=1e-12
+        responses(late.system.A, late.system.B, late.system.C) * pole[:, None, None],
+        responses(plain.system.A, plain.system.B, plain.system.C),
+        rtol=1e-9,
+        atol=1e-12,
     )
 
 
 def test_a_lag_under_load_is_the_same_for_torques_and_for_the_currents_that_answer_them(actuator):
     """Currents commanded as the allocation does, also as it follows the pose, are a torque commanded."""
-    fields = {"drive.time_constant_s": 4e-3}
-    by_torque = linearise(scenario(fields), TILTED, lag=True).system
-    model = linearise(scenario(fields), TILTED, inputs="currents", lag=True)
-    by_currents, input_at_rest = model.system, linearise(scenario(fields), TILTED).input_at_rest
+    lagging = scenario({"drive.time_constant_s": 4e-3})
+    by_torque, model = (linearise(lagging, TILTED, inputs=each, lag=True) for each in ("torque", "currents"))
+    given, system = by_torque.system, model.system
 
-    def allocated(q):
-        return inverse(rate_jacobian(q).T @ torque_matrix(q, actuator)) @ input_at_rest
+    def allocation(q):
+        return np.linalg.pinv(rate_jacobian(q).T @ torque_matrix(q, actuator))
 
-    np.testing.assert_allclose(allocated(TILTED), model.input_at_rest, rtol=0, atol=1e-6 * 0.1)
-    follows = np.hstack([gradient(allocated, TILTED), np.zeros((18, 21))])
-    answered = by_currents.B @ inverse(rate_jacobian(TILTED).T @ torque_matrix(TILTED, actuator))
-    closed = by_currents.A + by_currents.B @ follows
-    first, second = (
-        responses(by_torque),
-        np.array(
-            [
-                by_currents.C @ np.linalg.solve(1j * w * np.eye(24) - closed, answered)
-                for w in (1.0, 30.0, 300.0)
-            ]
-        ),
-    )
-    for one, other in zip(first, second, strict=True):
+    currents = allocation(TILTED) @ by_torque.input_at_rest
+    np.testing.assert_allclose(currents, model.input_at_rest, rtol=0, atol=1e-6 * 0.1)
+    slope = gradient(lambda q: allocation(q) @ by_torque.input_at_rest, TILTED)
+    closed = system.A + system.B @ np.hstack([slope, np.zeros((18, 21))])
+    for one, other in zip(
+        responses(given.A, given.B, given.C),
+        responses(closed, system.B @ allocation(TILTED), system.C),
+        strict=True,
+    ):
         # Differences of the table, as above.
         assert np.abs(one - other).max() < 1e-3 * np.abs(one).max()
 
 
-def test_a_drive_without_lag_has_no_states_for_it():
+def test_the_lag_is_that_of_the_drive():
     assert linearise(scenario({"drive.time_constant_s": 0.0}), lag=True).system.A.shape == (6, 6)
-
-
-def test_the_prototype_s_lag_is_that_of_its_amplifiers():
-    model = linearise(scenarios.load("tilt", {"hardware": "electronics"}), lag=True)
-    bandwidth = scenarios.load("tilt", {"hardware": "electronics"}).drive.bandwidth_rad_s
-    np.testing.assert_array_equal(model.system.A[6:, 6:], -bandwidth * np.eye(3))
+    electronics = scenarios.load("tilt", {"hardware": "electronics"})
+    of_amplifiers = linearise(electronics, lag=True).system.A[6:, 6:]
+    np.testing.assert_array_equal(of_amplifiers, -electronics.drive.bandwidth_rad_s * np.eye(3))
 
 
 def test_the_nominal_model_is_what_the_controller_knows():
     fields = {
         "nominal.inertia_kg_m2": [2e-3, 3e-3, 4e-3], "nominal.time_constant_s": 3e-3,
-        "nominal.torque_scale": 1.3, "plant.viscous_Nm_s": [1e-3] * 3,
-        "plant.modelling_torque_Nm": [0.01] * 3,
+        "nominal.torque_scale": 1.3, "nominal.viscous_Nm_s": [1e-3, 2e-3, 3e-3],
+        "plant.viscous_Nm_s": [0.1] * 3, "plant.modelling_torque_Nm": [0.01] * 3,
+        "drive.current_limit_A": 1e-3, "nominal.current_limit_A": 5.0,
     }  # fmt: skip
     model = linearise(scenario(fields), np.zeros(3), nominal=True, lag=True)
-    np.testing.assert_allclose(
-        np.linalg.inv(model.system.A[3:6, 6:]), np.diag([2e-3, 3e-3, 4e-3]), rtol=1e-12
-    )
-    np.testing.assert_array_equal(model.system.A[3:6, :6], 0)
-    np.testing.assert_array_equal(model.system.B[6:], np.eye(3) / 3e-3)
+    A, B = model.system.A, model.system.B
+    # Products and quotients round.
+    np.testing.assert_allclose(np.linalg.inv(A[3:6, 6:]), np.diag([2e-3, 3e-3, 4e-3]), rtol=1e-12)
+    np.testing.assert_allclose(A[3:6, 3:6], -np.diag([0.5, 2 / 3, 0.75]), rtol=1e-12, atol=1e-15)
+    np.testing.assert_array_equal(A[3:6, :3], 0)
+    np.testing.assert_array_equal(B[6:], np.eye(3) / 3e-3)
     np.testing.assert_array_equal(model.input_at_rest, 0)
-
-
-def test_nominal_friction_and_limit_are_those_of_the_data_sheet():
-    fields = {
-        "nominal.inertia_kg_m2": [2e-3, 3e-3, 4e-3], "nominal.viscous_Nm_s": [1e-3, 2e-3, 3e-3],
-        "plant.viscous_Nm_s": [0.1] * 3, "drive.current_limit_A": 1e-3, "nominal.current_limit_A": 5.0,
-    }  # fmt: skip
-    model = linearise(scenario(fields), np.zeros(3), nominal=True)
-    # A product and a quotient round.
-    np.testing.assert_allclose(model.system.A[3:6, 3:6], -np.diag([0.5, 2 / 3, 0.75]), rtol=1e-12, atol=1e-15)
     resting = initial_config(scenario(fields), None, None)
-    assert linearisation_data(resting.scenario, resting.files, nominal=True).current_limit_A == 5.0
-    assert linearisation_data(resting.scenario, resting.files, nominal=False).current_limit_A == 1e-3
+    for nominal, limit_A in ((True, 5.0), (False, 1e-3)):
+        data = linearisation_data(resting.scenario, resting.files, nominal=nominal)
+        assert data.current_limit_A == limit_A
 
 
 def test_a_constant_torque_is_held_beside_gravity():
+    pull = [0.01, -0.02, 0.03]
     plain, pulled = (
-        linearise(scenario({"plant.modelling_torque_Nm": pull}), TILTED).input_at_rest
-        for pull in ([0.0, 0.0, 0.0], [0.01, -0.02, 0.03])
+        linearise(scenario({"plant.modelling_torque_Nm": each}), TILTED) for each in ([0.0] * 3, pull)
     )
-    np.testing.assert_allclose(pulled - plain, [0.01, -0.02, 0.03], rtol=1e-12)
+    np.testing.assert_allclose(pulled.input_at_rest - plain.input_at_rest, pull, rtol=1e-12)
 
 
 def test_states_inputs_and_outputs_are_named_and_the_first_pose_is_where_it_rests():
@@ -253,12 +237,9 @@ def test_states_inputs_and_outputs_are_named_and_the_first_pose_is_where_it_rest
     ],
 )
 def test_what_has_no_linear_model_is_refused_in_one_line(changes, given, part):
-    with pytest.raises(InputError) as caught:
+    with pytest.raises(InputError, match=f"^linear model: expected .*{re.escape(part)}") as caught:
         linearise(scenario(changes), **given)
-    message = str(caught.value)
-    assert message.startswith("linear model: expected ")
-    assert part in message
-    assert message.isprintable()
+    assert str(caught.value).isprintable()
 
 
 def test_a_model_that_the_lagrangian_does_not_know_is_refused(tmp_path):
