@@ -88,69 +88,67 @@ def fixed_tendon(attributes: str) -> Edits:
     return at_the_end(f"<tendon><fixed {attributes}>{joints}</fixed></tendon>")
 
 
-def actuator(inside: str) -> Edits:
-    return at_the_end(f"<actuator>{inside}</actuator>")
+def actuator(inside: str, others: Edits = (), name: str = "actuator") -> Case:
+    return Case(others + at_the_end(f"<actuator>{inside}</actuator>"), name)
 
 
-def equality(inside: str) -> Edits:
-    return at_the_end(f"<equality>{inside}</equality>")
+def equality(inside: str, others: Edits = ()) -> Case:
+    return Case(others + at_the_end(f"<equality>{inside}</equality>"), "equality")
 
+
+def pair(geom: str) -> Edits:
+    return at_the_end(f'<contact><pair geom1="{geom}" geom2="post"/></contact>')
+
+
+SERVO = '<position site="{}" refsite="anchor" kp="3" gear="1 0 0 0 0 0"/>'
+GRAVITY = "gravity other than along -z"
+
+
+ANCHORED = after(STATOR, ANCHOR)
+EYE = after(MOUNT, '<site name="eye"/>')
+LOADED = after(TIP, LOAD.format(""))
+LOW = after(STATOR, ANCHOR.replace("0 0.1", "0 0.05"))
+SPRING = 'stiffness="30"'
+DRUM = '<geom geom="drum"/>'
 
 CASES = {
     "frictionloss": Case(hinge('frictionloss="0.1"'), "frictionloss"),
-    "frictionloss of a tilt hinge": Case(with_attributes(ALPHA, 'frictionloss="0.01"'), "frictionloss"),
     "stiffness": Case(hinge('stiffness="0.2"'), "stiffness"),
     "springref": Case(hinge('stiffness="0.2" springref="20"'), "stiffness", hinge('stiffness="0.2"')),
     "damping": Case(hinge('damping="0.05"'), "damping"),
     "damping of higher order": Case(hinge('damping="0 0.05"'), "damping"),
     "armature": Case(hinge('armature="0.001"'), "armature"),
     "limit margin": Case(with_attributes(ALPHA, 'margin="80"'), "limit margin"),
-    "equality of joints": Case(
-        equality('<joint joint1="gamma" joint2="alpha" polycoef="0 0.5 0 0 0"/>'), "equality"
+    "equality of joints": equality('<joint joint1="gamma" joint2="alpha" polycoef="0 0.5 0 0 0"/>'),
+    "equality of bodies": equality(
+        '<connect body1="rotor" body2="stator" anchor="0 0 0.03" solref="0.2 1"/>'
     ),
-    "equality of bodies": Case(
-        equality('<connect body1="rotor" body2="stator" anchor="0 0 0.03" solref="0.2 1"/>'), "equality"
+    "equality of sites": equality(
+        '<connect site1="shaft_tip" site2="above" solref="0.2 1"/>',
+        after(STATOR, '<site name="above" pos="0 0 0.12"/>'),
     ),
-    "equality of sites": Case(
-        after(STATOR, '<site name="above" pos="0 0 0.12"/>')
-        + equality('<connect site1="shaft_tip" site2="above" solref="0.2 1"/>'),
-        "equality",
-    ),
-    "weld of the mount": Case(equality('<weld body1="payload" body2="stator" solref="0.2 1"/>'), "equality"),
-    "weld to a mocap body": Case(
+    "weld of the mount": equality('<weld body1="payload" body2="stator" solref="0.2 1"/>'),
+    "weld to a mocap body": equality(
+        '<connect body1="rotor" body2="held" anchor="0 0 0.1" solref="0.2 1"/>',
         after(WORLD, '<body name="held" mocap="true" pos="0 0 0.1"/>')
-        + equality('<connect body1="rotor" body2="held" anchor="0 0 0.1" solref="0.2 1"/>')
         + at_the_end('<keyframe><key qpos="0 0 1" mpos="0 0 1"/></keyframe>'),
-        "equality",
     ),
     "fixed tendon": Case(fixed_tendon('stiffness="0.3" damping="0.01"'), "tendon"),
-    "fixed tendon with friction": Case(fixed_tendon('frictionloss="0.02"'), "tendon"),
     "fixed tendon with a limit": Case(fixed_tendon('limited="true" range="-0.1 0.1"'), "tendon"),
-    "spatial tendon": Case(
-        after(STATOR, ANCHOR) + spatial_tendon('stiffness="30" springlength="0.01"'), "tendon"
-    ),
-    "spatial tendon with friction": Case(
-        after(STATOR, ANCHOR) + spatial_tendon('frictionloss="0.5"'), "tendon"
-    ),
-    "spatial tendon with a limit": Case(
-        after(STATOR, ANCHOR) + spatial_tendon('limited="true" range="0 0.09"'), "tendon"
-    ),
+    "spatial tendon": Case(ANCHORED + spatial_tendon('stiffness="30" springlength="0.01"'), "tendon"),
+    "spatial tendon with friction": Case(ANCHORED + spatial_tendon('frictionloss="0.5"'), "tendon"),
+    "spatial tendon with a limit": Case(ANCHORED + spatial_tendon('limited="true" range="0 0.09"'), "tendon"),
     "spatial tendon over what is only drawn": Case(
-        after(STATOR, ANCHOR.replace("0 0.1", "0 0.05") + '<geom name="drum" type="sphere" size="0.105"/>')
-        + spatial_tendon('stiffness="30"', between='<geom geom="drum"/>'),
+        LOW
+        + after(STATOR, '<geom name="drum" type="sphere" size="0.105"/>')
+        + spatial_tendon(SPRING, between=DRUM),
         "tendon",
-        after(STATOR, ANCHOR.replace("0 0.1", "0 0.05")) + spatial_tendon('stiffness="30"'),
+        LOW + spatial_tendon(SPRING),
     ),
-    "spatial tendon on the mount": Case(
-        after(STATOR, ANCHOR)
-        + after(MOUNT, '<site name="eye"/>')
-        + spatial_tendon('stiffness="30"', site="eye"),
-        "tendon",
-    ),
+    "spatial tendon on the mount": Case(ANCHORED + EYE + spatial_tendon(SPRING, site="eye"), "tendon"),
     "density": Case(fluid('density="1000"'), "fluid"),
     "viscosity": Case(fluid('viscosity="5"'), "fluid"),
-    "wind": Case(fluid('density="1000" wind="2 3 0"') + after(TIP, LOAD.format("")), "fluid",
-                 fluid('density="1000"') + after(TIP, LOAD.format(""))),
+    "wind": Case(fluid('density="1000" wind="2 3 0"') + LOADED, "fluid", fluid('density="1000"') + LOADED),
     "drag of a shape that is only drawn": Case(
         fluid('viscosity="1"') + after(TIP, DISC.format('fluidshape="ellipsoid"')),
         "fluid",
@@ -166,73 +164,37 @@ CASES = {
         CONTACTS + with_attributes(MOUNT, COLLIDING) + after(STATOR, POST.format(0, COLLIDING)), "contact"
     ),
     "pair of what is only drawn": Case(
-        CONTACTS
-        + after(TIP, ARM.format(""))
-        + after(STATOR, POST.format(0.04, ""))
-        + at_the_end('<contact><pair geom1="arm" geom2="post"/></contact>'),
-        "contact",
+        CONTACTS + after(TIP, ARM.format("")) + after(STATOR, POST.format(0.04, "")) + pair("arm"), "contact"
     ),
-    "pair with the mount": Case(
-        CONTACTS
-        + after(STATOR, POST.format(0, ""))
-        + at_the_end('<contact><pair geom1="payload" geom2="post"/></contact>'),
-        "contact",
+    "pair with the mount": Case(CONTACTS + after(STATOR, POST.format(0, "")) + pair("payload"), "contact"),
+    "gravity aslant": Case(fluid('gravity="5 0 -9.81"') + LOADED, GRAVITY, LOADED),
+    "gravity upwards": Case(fluid('gravity="0 0 9.81"') + LOADED, GRAVITY, LOADED),
+    "gravity compensation": Case(after(TIP, LOAD.format('gravcomp="0.5"')), "gravity compensation", LOADED),
+    "position servo": actuator('<position joint="gamma" kp="0.3" kv="0.01"/>'),
+    "servo between sites": actuator(SERVO.format("shaft_tip"), ANCHORED),
+    "servo on the mount": actuator(SERVO.format("eye"), ANCHORED + EYE),
+    "bias of an actuator": actuator('<general joint="gamma" biastype="affine" biasprm="0.05 -0.2 0"/>'),
+    "damping of an actuator": actuator('<motor joint="gamma" damping="0.02"/>'),
+    "armature of an actuator": actuator('<motor joint="gamma" armature="0.001"/>'),
+    "actuator with a state": actuator(
+        '<general joint="gamma" dyntype="filter" dynprm="0.1" biastype="affine" biasprm="0.05"/>'
     ),
-    "gravity aslant": Case(
-        ((OPTION, f'{OPTION}gravity="5 0 -9.81" '), *after(TIP, LOAD.format(""))),
-        "gravity other than along -z",
-        after(TIP, LOAD.format("")),
+    "plugin": actuator(
+        '<plugin joint="gamma" actdim="1" instance="pid"/>', ((COMPILER, f"{PID}{COMPILER}"),), "plugin"
     ),
-    "gravity upwards": Case(
-        ((OPTION, f'{OPTION}gravity="0 0 9.81" '), *after(TIP, LOAD.format(""))),
-        "gravity other than along -z",
-        after(TIP, LOAD.format("")),
-    ),
-    "gravity compensation": Case(
-        after(TIP, LOAD.format('gravcomp="0.5"')), "gravity compensation", after(TIP, LOAD.format(""))
-    ),
-    "position servo": Case(actuator('<position joint="gamma" kp="0.3" kv="0.01"/>'), "actuator"),
-    "servo between sites": Case(
-        after(STATOR, ANCHOR)
-        + actuator('<position site="shaft_tip" refsite="anchor" kp="3" gear="1 0 0 0 0 0"/>'),
-        "actuator",
-    ),
-    "servo on the mount": Case(
-        after(STATOR, ANCHOR)
-        + after(MOUNT, '<site name="eye"/>')
-        + actuator('<position site="eye" refsite="anchor" kp="3" gear="1 0 0 0 0 0"/>'),
-        "actuator",
-    ),
-    "bias of an actuator": Case(
-        actuator('<general joint="gamma" biastype="affine" biasprm="0.05 -0.2 0"/>'), "actuator"
-    ),
-    "damping of an actuator": Case(actuator('<motor joint="gamma" damping="0.02"/>'), "actuator"),
-    "armature of an actuator": Case(actuator('<motor joint="gamma" armature="0.001"/>'), "actuator"),
-    "actuator with a state": Case(
-        actuator('<general joint="gamma" dyntype="filter" dynprm="0.1" biastype="affine" biasprm="0.05"/>'),
-        "actuator",
-    ),
-    "plugin": Case(
-        ((COMPILER, f"{PID}{COMPILER}"), *actuator('<plugin joint="gamma" actdim="1" instance="pid"/>')),
-        "plugin",
-    ),
-}  # fmt: skip
+}
 
 
 # What a user's file may hold beside its physics: it moves nothing, and keeps no file from being read.
+TUPLE = '<custom><tuple name="t"><element objtype="{}" objname="{}"/></tuple></custom>'
+
 IDLE = {
     "no flags": ((FLAGS, ""),),
     "no options": ((OPTION + 'timestep="0.0005">', "<option>"),),
     "keyframes": at_the_end('<keyframe><key name="tilted" qpos="0.1 0.2 0.3" qvel="1 2 3"/></keyframe>'),
-    "tuple of a site": at_the_end(
-        '<custom><tuple name="t"><element objtype="site" objname="shaft_tip"/></tuple></custom>'
-    ),
-    "tuple of the mount": at_the_end(
-        '<custom><tuple name="t"><element objtype="body" objname="payload"/></tuple></custom>'
-    ),
-    "tuple of a sensor": at_the_end(
-        '<custom><tuple name="t"><element objtype="sensor" objname="alpha_position"/></tuple></custom>'
-    ),
+    "tuple of a site": at_the_end(TUPLE.format("site", "shaft_tip")),
+    "tuple of the mount": at_the_end(TUPLE.format("body", "payload")),
+    "tuple of a sensor": at_the_end(TUPLE.format("sensor", "alpha_position")),
     "sensors of sites": at_the_end(
         '<sensor><framepos objtype="site" objname="shaft_tip"/><accelerometer site="shaft_tip"/></sensor>'
     ),
@@ -250,7 +212,10 @@ def box(sizes, mass):
 
 
 BALL_INSIDE = '<geom type="sphere" size="0.03" mass="0.5" {}/>'
-GRAINS = ((RING, RING + '<geom type="sphere" size="0.002" mass="1e-9"/>'),)  # rings must have a mass
+FORCED = (
+    (COMPILER, '<compiler inertiafromgeom="true" '),
+    (RING, RING + '<geom type="sphere" size="0.002" mass="1e-9"/>'),  # rings must have a mass
+)
 
 INERTIAS = {
     "sphere": ((INERTIAL, '<geom type="sphere" size="0.04" mass="1.5"/>'),),
@@ -258,16 +223,9 @@ INERTIAS = {
     "box and sphere": ((INERTIAL, box("0.03 0.04 0.045", 1.5) + BALL_INSIDE.format("")),),
     "axes in another order": ((INERTIAL, box("0.045 0.03 0.04", 1.5) + BALL_INSIDE.format("")),),
     "axes in a third order": ((INERTIAL, box("0.04 0.045 0.03", 1.5) + BALL_INSIDE.format("")),),
-    "by force": (
-        (COMPILER, '<compiler inertiafromgeom="true" '),
-        *GRAINS,
-        *after(INERTIAL, box("0.03 0.04 0.045", 1.5)),
-    ),
-    "by force, axes in another order": (
-        (COMPILER, '<compiler inertiafromgeom="true" '),
-        *GRAINS,
-        *after(INERTIAL, box("0.045 0.03 0.04", 1.5) + BALL_INSIDE.format("")),
-    ),
+    "by force": FORCED + after(INERTIAL, box("0.03 0.04 0.045", 1.5)),
+    "by force, axes in another order": FORCED
+    + after(INERTIAL, box("0.045 0.03 0.04", 1.5) + BALL_INSIDE.format("")),
     "full matrix": ((INERTIAL, '<inertial pos="0 0 0" mass="1" fullinertia="1e-3 3e-3 2.5e-3 0 0 0"/>'),),
 }
 
