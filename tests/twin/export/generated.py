@@ -42,8 +42,12 @@ class CPlant:
         groups = self.model.groups
         self.names = [name for quantity in self.model.parameters for name in quantity.names]
         self.parameters, self.x_start = np.empty(len(self.names)), np.empty(8 + 2 * groups)
-        self._c.st_plant_defaults(address(self.parameters), address(self.x_start))
         self._plant = np.zeros(len(self.x_start) + 3 + groups + 1)
+        self.reset()
+
+    def reset(self):
+        """Set the parameters and the state of the start."""
+        self._c.st_plant_defaults(address(self.parameters), address(self.x_start))
         self.start(self.x_start)
 
     @property

@@ -34,25 +34,21 @@ CASES = {
 }
 
 
-def recorded(changes):
-    """References and measurements of a run, and what its controller made of them."""
+def recorded_and_replayed(folder, changes, **settings):
+    """Shares and commands of a recorded run, and those of the C code for its references and measurements."""
     run = st.simulate("nutation", changes).telemetry
     reference = st.load("nutation", changes).trajectory.sample(run["t_s"])
-    return reference, run["q_rad"], run["qdot_rad_s"], run["current_command_A"], run["allocation_scale"]
-
-
-def replayed(controller, reference, angle, rate):
-    shares, commands = zip(*map(controller.tick, reference, angle, rate), strict=True)
-    return np.array(shares), np.array(commands)
+    controller = CController(folder, "nutation", changes, **settings)
+    ticks = zip(*map(controller.tick, reference, run["q_rad"], run["qdot_rad_s"]), strict=True)
+    shares, commands = map(np.array, ticks)
+    return run["allocation_scale"], run["current_command_A"], shares, commands
 
 
 @needs_c_compiler
 @pytest.mark.parametrize("case", CASES)
 def test_commands_are_those_of_the_recorded_run(case, tmp_path):
-    changes = RUN | CASES[case]
-    *given, command, share = recorded(changes)
+    share, command, shares, commands = recorded_and_replayed(tmp_path, RUN | CASES[case])
     assert (share < 1).any(), "the limit shall be active somewhere"
-    shares, commands = replayed(CController(tmp_path, "nutation", changes), *given)
     # Bound of the documentation. Rounding differs where the compiled tick fuses a product and a sum; a Kalman
     # filter multiplies it by its bandwidth, and an adaptive law accumulates it: some 1e-11 A of 1 A.
     np.testing.assert_allclose(commands, command, atol=1e-9)
@@ -63,9 +59,7 @@ def test_commands_are_those_of_the_recorded_run(case, tmp_path):
 @pytest.mark.parametrize("case", CASES)
 def test_single_precision_is_within_its_bound(case, tmp_path):
     changes = RUN | CASES[case] | {"nominal.current_limit_A": 8.0}
-    *given, command, _ = recorded(changes)
-    controller = CController(tmp_path, "nutation", changes, single=True)
-    _, commands = replayed(controller, *given)
+    _, command, _, commands = recorded_and_replayed(tmp_path, changes, single=True)
     # An angle of 1 rad is rounded to 6e-8; times bandwidths of 1e3 1/s and gains of 1e4 1/s² that is some
     # 0.1 A at 2e-3 kg·m² and 0.02 N·m/A, for laws that take rates from an estimator or an observer.
     bound = 0.15 if "estimator.kind" in changes or "afsm" in changes["controller.law"] else 1e-3
@@ -92,11 +86,14 @@ def test_a_start_erases_the_memory(tmp_path):
     controller = CController(tmp_path, "nutation", RUN | CASES["afsm"])
     generator = np.random.default_rng(0)
     motion = generator.uniform(-0.2, 0.2, (20, 5, 3))
-    first = [controller.tick(rows[:3], rows[3], rows[4])[1] for rows in motion]
+
+    def commands():
+        return [controller.tick(rows[:3], rows[3], rows[4])[1] for rows in motion]
+
+    first = commands()
     controller.start()
-    again = [controller.tick(rows[:3], rows[3], rows[4])[1] for rows in motion]
-    np.testing.assert_array_equal(first, again)
-    assert not np.array_equal(controller.tick(motion[0][:3], motion[0][3], motion[0][4])[1], first[0])
+    np.testing.assert_array_equal(first, commands())
+    assert not np.array_equal(commands()[0], first[0])
 
 
 @pytest.mark.parametrize(

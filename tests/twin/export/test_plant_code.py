@@ -1,6 +1,7 @@
 """C code of the plant against `plant.step` and `simulate`; its derivatives; sanitizers."""
 
 import subprocess
+from functools import cache
 
 import numpy as np
 import pytest
@@ -26,9 +27,19 @@ PROTOTYPE = {
 """General joint, scatter of poles and coils, a cable, warm magnets."""
 
 
-@pytest.fixture(params=[FRICTION, PROTOTYPE], ids=["ideal joint", "general joint"])
-def machine(request, tmp_path):
-    return CPlant(tmp_path, "nutation", request.param), plant.parameters("nutation", request.param)
+CHANGES = {"ideal joint": FRICTION, "general joint": PROTOTYPE}
+
+
+@pytest.fixture(scope="module")
+def started(tmp_path_factory):
+    """Return the plant of a name at its start; it is compiled once."""
+    compiled_plant = cache(lambda name: CPlant(tmp_path_factory.mktemp("plant"), "nutation", CHANGES[name]))
+
+    def start(name="ideal joint"):
+        compiled_plant(name).reset()
+        return compiled_plant(name)
+
+    return start
 
 
 def random_motion(generator):
@@ -36,8 +47,9 @@ def random_motion(generator):
 
 
 @needs_c_compiler
-def test_steps_are_those_of_the_plant_step(machine):
-    c_plant, parameters = machine
+@pytest.mark.parametrize("name", CHANGES)
+def test_steps_are_those_of_the_plant_step(started, name):
+    c_plant, parameters = started(name), plant.parameters("nutation", CHANGES[name])
     generator = np.random.default_rng(0)
     q, qdot = random_motion(generator)
     c_plant.set("lag_s", 0.0)  # the step takes the currents themselves, and the magnets stay as warm
@@ -56,8 +68,9 @@ def test_steps_are_those_of_the_plant_step(machine):
 
 
 @needs_c_compiler
-def test_directional_derivatives_are_exact(machine):
-    c_plant, _ = machine
+@pytest.mark.parametrize("name", CHANGES)
+def test_directional_derivatives_are_exact(started, name):
+    c_plant = started(name)
     generator = np.random.default_rng(1)
     x, u = c_plant.x_start.copy(), generator.uniform(-1, 1, 21)
     x[:3], x[3:6] = random_motion(generator)
@@ -76,10 +89,10 @@ def test_directional_derivatives_are_exact(machine):
 
 
 @needs_c_compiler
-def test_a_run_is_that_of_simulate(tmp_path):
+def test_a_run_is_that_of_simulate(started):
     changes = {**FRICTION, "disturbance.load": 1.0, "plant.engine": "lagrangian", "duration": 1.0}
     run = st.simulate("nutation", changes).telemetry
-    c_plant = CPlant(tmp_path, "nutation", changes)
+    c_plant = started()
     inputs = np.hstack([run["current_command_A"], run["disturbance_Nm"]])
     for row in range(len(inputs) - 1):
         assert c_plant.advance(np.ascontiguousarray(inputs[row]), 1e-3) == (0, pytest.approx(1e-3))
@@ -148,8 +161,8 @@ def test_leaving_the_range_and_diverging_end_a_step(tmp_path):
 
 
 @needs_c_compiler
-def test_a_step_that_is_no_multiple_is_divided_evenly(tmp_path):
-    c_plant = CPlant(tmp_path, "nutation", FRICTION)
+def test_a_step_that_is_no_multiple_is_divided_evenly(started):
+    c_plant = started()
     u = np.concatenate([np.linspace(-1, 1, 18), np.zeros(3)])
     c_plant.advance(u, 1.2e-3)  # three steps of 0.4 ms
     reached = c_plant.x.copy()
