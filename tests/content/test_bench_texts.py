@@ -114,7 +114,7 @@ SCRIPT = [
 def a_script_of_commands():
     """Status after each of some commands: what changed since the one before."""
     folder, lines = scratch("bench"), []
-    with bench() as made:
+    with bench(plant__end_stops__on=False) as made:
         before = {}
         for name, arguments, ticks in SCRIPT:
             given = {
@@ -280,7 +280,7 @@ def row(setting):
 
 def choices():
     """What the page of a bench offers."""
-    with bench(controller__law="pid") as made:
+    with bench(controller__law="pid", plant__end_stops__on=False) as made:
         offered = choices_of(made, scratch("bench_folder"))
         content = {
             "targets": {name: list(modes) for name, modes in offered.targets.items()},
