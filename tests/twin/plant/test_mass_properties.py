@@ -11,8 +11,6 @@ from spheretwin.models import actuator as actuators
 from spheretwin.models import mjcf
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.joint_chain import equations, read_chain
-from spheretwin.models.lagrangian import inertia_matrix
-from spheretwin.plant import lagrangian_rotor
 from spheretwin.plant.bristle_friction import (
     StictionSection,
     apply_bristles,
@@ -23,12 +21,14 @@ from spheretwin.plant.cable import CableSection
 from spheretwin.plant.friction import friction, slow_down
 from spheretwin.plant.lagrangian_rotor import LagrangianRotor
 from spheretwin.plant.mass_properties import MassSection, mass_errors, true_model
-from spheretwin.plant.mujoco_rotor import MujocoRotor, step
+from spheretwin.plant.mujoco_rotor import MujocoRotor
+from spheretwin.plant.plant_tick import step_rotor
 from spheretwin.session import Session
 from spheretwin.simulation import simulate
 from tests.models.test_joint_chain import full
+from tests.twin.plant import user_models as models
+from tests.twin.plant.motions import STEP_s
 
-STEP_S = 5e-4
 EVERYTHING = {
     "centre_m": (1e-3, -2e-3, 5e-4),
     "centre_error_m": 1e-3,
@@ -62,22 +62,19 @@ def rotor_of(changes):
     return assembly.rotor_of(config.scenario, config.files)
 
 
-def test_switched_off_nothing_general_is_in_the_plant(shipped):
-    assert mass_errors(MassSection(), 0) is None
-    assert shipped.has_ideal_joint
-    for engine in ("mujoco", "lagrangian"):
-        with Session(scenarios.load("hold", {"plant.engine": engine, "plant.payload_kg": 0.05})) as session:
-            plant = session._runtime._plant
-            assert plant.joint is plant.friction.chain is None
-            assert getattr(plant.rotor, "chain", None) is None
-
-
-def test_hinges_are_skewed_only_if_they_are(shipped):
-    for fields, skewed in (({"plant.mass.centre_m": [1e-3, 0.0, 0.0]}, False), (FIELDS, True)):
-        with Session(scenarios.load("hold", fields)) as session:
-            plant = session._runtime._plant
-            assert (plant.joint is not None) == skewed
-            assert plant.friction.chain is not None
+@pytest.mark.parametrize("engine", ["mujoco", "lagrangian"])
+@pytest.mark.parametrize(
+    ("fields", "general", "skewed"),
+    [({}, False, False), ({"plant.mass.centre_m": [1e-3, 0.0, 0.0]}, True, False), (FIELDS, True, True)],
+    ids=["ideal", "offset centre", "everything"],
+)
+def test_the_plant_has_general_parts_only_if_it_needs_them(engine, fields, general, skewed):
+    changes = fields | {"plant.engine": engine, "plant.payload_kg": 0.05}
+    with Session(scenarios.load("hold", changes)) as session:
+        plant = session._runtime._plant
+    assert (plant.joint is not None) == skewed
+    assert (plant.friction.chain is not None) == general
+    assert (getattr(plant.rotor, "chain", None) is not None) == (general and engine == "lagrangian")
 
 
 def test_inertia_of_the_rotor_upright_is_the_sum_of_its_parts(actuator, shipped):
@@ -129,37 +126,24 @@ def test_the_stream_of_a_quantity_does_not_depend_on_the_others():
     assert not np.any(other.axis_offset_m == alone.axis_offset_m)
 
 
-def test_an_offset_centre_hangs_down_and_weighs_m_g_r(shipped):
-    chain = chain_of(shipped, MassSection(centre_m=(1e-3, 0.0, 0.0)))
-    # The weight pulls the side of +x down, which turns beta upward: a negative torque holds it.
-    _, bias = equations(chain, (0.0,) * 3, (0.0,) * 3)
-    np.testing.assert_allclose(bias, [0, -1.6 * 9.81 * 1e-3, 0], rtol=0, atol=1e-15)
-    rotor = rotor_of({"plant.mass.centre_m": [1e-3, 0.0, 0.0]})  # the data hold addresses within it
-    plant = rotor.start(np.zeros(3), np.zeros(3))
-    for _ in range(20):
-        step(plant)
-    # beta = (m g r / J) t² / 2 at first; the gravity torque changes with cos(beta), in 1e-5 of it.
-    expected = 0.5 * 1.6 * 9.81e-3 / (2.176e-3 + 1.6e-6) * (20 * STEP_S) ** 2
-    assert plant.q[1] == pytest.approx(expected, rel=1e-4)
+def assert_same_steps(first, second, start):
+    """Compare 400 steps of a rotor of MuJoCo and one of the equations of motion."""
+    data = [rotor.start(*map(np.array, start)) for rotor in (first, second)]
+    for one in data:
+        one.torque_q[:] = 0.02, -0.05, 0.03
+        for _ in range(400):
+            step_rotor(one)
+    # Rounding over 400 steps of the same method, on rates of some rad/s.
+    np.testing.assert_allclose(data[1].q, data[0].q, rtol=0, atol=1e-12)
+    np.testing.assert_allclose(data[1].qdot, data[0].qdot, rtol=0, atol=1e-11)
 
 
 @pytest.mark.parametrize("payload_kg", [0.0, 0.05])
 def test_engines_agree_step_by_step(actuator, shipped, payload_kg):
-    errors, start = (
-        mass_errors(MassSection(**EVERYTHING), 3),
-        (np.array([0.4, -0.3, 0.2]), np.array([1.0, 2, -3])),
-    )
-    engine = MujocoRotor(shipped, STEP_S, "RK4", 0.2, payload_kg, 9.81, errors)
-    chain = read_chain(engine.model)
-    first, second = engine.start(*start), LagrangianRotor(actuator, STEP_S, chain=chain).start(*start)
-    for data in (first, second):
-        data.torque_q[:] = 0.02, -0.05, 0.03
-    for _ in range(400):
-        step(first)
-        lagrangian_rotor.step(second)
-    # Rounding over 400 steps of the same method, on rates of some rad/s.
-    np.testing.assert_allclose(second.q, first.q, rtol=0, atol=1e-12)
-    np.testing.assert_allclose(second.qdot, first.qdot, rtol=0, atol=1e-11)
+    errors = mass_errors(MassSection(**EVERYTHING), 3)
+    engine = MujocoRotor(shipped, STEP_s, "RK4", 0.2, payload_kg, 9.81, errors)
+    equations_of_motion = LagrangianRotor(actuator, STEP_s, chain=read_chain(engine.model))
+    assert_same_steps(engine, equations_of_motion, ([0.4, -0.3, 0.2], [1.0, 2.0, -3.0]))
 
 
 SMOOTH = {"controller.law": "pd", "disturbance.load": 0.5, "duration": 1.0}
@@ -193,13 +177,17 @@ def test_closed_loops_on_both_engines_agree(bearings):
     assert np.abs(ideal - first).max() > 1e-3
 
 
+@pytest.mark.uncompiled
 def test_true_orientation_drives_the_coils():
     # The torque of the coils is that of a pose with the orientation of the tilted joint.
-    tilt = {"plant.mass.axis_tilt_rad": ((0.0, 0.0), (0.0, 0.03), (0.0, 0.0)), "plant.engine": "lagrangian"}
-    changes = {"controller.law": "pd", "duration": 0.05, "plant.initial_rad": [0.2, 0.5, 0.3]}
-    tables = [simulate(scenarios.load("hold", changes | more)).telemetry for more in ({}, tilt)]
-    same, other = (table["torque_Nm"][0] for table in tables)
-    np.testing.assert_array_equal(tables[0]["current_command_A"][0], tables[1]["current_command_A"][0])
+    tilt = {"plant.mass.axis_tilt_rad": ((0.0, 0.0), (0.0, 0.03), (0.0, 0.0))}
+    changes = {"controller.law": "pd", "plant.engine": "lagrangian", "plant.initial_rad": [0.2, 0.5, 0.3]}
+    rows = []
+    for more in ({}, tilt):
+        with Session(scenarios.load("hold", changes | more)) as session:
+            rows.append(session.advance(1))
+    np.testing.assert_array_equal(*(row["current_command_A"][0] for row in rows))
+    same, other = (row["torque_Nm"][0] for row in rows)
     # First order in the tilt of 0.03 rad times sin(beta).
     assert 1e-3 < np.linalg.norm(other - same) / np.linalg.norm(same) < 0.5
 
@@ -208,7 +196,7 @@ def test_friction_gains_no_energy_on_a_general_joint(shipped):
     chain = chain_of(shipped, MassSection(**EVERYTHING))
     generator = np.random.default_rng(2)
     for coulomb in (1e-3, 1.0, 1e3):
-        stage = friction(np.full(3, coulomb), np.full(3, 1e-3), 0.01, np.full(3, 2e-3), STEP_S, chain)
+        stage = friction(np.full(3, coulomb), np.full(3, 1e-3), 0.01, np.full(3, 2e-3), STEP_s, chain)
         for _ in range(100):
             q, qdot, torque = generator.uniform(-1.3, 1.3, 3), generator.normal(size=3), np.zeros(3)
             M, before = full(equations(chain, tuple(q), (0.0,) * 3)[0]), qdot.copy()
@@ -217,14 +205,14 @@ def test_friction_gains_no_energy_on_a_general_joint(shipped):
             assert qdot @ M @ qdot <= before @ M @ before * (1 + 1e-12)
             assert before @ M @ qdot >= -1e-12 * (before @ M @ before)
             # The mean torque over the step is the change of momentum.
-            size = 1e-12 * np.abs(M @ before).max() / STEP_S
-            np.testing.assert_allclose(torque * STEP_S, M @ (qdot - before), rtol=0, atol=size * STEP_S)
+            size = 1e-12 * np.abs(M @ before).max() / STEP_s
+            np.testing.assert_allclose(torque * STEP_s, M @ (qdot - before), rtol=0, atol=size * STEP_s)
 
 
 def test_static_friction_gains_no_energy_on_a_general_joint(shipped):
     chain = chain_of(shipped, MassSection(**EVERYTHING), gravity_m_s2=0.0)
     section = StictionSection(on=True)
-    stage = bristle_friction(section, (5e-3,) * 3, CableSection(), np.full(3, 2e-3), STEP_S, chain)
+    stage = bristle_friction(section, (5e-3,) * 3, CableSection(), np.full(3, 2e-3), STEP_s, chain)
     q, torque = np.array([0.3, -0.4, 0.5]), np.zeros(3)
     M = full(equations(chain, tuple(q), (0.0,) * 3)[0])
     qdot = np.array([0.2, -0.1, 0.15])
@@ -239,8 +227,8 @@ def test_static_friction_gains_no_energy_on_a_general_joint(shipped):
         middle = np.array([0.3, -0.4, 0.5])
         torque[:] = 0.0
         begin_bristles(stage, middle, q, qdot, torque)
-        qdot += STEP_S * np.linalg.solve(M, torque)
-        q += 0.5 * STEP_S * (qdot + start_qdot)
+        qdot += STEP_s * np.linalg.solve(M, torque)
+        q += 0.5 * STEP_s * (qdot + start_qdot)
         apply_bristles(stage, middle, start_qdot, start_qdot, q, qdot)
         assert energy() <= last + 1e-12 * start
         last = energy()
@@ -264,18 +252,12 @@ def test_impossible_values_are_refused_in_one_line(fields, text):
     assert "\n" not in str(caught.value)
 
 
-def test_a_ring_needs_a_body(shipped, tmp_path):
-    text = actuators.MJCF_PATH.read_text(encoding="utf-8")
-    text = text.replace('meshdir="assets"', f'meshdir="{actuators.FOLDER / "assets"}"')
-    beta, start = (
-        '<joint name="beta" class="tilt_hinge" axis="0 1 0"/>',
-        text.index('<body name="inner_ring">'),
+def test_a_ring_needs_a_body(tmp_path):
+    start, stop = (models.TEXT.index(f'<body name="{name}">') for name in ("inner_ring", "rotor"))
+    merged = models.TEXT[:start] + models.TEXT[stop:].replace("</body>", "", 1)
+    (path := tmp_path / "merged.xml").write_text(
+        merged.replace('<joint name="gamma"', models.BETA + '<joint name="gamma"'), encoding="utf-8"
     )
-    stop = text.index('<body name="rotor">')
-    merged = text[:start] + text[stop:].replace("</body>", "", 1).replace(
-        '<joint name="gamma"', beta + '<joint name="gamma"'
-    )
-    (path := tmp_path / "merged.xml").write_text(merged, encoding="utf-8")
     assert mujoco.MjModel.from_xml_path(str(path)).nv == 3
     ring = {"plant.mass.ring_inertia_kg_m2": [[0.0] * 3, [1e-4] * 3], "plant.mjcf": str(path)}
     with pytest.raises(InputError, match="received one without a ring at hinge beta"):
@@ -283,13 +265,12 @@ def test_a_ring_needs_a_body(shipped, tmp_path):
 
 
 def test_a_file_and_the_section_give_the_same_machine(shipped, tmp_path, actuator):
-    text = actuators.MJCF_PATH.read_text(encoding="utf-8")
-    text = text.replace('meshdir="assets"', f'meshdir="{actuators.FOLDER / "assets"}"')
-    inertial = '<inertial pos="0 0 0" mass="1.6" diaginertia="2.219e-3 2.176e-3 2.256e-3"/>'
-    moved = inertial.replace("0 0 0", "1e-3 2e-3 -1e-3")
-    moved = moved.replace("diaginertia", "fullinertia").replace('2.256e-3"', '2.256e-3 1e-4 -5e-5 2e-5"')
-    text = text.replace(inertial, moved).replace('axis="0 1 0"', 'axis="0.02 1 -0.01" pos="1e-4 0 2e-4"')
-    (path := tmp_path / "moved.xml").write_text(text, encoding="utf-8")
+    moved = models.INERTIAL.replace("0 0 0", "1e-3 2e-3 -1e-3").replace("diaginertia", "fullinertia")
+    edits = (
+        (models.INERTIAL, moved.replace('2.256e-3"', '2.256e-3 1e-4 -5e-5 2e-5"')),
+        ('axis="0 1 0"', 'axis="0.02 1 -0.01" pos="1e-4 0 2e-4"'),
+    )
+    (path := tmp_path / "moved.xml").write_text(models.edited(edits), encoding="utf-8")
     section = MassSection(
         centre_m=(1e-3, 2e-3, -1e-3),
         products_kg_m2=(1e-4, -5e-5, 2e-5),
@@ -307,27 +288,23 @@ def test_a_file_and_the_section_give_the_same_machine(shipped, tmp_path, actuato
     np.testing.assert_allclose(actuators.load(path).inertia, expected, rtol=1e-12)
 
 
-def test_a_payload_off_the_axis_is_computed_by_the_equations_of_motion(shipped, tmp_path):
-    text = actuators.MJCF_PATH.read_text(encoding="utf-8")
-    text = text.replace('meshdir="assets"', f'meshdir="{actuators.FOLDER / "assets"}"')
-    text = text.replace('<body name="payload" pos="0 0 0.10">', '<body name="payload" pos="0.01 0.02 0.10">')
-    (path := tmp_path / "aside.xml").write_text(text, encoding="utf-8")
-    changes = SMOOTH | {"plant.mjcf": str(path), "plant.payload_kg": 0.05, "duration": 0.5}
-    tables = [
-        simulate(scenarios.load("nutation", changes | {"plant.engine": engine})).telemetry["q_rad"]
-        for engine in ("mujoco", "lagrangian")
-    ]
-    np.testing.assert_allclose(tables[1], tables[0], rtol=0, atol=1e-9)  # as in the cross-check
+def test_a_payload_off_the_axis_is_computed_by_the_equations_of_motion(tmp_path):
+    edits = (('<body name="payload" pos="0 0 0.10">', '<body name="payload" pos="0.01 0.02 0.10">'),)
+    (path := tmp_path / "aside.xml").write_text(models.edited(edits), encoding="utf-8")
+    changes = {"plant.mjcf": str(path), "plant.payload_kg": 0.05}
+    rotors = [rotor_of(changes | {"plant.engine": engine}) for engine in ("mujoco", "lagrangian")]
+    assert_same_steps(*rotors, ([0.4, -0.3, 0.2], [1.0, 2.0, -3.0]))
 
 
+@pytest.mark.uncompiled
 def test_a_change_during_the_run_acts_and_a_snapshot_restores_it():
     with Session(scenarios.load("hold", {"plant.engine": "lagrangian"})) as session:
-        session.advance(10)
+        session.advance(2)
         session.set("plant.mass.centre_m", [2e-3, 0.0, 0.0])
         snapshot = session.snapshot()
-        first = session.advance(50).values.copy()
+        first = session.advance(10).values.copy()
         session.restore(snapshot)
-        np.testing.assert_array_equal(session.advance(50).values, first)
+        np.testing.assert_array_equal(session.advance(10).values, first)
         assert np.abs(first).max() > 0
 
 
@@ -335,9 +312,3 @@ def test_a_linear_model_needs_an_ideal_joint():
     with pytest.raises(InputError, match=r"expected an ideal joint, received plant\.mass"):
         linearise(scenarios.load("hold", {"plant.mass.centre_m": [1e-3, 0.0, 0.0]}))
     linearise(scenarios.load("hold", {"plant.mass.centre_m": [1e-3, 0.0, 0.0]}), nominal=True)
-
-
-def test_ideal_inertia_matrix_is_the_closed_form_s(actuator, shipped):
-    np.testing.assert_allclose(
-        upright(read_chain(shipped.bare)), inertia_matrix(np.zeros(3), actuator.inertia), rtol=0, atol=1e-14
-    )
