@@ -1,8 +1,11 @@
-"""Calls of the command line in the process of the test."""
+"""Calls of the command line in the process of the test, and processes of their own."""
 
 import contextlib
 import io
 import json
+import signal
+import subprocess
+import sys
 from typing import NamedTuple
 
 from spheretwin import cli
@@ -48,3 +51,18 @@ def refusal(*arguments):
     assert message.isprintable()
     assert len(message) < LONGEST_LINE + 20
     return message
+
+
+COMMAND = [sys.executable, "-m", "spheretwin"]
+
+
+def started(*arguments, **options):
+    """Start the command with the default handlers of signals, as a shell in the foreground does."""
+    command, pipe = [*COMMAND, *map(str, arguments)], subprocess.PIPE
+    options = {"text": True, "preexec_fn": _default_handlers, **options}
+    return subprocess.Popen(command, stdout=pipe, stderr=pipe, **options)
+
+
+def _default_handlers():
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, signal.SIG_DFL)

@@ -20,9 +20,9 @@ from spheretwin.cli import bench
 from spheretwin.models.base.extras import install_command
 from spheretwin.models.telemetry.table import read_parquet
 from spheretwin.viz.bench.page import Page
-from tests.twin.cli.calls import call, refusal
+from tests.twin.cli.calls import call, refusal, started
 
-COMMAND = (sys.executable, "-m", "spheretwin", "bench", "hold", "--plant.engine", "lagrangian")
+BENCH = ("bench", "hold", "--plant.engine", "lagrangian")
 
 
 def test_a_port_in_use_is_told_in_one_line():
@@ -30,17 +30,15 @@ def test_a_port_in_use_is_told_in_one_line():
         taken.bind(("127.0.0.1", 0))
         taken.listen()
         port = taken.getsockname()[1]
-        message = refusal(*COMMAND[3:], "--no-browser", "--port", port)
+        message = refusal(*BENCH, "--no-browser", "--port", port)
     assert message.startswith(f"bench: expected a free port, received {port}")
 
 
 def test_ctrl_c_ends_it_and_what_was_recorded_is_kept(tmp_path):
     recording = tmp_path / "bench.rrd"
-    with subprocess.Popen(
-        [*COMMAND, "--no-browser", "--port", "0", "--record", str(recording)],
-        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
-        env={**os.environ, "PYTHONWARNINGS": "error"},
-    ) as process:  # fmt: skip
+    environment = {**os.environ, "PYTHONWARNINGS": "error"}
+    arguments = [*BENCH, "--no-browser", "--port", "0", "--record", recording]
+    with started(*arguments, env=environment) as process:
         address = process.stdout.readline().split()[1]
         assert address.startswith("http://127.0.0.1:")
         with pytest.raises(urllib.error.HTTPError) as unauthorised:
@@ -84,7 +82,7 @@ def test_a_browser_is_opened_at_the_printed_address_unless_it_is_not_to(monkeypa
     monkeypatch.setattr(bench, "Operators", operators)
     monkeypatch.setattr(Page, "show", lambda page, ended: None)
     monkeypatch.setattr(bench.webbrowser, "open", lambda file: opened.append(redirection(file)))
-    code, out, err = call(*COMMAND[3:], "--port", "0", *flags)
+    code, out, err = call(*BENCH, "--port", "0", *flags)
     address = re.fullmatch(r"bench: (http://127\.0\.0\.1:\d+/\?token=[\w-]+) \(Ctrl-C ends it\)\n", out)[1]
     assert not list(Path.home().glob("bench-*.html"))
     assert opened == ([] if flags else [(address, 0o600)])

@@ -13,22 +13,9 @@ import pytest
 
 from spheretwin.models.base import cache
 from spheretwin.models.telemetry.table import read_parquet
-from tests.twin.cli.calls import call
-
-COMMAND = [sys.executable, "-m", "spheretwin"]
-
+from tests.twin.cli.calls import COMMAND, call, started
 
 INSTALLED = str(Path(sys.executable).with_name("spheretwin"))
-
-
-def started(*arguments):
-    command, pipe = [*COMMAND, *map(str, arguments)], subprocess.PIPE
-    return subprocess.Popen(command, stdout=pipe, stderr=pipe, text=True, preexec_fn=_heed_ctrl_c)
-
-
-def _heed_ctrl_c():
-    """As from a terminal, although tests that a shell runs in the background are told to ignore it."""
-    signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 def test_a_process_prints_a_table_and_writes_the_bytes_of_a_call(tmp_path):

@@ -2,16 +2,12 @@
 
 import json
 import signal
-import subprocess
-import sys
 
 import pytest
 
-from spheretwin import cli
 from spheretwin.models.base.files import OPEN_FILES
 from spheretwin.models.telemetry.table import read_parquet
-
-COMMAND = [sys.executable, "-m", "spheretwin"]
+from tests.twin.cli.calls import call, started, succeeded
 
 # Each law says on stderr that it hangs: tests wait for that line. Only the first chunk of 1 s is finished.
 LAWS = """
@@ -66,19 +62,6 @@ def laws(tmp_path):
     return path
 
 
-def started(*arguments):
-    """Start the command with the default handlers, as a shell in the foreground does."""
-    command = [*COMMAND, *map(str, arguments)]
-    return subprocess.Popen(
-        command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, preexec_fn=_default_handlers
-    )
-
-
-def _default_handlers():
-    for number in CODES:
-        signal.signal(number, signal.SIG_DFL)
-
-
 def line_with(process, text):
     """Read lines of stderr until one has a text."""
     for line in process.stderr:
@@ -103,7 +86,7 @@ def ended(process, number):
     return stderr.splitlines()[1:]
 
 
-def test_a_compiled_law_that_never_returns_ends_by_the_second_signal(laws, tmp_path, capfd):
+def test_a_compiled_law_that_never_returns_ends_by_the_second_signal(laws, tmp_path):
     telemetry, recording = tmp_path / "run.parquet", tmp_path / "run.rrd"
     outputs = ["--telemetry", telemetry, "--record", recording]
     lines = ended(
@@ -114,9 +97,7 @@ def test_a_compiled_law_that_never_returns_ends_by_the_second_signal(laws, tmp_p
         assert not target.exists()
         complaint, _, command = line.partition(": spheretwin ")
         assert complaint == f"spheretwin: not complete: {target}; 1000 rows can be recovered"
-        code, printed = cli.main(command.split()), capfd.readouterr()
-        assert (code, printed.err) == (0, "")
-        assert "recovered 1000 rows, 1.000 s of the run" in printed.out
+        assert "recovered 1000 rows, 1.000 s of the run" in succeeded(*command.split())
     assert len(read_parquet(telemetry)[0]) == 1000
 
 
@@ -162,6 +143,6 @@ def test_rows_that_never_return_end_by_the_second_signal_and_the_study_goes_on(l
 
 def test_files_that_are_complete_are_not_named(tmp_path):
     before = list(OPEN_FILES.partial())
-    outputs = ["--telemetry", str(tmp_path / "run.parquet"), "--record", str(tmp_path / "run.rrd")]
-    assert cli.main(["simulate", "hold", "--duration", "0.01", "--json", *outputs]) == 0
+    outputs = ["--telemetry", tmp_path / "run.parquet", "--record", tmp_path / "run.rrd"]
+    assert call("simulate", "hold", "--duration", "0.01", "--json", *outputs).code == 0
     assert list(OPEN_FILES.partial()) == before

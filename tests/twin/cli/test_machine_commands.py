@@ -4,7 +4,6 @@ import json
 import os
 import signal
 import subprocess
-import sys
 
 import numpy as np
 import pytest
@@ -12,7 +11,7 @@ import pytest
 from spheretwin.cli import drive, machine
 from spheretwin.models.telemetry.table import read_parquet
 from tests.requirements import needs_posix
-from tests.twin.cli.calls import call
+from tests.twin.cli.calls import call, started
 from tests.twin.machine.link.lines import MEASUREMENT, command
 from tests.waiting import UNLIMITED_S
 
@@ -26,10 +25,7 @@ def test_both_verbs_write_their_files_in_real_time(tmp_path):
     flags = ["--duration", "0.3", "--json", "--timeout-ms", str(1000 * UNLIMITED_S)]
     files = ["--telemetry", names["d.parquet"], "--record", names["d.rrd"], "--log", names["log.parquet"]]
     own = ["udp://:0", "--idle-s", "600", "--real-time", "--telemetry", str(names["m.parquet"])]
-    with subprocess.Popen(
-        [sys.executable, "-m", "spheretwin", *MACHINE, *own, *flags],
-        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
-    ) as process:  # fmt: skip
+    with started(*MACHINE, *own, *flags) as process:
         address = f"udp://:{process.stderr.readline().strip().rpartition(':')[2]}"
         arm = ["--machine", address, "--arm", "--ramp-s", "0.1"]
         result = call("drive", "sinusoid", *arm, *flags, *files)
@@ -67,14 +63,14 @@ def test_frames_through_a_pipe():
     frames = b"".join(
         [command(1, flags=2), *(command(i, current=0.5) for i in range(2, 12)), command(12, flags=4)]
     )
-    done = subprocess.run(
-        [sys.executable, "-m", "spheretwin", *MACHINE, "-", "--duration", "1"],
-        input=frames, capture_output=True, check=False, env={**os.environ, "COLUMNS": "200"},
-    )  # fmt: skip
-    assert done.returncode == 1
-    assert b"interrupted, the controller ended the run" in done.stderr
+    environment = {**os.environ, "COLUMNS": "200"}
+    pipe = {"stdin": subprocess.PIPE, "text": False, "env": environment}
+    with started(*MACHINE, "-", "--duration", "1", **pipe) as process:
+        out, err = process.communicate(frames)
+    assert process.returncode == 1
+    assert b"interrupted, the controller ended the run" in err
     size = MEASUREMENT.size
-    answers = [MEASUREMENT.decode(done.stdout[at : at + size]) for at in range(0, len(done.stdout), size)]
+    answers = [MEASUREMENT.decode(out[at : at + size]) for at in range(0, len(out), size)]
     assert [answer["echo"] for answer in answers[:-1]] == list(range(1, 12))
     assert np.any(answers[-1]["angle"])  # the currents have moved the rotor
 
