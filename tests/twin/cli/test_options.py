@@ -29,55 +29,32 @@ def received(monkeypatch):
     return parse
 
 
-PAGE = {"out": None, "figure_format": "svg", "json": False}
-MAGNETICS = {"mjcf": MJCF_PATH, "json": False, "verbose": False, "out": None}
-
 DEFAULTS = {
-    "simulate hold": {
-        "scenario": "hold", "record": None, "record_rate": None, "telemetry": None, "live": False,
-        "live_window": None, "view": None, "replay": None, "metric": [], "json": False, "fields": [],
-        "export_log": None, "export_truth": None, "twin": None,
-    },
-    "log check a": {
-        "files": [Path("a")], "columns": None, "scenario": "hold", "accept": [], "json": False,
-    },
+    "simulate hold": {"scenario": "hold"},
+    "log check a": {"files": [Path("a")], "scenario": "hold"},
     "bench": {
-        "scenario": "bench", "port": 8080, "no_browser": False, "hold_after": 2.0, "record": None,
-        "fields": [], "folder": Path(), "machine": None, "arm": False, "lockstep": False, "ramp_s": None,
-        "timeout_ms": None, "limit_current_A": None, "limit_angle_deg": None, "limit_rate_rad_s": None,
-        "limit_temperature_degC": None, "frame": "spheretwin",
+        "scenario": "bench", "port": 8080, "hold_after": 2.0, "folder": Path(), "frame": "spheretwin",
     },
-    "crosscheck": {**PAGE, "states": 10_000, "mjcf": MJCF_PATH, "verbose": False},
-    "reproduce figure6": {
-        **PAGE, "names": ["figure6"], "verbose": False, "seeds": None, "limit": None, "plant": None,
-    },
-    "sweep paper": {
-        **PAGE, "study": "paper", "threads": None, "engine": "local", "address": None, "limit": None,
-        "row": None, "optimise": False, "trials": None, "twin": None, "draws": None,
-    },
-    "review a": {
-        "runs": [Path("a")], "tolerance": None, "export": None, "merge": None, "figures": None,
-        "figure_format": "svg", "json": False,
-    },
+    "crosscheck": {"states": 10_000, "mjcf": MJCF_PATH, "figure_format": "svg"},
+    "reproduce figure6": {"names": ["figure6"], "figure_format": "svg"},
+    "sweep paper": {"study": "paper", "engine": "local", "figure_format": "svg"},
+    "review a": {"runs": [Path("a")], "figure_format": "svg"},
     "recover a --out b": {"file": Path("a"), "out": Path("b")},
-    "explain x y": {"subject": ["x", "y"], "all": False, "json": False},
-    "magnetics curve": {**MAGNETICS, "csv": None},
-    "magnetics check": {
-        **MAGNETICS, "csv": None, "poses": 15, "seed": 0, "figure_format": "svg",
-    },
-    "magnetics map": {
-        **MAGNETICS, "csv": None, "need": None, "largest_tilt": 57.0, "figure_format": "svg",
-    },
+    "explain x y": {"subject": ["x", "y"]},
+    "magnetics curve": {"mjcf": MJCF_PATH},
+    "magnetics check": {"mjcf": MJCF_PATH, "poses": 15, "seed": 0, "figure_format": "svg"},
+    "magnetics map": {"mjcf": MJCF_PATH, "largest_tilt": 57.0, "figure_format": "svg"},
 }  # fmt: skip
+"""Defaults of the options that are neither absent nor off nor empty."""
 
 
 @pytest.mark.parametrize("command", DEFAULTS)
 def test_options_have_their_defaults(received, command):
     options = received(*command.split())
-    own = {name: value for name, value in options.items() if name in DEFAULTS[command]}
-    assert own == DEFAULTS[command]
-    assert set(options) - set(own) <= {"run", "parser", "has_fields", "help", "fields"}
-    assert options["has_fields"] == (command.split()[0] in ("simulate", "bench"))
+    assert options.pop("has_fields") == (command.split()[0] in ("simulate", "bench"))
+    own = set(options) - {"run", "parser", "help"}
+    stated = {name: options[name] for name in own if options[name] not in (None, [])}
+    assert {name: value for name, value in stated.items() if value is not False} == DEFAULTS[command]
 
 
 GIVEN = [
@@ -115,12 +92,7 @@ def test_files_are_paths_and_switches_are_on(received, command):
         ("bench", "--port", ["0", "65535"], ["65536", "-1", "8e3"]),
         ("bench", "--hold-after", ["0", "2.5"], ["-0.1", "inf"]),
         ("crosscheck", "--states", ["1", "1000000"], ["0", "1000001"]),
-        (
-            "crosscheck",
-            "--figure-format",
-            ["pdf", "png", "pdf-one-column", "pdf-two-columns"],
-            ["PDF", "jpg"],
-        ),
+        ("crosscheck", "--figure-format", ["pdf", "png", "pdf-one-column", "pdf-two-columns"], ["PDF"]),
         ("reproduce all", "--seeds", ["1", "1000"], ["0", "1001", "²"]),
         ("reproduce all", "--limit", ["1", "1000"], ["0", "1001"]),
         ("sweep paper", "--threads", ["1", "1024"], ["0", "1025"]),
