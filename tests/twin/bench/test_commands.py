@@ -136,27 +136,29 @@ def test_the_last_command_is_executed_last(made):
     assert made.state().mode == "hold"
 
 
-def test_a_fixed_field_waits_for_the_reset(made):
-    made.advance(5)
-    done(made, "set", name="controller.period_s", value=2e-3)
-    done(made, "set", name="hardware", value="electronics")
-    assert made.state().pending == (("controller.period_s", "0.002"), ("hardware", '"electronics"'))
-    assert made.state().period_s == 1e-3
-    done(made, "reset")
-    assert (made.state().pending, made.state().period_s, made.state().tick) == ((), 2e-3, 0)
-    named = scenarios.load("sinusoid", {"hardware": "electronics"})
-    fields = {name: value for name, value, _ in made.fields()}
-    assert fields["estimator.kind"] == named.estimator.kind
-    assert fields["drive.supply_V"] == named.drive.supply_V
+def test_a_fixed_field_waits_for_the_reset():
+    with begun(plant__engine="mujoco") as made:
+        made.advance(5)
+        done(made, "set", name="controller.period_s", value=2e-3)
+        done(made, "set", name="hardware", value="electronics")
+        assert made.state().pending == (("controller.period_s", "0.002"), ("hardware", '"electronics"'))
+        assert made.state().period_s == 1e-3
+        done(made, "reset")
+        assert (made.state().pending, made.state().period_s, made.state().tick) == ((), 2e-3, 0)
+        named = scenarios.load("sinusoid", {"hardware": "electronics"})
+        fields = {name: value for name, value, _ in made.fields()}
+        assert fields["estimator.kind"] == named.estimator.kind
+        assert fields["drive.supply_V"] == named.drive.supply_V
 
 
-def test_faults_are_cleared_by_their_place_and_all_at_once(made):
-    for group, start_s in ((7, 0.0), (3, 9.0), (4, 9.0)):
-        done(made, "add_fault", fault={"target": f"coil.{group:02d}", "mode": "open", "start_s": start_s})
-    done(made, "clear_faults", place=0)
-    assert made.state().faults == ("coil.03 open from 9 s", "coil.04 open from 9 s")
-    done(made, "clear_faults")
-    assert made.state().faults == ()
+def test_faults_are_cleared_by_their_place_and_all_at_once():
+    with begun(plant__engine="mujoco") as made:
+        for group, start_s in ((7, 0.0), (3, 9.0), (4, 9.0)):
+            done(made, "add_fault", fault={"target": f"coil.{group:02d}", "mode": "open", "start_s": start_s})
+        done(made, "clear_faults", place=0)
+        assert made.state().faults == ("coil.03 open from 9 s", "coil.04 open from 9 s")
+        done(made, "clear_faults")
+        assert made.state().faults == ()
 
 
 def test_a_run_that_ends_leaves_a_bench_that_a_reset_brings_back(made):

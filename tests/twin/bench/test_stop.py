@@ -48,6 +48,7 @@ def test_the_bench_that_starts_without_arguments_can_be_left_without_currents():
         done(bench, "hold")
 
 
+@pytest.mark.uncompiled
 def test_end_stops_are_on_unless_the_scenario_says_otherwise():
     for changes, expected in (
         ({}, True),

@@ -2,6 +2,7 @@
 
 import json
 
+import numba
 import numpy as np
 import pytest
 
@@ -80,6 +81,7 @@ def test_each_reason_by_what_provokes_it(how, action, ticks):
 BAD = (np.nan, np.inf, -np.inf, 1e300)
 
 
+@numba.njit
 def no_number(t, reference, measurement, parameters, state, torque):
     for axis in range(3):
         torque[axis] = (
