@@ -82,3 +82,7 @@ def test_pdf_of_a_paper_has_its_width_and_the_svg_that_of_the_page(tmp_path, kin
     figure_width_in = Figure().get_size_inches()[0]
     svg = ElementTree.parse(tmp_path / "a" / "first.svg").getroot()
     assert svg.get("width") == f"{72 * figure_width_in:g}pt"
+
+
+def test_anchors_are_those_of_github_and_equal_headings_are_numbered():
+    assert markdown.anchors(["Gains, `pd`", "Errors", "Errors"]) == ["gains-pd", "errors", "errors-1"]
