@@ -5,7 +5,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from spheretwin.models.kinematics import rate_jacobian, rotation, rotor_rate_jacobian
-from spheretwin.models.lagrangian import gravity_torque, loaded_inertia
+from spheretwin.models.lagrangian import gravity_torque
 from spheretwin.models.magnetics import torque_matrix
 from tests.twin.passive_cases import ASKEW, ENGINES, FREE, PAYLOAD_KG, PD, STILL, table
 
@@ -100,20 +100,6 @@ def test_viscous_friction_slows_a_spin_by_one_share_each_half_step(engine, actua
     np.testing.assert_array_equal(run["friction_Nm"][:, :2], 0)
 
 
-def test_friction_opposes_the_motion_and_stays_below_its_level():
-    coulomb, viscous = np.array([4e-3, 3e-3, 2e-3]), np.array([1e-4, 2e-4, 3e-4])
-    changes = {"plant.coulomb_Nm": coulomb.tolist(), "plant.viscous_Nm_s": viscous.tolist()}
-    run = table(3000, changes=changes)
-    friction, rate = run["friction_Nm"], run["qdot_rad_s"]
-    moving = np.abs(rate) > 0.2  # twenty times the smoothing rate
-    assert moving.sum() > 3000
-    assert np.all((friction * rate)[moving] < 0)
-    # Of the level 1 / sqrt(1 + 1/400) at least; the rate a step later differs by some per cent.
-    level = coulomb + viscous * np.abs(rate)
-    assert np.all(np.abs(friction)[moving] > 0.97 * level[moving])
-    assert np.all(np.abs(friction) < 1.03 * level + 1e-12)
-
-
 LOADED = {
     "controller.law": "pd", "plant.payload_kg": PAYLOAD_KG, "plant.coulomb_Nm": [4e-3, 3e-3, 2e-3],
     "plant.viscous_Nm_s": [1e-4, 2e-4, 3e-4], "plant.friction_smoothing_rad_s": 0.1,
@@ -195,12 +181,3 @@ def test_friction_takes_the_energy_that_its_rows_say_to_second_order(engine, act
     left_J = [unbalanced_J(engine, step_s, actuator, {})[0] for step_s in steps]
     assert 1.8 < order_of(steps, left_J) < 2.2, left_J
     assert left_J[-1] < 1e-3 * abs(unbalanced_J(engine, 5e-4, actuator, {})[1]["friction"])
-
-
-def test_the_payload_s_inertia_is_the_lagrangian_s(actuator):
-    # The same kinetic energy from the inertia that the plant is built with.
-    inertia = loaded_inertia(1.2 * actuator.inertia, PAYLOAD_KG, float(actuator.payload_mount_m[2]))
-    q, qdot = np.array([0.3, -0.4, 0.5]), np.array([1.0, -2.0, 3.0])
-    w = rotor_rate_jacobian(q) @ qdot
-    lifted = PAYLOAD_KG * 9.81 * (rotation(q) @ actuator.payload_mount_m)[2]
-    assert 0.5 * w @ (inertia * w) == pytest.approx(energy_J(q, qdot, actuator, 0.2) - lifted, rel=1e-14)
