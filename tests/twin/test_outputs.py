@@ -90,30 +90,21 @@ def test_the_descriptor_that_signals_wake_is_the_one_of_before():
         os.close(writing)
 
 
-def test_files_that_begin_later_have_the_rows_and_the_log_from_then_on(tmp_path):
-    session = Session(scenarios.load("hold", {"duration": 0.05}))
-    files = Outputs(session, tmp_path / "x.rrd", tmp_path / "x.parquet", live=False, first_tick=20)
-    changes = [Change(tick, "disturbance.load", 1e-3 * tick) for tick in (10, 40)]
-    follow(session, 50, files.sinks, journal=changes)
-    assert files.close() == []
-    recording = read(tmp_path / "x.rrd")
-    for table in (recording.table, read_parquet(tmp_path / "x.parquet")[0]):
-        np.testing.assert_allclose(table["t_s"], np.arange(20, 50) * 1e-3, rtol=1e-12)
-    logged = [t_s for t_s, _, text in recording.log if "disturbance.load" in text]
-    assert logged == [pytest.approx(0.04)]
-
-
 @pytest.mark.parametrize("chunk", [1, 7, 50])
-def test_the_log_of_files_that_begin_later_is_the_same_for_any_chunks(tmp_path, monkeypatch, chunk):
-    """Faults and events before, exactly at and after the first tick of the files."""
+def test_files_that_begin_later_have_the_rows_and_the_log_from_then_on(tmp_path, monkeypatch, chunk):
+    """Faults, events and changes before, exactly at and after the first tick of the files."""
     times_s = (0.005, 0.019, 0.02, 0.03)
     faults = [{"target": f"coil.{i:02d}", "mode": "open", "start_s": t_s} for i, t_s in enumerate(times_s)]
     events = [{"t_s": t_s, "set": "disturbance.load", "value": t_s} for t_s in times_s]
     session = Session(scenarios.load("hold", {"duration": 0.05, "fault": faults, "event": events}))
     monkeypatch.setattr(simulations, "CHUNK_STEPS", chunk * session.scenario.substeps)
-    files = Outputs(session, tmp_path / "x.rrd", None, live=False, first_tick=20)
-    follow(session, 50, files.sinks)
+    files = Outputs(session, tmp_path / "x.rrd", tmp_path / "x.parquet", live=False, first_tick=20)
+    changes = [Change(round(1e3 * t_s), "disturbance.random_bound_Nm", t_s) for t_s in times_s]
+    follow(session, 50, files.sinks, journal=changes)
     assert files.close() == []
-    log = read(tmp_path / "x.rrd").log
-    for part in ("coil", "disturbance.load"):
-        assert [t_s for t_s, _, text in log if part in text] == pytest.approx([0.02, 0.03], abs=1e-9)
+    recording = read(tmp_path / "x.rrd")
+    for table in (recording.table, read_parquet(tmp_path / "x.parquet")[0]):
+        np.testing.assert_allclose(table["t_s"], np.arange(20, 50) * 1e-3, rtol=1e-12)
+    for part in ("coil", "disturbance.load", "disturbance.random_bound_Nm"):
+        logged = [t_s for t_s, _, text in recording.log if part in text]
+        assert logged == pytest.approx([0.02, 0.03], abs=1e-9)

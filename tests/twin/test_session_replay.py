@@ -55,13 +55,6 @@ def test_the_command_replays_a_run_whose_columns_change(part_rows, tmp_path, mon
     assert json.loads(capsys.readouterr().out)["status"] == "completed"
     table, _ = read_parquet(second)
     assert len(table) == 600
-    present = {name: ~np.isnan(table[name].reshape(600, -1)).any(axis=1) for name in
-               ("q_rad", "sliding_s", "switching_gain", "friction_Nm")}  # fmt: skip
-    ticks = np.arange(600)
-    np.testing.assert_array_equal(present["q_rad"], True)
-    np.testing.assert_array_equal(present["sliding_s"], (ticks < 200) | (ticks >= 450))
-    np.testing.assert_array_equal(present["switching_gain"], ticks < 200)
-    np.testing.assert_array_equal(present["friction_Nm"], ticks >= 300)
     bounds = np.cumsum([0, *map(len, parts)])
     for part, start, end in zip(parts, bounds, bounds[1:], strict=False):
         for signal in part.signals:

@@ -51,14 +51,10 @@ def test_pd_error_is_what_statics_says(sinusoid):
     assert np.all(np.abs(largest_error(sinusoid["pd", 1.0]) - static) < 0.06)
 
 
-@pytest.fixture(scope="module")
-def nutation():
-    return run("nutation")
-
-
-def test_nutation_is_tracked_from_rest(nutation):
-    assert nutation.status == "completed"
-    table = nutation.telemetry
+def test_nutation_is_tracked_from_rest():
+    finished = run("nutation")
+    assert finished.status == "completed"
+    table = finished.telemetry
     late = table["t_s"] > 1.0
     assert np.abs(table["error_rad"][late]).max() <= 0.03
     assert np.abs(table["current_A"]).max() <= 8.0
