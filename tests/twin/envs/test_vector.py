@@ -38,21 +38,11 @@ def test_an_episode_under_currents_is_that_of_simulate(tmp_path, changes):
     header = ",".join(["t_s", *(f"current_{j:02}_A" for j in range(18))])
     rows = np.column_stack([1e-3 * np.arange(ticks), currents])
     np.savetxt(file, rows, delimiter=",", header=header, comments="", fmt="%.17g")
-    fields = {
-        "plant.engine": "lagrangian",
-        "plant.step_s": 1e-3,
-        "duration": ticks * 1e-3,
-        "seed": 5,
-        **changes,
-    }
+    common = {"seed": 5, **changes}
+    fields = {"plant.engine": "lagrangian", "plant.step_s": 1e-3, "duration": ticks * 1e-3, **common}
     run = st.simulate("nutation", fields | {"manual.file": str(file)}).telemetry
-    env = TwinEnv(
-        scenario="nutation",
-        changes={"seed": 5, **changes},
-        actions="current",
-        episode_s=ticks * 1e-3,
-        variants=1,
-    )
+    settings = {"actions": "current", "episode_s": ticks * 1e-3, "variants": 1}
+    env = TwinEnv(scenario="nutation", changes=common, **settings)
     observed = [env.reset(seed=0)[0]] + [env.step(row / 8)[0] for row in currents]  # of 8 A
     assert np.abs(run["qdot_rad_s"]).max() > 1
     for name in ("q_rad", "qdot_rad_s", "error_rad"):
@@ -70,28 +60,21 @@ def test_an_episode_under_torques_is_that_of_single_steps():
     for row in actions:
         observations = env.step(row)[0]
     for i, scenario in enumerate(lanes):
-        disturbance = st.simulate(scenario).telemetry["disturbance_Nm"]
+        run = st.simulate(scenario).telemetry
         parameters = plant.parameters(scenario)
-        state = plant.State(*_start_of(scenario))
+        state = plant.State(run["q_rad"][0].copy(), run["qdot_rad_s"][0].copy())
         for tick in range(30):
-            state = plant.step(
-                state, np.zeros(18), disturbance[tick] - 0.5 * actions[tick, i], parameters, 1e-3
-            )
-        np.testing.assert_allclose(observations[i, PARTS["q_rad"]], state.q_rad, rtol=2e-7, atol=1e-7)
-        np.testing.assert_allclose(
-            observations[i, PARTS["qdot_rad_s"]], state.qdot_rad_s, rtol=2e-7, atol=1e-7
-        )
-
-
-def _start_of(scenario):
-    run = st.simulate(scenario).telemetry
-    return run["q_rad"][0].copy(), run["qdot_rad_s"][0].copy()
+            torque = run["disturbance_Nm"][tick] - 0.5 * actions[tick, i]
+            state = plant.step(state, np.zeros(18), torque, parameters, 1e-3)
+        for name, expected in state._asdict().items():
+            np.testing.assert_allclose(observations[i, PARTS[name]], expected, rtol=2e-7, atol=1e-7)
 
 
 def test_two_physics_steps_make_a_period_of_two_milliseconds():
-    changes = {"controller.period_s": 2e-3, "disturbance.load": 0.0}
-    coarse = TwinVectorEnv(1, "Hold", episode_s=0.02, variants=1, changes=changes)
-    fine = TwinVectorEnv(1, "Hold", episode_s=0.02, variants=1, changes={"disturbance.load": 0.0})
+    coarse, fine = (
+        TwinVectorEnv(1, "Hold", episode_s=0.02, variants=1, changes={"disturbance.load": 0.0, **changes})
+        for changes in ({"controller.period_s": 2e-3}, {})
+    )
     action = np.array([[0.3, -0.2, 0.1]])
     coarse.reset()
     fine.reset()
@@ -121,19 +104,19 @@ def test_rewards_are_the_sum_of_their_terms():
     assert env.reward_terms == REWARD_TERMS == tuple(reward)
 
 
-def run_to_the_end(env, action):
-    """Last step of an environment of one plant."""
-    env.reset(seed=0)
+def until_an_end(env, actions):
+    """Return the last step before a plant leaves its workspace."""
     for _ in range(10_000):
-        result = env.step(action)
-        if result[2].any() or result[3].any():
+        result = env.step(actions)
+        if result[2].any():
             return result
     raise AssertionError
 
 
 def test_a_rotor_that_leaves_its_workspace_terminates_the_episode():
     env = TwinVectorEnv(1, "Hold", **FALLING)
-    _, rewards, terminations, truncations, infos = run_to_the_end(env, np.array([[0.0, 1.0, 0.0]]))
+    env.reset(seed=0)
+    _, rewards, terminations, truncations, infos = until_an_end(env, np.array([[0.0, 1.0, 0.0]]))
     assert (terminations[0], truncations[0]) == (True, False)
     assert infos["status"][0] == "left_workspace"
     assert infos["reward_terms"][0, 3] == -100
@@ -152,29 +135,27 @@ def test_a_complete_episode_is_truncated_with_its_figures():
     assert infos["rms_error_rad"][0] == pytest.approx(np.sqrt(np.mean(np.square(errors))), rel=1e-6)
 
 
-def ending(mode, **more):
-    """Environment of two plants whose first leaves the workspace long before the end."""
-    env = TwinVectorEnv(2, "Hold", mode, **FALLING | more)
+PUSH = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 0.0]])
+
+
+def ending(mode):
+    """Environment of two plants whose first leaves the workspace long before the end, and its last step."""
+    env = TwinVectorEnv(2, "Hold", mode, **FALLING)
     env.reset(seed=0)
-    return env, np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 0.0]])
+    return env, until_an_end(env, PUSH)
 
 
-def until_an_end(env, actions):
-    for _ in range(10_000):
-        result = env.step(actions)
-        if result[2].any():
-            return result
-    raise AssertionError
+def start():
+    """First observation of an episode of these plants."""
+    return TwinVectorEnv(1, "Hold", **FALLING).reset(seed=0)[0][0]
 
 
 def test_next_step_starts_an_episode_anew_in_the_step_after_its_end():
-    env, actions = ending("NextStep")
-    last, _, terminations, _, _ = until_an_end(env, actions)
+    env, (last, _, terminations, _, _) = ending("NextStep")
     assert terminations.tolist() == [True, False]
-    start = TwinVectorEnv(1, "Hold", **FALLING).reset(seed=0)[0][0]
-    observations, rewards, terminations, truncations, infos = env.step(actions)
-    np.testing.assert_array_equal(observations[0], start)
-    assert not np.array_equal(last[0], start)
+    observations, rewards, terminations, truncations, infos = env.step(PUSH)
+    np.testing.assert_array_equal(observations[0], start())
+    assert not np.array_equal(last[0], start())
     assert rewards[0] == 0
     assert rewards[1] < 0
     assert not terminations.any()
@@ -183,28 +164,24 @@ def test_next_step_starts_an_episode_anew_in_the_step_after_its_end():
 
 
 def test_same_step_returns_the_start_and_keeps_the_last_observation():
-    env, actions = ending("SameStep")
-    other, _ = ending("NextStep")
-    expected = until_an_end(other, actions)
-    observations, rewards, terminations, _, infos = until_an_end(env, actions)
-    start = TwinVectorEnv(1, "Hold", **FALLING).reset(seed=0)[0][0]
-    np.testing.assert_array_equal(observations[0], start)
+    env, (observations, rewards, terminations, _, infos) = ending("SameStep")
+    _, expected = ending("NextStep")
+    np.testing.assert_array_equal(observations[0], start())
     np.testing.assert_array_equal(infos["final_obs"][0], expected[0][0])
     assert infos["_final_obs"].tolist() == [True, False]
     assert infos["final_info"]["status"][0] == "left_workspace"
     np.testing.assert_array_equal(rewards, expected[1])
     assert terminations.tolist() == [True, False]
-    assert not env.step(actions)[2].any()
+    assert not env.step(PUSH)[2].any()
 
 
 def test_disabled_holds_an_episode_until_it_is_reset():
-    env, actions = ending("Disabled")
-    last = until_an_end(env, actions)[0]
-    observations, rewards, terminations, _, _ = env.step(actions)
+    env, (last, *_) = ending("Disabled")
+    observations, rewards, terminations, _, _ = env.step(PUSH)
     assert terminations.tolist() == [True, False]
     assert rewards[0] == 0
     env.reset(options={"reset_mask": np.array([True, False])})
-    after, rewards, terminations, _, _ = env.step(actions)
+    after, rewards, terminations, _, _ = env.step(PUSH)
     assert not terminations.any()
     assert rewards[0] != 0
     assert abs(after[0, 7] - 1.0) < 1e-3
@@ -284,24 +261,17 @@ def test_settings_that_do_not_fit_are_refused(settings, message):
 
 
 @pytest.mark.parametrize(
-    ("actions", "message"),
-    [(np.zeros((2, 4)), r"shape \(2, 3\), received \(2, 4\)"), (np.full((2, 3), np.nan), "nan")],
+    ("method", "argument", "message"),
+    [
+        ("step", {"actions": np.zeros((2, 4))}, r"shape \(2, 3\), received \(2, 4\)"),
+        ("step", {"actions": np.full((2, 3), np.nan)}, "nan"),
+        ("reset", {"seed": [1]}, "expected 2 seeds, received 1"),
+        ("reset", {"options": {"mask": 1}}, "expected reset_mask of 2 booleans"),
+        ("reset", {"options": {"reset_mask": np.ones(3, bool)}}, "expected reset_mask of 2 booleans"),
+    ],
 )
-def test_actions_that_do_not_fit_are_refused(actions, message):
+def test_actions_and_resets_that_do_not_fit_are_refused(method, argument, message):
     env = TwinVectorEnv(2, "Hold", variants=1)
     env.reset()
     with pytest.raises(InputError, match=message):
-        env.step(actions)
-
-
-@pytest.mark.parametrize(
-    ("call", "message"),
-    [
-        ({"seed": [1]}, "expected 2 seeds, received 1"),
-        ({"options": {"mask": 1}}, "expected reset_mask of 2 booleans"),
-        ({"options": {"reset_mask": np.ones(3, bool)}}, "expected reset_mask of 2 booleans"),
-    ],
-)
-def test_resets_that_do_not_fit_are_refused(call, message):
-    with pytest.raises(InputError, match=message):
-        TwinVectorEnv(2, "Hold", variants=1).reset(**call)
+        getattr(env, method)(**argument)
