@@ -28,18 +28,24 @@ def compiled(text):
     return mujoco.MjModel.from_xml_string(text)
 
 
-def moved(model, q=(0.3, -0.2, 0.4), qdot=(3.0, 2.0, 1.0)):
+def forward(model, ctrl, q=(0.3, -0.2, 0.4), qdot=(3.0, 2.0, 1.0), **more):
+    """Return the data of a moving rotor after a forward computation."""
     data = mujoco.MjData(model)
-    data.qpos[:], data.qvel[:] = q, qdot
+    for name, values in {"ctrl": ctrl, "qpos": q, "qvel": qdot, **more}.items():
+        getattr(data, name)[:] = values
+    mujoco.mj_forward(model, data)
     return data
 
 
+def with_actuators(**attributes):
+    """The example with attributes of each actuator, without a range of its control."""
+    given = " ".join([ACTUATOR, *(f'{name}="{value}"' for name, value in attributes.items())])
+    return TEXT.replace(ACTUATOR, given).replace('ctrlrange="-8 8"', "")
+
+
 def test_gains_scale_the_torque_of_each_group(actuator):
-    gain = np.linspace(0.9, 1.1, 18)
-    model = compiled(configured(gain=" ".join(map(str, gain))))
-    data = moved(model)
-    data.ctrl[:] = current = np.linspace(-3, 3, 18)
-    mujoco.mj_forward(model, data)
+    gain, current = np.linspace(0.9, 1.1, 18), np.linspace(-3, 3, 18)
+    data = forward(compiled(configured(gain=" ".join(map(str, gain)))), current)
     expected = magnetics.torque_matrix(data.qpos, actuator) @ (gain * current)
     # Sums of 18 products below 0.1 N·m in another order.
     np.testing.assert_allclose(data.sensor("coil_torque").data, expected, rtol=0, atol=1e-15)
@@ -51,12 +57,10 @@ def test_a_curve_replaces_the_shipped_one(tmp_path):
     head = text.index("phi_deg,torque_Nm_per_A")
     halved = [f"{phi},{float(torque) / 2!r}" for phi, torque in (row.split(",") for row in text[head + 1 :])]
     curve.write_text("\n".join([text[head], *halved]))
-    torques = []
-    for model in (compiled(configured(curve=curve)), compiled(configured(gain=0.5))):
-        data = moved(model)
-        data.ctrl[:] = np.linspace(-3, 3, 18)
-        mujoco.mj_forward(model, data)
-        torques.append(data.qfrc_actuator.copy())
+    torques = [
+        forward(compiled(configured(**attributes)), np.linspace(-3, 3, 18)).qfrc_actuator
+        for attributes in ({"curve": curve}, {"gain": 0.5})
+    ]
     # The spline of halved samples is half of the spline, within its rounding.
     np.testing.assert_allclose(*torques, rtol=0, atol=1e-14)
 
@@ -67,21 +71,16 @@ def test_an_actuator_with_a_torque_field_has_its_torque():
     lines = "".join(f'<plugin name="group_{j}" {ACTUATOR}/>' for j in range(len(second.groups)))
     text = TEXT[:first] + f"<actuator>{lines}</actuator>" + TEXT[TEXT.index("</actuator>") + 11 :]
     text = text.replace(f"{actuators.MJCF_PATH}", f"{SECOND}/actuator.xml")
-    model = compiled(configured(text, curve=SECOND / "torque_field.csv"))
-    data = moved(model)
-    data.ctrl[:] = current = np.linspace(-1, 1, len(second.groups))
-    mujoco.mj_forward(model, data)
+    current = np.linspace(-1, 1, len(second.groups))
+    data = forward(compiled(configured(text, curve=SECOND / "torque_field.csv")), current)
     expected = magnetics.torque_matrix(data.qpos, second) @ current
     # Sums of 8 products below 0.1 N·m in another order.
     np.testing.assert_allclose(data.sensor("coil_torque").data, expected, rtol=0, atol=1e-15)
 
 
 def test_voltages_drive_currents_through_resistance_and_inductance():
-    text = TEXT.replace(ACTUATOR, f'{ACTUATOR} actdim="1"').replace('ctrlrange="-8 8"', "")
-    model = compiled(configured(text, input="voltage", resistance_ohm=2.0, inductance_H=0.5e-3))
-    data = moved(model)
-    data.act[:], data.ctrl[:] = np.linspace(-1, 1, 18), 12.0
-    mujoco.mj_forward(model, data)
+    text = configured(with_actuators(actdim=1), input="voltage", resistance_ohm=2.0, inductance_H=0.5e-3)
+    data = forward(compiled(text), 12.0, act=np.linspace(-1, 1, 18))
     emf_V = data.sensor("coil_emf").data
     # Quotients of about 2e4 A/s, rounded four times.
     np.testing.assert_allclose(data.act_dot, (12.0 - 2.0 * data.act - emf_V) / 0.5e-3, rtol=1e-14)
@@ -89,8 +88,7 @@ def test_voltages_drive_currents_through_resistance_and_inductance():
 
 
 def test_a_locked_rotor_reaches_the_current_of_ohm_s_law_exponentially():
-    text = TEXT.replace(ACTUATOR, f'{ACTUATOR} actdim="1"').replace('ctrlrange="-8 8"', "")
-    model = compiled(configured(text, input="voltage"))
+    model = compiled(configured(with_actuators(actdim=1), input="voltage"))
     model.opt.timestep = 1e-4
     model.dof_armature[:] = 1e9
     data, time_constant_s = mujoco.MjData(model), 0.9e-3 / 1.3
@@ -102,8 +100,7 @@ def test_a_locked_rotor_reaches_the_current_of_ohm_s_law_exponentially():
 
 
 def test_a_dyntype_makes_currents_follow_the_controls():
-    text = TEXT.replace(ACTUATOR, f'{ACTUATOR} dyntype="filter" dynprm="0.0007"')
-    model = compiled(text)
+    model = compiled(with_actuators(dyntype="filter", dynprm=0.0007))
     data = mujoco.MjData(model)
     data.ctrl[:] = 1.0
     mujoco.mj_step(model, data, nstep=2)
@@ -114,11 +111,9 @@ def test_a_dyntype_makes_currents_follow_the_controls():
 
 
 def test_controls_are_clamped_to_their_range():
-    model = compiled(TEXT.replace('ctrlrange="-8 8"', 'ctrlrange="-2 1"'))
-    data = mujoco.MjData(model)
-    data.ctrl[:] = np.linspace(-5, 5, 18)
-    mujoco.mj_forward(model, data)
-    np.testing.assert_array_equal(data.sensor("coil_current").data, np.clip(data.ctrl, -2, 1))
+    ctrl = np.linspace(-5, 5, 18)
+    data = forward(compiled(TEXT.replace('ctrlrange="-8 8"', 'ctrlrange="-2 1"')), ctrl)
+    np.testing.assert_array_equal(data.sensor("coil_current").data, np.clip(ctrl, -2, 1))
 
 
 INVALID = {

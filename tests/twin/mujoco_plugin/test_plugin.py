@@ -43,14 +43,13 @@ def test_torque_and_sensors_are_those_of_the_torque_matrix(model, actuator):
 @pytest.fixture(scope="module")
 def recorded():
     """Run on MuJoCo with currents that follow at once, and without torque of others."""
-    changes = {
-        "duration": 0.2,
-        "plant.modelling_error": 0.0,
-        "plant.modelling_torque_Nm": [0.0, 0.0, 0.0],
-        "disturbance.load": 0.0,
-        "disturbance.random_bound_Nm": 0.0,
-        "drive.time_constant_s": 0.0,
-    }
+    zero = (
+        "plant.modelling_error",
+        "disturbance.load",
+        "disturbance.random_bound_Nm",
+        "drive.time_constant_s",
+    )
+    changes = {"duration": 0.2, "plant.modelling_torque_Nm": [0.0, 0.0, 0.0], **dict.fromkeys(zero, 0.0)}
     return simulate("sinusoid", changes)
 
 
@@ -154,19 +153,14 @@ def test_memory_of_deleted_data_is_released(model):
     assert newest.qpos.shape == (3,)
 
 
-def test_the_launcher_opens_the_example_in_the_viewer(monkeypatch):
+@pytest.mark.parametrize(("arguments", "code", "lines"), [([], 0, 0), (["none.xml"], 2, 1)])
+def test_the_launcher_opens_the_example_or_reports_an_invalid_model_in_one_line(
+    monkeypatch, capsys, arguments, code, lines
+):
     opened = []
     monkeypatch.setattr(viewer, "launch", opened.append)
-    monkeypatch.setattr(sys, "argv", ["mujoco_plugin"])
+    monkeypatch.setattr(sys, "argv", ["mujoco_plugin", *arguments])
     with pytest.raises(SystemExit) as ended:
         runpy.run_module("spheretwin.mujoco_plugin", run_name="__main__")
-    assert ended.value.code == 0
-    assert opened[0].nu == 18
-
-
-def test_the_launcher_reports_an_invalid_model_in_one_line(monkeypatch, capsys, tmp_path):
-    monkeypatch.setattr(sys, "argv", ["mujoco_plugin", f"{tmp_path}/none.xml"])
-    with pytest.raises(SystemExit) as ended:
-        runpy.run_module("spheretwin.mujoco_plugin", run_name="__main__")
-    assert ended.value.code == 2
-    assert capsys.readouterr().err.count("\n") == 1
+    assert (ended.value.code, capsys.readouterr().err.count("\n")) == (code, lines)
+    assert [model.nu for model in opened] == ([] if code else [18])
