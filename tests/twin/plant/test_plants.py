@@ -6,16 +6,9 @@ import pytest
 from spheretwin import plant
 from spheretwin.models.base.errors import InputError
 from spheretwin.plant.plant_step import step
+from tests.twin.plant.test_plant_step import LOADED
 
 FRICTION = {"plant.coulomb_Nm": [2e-3, 5e-3, 0.0], "plant.viscous_Nm_s": [1e-4, 0.0, 2e-4]}
-LOADED = {
-    "plant.payload_kg": 0.05,
-    "plant.modelling_error": 0.3,
-    "plant.modelling_torque_Nm": [1e-3, 0.0, -2e-3],
-    "plant.cable.stiffness_Nm_rad": [0.02, 0.03, 0.01],
-    "plant.cable.neutral_rad": [0.2, 0.0, 0.1],
-    "plant.group_gain": np.linspace(0.97, 1.03, 18).tolist(),
-}
 SCATTER = {"plant.poles.gain_error": 0.05, "plant.coils.angle_error_rad": 5e-3}
 TILTED = {"plant.mass.axis_tilt_rad": [[0.02, 0.0], [0.0, 0.01], [0.0, 0.0]]}
 KINDS = {"ideal": {}, "friction": FRICTION, "loaded": FRICTION | LOADED, "scatter": LOADED | SCATTER}
@@ -70,13 +63,12 @@ def test_plants_of_different_kinds_move_as_alone():
     assert_equal(together(parameters, *case, 10), one_by_one(parameters, *case, 10))
 
 
-def test_torque_curves_of_different_plants_stay_apart(tmp_path):
+def test_torque_curves_of_different_plants_stay_apart():
     shipped = plant.parameters("tilt")
     stronger = shipped._replace(magnetics=shipped.magnetics._replace(table=1.1 * shipped.magnetics.table))
     parameters = [shipped, stronger, shipped, stronger]
     case = motion(4, seed=2)
-    reached = together(parameters, *case, 10)
-    assert_equal(reached, one_by_one(parameters, *case, 10))
+    assert_equal(together(parameters, *case, 10), one_by_one(parameters, *case, 10))
 
 
 def test_torques_on_the_hinges_act_as_disturbances_do():
@@ -128,40 +120,23 @@ def test_parameters_and_states_of_one_plant_are_set_between_steps():
 
 
 def test_values_of_all_plants_are_given_once():
-    parameters, (q, qdot, currents, disturbance) = plant.parameters("tilt"), motion(1, seed=7)
+    parameters, case = plant.parameters("tilt"), motion(1, seed=7)
     plants = plant.Plants(parameters, 18)
-    plants.set_state(q[0], qdot[0])
-    plants.step(currents[0], disturbance[0], dt)
-    expected = one_by_one([parameters], q, qdot, currents, disturbance, 1)
-    assert_equal(
-        (plants.q_rad, plants.qdot_rad_s), (np.repeat(expected[0], 18, 0), np.repeat(expected[1], 18, 0))
-    )
+    plants.set_state(case[0][0], case[1][0])
+    plants.step(case[2][0], case[3][0], dt)
+    expected = one_by_one([parameters], *case, 1)
+    assert_equal((plants.q_rad, plants.qdot_rad_s), np.repeat(expected, 18, axis=1))
 
 
 @pytest.mark.parametrize(
     ("call", "message"),
     [
         (lambda one: plant.Plants(one, 0), "expected at least one plant"),
-        (lambda one: plant.Plants([one, one], 2), "expected a count with one set of parameters, received 2"),
-        (
-            lambda one: plant.Plants(one, 2).step(np.zeros(17), np.zeros(3), dt),
-            "expected currents of 18 finite numbers, for all or for each of 2",
-        ),
-        (
-            lambda one: plant.Plants(one, 2).step(np.zeros(18), [0, np.nan, 0], dt),
-            "expected disturbance of 3 finite numbers",
-        ),
-        (
-            lambda one: plant.Plants(one, 2).step_torque(np.zeros((3, 3)), dt),
-            r"expected torque_q of 3 finite numbers, .* received an array of \(3, 3\)",
-        ),
-        (
-            lambda one: plant.Plants([one, _of_fewer_groups(one)]),
-            "expected 8 pole lines and 18 groups, received 8 and 12",
-        ),
+        (lambda one: plant.Plants([one, one], 2), "a count with one set of parameters, received 2"),
+        (lambda one: plant.Plants([one, _of_fewer_groups(one)]), "18 groups, received 8 and 12"),
     ],
 )
-def test_values_that_do_not_fit_are_refused(call, message):
+def test_plants_that_do_not_fit_are_refused(call, message):
     with pytest.raises(InputError, match=message):
         call(plant.parameters("tilt"))
 
@@ -170,3 +145,16 @@ def _of_fewer_groups(parameters):
     magnetics = parameters.magnetics
     fewer = magnetics._replace(group_axes=np.ascontiguousarray(magnetics.group_axes[:, :12]))
     return parameters._replace(magnetics=fewer, torque_gain=parameters.torque_gain[:12])
+
+
+@pytest.mark.parametrize(
+    ("method", "values", "message"),
+    [
+        ("step", (np.zeros(17), np.zeros(3)), "currents of 18 finite numbers, for all or for each of 2"),
+        ("step", (np.zeros(18), [0, np.nan, 0]), "expected disturbance of 3 finite numbers"),
+        ("step_torque", (np.zeros((3, 3)),), r"torque_q of 3 finite numbers, .* an array of \(3, 3\)"),
+    ],
+)
+def test_values_that_do_not_fit_are_refused(method, values, message):
+    with pytest.raises(InputError, match=message):
+        getattr(plant.Plants(plant.parameters("tilt"), 2), method)(*values, dt)
