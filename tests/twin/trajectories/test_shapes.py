@@ -13,13 +13,7 @@ from spheretwin.simulation import simulate
 from spheretwin.trajectories import SHAPES
 from spheretwin.trajectories.shapes import Chirp, Component, Hold, Multisine, Nutation, Sinusoid, Steps, Tilt
 
-POSES = "t_s,alpha_rad,beta_rad,gamma_rad\n0.5,0,0,0\n1.25,0.2,-0.1,1\n3,0.1,0.3,-1\n4.5,0,0,0.5\n"
-
-
-@pytest.fixture
-def poses(tmp_path):
-    (path := tmp_path / "poses.csv").write_text(POSES)
-    return path
+ZERO = (0.0, 0.0, 0.0)
 
 
 # --- exact solutions
@@ -119,10 +113,6 @@ def test_steps_hold_each_pose_from_its_time_on():
     np.testing.assert_array_equal(samples[:, 1:], 0.0)
 
 
-def test_a_step_at_0_is_there_from_the_first_tick():
-    assert Steps(times_s=(0.0,), angles_rad=((0.1, 0.2, 0.3),)).sample(np.zeros(1))[0, 0, 2] == 0.3
-
-
 # Periods and ticks whose product falls short of the decimal fraction by its rounding.
 @pytest.mark.parametrize(("period", "tick", "time"), [(7e-4, 17, 0.0119), (7e-4, 25, 0.0175)])
 def test_a_tick_whose_time_is_rounded_down_still_reaches_the_step(period, tick, time):
@@ -135,32 +125,18 @@ def test_a_tick_whose_time_is_rounded_down_still_reaches_the_step(period, tick, 
 # --- refusals
 
 
+# Bounds of single fields are in the approved schema of a scenario.
 @pytest.mark.parametrize(
     ("name", "fields", "complaint"),
     [
-        ("sinusoid", {"frequency_Hz": 0.0}, "frequency_Hz"),
-        ("chirp", {"start_frequency_Hz": 0.0}, "start_frequency_Hz"),
-        ("chirp", {"sweep_s": -1.0}, "sweep_s"),
-        ("chirp", {"sweep": "quadratic"}, "sweep"),
-        ("chirp", {"amplitude_rad": (1e5, 0.0, 0.0)}, "amplitude_rad"),
-        ("multisine", {"components": ()}, "components"),
-        ("multisine", {"components": ({"frequency_Hz": (-1.0, 0.0, 0.0)},)}, "frequency_Hz"),
         ("multisine", {"components": ({"frequency": 1.0},)}, "frequency"),
         ("steps", {"times_s": (1.0, 2.0)}, "as many angles_rad as times_s, received 1 for 2 times"),
-        (
-            "steps",
-            {"times_s": (1.0, 1.0), "angles_rad": ((0.0, 0.0, 0.0),) * 2},
-            "rising times, received 1 then 1",
-        ),
-        ("steps", {"times_s": (-1.0,)}, "times_s"),
-        ("steps", {"times_s": (), "angles_rad": ()}, "times_s"),
+        ("steps", {"times_s": (1.0, 1.0), "angles_rad": (ZERO, ZERO)}, "rising times, received 1 then 1"),
         ("steps", {"times_s": (float("nan"),)}, "times_s"),
-        ("hold", {"rounding_rad_s2": 0.0}, "rounding_rad_s2"),
-        ("hold", {"rounding_rad_s2": -1.0}, "rounding_rad_s2"),
         ("tilt", {"rounding_rad_s2": 0.01}, "rounding_rad_s2 of at least 0.152588 rad/s²"),
     ],
 )
-def test_parameters_out_of_range_are_refused_by_name(name, fields, complaint):
+def test_parameters_that_do_not_fit_are_refused_by_name(name, fields, complaint):
     with pytest.raises(ValidationError) as refusal:
         SHAPES[name](**fields)
     assert complaint in str(refusal.value)
@@ -169,8 +145,9 @@ def test_parameters_out_of_range_are_refused_by_name(name, fields, complaint):
 # --- from a file to a run
 
 
-def test_scenario_file_names_them(tmp_path, poses):
-    text = """
+def test_scenario_file_names_them(tmp_path):
+    path = tmp_path / "mine.toml"
+    path.write_text("""
 duration = 0.05
 [trajectory]
 shape = "multisine"
@@ -182,18 +159,13 @@ frequency_Hz = [0.5, 1.0, 1.5]
 amplitude_rad = [0.0, 0.05, 0.0]
 frequency_Hz = [2.0, 2.0, 2.0]
 phase_rad = [0.0, 1.5, 0.0]
-"""
-    path = tmp_path / "mine.toml"
-    path.write_text(text)
+""")
     loaded = scenarios.load(str(path))
     assert len(loaded.trajectory.components) == 2
     run = simulate(loaded)
     expected = loaded.trajectory.sample(run.telemetry["t_s"])[:, :2]
     np.testing.assert_array_equal(run.telemetry["q_ref_rad"], expected[:, 0])
     np.testing.assert_array_equal(run.telemetry["qdot_ref_rad_s"], expected[:, 1])
-    path.write_text(f'[trajectory]\nshape = "waypoints"\nfile = "{poses}"\nlargest_rate_rad_s = 1e-3\n')
-    with pytest.raises(InputError, match=r"expected a largest rate of 0.001 rad/s, received .* on gamma at"):
-        scenarios.load(str(path))
     path.write_text('[trajectory]\nshape = "tilt"\nrounding_rad_s2 = 1e-3\n')
     with pytest.raises(InputError, match=r"trajectory: expected rounding_rad_s2 of at least 0.152588 rad/s²"):
         scenarios.load(str(path))

@@ -1,6 +1,5 @@
 """Waypoints: the path between poses against its own definition, its peaks, its limits, and its file."""
 
-import json
 from itertools import pairwise
 
 import numpy as np
@@ -8,7 +7,6 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from spheretwin import cli
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.telemetry.csv_series import TimeSeries
 from spheretwin.trajectories.waypoints import WaypointPath, Waypoints
@@ -20,10 +18,7 @@ KINDS = ("minimum_jerk", "cubic")
 
 
 def written(path, t=T, poses=POSES):
-    rows = [
-        ",".join(map(repr, [float(time), *map(float, pose)])) for time, pose in zip(t, poses, strict=True)
-    ]
-    path.write_text("\n".join([HEADER, *rows]))
+    np.savetxt(path, np.column_stack([t, poses]), fmt="%.17g", delimiter=",", header=HEADER, comments="")
     return str(path)
 
 
@@ -73,11 +68,8 @@ def test_minimum_jerk_solves_the_conditions_of_rest_at_both_ends(poses):
         polynomial = np.linalg.solve(conditions, right)
         share = np.linspace(0, 1, 21)[1:-1]
         expected = (share[:, None] ** powers) @ polynomial
-        np.testing.assert_allclose(
-            path.sample(poses.t_s[i] + lasts * share)[:, 0],
-            expected,
-            atol=1e-12,  # condition number 1e3
-        )
+        sampled = path.sample(poses.t_s[i] + lasts * share)[:, 0]
+        np.testing.assert_allclose(sampled, expected, atol=1e-12)  # condition number 1e3
 
 
 def test_cubic_is_the_clamped_spline():
@@ -123,31 +115,13 @@ def test_minimum_jerk_has_the_known_peaks(tmp_path):
     assert acceleration.t_s == pytest.approx(0.5 + 0.75 * (0.5 - np.sqrt(1 / 12)))
 
 
-def test_a_run_tells_its_peaks(tmp_path, capsys):
-    file = written(tmp_path / "one.csv", T[:2], [[0, 0, 0], [0.1, -0.4, 0.0]])
-    message = "largest rate 1 rad/s (β at 0.875 s), largest acceleration 4.106 rad/s² (β at 0.6585 s)"
-    scenario = tmp_path / "mine.toml"
-    scenario.write_text('duration = 0.01\n[trajectory]\nshape = "waypoints"\nfile = "one.csv"\n')
-    assert cli.main(["simulate", str(scenario), "--json"]) == 0
-    assert json.loads(capsys.readouterr().out)["notes"] == [f"waypoints {file}: {message}"]
-    assert cli.main(["simulate", str(scenario)]) == 0
-    assert f"waypoints {file}: {message}\n" in capsys.readouterr().out
-
-
 @pytest.mark.parametrize("between", KINDS)
 def test_limits_are_kept_or_told(file, between):
     rate, acceleration = Waypoints(file=file, between=between).peaks()
-    within_limits = Waypoints(
-        file=file,
-        between=between,
-        largest_rate_rad_s=rate.value,
-        largest_acceleration_rad_s2=acceleration.value,
-    )
-    assert within_limits.peaks() == (rate, acceleration)
-    for field, peak, words in (
-        ("largest_rate_rad_s", rate, "largest rate of 1 rad/s, received"),
-        ("largest_acceleration_rad_s2", acceleration, "largest acceleration of 1 rad/s², received"),
-    ):
+    limits = {"largest_rate_rad_s": rate.value, "largest_acceleration_rad_s2": acceleration.value}
+    assert Waypoints(file=file, between=between, **limits).peaks() == (rate, acceleration)
+    texts = "largest rate of 1 rad/s, received", "largest acceleration of 1 rad/s², received"
+    for field, peak, words in zip(limits, (rate, acceleration), texts, strict=True):
         with pytest.raises(InputError) as refusal:
             Waypoints(file=file, between=between, **{field: 1.0})
         message = str(refusal.value)
@@ -190,7 +164,3 @@ def test_bad_files_are_refused_on_one_line(tmp_path, text, complaint):
     assert complaint in str(refusal.value)
     assert str(refusal.value).startswith(f"waypoints {path}: ")
     assert "\n" not in str(refusal.value)
-
-
-def test_file_is_known_as_a_path():
-    assert Waypoints.model_fields["file"].json_schema_extra == {"path": True}
