@@ -18,6 +18,8 @@ from spheretwin.session import Session
 from spheretwin.simulation import follow
 from spheretwin.viz.recording import live
 
+LOADS = ("disturbance.load", "disturbance.random_bound_Nm")
+
 
 @pytest.fixture
 def session():
@@ -90,21 +92,32 @@ def test_the_descriptor_that_signals_wake_is_the_one_of_before():
         os.close(writing)
 
 
-@pytest.mark.parametrize("chunk", [1, 7, 50])
+@pytest.mark.parametrize("chunk", [1, 10, 50])
 def test_files_that_begin_later_have_the_rows_and_the_log_from_then_on(tmp_path, monkeypatch, chunk):
-    """Faults, events and changes before, exactly at and after the first tick of the files."""
-    times_s = (0.005, 0.019, 0.02, 0.03)
-    faults = [{"target": f"coil.{i:02d}", "mode": "open", "start_s": t_s} for i, t_s in enumerate(times_s)]
+    """Faults, events and changes before and at the first tick, and at the edges of chunks, come once."""
+    starts_s, ends_s, times_s = (
+        (0.005, 0.019, 0.02, 0.03),
+        (0.01, 0.02, 0.029, 0.049),
+        (0.019, 0.02, 0.039, 0.04),
+    )
+    faults = [
+        {"target": f"coil.{i:02d}", "mode": "open", "start_s": start_s, "end_s": end_s}
+        for i, (start_s, end_s) in enumerate(zip(starts_s, ends_s, strict=True))
+    ]
     events = [{"t_s": t_s, "set": "disturbance.load", "value": t_s} for t_s in times_s]
     session = Session(scenarios.load("hold", {"duration": 0.05, "fault": faults, "event": events}))
     monkeypatch.setattr(simulations, "CHUNK_STEPS", chunk * session.scenario.substeps)
     files = Outputs(session, tmp_path / "x.rrd", tmp_path / "x.parquet", live=False, first_tick=20)
     changes = [Change(round(1e3 * t_s), "disturbance.random_bound_Nm", t_s) for t_s in times_s]
-    follow(session, 50, files.sinks, journal=changes)
+    assert follow(session, 50, files.sinks, journal=changes) == "completed"
     assert files.close() == []
     recording = read(tmp_path / "x.rrd")
     for table in (recording.table, read_parquet(tmp_path / "x.parquet")[0]):
         np.testing.assert_allclose(table["t_s"], np.arange(20, 50) * 1e-3, rtol=1e-12)
-    for part in ("coil", "disturbance.load", "disturbance.random_bound_Nm"):
-        logged = [t_s for t_s, _, text in recording.log if part in text]
-        assert logged == pytest.approx([0.02, 0.03], abs=1e-9)
+    expected = [
+        *((start_s, f"coil.{i:02d} open") for i, start_s in enumerate(starts_s)),
+        *((end_s, f"coil.{i:02d} works again") for i, end_s in enumerate(ends_s)),
+        *((t_s, f"{name} set to {t_s}") for t_s in times_s for name in LOADS),
+    ]
+    logged = [(round(t_s, 9), text) for t_s, _, text in recording.log if text.startswith(("coil", *LOADS))]
+    assert sorted(logged) == sorted(entry for entry in expected if entry[0] >= 0.02)

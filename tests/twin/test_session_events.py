@@ -5,13 +5,11 @@ import pytest
 
 from spheretwin import cli
 from spheretwin import scenario as scenarios
-from spheretwin import simulation as simulations
 from spheretwin.models.actuator import TORQUE_CURVE_PATH
 from spheretwin.models.base.errors import InputError
-from spheretwin.models.telemetry.run_record import Change
 from spheretwin.scenario.changes import scheduled_changes
 from spheretwin.session import Session
-from spheretwin.simulation import follow, simulate
+from spheretwin.simulation import simulate
 
 CHANGES = [
     (50, "controller.law", "pd"),
@@ -86,49 +84,6 @@ def test_replay_makes_them_again_and_nothing_twice(planned, tmp_path):
     first = simulate(planned).save(tmp_path / "first.parquet")
     assert cli.main(["simulate", "--replay", str(first), "--telemetry", str(again)]) == 0
     assert first.read_bytes() == again.read_bytes()
-
-
-class Follower:
-    """Sink that collects the notes."""
-
-    def __init__(self):
-        self.noted = []
-
-    def write(self, rows):
-        pass
-
-    def note(self, t_s, text):
-        self.noted.append((round(t_s, 9), text))
-
-    def finish(self, status):
-        pass
-
-
-@pytest.mark.parametrize("chunk", [1, 10, 40])
-def test_messages_at_the_edges_of_chunks_come_once_and_in_time(chunk, monkeypatch):
-    """Faults, events and changes at the first and the last tick of a chunk of ten, and at the end."""
-    faults = [
-        {"target": "coil.07", "mode": "open", "start_s": 0.01, "end_s": 0.019},
-        {"target": "controller", "mode": "dropout", "start_s": 0.02, "end_s": 0.039},
-    ]
-    events = [
-        {"t_s": t_s, "set": "disturbance.load", "value": 10 * t_s} for t_s in (0.0, 0.01, 0.019, 0.02, 0.039)
-    ]
-    scenario = scenarios.load("hold", {"duration": 0.04, "fault": faults, "event": events})
-    monkeypatch.setattr(simulations, "CHUNK_STEPS", chunk * scenario.substeps)
-    journal = [Change(tick, "disturbance.random_bound_Nm", 1e-6 * tick) for tick in (9, 30, 40)]
-    with Session(scenario) as session:
-        assert follow(session, 40, [follower := Follower()], journal=journal) == "completed"
-    assert sorted(follower.noted) == sorted(
-        [
-            *((event["t_s"], f"disturbance.load set to {event['value']}") for event in events),
-            *((change.tick / 1000, f"{change.name} set to {change.value}") for change in journal),
-            (0.01, "coil.07 open"),
-            (0.019, "coil.07 works again"),
-            (0.02, "controller dropout"),
-            (0.039, "controller works again"),
-        ]
-    )
 
 
 def test_a_file_that_an_event_names_is_taken_from_where_it_is_written(tmp_path):
