@@ -221,6 +221,7 @@ class Broken(LawParameters):
 """
 
 
+@pytest.mark.uncompiled
 def test_a_law_that_raises_is_a_fault_that_says_why(made, tmp_path):
     (tmp_path / "law.py").write_text(BROKEN)
     assert "law.py" in said(made, "set", name="controller.law", value=f"{tmp_path / 'law.py'}:Nobody")
