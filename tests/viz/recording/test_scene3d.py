@@ -14,7 +14,7 @@ from spheretwin.models.telemetry.table import Table
 from spheretwin.viz.recording import stream
 from spheretwin.viz.recording.recorder import Recorder
 from spheretwin.viz.recording.scene3d import Ending, MovingActuator, Torques, Traces
-from spheretwin.viz.scene.entities import TRACES, TRAIL_S, METRES_PER_Nm
+from spheretwin.viz.scene.entities import TRACES, TRAIL_S, METRES_PER_Nm, shaft_tip
 from spheretwin.viz.scene.meshes import FAILURE, FAILURE_TEXT, TORQUES
 from tests.viz.recording.recordings import recorded, session_and_facts, static, timed
 
@@ -35,7 +35,17 @@ def loaded(tmp_path_factory):
     return path, telemetry
 
 
-def test_the_ages_of_what_is_shown_of_the_way_meet(actuator):
+@pytest.mark.parametrize("trace", TRACES, ids=lambda trace: trace.entity)
+def test_traces_follow_the_shaft_tip_without_gaps(loaded, actuator, trace):
+    path, telemetry = loaded
+    ticks, strips = zip(*timed(path, trace.entity, "LineStrips3D:strips"), strict=True)
+    tips = shaft_tip(telemetry[trace.signal][list(ticks)], actuator)
+    ends = np.array(strips)[:, 0]
+    np.testing.assert_allclose(ends[:, 1], tips, atol=1e-8)  # single precision
+    np.testing.assert_array_equal(ends[1:, 0], ends[:-1, 1])
+
+
+def test_the_ages_of_what_is_shown_of_the_way_meet():
     way = [trace for trace in TRACES if trace.signal == "q_rad"]
     assert [trace.newest_s for trace in way] == [0.0, *(trace.oldest_s for trace in way[:-1])]
     assert way[-1].oldest_s == TRAIL_S
