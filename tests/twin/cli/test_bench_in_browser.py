@@ -21,22 +21,30 @@ from tests.browser import Browser, needs_a_browser
 from tests.viz.bench.on_page import STATUS, at_rest, choose, errors, on_screen, opened, show_tab, write
 from tests.waiting import UNLIMITED_S, wait_for
 
-pytestmark = needs_a_browser
+pytestmark = [
+    needs_a_browser,
+    pytest.mark.release(
+        "browser, 6 to 70 s; tests/twin/bench has the same commands and refusals without one"
+    ),
+]
+
+LAGRANGIAN = {"plant.engine": "lagrangian"}
 
 
 @contextlib.contextmanager
-def driven(scenario, silence_s=UNLIMITED_S):
-    """A bench, and a page of it that follows; on a busy machine a page is silent for long."""
+def driven(name="hold", fields=LAGRANGIAN, silence_s=UNLIMITED_S, size=(1280, 800)):
+    """A bench, its page that follows, and a tab of a browser; on a busy machine a page is silent for long."""
     ended = threading.Event()
     with (
-        Bench(scenario, Operators(silence_s=silence_s)) as bench,
+        Bench(scenarios.load(name, fields), Operators(silence_s=silence_s)) as bench,
         Page(bench, choices_of(bench), server.listen(0)) as page,
     ):
         bench.begin()
         following = threading.Thread(target=page.show, args=(ended.is_set,))
         following.start()
         try:
-            yield bench, page
+            with Browser(size) as browser:
+                yield bench, page, opened(browser, page)
         finally:
             ended.set()
             following.join()
@@ -55,12 +63,9 @@ def says(tab, *words):
         tab.wait_for(f"{STATUS}.innerText.includes({word!r})")
 
 
-@pytest.mark.release("browser, 6 to 70 s; tests/twin/bench has the same commands and refusals without one")
 def test_a_bench_is_driven_from_a_browser(tmp_path):
-    scenario = scenarios.load("sinusoid", {"plant.engine": "lagrangian"})
     telemetry_path = tmp_path / "bench.parquet"
-    with driven(scenario) as (bench, page), Browser() as browser:
-        tab = opened(browser, page)
+    with driven("sinusoid") as (bench, page, tab):
         says(tab, "TRAJECTORY", "PAUSED", "afsm")
 
         show_tab(tab, "files")
@@ -118,18 +123,15 @@ def test_a_bench_is_driven_from_a_browser(tmp_path):
     assert again.read_bytes() == telemetry_path.read_bytes()
 
 
-@pytest.mark.release("browser, 6 to 70 s; tests/twin/bench has the same commands and refusals without one")
 def test_what_is_out_of_range_is_refused_in_the_words_of_the_command_line():
-    scenario = scenarios.load("hold", {"plant.engine": "lagrangian"})
-    with driven(scenario) as (_, page), Browser((800, 600)) as browser:
-        tab = opened(browser, page)
+    with driven(size=(800, 600)) as (_, _, tab):
         show_tab(tab, "law")
         tab.click("text=all fields of the controller")
         write(tab, "period_s", "-1")
         tab.click("text=Set gains")
         tab.wait_for("document.body.innerText.includes('controller.period_s: expected')")
         with pytest.raises(InputError) as refusal:
-            scenarios.load("hold", {"plant.engine": "lagrangian", "controller.period_s": -1})
+            scenarios.load("hold", {**LAGRANGIAN, "controller.period_s": -1})
         shown = tab.evaluate("document.body.innerText")
         assert str(refusal.value).partition("controller.period_s")[2] in shown
         assert errors(tab) == []
@@ -139,11 +141,8 @@ def test_what_is_out_of_range_is_refused_in_the_words_of_the_command_line():
 FREEZE = "setTimeout(() => { while (true); }, 0)"
 
 
-@pytest.mark.release("browser, 6 to 70 s; tests/twin/bench has the same commands and refusals without one")
 def test_a_frozen_page_is_lost_and_the_twin_holds():
-    scenario = scenarios.load("hold", {"plant.engine": "lagrangian"})
-    with driven(scenario, 10.0) as (bench, page), Browser() as browser:  # 2 s, unless the machine is busy
-        tab = opened(browser, page)
+    with driven(silence_s=10.0) as (bench, page, tab):  # 2 s, unless the machine is busy
         while bench.state().operator is None:  # a busy page may have been lost before
             bench.command("ask", client="page 0")
         for name, arguments in (("start", {}), ("jog", {"rates_rad_s": [0.0, 0.0, 0.5]})):
@@ -155,12 +154,9 @@ def test_a_frozen_page_is_lost_and_the_twin_holds():
         assert page._server.get_clients()  # it has not left
 
 
-@pytest.mark.release("browser, 6 to 70 s; tests/twin/bench has the same commands and refusals without one")
 def test_a_law_that_never_returns_is_shown_and_leaves_the_page_alive(tmp_path):
     (tmp_path / "law.py").write_text(WAITS)
-    scenario = scenarios.load("hold", {"plant.engine": "lagrangian"})
-    with driven(scenario) as (bench, page), Browser() as browser:
-        tab = opened(browser, page)
+    with driven() as (bench, _, tab):
         show_tab(tab, "law")
         tab.click("text=load law from file")
         write(tab, "law file", f"{tmp_path / 'law.py'}:waits")
@@ -191,11 +187,8 @@ def waits(t, reference, measurement, parameters, state, torque):
 """
 
 
-@pytest.mark.release("browser, 6 to 70 s; tests/twin/bench has the same commands and refusals without one")
 def test_a_rotor_that_is_let_go_stays_on_the_bench_and_the_currents_return_to_zero():
-    scenario = scenarios.load("hold", {"plant.engine": "lagrangian", "plant.payload_kg": 0.05})
-    with driven(scenario) as (bench, page), Browser() as browser:
-        tab = opened(browser, page)
+    with driven(fields={**LAGRANGIAN, "plant.payload_kg": 0.05}) as (bench, page, tab):
         tab.click("text=start")
         tab.click("text=manual currents: or click a coil")
         tab.click("text=Only this group, at 1 A")
