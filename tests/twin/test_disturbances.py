@@ -1,26 +1,52 @@
-"""Load and random torque of the paper, seeded; terms of a file add to them."""
+"""Load and random torque of the paper, and terms: each is its exact torque; a file's terms add."""
 
 import numpy as np
 import pytest
 
 from spheretwin import scenario as scenarios
-from spheretwin.disturbances import Disturbance, Draws, term_draws
+from spheretwin.disturbances import (
+    ConstantDisturbance,
+    Disturbance,
+    Draws,
+    RandomDisturbance,
+    SinusoidalDisturbance,
+    StepDisturbance,
+    TableDisturbance,
+    term_draws,
+)
+from spheretwin.models.base.errors import InputError
 from spheretwin.session import Session
-
-T = np.linspace(0, 2, 2001)
+from tests.twin.disturbance_cases import PERIOD, TORQUES, sampled
 
 
 @pytest.mark.parametrize(("envelope", "sign"), [("decaying", -1), ("growing", 1)])
 def test_random_torque_is_equation_56(envelope, sign):
-    disturbance = Disturbance(random_bound_Nm=0.05, gamma_envelope=envelope)
-    sampled = disturbance.sample(T, Draws(np.random.default_rng(0).random(len(T)), None))
-    r = sampled[:, 0] / np.cos(np.pi * T)
-    r = np.where(np.abs(np.cos(np.pi * T)) > 0.1, r, np.nan)
-    known = np.isfinite(r)
-    assert np.all(np.abs(r[known]) <= 0.05)
-    assert np.nanstd(r) == pytest.approx(0.05 / np.sqrt(3), rel=0.05)  # uniform, 1,900 draws
-    np.testing.assert_allclose(sampled[known, 1], (r * np.sin(-np.pi * T))[known], atol=1e-15)
-    np.testing.assert_allclose(sampled[known, 2], (r * np.exp(sign * np.pi * T))[known], rtol=1e-12)
+    """One factor for all axes, uniform from -1 to 1."""
+    draws, t = term_draws(3, 0, 2000, 2), PERIOD * np.arange(2000)
+    shape = np.stack([np.cos(np.pi * t), -np.sin(np.pi * t), np.exp(sign * np.pi * t)], axis=1)
+    expected = (2 * draws[:, None] - 1) * shape
+    paper = Disturbance(random_bound_Nm=0.05, gamma_envelope=envelope).sample(t, Draws(draws, None))
+    np.testing.assert_allclose(paper, 0.05 * expected, rtol=1e-12, atol=1e-16)
+    term = RandomDisturbance(bound_Nm=(0.05, 0.02, 0.01), gamma_envelope=envelope)
+    np.testing.assert_allclose(sampled(term, 0, 2000), [0.05, 0.02, 0.01] * expected, rtol=1e-12, atol=1e-16)
+
+
+def test_draws_of_a_term_are_uniform_and_independent():
+    draws = 2 * term_draws(3, 0, 100_000, 2) - 1
+    # Mean 0 with variance 1/3, and its estimate with variance (1/5 - 1/9) / n: four standard deviations.
+    assert np.abs(draws).max() <= 1
+    assert abs(draws.mean()) < 4 * np.sqrt(1 / 3 / 100_000)
+    assert abs(draws.var() - 1 / 3) < 4 * np.sqrt((1 / 5 - 1 / 9) / 100_000)
+    assert abs(np.corrcoef(draws[1:], draws[:-1])[0, 1]) < 4 / np.sqrt(100_000)
+
+
+def test_draws_count_by_tick_for_any_seed():
+    far = 10**15
+    for seed in (0, 2**200):
+        whole = term_draws(seed, far, 20, 0)
+        assert whole[7:9].tobytes() == term_draws(seed, far + 7, 2, 0).tobytes()
+        assert not np.any(whole == term_draws(seed, far, 20, 1))
+        assert len(np.unique(whole)) == 20
 
 
 def test_growing_random_torque_of_bound_zero_is_none():
@@ -29,6 +55,54 @@ def test_growing_random_torque_of_bound_zero_is_none():
         np.array([300.0]), Draws(np.ones(1), None)
     )
     np.testing.assert_array_equal(torque, [[0.05, 0.05, 0.05]])
+
+
+def test_constant_and_steps_hold_on_each_axis_by_itself():
+    np.testing.assert_array_equal(
+        sampled(ConstantDisturbance(torque_Nm=(1.0, 2.0, 3.0)), 7, 3), [[1, 2, 3]] * 3
+    )
+    steps = StepDisturbance(times_s=(0.002, 0.004), torques_Nm=((1.0, 0.0, -1.0), (0.0, 5.0, 0.0)))
+    expected = [[0, 0, 0], [0, 0, 0], [1, 0, -1], [1, 0, -1], [0, 5, 0], [0, 5, 0]]
+    np.testing.assert_array_equal(sampled(steps, 0, 6), expected)
+
+
+def test_sinusoidal_swings_on_each_axis_by_itself():
+    term = SinusoidalDisturbance(
+        amplitude_Nm=(0.1, 0.2, 0.3), frequency_Hz=(1.0, 2.0, 0.0), phase_rad=(0.0, np.pi / 2, np.pi / 6)
+    )
+    quarters = term.sample(np.array([0.0, 0.25, 0.5, 0.75, 1.0]), None)
+    expected = [[0, 0.2, 0.15], [0.1, -0.2, 0.15], [0, 0.2, 0.15], [-0.1, -0.2, 0.15], [0, 0.2, 0.15]]
+    np.testing.assert_allclose(quarters, expected, atol=1e-15)
+
+
+def test_table_goes_by_its_rows(torques):
+    t = np.array([0.0, 0.5, 1.0, 1.5, 1.75, 2.0, 50.0])
+    linear = TableDisturbance(file=torques).sample(t, None)
+    rows = [[0.1, 0, 0], [0.3, -0.2, 0], [0, 0, 0.4]]
+    first, second, last = rows
+    expected = [first, first, [0.2, -0.1, 0], second, [0.15, -0.1, 0.2], last, last]
+    np.testing.assert_allclose(linear, expected, atol=1e-16)
+    steps = TableDisturbance(file=torques, between="held").sample(t, None)
+    np.testing.assert_array_equal(steps, np.array(rows)[[0, 0, 0, 1, 1, 2, 2]])
+
+
+def test_an_edit_of_the_file_changes_no_table_that_is_made(tmp_path, torques):
+    term = TableDisturbance(file=torques)
+    before = sampled(term, 0, 100).tobytes()
+    (tmp_path / "torques.csv").write_text(TORQUES.replace("0.1", "0.2"))
+    assert sampled(term, 0, 100).tobytes() == before
+    assert TableDisturbance(file=torques) != term
+    assert TableDisturbance.model_fields["file"].json_schema_extra == {"path": True}
+
+
+def test_bad_table_is_refused_on_one_line(tmp_path, torques):
+    (tmp_path / "torques.csv").write_text(TORQUES.replace("0.3", "2000"))
+    with pytest.raises(InputError) as refusal:
+        TableDisturbance(file=torques)
+    expected = (
+        f"disturbance {torques}: line 3: expected a number from -1000 to 1000 as alpha_Nm, received '2000'"
+    )
+    assert str(refusal.value) == expected
 
 
 FILE = """
