@@ -88,20 +88,6 @@ def test_directional_derivatives_are_exact(started, name):
         np.testing.assert_allclose(exact[:6], difference[:6], rtol=1e-6, atol=1e-5)
 
 
-@needs_c_compiler
-def test_a_run_is_that_of_simulate(started):
-    changes = {**FRICTION, "disturbance.load": 1.0, "plant.engine": "lagrangian", "duration": 1.0}
-    run = st.simulate("nutation", changes).telemetry
-    c_plant = started()
-    inputs = np.hstack([run["current_command_A"], run["disturbance_Nm"]])
-    for row in range(len(inputs) - 1):
-        assert c_plant.advance(np.ascontiguousarray(inputs[row]), 1e-3) == (0, pytest.approx(1e-3))
-        # Bound of the specification; the difference is some 1e-13.
-        np.testing.assert_allclose(c_plant.x[:3], run["q_rad"][row + 1], atol=1e-9)
-        np.testing.assert_allclose(c_plant.x[3:6], run["qdot_rad_s"][row + 1], atol=1e-9)
-    assert np.ptp(run["q_rad"], axis=0).max() > 1
-
-
 HEAT = {
     "plant.engine": "lagrangian",
     "duration": 0.03,
