@@ -2,7 +2,6 @@
 
 import json
 import pickle
-from itertools import islice
 from pathlib import Path
 
 import numpy as np
@@ -19,9 +18,6 @@ from spheretwin.scenario.sections import ResolvedScenario, Scenario
 from spheretwin.scenario.writing import as_command, as_toml
 from spheretwin.session import Session
 from spheretwin.simulation import simulate
-from spheretwin.study.grid import Grid
-from spheretwin.study.row import Rows
-from spheretwin.study.study import load
 from tests.twin.session_cases import write_curve
 
 # Every part of a controller is at work: estimator, governor, prediction, feed-forward, detector, watchdog.
@@ -116,15 +112,6 @@ def test_a_change_of_the_truth_does_not_reach_the_controller(dotted, whole):
     other = WHOLE | {dotted: TRUTH[dotted]}
     assert resolved(**other).nominal == resolved(**WHOLE).nominal
     same_controller(controller(other), whole)
-
-
-def test_the_controller_knows_nothing_of_what_the_robustness_study_draws():
-    study = load("robustness")
-    rows = Rows(study)
-    drawn = [rows.scenario(row) for row in islice(Grid(study), 5)]
-    assert len({scenario.plant.coulomb_Nm for scenario in drawn}) == 5
-    stated = scenarios.load("sinusoid", {"hardware": "electronics"}).nominal
-    assert [scenario.nominal for scenario in drawn] == [stated] * 5
 
 
 @pytest.mark.parametrize("hardware", ["ideal", "electronics"])

@@ -1,5 +1,7 @@
 """What comes from outside a loop: streams of random terms, snapshots, trajectories of the user's."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
@@ -68,37 +70,33 @@ def test_a_growing_random_term_is_refused_before_it_overflows():
         grown.check_horizon(240_000)
 
 
-class Own:
-    """Nutation up to a time, after which it fails in a way of its own."""
+def own(after=lambda samples: samples):
+    """Nutation up to 1.5 s, after which it fails in a way of its own."""
 
-    def __init__(self, end_s=np.inf, after=None):
-        self.end_s, self.after = end_s, after
-
-    def sample(self, t):
+    def sample(t):
         samples = Nutation().sample(t)
-        if t[-1] > self.end_s:
-            return self.after(samples)
-        return samples
+        return after(samples) if t[-1] > 1.5 else samples
+
+    return SimpleNamespace(sample=sample)
 
 
 def test_a_trajectory_of_the_user_s_is_followed_instead():
-    own = run(InputGenerator(scenario(), Own()))
+    followed = run(InputGenerator(scenario(), own()))
     named = run(InputGenerator(scenarios.load("nutation")))
-    assert own[1].tobytes() == named[1].tobytes()
-    assert own[2].tobytes() == run(InputGenerator(scenario()))[2].tobytes()
-    generator = InputGenerator(scenario(), Own())
+    assert followed[1].tobytes() == named[1].tobytes()
+    assert followed[2].tobytes() == run(InputGenerator(scenario()))[2].tobytes()
+    generator = InputGenerator(scenario(), own())
     generator.scenario = scenario(RANDOM_TERM)
     assert run(generator)[1].tobytes() == named[1].tobytes()
 
 
 def test_one_that_fails_later_is_refused_then():
-    exogenous = InputGenerator(scenario(), Own(1.5, lambda samples: samples[:, 0]))
-    run(exogenous, end=1000)
+    flat = InputGenerator(scenario(), own(lambda samples: samples[:, 0]))
+    run(flat, end=1000)
     with pytest.raises(InputError, match=r"expected float64 of shape \(1000, 3, 3\)"):
-        exogenous.rows(1000, 1)
-    lost = InputGenerator(
-        scenario(), Own(1.5, lambda samples: np.where(np.arange(1000)[:, None, None] < 700, samples, np.nan))
-    )
+        flat.rows(1000, 1)
+    until_1700 = np.arange(1000)[:, None, None] < 700
+    lost = InputGenerator(scenario(), own(lambda samples: np.where(until_1700, samples, np.nan)))
     assert len(run(lost, end=1700)[0]) == 1700
     with pytest.raises(InputError, match=r"expected a finite trajectory, received NaN at 1\.7 s"):
         lost.rows(1700, 1)

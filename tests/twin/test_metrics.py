@@ -5,7 +5,7 @@ import pytest
 
 from spheretwin import metrics
 from spheretwin import scenario as scenarios
-from spheretwin.metrics import METRICS, PIECE_TICKS, BAND_rad
+from spheretwin.metrics import METRICS, BAND_rad
 from spheretwin.models import actuator as actuators
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.telemetry.signals import Signal, common_signals, width
@@ -83,11 +83,6 @@ def runs():
     ]
 
 
-@pytest.fixture(scope="module")
-def ended_early():
-    return simulate(scenarios.load("sinusoid", {"controller.law": "pd", "disturbance.load": 5.0}))
-
-
 @pytest.mark.parametrize("name", PLAIN)
 def test_each_is_its_plain_definition(runs, name):
     for run in runs:
@@ -95,14 +90,6 @@ def test_each_is_its_plain_definition(runs, name):
         received = np.asarray(figures_of(run)[name], dtype=float)
         # Sums of some thousand squares in another order.
         np.testing.assert_allclose(received, expected, rtol=1e-12, atol=1e-15)
-
-
-def test_the_tail_of_a_run_that_ended_early_begins_within_a_piece_before_its_half(ended_early):
-    error = ended_early.telemetry["error_rad"]
-    half = len(error) // 2
-    tails = [np.sqrt(np.mean(error[first:] ** 2, axis=0)) for first in range(half - PIECE_TICKS, half + 1)]
-    received = figures_of(ended_early)["tail_rms_error_rad"]
-    assert any(np.allclose(received, expected, rtol=1e-12, atol=0) for expected in tails)
 
 
 @pytest.fixture

@@ -63,18 +63,6 @@ def test_a_figure_of_the_user_s_takes_no_other_s_place(run, name):
         figures_of(run, {name: lambda run: 1.0})
 
 
-def test_what_fails_or_is_no_json_is_told_with_its_name(run):
-    def failing(run):
-        raise ValueError("line one\nline two")
-
-    with pytest.raises(
-        InputError, match="metric mine: expected a figure, it raised ValueError: line one line"
-    ):
-        figures_of(run, {"mine": failing})
-    with pytest.raises(InputError, match="metric mine: expected a value in JSON types, received <function"):
-        figures_of(run, {"mine": lambda run: failing})
-
-
 def test_an_event_at_the_end_of_a_run_is_not_in_its_log(tmp_path):
     events = [{"t_s": t_s, "set": "disturbance.load", "value": t_s} for t_s in (0.02, 0.05)]
     run = simulate(scenarios.load("hold", {"duration": 0.05, "event": events}))

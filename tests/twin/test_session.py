@@ -7,7 +7,6 @@ from spheretwin import scenario as scenarios
 from spheretwin.control.law import Law, NominalModel
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.telemetry.signals import Signal
-from spheretwin.models.telemetry.table import Table
 from spheretwin.session import Session
 from spheretwin.simulation import simulate
 from tests.twin.session_cases import ENGINES, compiled_law, rows, scenario, session
@@ -123,15 +122,6 @@ def test_a_shipped_law_handed_over_is_the_same_law():
         section.build(NominalModel(1e-3, 0.0, np.array(session().scenario.nominal.inertia_kg_m2)))
     )
     assert rows(handed.advance(200)) == rows(session().advance(200))
-
-
-def test_tables_of_a_session_are_its_own():
-    live = session()
-    first = live.advance(10)
-    first_rows = rows(first)
-    live.advance(10)
-    assert rows(first) == first_rows
-    assert isinstance(first, Table)
 
 
 @pytest.mark.parametrize(

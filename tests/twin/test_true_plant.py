@@ -67,37 +67,7 @@ def test_without_gravity_a_payload_does_not_sag(actuator):
     assert np.abs(sag).max() > 0.005
 
 
-@pytest.mark.parametrize("engine", ENGINES)
-def test_a_run_begins_at_the_rates_that_are_given(engine):
-    rates = [0.3, -0.2, 4.0]
-    run = table(1, "hold", {"plant.initial_rad_s": rates, "plant.engine": engine})
-    np.testing.assert_array_equal(run["qdot_rad_s"][0], rates)
-    spinning = table(500, "hold", STILL | {"plant.initial_rad_s": [0, 0, 4.0], "plant.engine": engine}, FREE)
-    # A principal axis, without torque: a steady rate. A thousand sums of 2e-3 rad round up to 2 rad.
-    np.testing.assert_allclose(spinning["q_rad"][:, 2], 4.0 * spinning["t_s"], rtol=0, atol=1e-13)
-    np.testing.assert_allclose(spinning["q_rad"][:, :2], 0, atol=1e-15)
-
-
 # --- friction in the loop
-
-
-@pytest.mark.parametrize("engine", ENGINES)
-def test_viscous_friction_slows_a_spin_by_one_share_each_half_step(engine, actuator):
-    viscous, step_s = 1e-3, 5e-4
-    changes = STILL | {
-        "plant.engine": engine, "plant.initial_rad_s": [0.0, 0.0, 20.0],
-        "plant.viscous_Nm_s": [0.0, 0.0, viscous], "plant.modelling_error": 0.5,
-    }  # fmt: skip
-    run = table(400, "hold", changes, FREE)
-    inertia = 1.5 * actuator.inertia[2]
-    x = 0.5 * step_s * viscous / inertia
-    share = 1 / (1 + x + x**2 / 2)
-    exact = 20.0 * share ** (4 * np.arange(400))  # two steps a tick
-    np.testing.assert_allclose(run["qdot_rad_s"][:, 2], exact, rtol=1e-12)  # 1600 roundings
-    # The mean over the step; 1e-16 of a rate, of which a step loses 1.5e-4.
-    mean = inertia * exact * (share**2 - 1) / step_s
-    np.testing.assert_allclose(run["friction_Nm"][:, 2], mean, rtol=1e-11)
-    np.testing.assert_array_equal(run["friction_Nm"][:, :2], 0)
 
 
 LOADED = {
