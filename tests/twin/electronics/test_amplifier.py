@@ -158,30 +158,6 @@ def test_at_rest_nothing_moves_by_a_bit():
     np.testing.assert_allclose(passed.copper_J, 1.3 * setpoint**2 * 0.5, rtol=1e-12)  # 1000 sums
 
 
-def test_a_rise_under_the_voltage_limit_is_the_ramp_of_the_voltage_that_is_left():
-    # HARDWARE: 24 - 4.8 - 1.3 * 8 = 8.8 V are left at 8 A, and 8.8 V / 0.9 mH are 9.8 kA/s.
-    case = Case(8.0, 12.0, 0.0, "U", limit=20.0, step_s=1e-7)
-    slope = (stepped(case).current - 8.0) / 1e-7
-    assert slope == pytest.approx(8.8 / 0.9e-3, rel=1e-4)  # half of R step / L, 7e-5, is lost on the way
-    assert slope == pytest.approx(9.8e3, rel=0.01)
-
-
-@pytest.mark.parametrize("x", [1e-12, 1e-9, 1e-6, 1e6, 1e12])
-def test_time_constants_far_from_the_step_keep_their_digits(x):
-    """Time of a step in time constants L/R: a ramp of nearly pure inductance, or none at all."""
-    R = 1.0
-    case = Case(0.0, 1e9, 0.0, "U", R=R, L=R * STEP_S / x, rate=1e9, limit=1e9)
-    current, mean, copper, work, limited = stepped(case)
-    last = case.highest / R
-    if x < 1:
-        expected = [last * x, last * x / 2, R * (last * x) ** 2 / 3 * STEP_S, last**2 * R * x / 2 * STEP_S]
-    else:
-        expected = [last, last, R * last**2 * STEP_S, R * last**2 * STEP_S]
-    # The next term of either limit is the share x, or 1.5 / x; then rounding.
-    np.testing.assert_allclose([current, mean, copper, work], expected, rtol=1.5 * min(x, 1 / x) + 1e-14)
-    assert limited == STEP_S
-
-
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_a_step_that_begins_at_a_limit_to_the_bit_and_goes_beyond_stays_there(sign):
     # L rate = 2: the voltage is 2 * 4 - 5 + 5 = 8 V at the start, and would be 4 + 5 = 9 V at the target.

@@ -95,16 +95,3 @@ def test_emf_takes_as_power_what_the_torque_gives(seed, groups):
     np.testing.assert_allclose(emf, gain * (G.T @ rate), rtol=0, atol=1e-14)
     # Rounding of sums of some thirty products of size one.
     assert emf @ current == pytest.approx(torque @ rate, rel=0, abs=1e-13)
-
-
-@given(st.lists(st.floats(0, 1e30), min_size=4, max_size=4), st.floats(0, 1e6), st.floats(1e-3, 1e6))
-def test_any_heat_leaves_a_temperature_and_a_resistance(joules, thermal, capacity):
-    section = CoilSection(resistance_per_K=0.01, thermal_resistance_K_W=thermal, heat_capacity_J_K=capacity)
-    made = group_coils(section, R, L, PERIOD_S, 4)
-    for _ in range(3):
-        advance_temperature(made, np.array(joules))
-    assert np.all(np.isfinite(made.temperature_degC))
-    assert np.all(made.temperature_degC >= 20)
-    assert np.all(made.resistance_ohm >= R)
-    advance_temperature(made, np.array([np.nan, 0, 0, 0]))
-    np.testing.assert_array_equal(np.isnan(made.resistance_ohm), [True, False, False, False])

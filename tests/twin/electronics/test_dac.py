@@ -66,17 +66,6 @@ def test_any_number_gives_a_current_within_the_range_and_its_errors(command, see
     assert np.all(np.abs(setpoint) <= most)  # and so is none that is not a number
 
 
-def test_offset_and_gain_are_those_of_a_straight_line_through_the_ends():
-    made = dac(PROTOTYPE, GAIN_A_V, GROUPS, 7)
-    for channel in range(GROUPS):
-        setpoint = curve(made, channel)
-        slope = (setpoint[-1] - setpoint[0]) / (CODES[-1] - CODES[0]) / LSB_A
-        # 1e-15 A of rounding over 16 A.
-        assert slope == pytest.approx(made.gain[channel], rel=1e-14)
-        middle = setpoint[0] + slope * LSB_A * 2**15
-        assert middle == pytest.approx(GAIN_A_V * made.offset_V[channel], abs=1e-14)
-
-
 def test_inl_is_smooth_keeps_to_its_bound_and_turns_no_code_back():
     made = dac(PROTOTYPE, GAIN_A_V, GROUPS, 3)
     largest = []

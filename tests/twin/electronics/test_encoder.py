@@ -38,16 +38,6 @@ def test_a_count_is_exact_over_ten_million_turns(turns, place, inside):
     assert counted(made(2000), (count + inside) * line) == count * line
 
 
-def test_the_index_is_a_line_and_steps_come_half_way():
-    line = 2 * np.pi / 2000
-    assert np.degrees(line) == pytest.approx(0.18)
-    for turn in range(-3, 4):
-        assert counted(made(2000), 2 * np.pi * turn) == pytest.approx(2 * np.pi * turn, rel=1e-15)
-    for just_below, just_above in ((0.4999, 0.5001), (-0.5001, -0.4999), (1234.4999, 1234.5001)):
-        below, above = counted(made(2000), just_below * line), counted(made(2000), just_above * line)
-        assert above - below == pytest.approx(line, rel=1e-12)  # rounding of 1235 lines
-
-
 def test_none_stays_none_and_the_endless_endless():
     assert np.isnan(counted(made(2000), np.nan))
     assert counted(made(2000), np.inf) == np.inf

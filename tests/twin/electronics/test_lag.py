@@ -22,15 +22,6 @@ def test_one_step_is_the_exact_exponential_and_its_mean(time_constant_s):
     np.testing.assert_allclose(mean, expected, rtol=1e-12)
 
 
-def test_two_half_steps_are_one_whole():
-    command, mean = np.array([4.0]), np.empty(1)
-    whole, halves = np.zeros(1), np.zeros(1)
-    advance_lag(current_lag(7e-4, 1e-3, 8.0), command, whole, mean)
-    for _ in range(2):
-        advance_lag(current_lag(7e-4, 5e-4, 8.0), command, halves, mean)
-    np.testing.assert_allclose(halves, whole, rtol=1e-14)
-
-
 def test_without_lag_the_current_is_the_command():
     command, current, mean = np.array([4.0]), np.zeros(1), np.empty(1)
     advance_lag(current_lag(0.0, 5e-4, 8.0), command, current, mean)

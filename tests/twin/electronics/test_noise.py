@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from scipy.stats import kstest
 
 from spheretwin.disturbances import term_draws
 from spheretwin.electronics.random_streams import noise_table, stream_key, width_of
@@ -25,20 +24,6 @@ def test_neither_blocks_nor_further_columns_move_a_bit(whole, first, ticks, widt
     np.testing.assert_array_equal(rows, whole[first : first + ticks, :width])
 
 
-def test_numbers_are_normal_and_independent():
-    rows = noise_table(1, 0, 50_000, ((NAME, 8),))
-    for column in rows.T:
-        assert kstest(column, "norm").pvalue > 1e-3  # one fixed draw of eight: 0.8 % would fall below
-    followed = np.concatenate([rows[1:], rows[:-1], rows[1:] ** 2 - 1], axis=1)
-    related = np.corrcoef(followed.T) - np.eye(24)
-    for column in range(8):  # a number and its own square: E[x²(x² - 1)²] / 2 = 5 times the variance
-        related[column, 16 + column] /= np.sqrt(5)
-        related[16 + column, column] /= np.sqrt(5)
-    # 276 coefficients of a deviation of 1/√n: five of these.
-    assert np.abs(related).max() < 5 / np.sqrt(50_000)
-    assert np.abs(rows).max() < 8.6
-
-
 def test_streams_are_those_of_the_seed_and_of_nothing_else(whole):
     assert not np.any(noise_table(SEED + 1, 0, TICKS, ((NAME, WIDTH),)) == whole)
     uniform = np.random.Generator(
@@ -46,11 +31,6 @@ def test_streams_are_those_of_the_seed_and_of_nothing_else(whole):
     ).random(4 * TICKS)
     for place in range(5):
         assert not np.isin(term_draws(SEED, 0, TICKS, place), uniform).any()
-
-
-@pytest.mark.parametrize("seed", [0, 2**32, 2**64 + 1, 10**40])
-def test_any_seed_will_do(seed):
-    assert np.isfinite(noise_table(seed, 10**12, 5, ((NAME, 3),))).all()
 
 
 def test_streams_of_other_names_move_no_bit(whole):
@@ -62,7 +42,7 @@ def test_streams_of_other_names_move_no_bit(whole):
     assert noise_table(SEED, 0, 5, ()).shape == (5, 0)
 
 
-@pytest.mark.parametrize("seed", [0, 7, 2**64 + 1])
+@pytest.mark.parametrize("seed", [0, 7, 2**64 + 1, 10**40])
 @pytest.mark.parametrize(("first", "ticks", "width"), [(0, 1000, 18), (10**12, 7, 3), (5, 1, 6)])
 def test_bits_are_those_of_numpy(seed, first, ticks, width):
     expected = np.empty((ticks, 0))

@@ -8,7 +8,7 @@ from pydantic import ValidationError
 
 from spheretwin import scenario as scenarios
 from spheretwin.electronics.random_streams import noise_table
-from spheretwin.electronics.sensor_chain import SensorsSection, noise_streams, sense, sensor_chain
+from spheretwin.electronics.sensor_chain import SensorsSection
 from spheretwin.electronics.stages import SensorSetup
 from spheretwin.electronics.transducers import LAG, PotentiometerSection, wiper_angle
 from spheretwin.session import Session
@@ -68,18 +68,6 @@ def test_hysteresis_is_the_difference_of_readings_from_both_sides():
     assert stage.play[0, LAG] == above  # the joint is at 0
 
 
-@pytest.mark.parametrize("side", [-1, 1])
-def test_repeatability_is_the_spread_of_readings_from_one_side(side):
-    count, angles = 3000, approaches(3000, side)
-    draws = noise_table(4, 0, len(angles), (("sensors.potentiometer noise", 2),))
-    reading = followed(made(), angles, draws)[len(angles) // count - 1 :: len(angles) // count]
-    deviation = reading - side * WIDTH / 2
-    assert 0.9 * SPREAD < np.abs(deviation).max() <= SPREAD * (1 + 1e-12)
-    # The standard deviation of 3000 numbers strays by 1 / sqrt(6000) of itself; four of these.
-    assert deviation.std() == pytest.approx(SPREAD / 3, rel=4 / np.sqrt(6000) + 0.01)  # 0.3 % are cut off
-    assert abs(deviation.mean()) < 4 * SPREAD / 3 / np.sqrt(count)
-
-
 def test_spread_larger_than_the_play_is_refused():
     message = "expected repeatability_rad of at most half of hysteresis_rad, received 0.003 and 0.004"
     with pytest.raises(ValidationError, match=message):
@@ -90,29 +78,6 @@ def test_wiper_starts_at_the_joint_and_nan_stays_nan():
     stage, none = made(repeatability=0.0), np.zeros(0)
     assert wiper_angle(stage, 0, 0.3, none) == 0.3
     assert np.isnan(wiper_angle(stage, 0, np.nan, none))
-
-
-def test_play_changes_no_other_number_and_is_the_channel_s_own():
-    """The converter's noise is the same numbers with and without play; α and β have their own spread."""
-    tracks = {"hysteresis_rad": WIDTH, "repeatability_rad": SPREAD}
-    section = SensorsSection(potentiometer=tracks, adc={"noise_V": 1e-3})
-    plain = SensorsSection(adc={"noise_V": 1e-3})
-    angles = np.concatenate([approaches(20, 1), approaches(20, -1)])
-    measured = {}
-    for name, parameters in (("play", section), ("plain", plain)):
-        chain, row = sensor_chain(parameters, 3), np.empty((3, 3))
-        noise = noise_table(3, 0, len(angles), noise_streams(parameters))
-        measured[name] = []
-        for angle, numbers in zip(angles, noise, strict=True):
-            sense(chain, np.array([angle, angle, 0.0]), np.zeros(3), numbers, row)
-            measured[name].append(row[0, :2].copy())
-    play = np.array(measured["play"]) - np.array(measured["plain"])
-    numbers = noise_table(3, 0, len(angles), (("sensors.potentiometer noise", 2),))
-    for channel in range(2):
-        expected = slow_wiper(angles, numbers[:, channel], WIDTH / 2, SPREAD) - angles
-        # Sums of volts, in rad of 1 V/rad.
-        np.testing.assert_allclose(play[:, channel], expected, rtol=0, atol=1e-14)
-    assert np.abs(play[:, 0] - play[:, 1]).max() > SPREAD / 10
 
 
 def test_telemetry_has_the_lead_of_the_wiper_and_snapshots_hold_it():

@@ -30,17 +30,10 @@ PLACES = {"pot.alpha": 0, "pot.beta": 1}
 FAULTS = [
     ("coil.03", "short", 0.05, 0.30, None),
     ("coil.05", "open", 0.04, 0.20, None),
-    ("coil.07", "gain", 0.02, None, 0.6),
     ("amplifier.02", "offset", 0.06, 0.35, 0.3),
     ("amplifier.02", "gain", 0.08, 0.35, -0.5),
     ("amplifier.09", "noise", 0.03, None, 0.2),
-    ("amplifier.11", "stuck", 0.10, 0.25, None),
-    ("amplifier.12", "dropout", 0.15, 0.28, None),
-    ("amplifier.14", "open", 0.15, 0.22, None),
     ("dac.02", "offset", 0.09, 0.30, -0.4),  # which its amplifier's gain, above, multiplies all the same
-    ("dac.04", "gain", 0.05, 0.18, 0.5),
-    ("dac.13", "stuck", 0.12, 0.24, 0.5),
-    ("dac.15", "offset", 0.07, None, -0.2),
     ("dac.16", "noise", 0.07, 0.33, 0.1),
     ("pot.alpha", "offset", 0.05, 0.20, 0.003),
     ("pot.alpha", "stuck", 0.36, 0.365, None),  # where nothing else is wrong with the readings
@@ -48,7 +41,6 @@ FAULTS = [
     ("pot.beta", "noise", 0.06, 0.30, 1e-3),
     ("encoder.gamma", "offset", 0.05, 0.20, 0.01),
     ("encoder.gamma", "dropout", 0.25, 0.26, None),
-    ("encoder.gamma", "stuck", 0.28, 0.285, None),
     ("adc", "noise", 0.05, 0.30, 2e-4),
     ("adc", "delay", 0.12, 0.16, 2e-3),
     ("adc", "dropout", 0.31, 0.314, None),
@@ -58,7 +50,6 @@ FAULTS = [
     ("supply", "dropout", 0.34, 0.343, None),
     ("controller", "delay", 0.09, 0.13, 2e-3),
     ("controller", "stuck", 0.17, 0.175, None),
-    ("controller", "dropout", 0.19, 0.194, None),
 ]
 
 

@@ -8,8 +8,8 @@ from hypothesis import strategies as st
 from spheretwin.electronics.random_streams import noise_table, stream_key, width_of
 from spheretwin.electronics.sensor_chain import SensorsSection, noise_streams, sense, sensor_chain
 from spheretwin.scenario.hardware import PROTOTYPE_SENSORS
-from tests.twin.plant.allocations import allocates_nothing
 from tests.twin.electronics.slow_residual import residual_of
+from tests.twin.plant.allocations import allocates_nothing
 
 NO_NOISE = np.empty(0)
 STAGES = {

@@ -1,14 +1,10 @@
 """Static friction: rest, break-away, hysteresis, exact motions, energy, order; and hysteresis of a cable."""
 
-from itertools import pairwise
-
 import numpy as np
 import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from spheretwin.models import actuator as actuators
-from spheretwin.models import mjcf
 from spheretwin.models.lagrangian import inertia_matrix
 from spheretwin.plant.bristle_friction import (
     CABLE,
@@ -20,7 +16,6 @@ from spheretwin.plant.bristle_friction import (
 )
 from spheretwin.plant.cable import CableSection, constant_torque_Nm
 from spheretwin.plant.lagrangian_rotor import LagrangianRotor
-from spheretwin.plant.mujoco_rotor import MujocoRotor
 from tests.twin.plant.allocations import allocates_nothing
 from tests.twin.plant.motions import UPRIGHT, STEP_s, motion, on_gamma, order
 
@@ -42,12 +37,6 @@ def lagrangian(actuator, step_s=STEP_s):
     return LagrangianRotor(actuator, step_s)
 
 
-ROTORS = {
-    "lagrangian": lagrangian,
-    "mujoco": lambda actuator: MujocoRotor(mjcf.read(actuators.MJCF_PATH), STEP_s, "RK4", 0.0, 0.0),
-}
-
-
 def spin(actuator, torque, step_s=STEP_s, stiction=STICTION, cable=NO_CABLE, rate=0.0, viscous_Nm_s=0.0):
     """Angles, rates and torque of the bearing of the third hinge alone, upright, with the inertia J3."""
     bristles = elements(actuator, stiction, cable, step_s=step_s)
@@ -60,24 +49,6 @@ def spin(actuator, torque, step_s=STEP_s, stiction=STICTION, cable=NO_CABLE, rat
 # Rest
 
 
-# A step of MuJoCo takes six times as long, and the elements are the same.
-@pytest.mark.release("2.4 s; test_static_friction.py has a rotor that rests")
-@pytest.mark.parametrize(("engine", "minutes"), [("lagrangian", 10), ("mujoco", 2)])
-def test_a_hinge_at_half_of_the_break_away_torque_rests_for_minutes(actuator, engine, minutes):
-    # Within 1 s, so that nothing overshoots.
-    rise = np.minimum(STEP_s * np.arange(round(60 * minutes / STEP_s)), 1.0)
-    load = 0.5 * BREAK_AWAY_Nm * np.outer(rise, [1.0, -1.0, 1.0])
-    bristles = elements(actuator)
-    q, qdot, _ = motion(ROTORS[engine](actuator), bristles, load, TILTED, every=round(1 / STEP_s))
-    # The elastic motion decays with 1 / (0.3 · 42 rad/s) = 0.08 s, by exp(-25) from 1 to 3 s. Rounding of q,
-    # 1e-16 in each of 120,000 steps a minute, is all that is left: it adds up to 1e-11 rad a minute at most.
-    # The requirement is 1e-6 rad in ten minutes.
-    assert np.ptp(q[3:], axis=0).max() < 1e-11 * minutes
-    assert np.abs(qdot[3:]).max() < 1e-9
-    # The deflection is that of the springs, and both engines are at the same place.
-    np.testing.assert_allclose(q[-1] - TILTED, load[-1] / STIFFNESS_Nm_rad, rtol=1e-9)
-
-
 def test_loads_that_oscillate_below_break_away_do_not_move_the_hinge(actuator):
     """LuGre creeps under such a load; here each cycle, of slip in one slider, ends where it began."""
     t_s = STEP_s * np.arange(round(50 / STEP_s))
@@ -86,16 +57,6 @@ def test_loads_that_oscillate_below_break_away_do_not_move_the_hinge(actuator):
     ends = q[round(2 / STEP_s) :: round(1 / STEP_s)]
     assert np.ptp(ends) < 1e-12  # rad, over 48 cycles: rounding
     assert np.ptp(q[-round(1 / STEP_s) :]) > 0.3 * PRESLIDING_rad
-
-
-def test_a_hinge_returns_to_its_place_when_a_load_in_the_elastic_range_ends(actuator):
-    """Two thirds of the break-away torque are elastic."""
-    steps = round(1 / STEP_s)
-    ramp = np.concatenate([np.linspace(0, 1, steps), np.linspace(1, 0, steps), np.zeros(3 * steps)])
-    for share, back in ((0.65, True), (0.9, False)):
-        q, _, _ = spin(actuator, share * BREAK_AWAY_Nm * ramp)
-        assert np.abs(q).max() > 0.4 * PRESLIDING_rad
-        assert (abs(q[-1]) < 1e-9) == back
 
 
 # Break-away
@@ -118,19 +79,6 @@ def test_the_break_away_torque_does_not_depend_on_the_rate_of_loading(actuator, 
     assert abs(load[peak] / BREAK_AWAY_Nm - 1) < (0.01 if loading_s > 0.5 else 0.02)
     # In sliding the Stribeck effect leaves the Coulomb level.
     assert bearing[qdot > 0.2] == pytest.approx(COULOMB_Nm, rel=1e-5)
-
-
-def test_the_stribeck_curve_is_that_of_the_rate_of_slip(actuator):
-    load = 2.5 * BREAK_AWAY_Nm * np.linspace(0, 1, round(3 / STEP_s))
-    stiction = STICTION.model_copy(update={"stribeck_rad_s": 0.5})
-    _, qdot, bearing = spin(actuator, load, stiction=stiction)
-    sliding = np.argmax(qdot > 0.05)
-    level_Nm = BREAK_AWAY_Nm * (1 / RATIO + (1 - 1 / RATIO) * np.exp(-((qdot / 0.5) ** 2)))
-    # The mean over a step is the trapezoid of both ends, within the predicted rate: h² times a second
-    # derivative.
-    expected = 0.5 * (level_Nm[sliding:-1] + level_Nm[sliding + 1 :])
-    np.testing.assert_allclose(bearing[sliding:-1], expected, rtol=2e-6)
-    assert qdot[-1] > 0.8
 
 
 # Hysteresis
@@ -162,19 +110,6 @@ def test_presliding_has_a_closed_hysteresis_loop(actuator):
     slip = 4 * (top - 0.5 * PRESLIDING_rad)
     # This oscillation adds its amplitude times twice the load at each end: 2 %.
     assert area == pytest.approx(slip * BREAK_AWAY_Nm / 3, rel=2e-2)
-
-
-def test_a_minor_loop_ends_where_it_began(actuator):
-    """Return-point memory, which no single-state model has."""
-    steps = round(20 / STEP_s)
-    turns = [0.0, 0.95, 0.4, 0.9, 0.4, 0.95]
-    load = BREAK_AWAY_Nm * np.concatenate([np.linspace(a, b, steps) for a, b in pairwise(turns)])
-    q, _, _ = spin(actuator, load, stiction=STICTION.model_copy(update={"damping_ratio": 0.1}))
-    ends = q[steps - 1 :: steps]
-    # The lag as above.
-    assert ends[1] == pytest.approx(ends[3], abs=5e-3 * PRESLIDING_rad)
-    assert ends[0] == pytest.approx(ends[4], abs=5e-3 * PRESLIDING_rad)
-    assert ends[0] - ends[1] > 0.3 * PRESLIDING_rad
 
 
 def test_a_cable_has_hysteresis_of_its_own_level(actuator):

@@ -20,7 +20,7 @@ from spheretwin.plant.end_stops import EndStopsSection, end_stops
 from spheretwin.plant.friction import friction
 from spheretwin.plant.lagrangian_rotor import LagrangianRotor
 from spheretwin.session import Session
-from tests.twin.plant.motions import NONE, STEP_s, motion, on_gamma, order, steps
+from tests.twin.plant.motions import NONE, STEP_s, motion, on_gamma, steps
 from tests.twin.plant.test_bristle_friction import three
 
 ON = EndStopsSection(on=True)
@@ -149,7 +149,7 @@ FREE = {
 }
 
 
-@pytest.mark.release("compiles two loops for 20 s; test_a_bounce_converges has the bounce of two hinges")
+@pytest.mark.release("compiles two loops for 20 s; crosscheck/test_end_stops.py has both engines")
 def test_a_thrown_rotor_stays_within_its_range_on_both_engines():
     """Without end stops the run ends at the end of the range."""
     on = FREE | {"plant.end_stops.on": True, "plant.viscous_Nm_s": [2e-3, 2e-3, 2e-3]}
@@ -186,19 +186,3 @@ def test_there_are_no_stops_unless_they_are_on(actuator):
         assert end_stops(section, RANGE_rad, actuator.inertia, STEP_s) is None
     with pytest.raises(InputError, match="expected a travel_rad below half of each hinge's range"):
         end_stops(ON.model_copy(update={"travel_rad": 0.6}), RANGE_rad, actuator.inertia, STEP_s)
-
-
-def test_a_bounce_converges(actuator):
-    """Rate after an impact on two hinges that are coupled, against a fine step."""
-
-    def final(h):
-        rotor, torque = LagrangianRotor(actuator, h), np.zeros((round(0.05 / h), 3))
-        start = np.array([1.2, -0.9, 0.0]), np.array([8.0, 3.0, 0.0])
-        q, qdot, _ = motion(rotor, stopped(actuator, step_s=h), torque, *start)
-        assert q[:, 0].max() > 1.35
-        return qdot[-1]
-
-    sizes = np.array([5e-4, 2.5e-4, 1.25e-4])
-    reference = final(5e-4 / 64)
-    errors = [np.abs(final(h) - reference).max() for h in sizes]
-    assert order(sizes, errors) > 1.5, errors

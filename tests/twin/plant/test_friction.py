@@ -52,56 +52,6 @@ def test_viscous_friction_is_an_exponential_decay(actuator):
     )  # the next power of the step adds a share of decay h
 
 
-def test_coulomb_friction_is_a_ramp_to_rest(actuator):
-    rate, duration = 5.0, 3.3
-    slope = COULOMB_Nm / actuator.inertia[2]  # at rest after 2.26 s
-    errors = []
-    for h in (4 * STEP_s, 2 * STEP_s, STEP_s):
-        resistance = friction(on_gamma(COULOMB_Nm), NONE, SMOOTHING_rad_s, actuator.inertia, h)
-        angles, rates = spin(actuator, resistance, duration, rate)
-        t = h * np.arange(len(rates))
-        errors.append(np.abs(rates - np.maximum(rate - slope * t, 0)).max())
-        # Where half a step takes the share r of the rate it is off by r²/2 of what it takes: one step's loss
-        # covers the sum, down to rest. Smoothing lags by its own rate.
-        assert errors[-1] < slope * h + SMOOTHING_rad_s
-        # The last second: at rest, where each step leaves P(x)², x = h k(0) / 2J, at most 0.35, of the rate.
-        assert np.all(np.diff(rates) <= 0)  # never back
-        assert np.all(rates >= 0)
-        assert rates[t > 2.4].max() < 1e-12
-        assert np.ptp(angles[t > 2.4]) < 1e-12
-    assert errors[-1] < 1.2e-3  # rad/s, at 0.5 ms
-
-
-@pytest.mark.parametrize("h", [5e-4, 5e-5])
-def test_below_its_level_coulomb_friction_creeps_as_slowly_as_it_is_smooth(actuator, h):
-    smoothing, torque, inertia = 0.05, 0.5 * COULOMB_Nm, actuator.inertia[2]
-    resistance = friction(on_gamma(COULOMB_Nm), NONE, smoothing, actuator.inertia, h)
-    _, rates = spin(actuator, resistance, 1.0, 0.0, torque)
-    steady = rates[-1]
-
-    def slowed(rate):
-        factors = [COULOMB_Nm / np.hypot(rate, smoothing)]
-        middle = rate / (1 + h / 4 * factors[0] / inertia)
-        x = h / 2 * COULOMB_Nm / np.hypot(middle, smoothing) / inertia
-        return rate / (1 + x + x**2 / 2)
-
-    # 44 time constants J/k(0) from rest: nothing is left of the start but rounding in the last steps, each
-    # 1e-16 of a rate, of which as many count as there are in the time constant, at most 450.
-    assert slowed(slowed(steady) + h * torque / inertia) == pytest.approx(steady, rel=1e-12)
-    in_the_limit = smoothing * torque / np.sqrt(COULOMB_Nm**2 - torque**2)
-    # Of second order: below the square of the share h k(0)/2J that half a step takes.
-    assert abs(steady / in_the_limit - 1) < (h * COULOMB_Nm / (2 * smoothing * inertia)) ** 2
-
-
-def test_above_its_level_coulomb_friction_leaves_the_rest_of_the_torque(actuator):
-    torque, duration, rate = 2 * COULOMB_Nm, 0.1, 10.0
-    resistance = friction(on_gamma(COULOMB_Nm), NONE, SMOOTHING_rad_s, actuator.inertia, STEP_s)
-    _, rates = spin(actuator, resistance, duration, rate, torque)
-    mean = (rates[-1] - rate) / duration
-    # Half a step takes the share r = 5.5e-5 of the rate and is off by r²/2 of that; smoothing takes 5e-9.
-    assert mean == pytest.approx((torque - COULOMB_Nm) / actuator.inertia[2], rel=1e-8)
-
-
 def decades(lowest, highest):
     return st.floats(lowest, highest).map(lambda exponent: 10.0**exponent)
 

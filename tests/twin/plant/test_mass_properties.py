@@ -146,26 +146,19 @@ def test_engines_agree_step_by_step(actuator, shipped, payload_kg):
     assert_same_steps(engine, equations_of_motion, ([0.4, -0.3, 0.2], [1.0, 2.0, -3.0]))
 
 
-SMOOTH = {"controller.law": "pd", "disturbance.load": 0.5, "duration": 1.0}
-
-
 @pytest.mark.release(
     "compiles loops of four kinds for 30 s; accelerations of both engines are compared in less"
 )
-@pytest.mark.parametrize(
-    "bearings",
-    [
-        {"plant.coulomb_Nm": [5e-3] * 3, "plant.viscous_Nm_s": [1e-4] * 3},
-        {
-            "plant.coulomb_Nm": [5e-3] * 3,
-            "plant.stiction.on": True,
-            "plant.cable.stiffness_Nm_rad": [2e-3] * 3,
-        },
-    ],
-    ids=["smoothed friction", "static friction and cable"],
-)
-def test_closed_loops_on_both_engines_agree(bearings):
-    changes = SMOOTH | FIELDS | bearings
+@pytest.mark.parametrize("stiction", [False, True], ids=["smoothed friction", "static friction"])
+def test_closed_loops_on_both_engines_agree(stiction):
+    bearings = {
+        "plant.coulomb_Nm": [5e-3] * 3,
+        "plant.stiction.on": stiction,
+        "plant.viscous_Nm_s": [1e-4] * 3,
+        "plant.cable.stiffness_Nm_rad": [2e-3] * 3,
+    }
+    smooth = {"controller.law": "pd", "disturbance.load": 0.5, "duration": 1.0} | bearings
+    changes = smooth | FIELDS
     runs = [
         simulate(scenarios.load("nutation", changes | {"plant.engine": engine}))
         for engine in ("mujoco", "lagrangian")
@@ -173,7 +166,7 @@ def test_closed_loops_on_both_engines_agree(bearings):
     first, second = (run.telemetry["q_rad"] for run in runs)
     # As in the cross-check.
     np.testing.assert_allclose(second, first, rtol=0, atol=1e-9)
-    ideal = simulate(scenarios.load("nutation", SMOOTH | bearings)).telemetry["q_rad"]
+    ideal = simulate(scenarios.load("nutation", smooth)).telemetry["q_rad"]
     assert np.abs(ideal - first).max() > 1e-3
 
 
@@ -262,30 +255,6 @@ def test_a_ring_needs_a_body(tmp_path):
     ring = {"plant.mass.ring_inertia_kg_m2": [[0.0] * 3, [1e-4] * 3], "plant.mjcf": str(path)}
     with pytest.raises(InputError, match="received one without a ring at hinge beta"):
         Session(scenarios.load("hold", ring))
-
-
-def test_a_file_and_the_section_give_the_same_machine(shipped, tmp_path, actuator):
-    moved = models.INERTIAL.replace("0 0 0", "1e-3 2e-3 -1e-3").replace("diaginertia", "fullinertia")
-    edits = (
-        (models.INERTIAL, moved.replace('2.256e-3"', '2.256e-3 1e-4 -5e-5 2e-5"')),
-        ('axis="0 1 0"', 'axis="0.02 1 -0.01" pos="1e-4 0 2e-4"'),
-    )
-    (path := tmp_path / "moved.xml").write_text(models.edited(edits), encoding="utf-8")
-    section = MassSection(
-        centre_m=(1e-3, 2e-3, -1e-3),
-        products_kg_m2=(1e-4, -5e-5, 2e-5),
-        axis_tilt_rad=((0.0, 0.0), (0.02, -0.01), (0.0, 0.0)),
-        axis_offset_m=((0.0, 0.0), (1e-4, 2e-4), (0.0, 0.0)),
-    )
-    ours = chain_of(shipped, section, payload_kg=0.05)
-    theirs = read_chain(true_model(mjcf.read(path), 0.0, 0.05, 9.81, None))
-    q, qdot = (0.3, -0.4, 0.2), (2.0, -1.0, 3.0)
-    for one, other in zip(equations(ours, q, qdot), equations(theirs, q, qdot), strict=True):
-        np.testing.assert_allclose(one, other, rtol=0, atol=1e-13)
-    # The nominal inertia of the file: moments about the axes through the joint centre.
-    centre = np.array([1e-3, 2e-3, -1e-3])
-    expected = actuator.inertia + 1.6 * (centre @ centre - centre**2)
-    np.testing.assert_allclose(actuators.load(path).inertia, expected, rtol=1e-12)
 
 
 def test_a_payload_off_the_axis_is_computed_by_the_equations_of_motion(tmp_path):

@@ -3,7 +3,6 @@
 import numba
 import numpy as np
 import pytest
-from scipy.linalg import expm
 
 import spheretwin as st
 from spheretwin import plant
@@ -121,27 +120,6 @@ def test_a_user_s_compiled_code_calls_it():
     reached = coast(state, parameters, 1e-3, 20)
     np.testing.assert_allclose(reached.q_rad, expected.q_rad, rtol=1e-13)
     np.testing.assert_allclose(reached.qdot_rad_s, expected.qdot_rad_s, rtol=1e-13)
-
-
-def test_its_slopes_are_the_linear_model():
-    changes = {"plant.payload_kg": 0.05, "plant.viscous_Nm_s": [1e-3] * 3, "plant.engine": "lagrangian"}
-    pose, dt, small = np.array([0.2, -0.1, 0.3]), 1e-3, 1e-5
-    model = plant.linearise(st.load("tilt", changes), pose, inputs="currents")
-    A, B = np.asarray(model.system.A), np.asarray(model.system.B)
-    parameters, rest, holding = plant.parameters("tilt", changes), np.zeros(3), model.input_at_rest
-
-    def after(x, current):
-        reached = step(plant.State(x[:3], x[3:]), current, rest, parameters, dt)
-        return np.concatenate(reached)
-
-    x = np.concatenate([pose, rest])
-    moved = [after(x + e, holding) - after(x - e, holding) for e in small * np.eye(6)]
-    by_state = np.transpose(moved) / (2 * small)
-    exact = expm(A * dt)
-    # A step is of second order: what it leaves out is (|A| dt)³, here 1e-6 of the largest entries.
-    np.testing.assert_allclose(by_state, exact, atol=3e-6 * np.abs(exact).max())
-    by_current = (after(x, holding + 1e-3 * np.eye(18)[4]) - after(x, holding - 1e-3 * np.eye(18)[4])) / 2e-3
-    np.testing.assert_allclose(by_current[3:], dt * B[3:, 4], atol=1e-3 * np.abs(dt * B[3:, 4]).max())
 
 
 @pytest.mark.parametrize(

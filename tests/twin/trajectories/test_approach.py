@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from spheretwin import scenario as scenarios
 from spheretwin.simulation import simulate
-from spheretwin.trajectories.rounding import FADING, ACCELERATION_FADE_s, Approach, faded
+from spheretwin.trajectories.rounding import ACCELERATION_FADE_s, Approach, faded
 from spheretwin.trajectories.shapes import Hold, Jog, Nutation, Sinusoid
 
 STEP = 1e-5
@@ -47,14 +47,6 @@ def test_rates_and_accelerations_are_derivatives_and_nothing_jumps(kind):
     # The jerk is at most 9 times the difference of accelerations over a tenth of a second.
     largest = np.abs(fine[:, 2]).max()
     assert np.abs(np.diff(fine[:, 2], axis=0)).max() < 1e-4 * 20 * largest / ACCELERATION_FADE_s
-
-
-def test_the_polynomials_are_those_that_end_at_rest():
-    for order, powers in enumerate(FADING):
-        polynomial = np.polynomial.Polynomial(powers)
-        for derivative in range(3):
-            assert polynomial.deriv(derivative)(0.0) == (derivative == order)
-            assert abs(polynomial.deriv(derivative)(1.0)) < 1e-14
 
 
 @given(st.lists(st.floats(-10, 10), min_size=9, max_size=9), st.floats(0.01, 100), st.floats(0, 200))

@@ -7,9 +7,6 @@ from hypothesis import strategies as st
 from pydantic import ValidationError
 from scipy import signal
 
-from spheretwin import scenario as scenarios
-from spheretwin.models.base.errors import InputError
-from spheretwin.simulation import simulate
 from spheretwin.trajectories import SHAPES
 from spheretwin.trajectories.shapes import Chirp, Component, Hold, Multisine, Nutation, Sinusoid, Steps, Tilt
 
@@ -70,15 +67,6 @@ def test_chirp_goes_on_where_its_sweep_ends(chirp):
     expected = after[0, 0] * np.cos(phase) + after[1, 0] / w * np.sin(phase)
     np.testing.assert_allclose(beyond[:, 0], expected, atol=1e-11)  # phases below 3,000 rad
     np.testing.assert_allclose(beyond[:, 2], -(w**2) * expected, atol=1e-11 * w**2)
-
-
-def test_exponential_chirp_passes_octaves_in_equal_times():
-    chirp = Chirp(start_frequency_Hz=1.0, end_frequency_Hz=8.0, sweep_s=3.0, sweep="exponential")
-    # Turns done after each octave: 1 / ln 2 times 1, 2, 4, all of them shares of a whole.
-    for octave, turns in enumerate(np.cumsum([0.0, 1.0, 2.0, 4.0]) / np.log(2)):
-        angle, rate, _ = chirp.sample(np.array([float(octave)]))[0, :, 0]
-        assert angle == pytest.approx(0.1 * np.sin(2 * np.pi * turns), abs=1e-14)
-        assert rate == pytest.approx(0.2 * np.pi * 2**octave * np.cos(2 * np.pi * turns), abs=1e-12)
 
 
 def test_multisine_of_one_is_a_sinusoid_about_its_offset():
@@ -143,29 +131,3 @@ def test_parameters_that_do_not_fit_are_refused_by_name(name, fields, complaint)
 
 
 # --- from a file to a run
-
-
-def test_scenario_file_names_them(tmp_path):
-    path = tmp_path / "mine.toml"
-    path.write_text("""
-duration = 0.05
-[trajectory]
-shape = "multisine"
-offset_rad = [0.05, 0.0, 0.0]
-[[trajectory.components]]
-amplitude_rad = [0.1, 0.1, 0.1]
-frequency_Hz = [0.5, 1.0, 1.5]
-[[trajectory.components]]
-amplitude_rad = [0.0, 0.05, 0.0]
-frequency_Hz = [2.0, 2.0, 2.0]
-phase_rad = [0.0, 1.5, 0.0]
-""")
-    loaded = scenarios.load(str(path))
-    assert len(loaded.trajectory.components) == 2
-    run = simulate(loaded)
-    expected = loaded.trajectory.sample(run.telemetry["t_s"])[:, :2]
-    np.testing.assert_array_equal(run.telemetry["q_ref_rad"], expected[:, 0])
-    np.testing.assert_array_equal(run.telemetry["qdot_ref_rad_s"], expected[:, 1])
-    path.write_text('[trajectory]\nshape = "tilt"\nrounding_rad_s2 = 1e-3\n')
-    with pytest.raises(InputError, match=r"trajectory: expected rounding_rad_s2 of at least 0.152588 rad/s²"):
-        scenarios.load(str(path))
