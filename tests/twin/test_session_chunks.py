@@ -1,5 +1,7 @@
 """The same bytes, whatever the chunks."""
 
+import functools
+
 import numpy as np
 import pytest
 from hypothesis import example, given, settings
@@ -15,19 +17,11 @@ LENGTH = 2 * BLOCK_TICKS + 300
 VARIANTS = {"ideal": {}, "worn": WORN, "askew": ASKEW, "both": WORN | ASKEW}
 
 
-@pytest.fixture(scope="module")
-def whole():
-    """Rows of one long call, made when first asked for."""
-    made = {}
-
-    def of(law, engine, variant):
-        key = law, engine, variant
-        if key not in made:
-            changes = {"controller.law": law, "plant.engine": engine} | VARIANTS[variant]
-            made[key] = rows(Session(scenario(**changes)).advance(LENGTH))
-        return made[key]
-
-    return of
+@functools.cache
+def whole(law, engine, variant):
+    """Rows of one long call."""
+    changes = {"controller.law": law, "plant.engine": engine} | VARIANTS[variant]
+    return rows(Session(scenario(**changes)).advance(LENGTH))
 
 
 @settings(max_examples=60)
@@ -39,7 +33,7 @@ def whole():
 )
 @example("afsm", "mujoco", "both", [0, 0, 1, 999, 1000, 1000, 1001, 2000])
 @example("pd", "lagrangian", "ideal", list(range(960, 1040)))
-def test_chunks_change_no_bit(whole, law, engine, variant, cuts):
+def test_chunks_change_no_bit(law, engine, variant, cuts):
     changes = {"controller.law": law, "plant.engine": engine} | VARIANTS[variant]
     ends = [*sorted(cuts), LENGTH]
     chunked = Session(scenario(**changes))

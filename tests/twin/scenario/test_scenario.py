@@ -34,17 +34,11 @@ def test_help_shows_fields_as_they_can_be_given():
     assert {"--name", "--plant.mjcf", "--plant.initial-rad", "--drive.current-limit-A"} < set(shown)
 
 
-OPEN = {"target": "coil.07", "mode": "open"}
-
-
 @pytest.mark.parametrize(
     ("overrides", "parts"),
     [
         ({"controller.law": "pdd"}, ["controller.law", "pd, pid, lqi", "'pdd'", "did you mean pd?"]),
-        ({"plant.modeling_error": 1}, ["received modeling_error; did you mean modelling_error?"]),
-        ({"controler.law": "pd"}, ["received controler; did you mean controller?"]),
         ({"law": "pd"}, ["received law; did you mean controller.law?"]),
-        ({"fault": [OPEN | {"known": True}]}, ["received known, the former name of reported_to_controller"]),
         ({"duration": float("nan")}, ["duration", "finite", "nan"]),
         ({"duration": float("inf")}, ["duration", "finite", "inf"]),
         ({"duration": 1e-9}, ["duration", "control period"]),
@@ -53,14 +47,11 @@ OPEN = {"target": "coil.07", "mode": "open"}
         ({"seed": None}, ["seed", "received none"]),
         ({"seed": 10**5000}, ["digits"]),
         ({"seed": "9" * 5000}, ["seed", "whole number", "9…9"]),
-        ({"plant.modelling_error": -1.0}, ["modelling_error", "-1"]),
-        ({"drive.current_limit_A": 0}, ["current_limit_A", "greater than 0", "0"]),
         ({"disturbance.load": 1e300}, ["load", "1000"]),
         ({"controller.period_s": 7e-4}, ["whole multiple", "0.0007", "0.0005"]),
         ({"controller.period_s": 1e-4}, ["whole multiple", "0.0001", "0.0005"]),
         ({"controller.period_s": 1.0000001e-3}, ["received 0.0010000001 and 0.0005 s"]),
         ({"trajectory": {}}, ["trajectory.shape: expected one of sinusoid", "received none"]),
-        ({"trajectory": 3}, ["trajectory", "3"]),
         (
             {"disturbance.terms": [{"kind": "constant", "torque": [1.0, 2.0, 3.0]}]},
             ["expected one of kind, torque_Nm in disturbance.terms.0, received torque; did you mean"],
@@ -101,7 +92,6 @@ def test_bad_input_is_told_in_one_line(overrides, parts):
     ("source", "text", "part"),
     [
         ("spiral", None, "bench, hold, nutation, sinusoid, tilt, ventusff"),
-        ("missing.toml", None, "missing.toml"),
         ("broken.toml", "duration = = 2", "TOML"),
         ("empty.toml", "", "trajectory"),
         ("nutatoin", None, "received 'nutatoin'; did you mean nutation?"),
@@ -110,11 +100,8 @@ def test_bad_input_is_told_in_one_line(overrides, parts):
         (f"{'x' * 20_000}.toml", None, "too long"),
         ("a\0b.toml", None, r"a\\x00b.toml: expected a readable"),
         ("digits.toml", f"seed = {'9' * 5000}", "digits"),
-        ("deep.toml", f"{'a.' * 3000}a = 1", "deep.toml"),
-        ("lists.toml", f"seed = {'[' * 3000}{']' * 3000}", "lists.toml"),
         ("zero.toml", "duration = 1\0", "TOML"),
         ("date.toml", "seed = 1979-05-27\n[trajectory]\nshape = 'hold'", "seed"),
-        ("latin.toml", b"name = '\xff'", "readable TOML file"),
     ],
 )
 def test_bad_source_is_told_in_one_line(tmp_path, monkeypatch, source, text, part):
