@@ -1,4 +1,4 @@
-"""What every kind of axis owes: words for its fields, refusals by name, and values of its own."""
+"""Requirements on every kind of axis: descriptions of its fields, refusals by name, values of its own."""
 
 from typing import get_args
 
@@ -15,54 +15,50 @@ from tests.twin.study.cases import study
 
 UNION = get_args(AnyAxis)[0]
 KINDS = {kind.model_fields["kind"].default: kind for kind in (get_args(UNION) or (UNION,))}
+each_kind = pytest.mark.parametrize("kind", KINDS)
 
 
 def fields(kind):
     """Fields of an axis of a kind: those without a default rise, one by one."""
-    given_fields = {"field": "disturbance.load", "kind": kind}
+    values = {"field": "disturbance.load"}
     for place, (name, field) in enumerate(KINDS[kind].model_fields.items()):
-        if name not in given_fields and field.is_required():
-            given_fields[name] = {float: 0.1 * (1 + place), int: 3}.get(field.annotation, [0.25, 0.5])
-    return given_fields
+        if name not in values and field.is_required():
+            values[name] = {float: 0.1 * (1 + place), int: 3}.get(field.annotation, [0.25, 0.5])
+    return values
 
 
-def grid(kind, **others):
+def listed(kind, **others):
+    """Values of the rows of a study over an axis of a kind."""
     samples = 16 if issubclass(KINDS[kind], DrawnAxis) else None
-    return Grid(study({**fields(kind), **others}, samples=samples))
+    rows = Grid(study({**fields(kind), "kind": kind, **others}, samples=samples))
+    return [row.values["disturbance.load"] for row in rows]
 
 
-@pytest.mark.parametrize("kind", KINDS)
-def test_it_says_what_it_is(kind):
+@each_kind
+def test_values_are_finite_and_different_and_the_same_each_time(kind):
     check_every_field_says_what_it_is(KINDS[kind])
     assert KINDS[kind].__doc__
-
-
-@pytest.mark.parametrize("kind", KINDS)
-def test_its_values_are_its_own_and_the_same_each_time(kind):
-    listed = [row.values["disturbance.load"] for row in grid(kind)]
-    assert len(set(listed)) == len(listed) > 1
-    assert np.all(np.isfinite(listed))
-    assert listed == [row.values["disturbance.load"] for row in grid(kind)]
+    values = listed(kind)
+    assert len(set(values)) == len(values) > 1
+    assert np.all(np.isfinite(values))
+    assert values == listed(kind)
 
 
 @pytest.mark.parametrize("kind", [kind for kind in KINDS if issubclass(KINDS[kind], DrawnAxis)])
 @given(st.lists(st.floats(1e-12, 1 - 1e-12), min_size=2, max_size=20))
 def test_what_is_drawn_rises_with_what_it_is_drawn_by(kind, uniform):
-    given_fields = {name: value for name, value in fields(kind).items() if name != "kind"}
-    drawn = KINDS[kind](**given_fields).quantile(np.sort(uniform))
+    drawn = KINDS[kind](**fields(kind)).quantile(np.sort(uniform))
     assert np.all(np.isfinite(drawn))
     # The inverse of a distribution: where two numbers are next to each other, rounding is all there is.
     assert np.all(np.diff(drawn) >= -1e-12 * np.abs(drawn).max())
 
 
-@pytest.mark.parametrize("kind", KINDS)
-def test_what_it_does_not_know_is_refused_by_name(kind):
-    with pytest.raises(InputError) as refusal:
-        grid(kind, no_such_field=1.0)
-    assert "no_such_field" in str(refusal.value)
+@each_kind
+def test_unknown_fields_and_values_that_are_no_numbers_are_refused_by_name(kind):
     numbers = [name for name, value in fields(kind).items() if isinstance(value, int | float)]
-    for name in numbers:
-        for bad in (float("nan"), float("inf"), "text"):
-            with pytest.raises(InputError) as refusal:
-                grid(kind, **{name: bad})
-            assert f"axis.0.{name}: expected" in str(refusal.value)
+    bad = [("no_such_field", 1.0, "no_such_field")]
+    bad += [(n, value, f"axis.0.{n}: expected") for n in numbers for value in (np.nan, np.inf, "text", "0")]
+    for name, value, message in bad:
+        with pytest.raises(InputError) as refusal:
+            listed(kind, **{name: value})
+        assert message in str(refusal.value)
