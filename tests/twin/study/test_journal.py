@@ -1,14 +1,13 @@
 """The journal: what was finished is kept, whatever happens to its file."""
 
 import json
-import subprocess
-import sys
+import tracemalloc
 
 import pytest
 
 from spheretwin.models.base.errors import InputError, SpheretwinError
 from spheretwin.study import journal
-from spheretwin.study.grid import Grid, Row
+from spheretwin.study.grid import Row
 from spheretwin.study.journal import Journal
 from spheretwin.study.row import Result
 from tests.twin.study.cases import Full, loads, run_rows, study, table, values
@@ -85,17 +84,13 @@ def test_a_row_whose_line_was_damaged_is_run_again_and_the_table_is_the_same(tmp
     assert len(path.read_bytes().splitlines()) == len(lines) + 1
 
 
-@pytest.mark.parametrize("text", [b"my notes", b"my notes\nand more\n", b"[1, 2]\n", b'{"journal": 1', b"\n"])
+@pytest.mark.parametrize("text", [b"my notes", b"my notes\nand more\n", b"[1, 2]\n", b"\n", b"\x00\xff\n"])
 def test_a_file_that_is_no_journal_is_refused_and_left_as_it_is(tmp_path, text):
     path = tmp_path / journal.NAME
-    if b"journal" not in text:
-        path.write_bytes(text)
-        with pytest.raises(InputError, match="expected a journal of a study"):
-            held(path)
-        assert path.read_bytes() == text
-    else:  # as it begins: one that was torn in its first line
-        path.write_bytes(text)
-        assert held(path)[0] == {}
+    path.write_bytes(text)
+    with pytest.raises(InputError, match=r"expected a journal of a study, received .*journal\.jsonl"):
+        held(path)
+    assert path.read_bytes() == text
 
 
 def test_the_journal_of_another_study_is_refused_and_left_as_it_is(path):
@@ -122,11 +117,7 @@ def test_whatever_changes_a_figure_makes_another_study(tmp_path, other):
     with pytest.raises(InputError, match="received one of others"):
         run_rows(loads(**other), tmp_path)
     assert table(tmp_path) == before
-
-
-def test_other_words_about_it_make_no_other_study(tmp_path):
-    run_rows(loads(), tmp_path, limit=2)
-    assert len(run_rows(loads(description="another"), tmp_path, limit=2)) == 2
+    assert len(run_rows(loads(description="another"), tmp_path, limit=1)) == 1
 
 
 def test_an_edited_file_of_the_user_s_makes_another_study(tmp_path):
@@ -137,22 +128,6 @@ def test_an_edited_file_of_the_user_s_makes_another_study(tmp_path):
     mine.write_text("def ticks(run): return 2 * len(run.telemetry)")
     with pytest.raises(InputError, match="received one of others"):
         run_rows(chosen, tmp_path / "out")
-
-
-def test_a_second_writer_is_refused(path):
-    # The lock is a process's, so the second is one: within a process it would be the same on some systems.
-    script = (
-        "import sys; from pathlib import Path; from spheretwin.study.journal import Journal\n"
-        "with Journal(Path(sys.argv[1]), 'd', 6): print('in', flush=True); input()"
-    )
-    with subprocess.Popen(
-        [sys.executable, "-c", script, str(path)], stdin=subprocess.PIPE, stdout=subprocess.PIPE
-    ) as other:
-        assert other.stdout.readline() == b"in\n"
-        with pytest.raises(InputError, match="one process at a time"):
-            held(path)
-        other.communicate(b"\n")
-    assert len(held(path)[0]) == 6
 
 
 def test_a_full_disk_is_told_and_what_was_finished_is_kept(path):
@@ -180,8 +155,6 @@ def test_a_full_disk_ends_a_study_which_goes_on_when_there_is_room(tmp_path, mon
 
 
 def test_of_rows_that_there_may_be_none_takes_memory(tmp_path):
-    import tracemalloc
-
     tracemalloc.start()
     with Journal(tmp_path / journal.NAME, "d", 10**8) as writer:
         peak = tracemalloc.get_traced_memory()[1]
@@ -190,7 +163,6 @@ def test_of_rows_that_there_may_be_none_takes_memory(tmp_path):
     tracemalloc.stop()
     # Addresses are all that is taken before a row is finished: eight bytes a row, none of them written.
     assert peak < 8 * 10**8 + 10**6
-    assert len(Grid(loads())) == 24
 
 
 @pytest.mark.parametrize("rows", [3, 5])

@@ -9,12 +9,15 @@ import sys
 import pytest
 
 from spheretwin import cli
-from tests.twin.study.cases import rows_of, run_rows, study, table, values
+from spheretwin.study.study import load
+from tests.twin.study.cases import rows_of, run_rows, table
 from tests.waiting import wait_for
 
+SAME_IN_LESS = pytest.mark.release(
+    "processes of 1 to 2 s; SIGKILL and SIGINT here, test_journal.py and test_trials.py show the same"
+)
 PROGRAM = [sys.executable, "-m", "spheretwin"]
 LOADS = [0.1 * place for place in range(60)]
-MANY = study(values("disturbance.load", *LOADS), law=[{"law": "pd"}], fields={"duration": 2.0})
 SOURCE = f"""
 name = "short"
 scenario = "sinusoid"
@@ -24,24 +27,24 @@ axis = [{{field = "disturbance.load", kind = "values", values = {LOADS}}}]
 """
 
 
-@pytest.fixture
-def command(tmp_path):
-    """What sweeps the study into a folder of the test's."""
-    source = tmp_path / "short.toml"
-    source.write_text(SOURCE)
-    return [*PROGRAM, "sweep", str(source), "--out", str(tmp_path / "out"), "--json"]
-
-
 @pytest.fixture(scope="module")
 def whole(tmp_path_factory):
+    """Folder of the study, complete."""
     folder = tmp_path_factory.mktemp("whole")
-    run_rows(MANY, folder)
+    (folder / "short.toml").write_text(SOURCE)
+    run_rows(load(str(folder / "short.toml")), folder)
     return folder
 
 
-def begun(command, folder, **options):
+@pytest.fixture
+def command(tmp_path, whole):
+    """Command that sweeps the study into a folder of the test."""
+    return [*PROGRAM, "sweep", str(whole / "short.toml"), "--out", str(tmp_path / "out"), "--json"]
+
+
+def begun(command, folder):
     """A process that has finished some rows, and not all."""
-    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, **options)
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     try:
         wait_for(lambda: journal_lines(folder) > 4 or process.poll() is not None)
         assert process.poll() is None, process.communicate()
@@ -65,7 +68,7 @@ def gone_on_with(command, folder, whole, capfd):
     return json.loads(out)
 
 
-@pytest.mark.parametrize("threads", ["1", "2"])
+@pytest.mark.parametrize("threads", ["1", pytest.param("2", marks=SAME_IN_LESS)])
 def test_kill_loses_no_finished_row(tmp_path, command, whole, capfd, threads):
     folder = tmp_path / "out"
     process = begun([*command, "--threads", threads], folder)
@@ -77,10 +80,7 @@ def test_kill_loses_no_finished_row(tmp_path, command, whole, capfd, threads):
     assert gone_on_with(command, folder, whole, capfd)["resumed"] == finished
 
 
-@pytest.mark.release(
-    "processes that are interrupted or killed, 1.3 to 4 s; test_kill_loses_no_finished_row has one"
-)
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("number", [signal.SIGINT, pytest.param(signal.SIGTERM, marks=SAME_IN_LESS)])
 def test_an_interruption_finishes_the_rows_in_flight_and_writes_the_table(
     tmp_path, command, whole, capfd, number
 ):
@@ -90,17 +90,15 @@ def test_an_interruption_finishes_the_rows_in_flight_and_writes_the_table(
     out, err = process.communicate()
     assert process.returncode == cli.FAILED
     report = json.loads(out)
-    assert (
-        4 <= report["rows"] == journal_lines(folder) - 1 == len(rows_of(folder)) < report["of"] == len(LOADS)
-    )
-    assert f"interrupted after {report['rows']} of 60 rows; the same command continues from there" in err
+    finished = journal_lines(folder) - 1
+    assert 4 <= finished < len(LOADS)
+    assert (report["rows"], report["of"], len(rows_of(folder))) == (finished, len(LOADS), finished)
+    assert f"interrupted after {finished} of 60 rows; the same command continues from there" in err
     assert "Traceback" not in err
-    assert gone_on_with(command, folder, whole, capfd)["resumed"] == report["rows"]
+    assert gone_on_with(command, folder, whole, capfd)["resumed"] == finished
 
 
-@pytest.mark.release(
-    "processes that are interrupted or killed, 1.3 to 4 s; test_kill_loses_no_finished_row has one"
-)
+@SAME_IN_LESS
 def test_a_second_process_is_refused_and_the_first_goes_on(tmp_path, command, whole, capfd):
     folder = tmp_path / "out"
     process = begun([*command, "--threads", "1"], folder)
@@ -115,6 +113,7 @@ def test_a_second_process_is_refused_and_the_first_goes_on(tmp_path, command, wh
     assert table(folder) == table(whole)
 
 
+@SAME_IN_LESS
 def test_where_files_may_not_grow_the_study_ends_in_one_line_and_loses_nothing(
     tmp_path, command, whole, capfd
 ):

@@ -1,13 +1,10 @@
 """What is said of a study as a whole: its summary, what the worst goes with, its figures and its page."""
 
-import re
-
 import numpy as np
 import pyarrow as pa
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from matplotlib.text import Text
 from scipy import stats
 
 from spheretwin.metrics import METRICS
@@ -15,9 +12,8 @@ from spheretwin.models.base.errors import InputError
 from spheretwin.scenario.fields import every_field, quantity_text, unit_of
 from spheretwin.scenario.sections import Scenario
 from spheretwin.study import report
-from spheretwin.study.report import drawings
 from spheretwin.study.statistics import Rows, largest, ranked, read, strongest, summary
-from tests.twin.study.cases import LOADS, loads, run_rows, study, values
+from tests.twin.study.cases import loads, run_rows, study
 
 LISTS = st.none() | st.lists(st.none() | st.floats(-9, 9), min_size=1, max_size=3)
 
@@ -26,11 +22,8 @@ def made(count, figures, axes, laws=("pd",), lost=()):
     """Rows of a study that never ran."""
     statuses = np.full(count, "completed", dtype=object)
     statuses[list(lost)] = "left_workspace"
-    fields = {
-        "name": "made",
-        "description": "It was made.",
-        "axis": [{"field": f, "kind": "values"} for f in axes],
-    }
+    listed = [{"field": field, "kind": "values"} for field in axes]
+    fields = {"name": "made", "description": "It was made.", "axis": listed}
     texts = np.full(count, "", dtype=object)
     named = np.array([laws[place % len(laws)] for place in range(count)], dtype=object)
     keys = np.array([f"{place:016x}" for place in range(count)], dtype=object)
@@ -39,9 +32,7 @@ def made(count, figures, axes, laws=("pd",), lost=()):
 
 @given(st.lists(LISTS, max_size=8))
 def test_the_largest_of_a_list_is_none_where_a_part_is(lists):
-    column = pa.chunked_array(
-        [pa.array(lists[:3], pa.list_(pa.float64())), pa.array(lists[3:], pa.list_(pa.float64()))]
-    )
+    column = pa.chunked_array([pa.array(part, pa.list_(pa.float64())) for part in (lists[:3], lists[3:])])
     expected = [np.nan if each is None or None in each else max(each) for each in lists]
     np.testing.assert_array_equal(largest(column), expected)
 
@@ -80,12 +71,11 @@ def test_what_is_partial_is_the_correlation_of_what_fits_of_the_others_leave():
     columns = np.stack([stats.rankdata(each) for each in (*x, *(np.abs(a - np.median(a)) for a in x))])
     for place in range(6):
         others = np.vstack([np.delete(columns, place, axis=0), np.ones(200)]).T
-        left = [
-            each - others @ np.linalg.lstsq(others, each)[0] for each in (columns[place], stats.rankdata(y))
-        ]
-        found_ = [*rank.by_value, *rank.by_distance][place]
+        both = (columns[place], stats.rankdata(y))
+        left = [each - others @ np.linalg.lstsq(others, each)[0] for each in both]
         # Two ways to solve systems whose condition is some tens.
-        assert found_ == pytest.approx(np.corrcoef(left)[0, 1], abs=1e-9)
+        partial = pytest.approx(np.corrcoef(left)[0, 1], abs=1e-9)
+        assert [*rank.by_value, *rank.by_distance][place] == partial
     # Behind the first, which outweighs them, the others show: by value, and by distance alone.
     assert rank.by_value[1] > 3 * rank.chance
     assert rank.by_distance[2] > 3 * rank.chance
@@ -112,27 +102,6 @@ def test_what_does_not_matter_is_by_chance_95_times_of_a_hundred():
 NUMBERS = np.linspace(0, 1, 24)
 
 
-@pytest.mark.parametrize(
-    ("axes", "files"),
-    [
-        ({}, ["report_spread.svg"]),
-        ({"a": NUMBERS}, ["report_axis.svg", "report_spread.svg"]),
-        ({"a": np.array(["x", "y"] * 12, dtype=object)}, ["report_axis.svg", "report_spread.svg"]),
-        ({"a": NUMBERS // 0.25, "b": NUMBERS % 0.25 // 0.1}, ["report_map.svg", "report_spread.svg"]),
-        (
-            {"a": NUMBERS, "b": NUMBERS[::-1], "c": NUMBERS**2},
-            ["report_ranks.svg", "report_strongest.svg", "report_spread.svg"],
-        ),
-    ],
-)
-@pytest.mark.parametrize("laws", [("pd",), ("pd", "afsm, gain = 2")])
-def test_figures_suit_the_axes(axes, files, laws):
-    rows = made(24, {"max_abs_error_rad": 0.1 + NUMBERS, "own": NUMBERS}, axes, laws, lost=(3,))
-    drawn = list(drawings(rows))
-    assert [drawing.file for drawing in drawn] == files
-    assert all(drawing.caption.endswith(".") for drawing in drawn)
-
-
 @pytest.mark.parametrize("lost", [range(24), range(23)])
 def test_where_hardly_a_row_was_completed_nothing_fails(tmp_path, lost):
     rows = made(24, {"max_abs_error_rad": NUMBERS}, {"a": NUMBERS, "b": NUMBERS, "c": NUMBERS}, lost=lost)
@@ -140,56 +109,14 @@ def test_where_hardly_a_row_was_completed_nothing_fails(tmp_path, lost):
     assert "| pd | left_workspace |" in (tmp_path / "report.md").read_text()
 
 
-@pytest.mark.parametrize(
-    ("of", "total", "missing", "beyond"), [(24, 24, [], []), (30, 30, ["6"], []), (24, 48, [], ["48"])]
-)
-def test_the_page_counts_rows_that_remain_and_rows_that_were_not_requested(
-    tmp_path, of, total, missing, beyond
-):
-    rows = made(24, {"max_abs_error_rad": NUMBERS}, {"a": NUMBERS})
-    markdown, _ = report.write(tmp_path, rows, summary(rows), (of, total), "made")
-    assert f"24 of {of} rows: 24 completed." in (text := markdown.read_text())
-    assert re.findall(r"(\d+) rows remain", text) == missing
-    assert re.findall(r"of the study's (\d+) rows", text) == beyond
-
-
-@pytest.mark.release("1 s; content of study pages has the text")
-def test_the_page_tells_of_a_study(tmp_path):
-    chosen = loads(axis=[*LOADS, values("plant.payload_kg", 0.0, -1.0)])
-    reported = run_rows(chosen, tmp_path)
-    rows = read(tmp_path / "table.parquet")
-    markdown, html = report.write(tmp_path, rows, summary(rows), (48, 48), "my study.toml")
-    text = markdown.read_text()
-    assert "48 of 48 rows: 24 completed, 24 refused." in text
-    assert "afsm, surface_slope = [60.0, 60.0, 60.0]" in text
-    worst = max(
-        (row for row in reported if row["status"] == "completed"),
-        key=lambda row: max(row["max_abs_error_rad"]),
-    )
-    assert f"| {worst['row']} | `{worst['key']}` |" in text
-    assert "payload_kg: expected a number greater than or equal to 0, received -1.0 | 12 |" in text
-    assert "`spheretwin sweep 'my study.toml' --row KEY`" in text
-    for line in text.splitlines():
-        if line.startswith("!["):
-            assert (tmp_path / line.rpartition("(")[2].rstrip(")")).stat().st_size > 1000
-    assert "<table>" in html.read_text()
-
-
-@pytest.mark.release("0.8 s; content of study pages has the text")
-def test_the_same_table_gives_the_same_page(tmp_path):
-    for name in ("a", "b"):
-        run_rows(loads(), tmp_path / name)
-        rows = read(tmp_path / name / "table.parquet")
-        report.write(tmp_path / name, rows, summary(rows), (24, 24), "short")
-    for path in (tmp_path / "a").glob("report*"):
-        assert path.read_bytes() == (tmp_path / "b" / path.name).read_bytes()
-
-
 def test_a_study_of_one_row_has_a_page(tmp_path):
     run_rows(study(), tmp_path)
     rows = read(tmp_path / "table.parquet")
     report.write(tmp_path, rows, summary(rows), (1, 1), "short")
     assert "Only the seed differs." in (tmp_path / "report.md").read_text()
+
+
+DAMAGED = r"(row group 0, rows 0 to 23|the footer).*: the file is damaged|magic"
 
 
 def test_a_damaged_table_is_refused_with_its_place(tmp_path):
@@ -201,9 +128,7 @@ def test_a_damaged_table_is_refused_with_its_place(tmp_path):
         damaged = bytearray(content)
         damaged[bit // 8] ^= 1 << bit % 8
         path.write_bytes(damaged)
-        with pytest.raises(
-            InputError, match=r"(row group 0, rows 0 to 23|the footer).*: the file is damaged|magic"
-        ):
+        with pytest.raises(InputError, match=DAMAGED):
             read(path)
 
 
@@ -214,87 +139,9 @@ def test_failures_are_rows_that_a_watchdog_ended_or_in_which_user_code_raised():
     assert rows.failures.tolist() == [2, 3, 4]
 
 
-@pytest.mark.parametrize(
-    ("name", "words"),
-    [
-        ("max_abs_error_rad", "largest error, rad"),
-        ("current_variation_A_s", "current variation, A/s"),
-        ("copper_loss_J", "copper loss, J"),
-        ("saturated_fraction", "saturated fraction"),
-        ("drive.delay_s", "drive delay, s"),
-        ("plant.coulomb_Nm.1", "plant coulomb 1, N·m"),
-        ("controller.surface_slope", "controller surface slope"),
-        ("trajectory", "trajectory"),
-        ("duration", "duration, s"),
-        ("worst tail_rms_error_rad", "worst tail rms error, rad"),
-    ],
-)
-def test_quantities_are_words_with_their_unit(name, words):
-    assert quantity_text(name) == words
-
-
 def test_words_of_all_fields_and_metrics_are_different_and_end_in_their_units():
     names = {name for name, _ in every_field(Scenario)} | set(METRICS)
     words = {name: quantity_text(name) for name in names}
     assert len(set(words.values())) == len(names)
     assert not any("_" in text or "." in text for text in words.values())
     assert all(text.endswith(f", {unit_of(name)}") for name, text in words.items() if unit_of(name))
-
-
-def texts(figure):
-    """All text of a figure."""
-    figure.draw_without_rendering()
-    return [text.get_text() for text in figure.findobj(Text)]
-
-
-FIELDS = {
-    "drive.delay_s": NUMBERS,
-    "plant.coulomb_Nm.0": NUMBERS[::-1],
-    "disturbance.load": NUMBERS**2,
-}
-
-
-@pytest.mark.release("2 s; content of study pages has the figures")
-@pytest.mark.parametrize("count", [1, 2, 3])
-def test_figures_and_summary_have_words_with_units_and_no_raw_keys(count, tmp_path):
-    axes = {name: FIELDS[name].round(1) for name in list(FIELDS)[:count]}
-    figures = {"max_abs_error_rad": 0.1 + NUMBERS, "current_variation_A_s": NUMBERS}
-    rows = made(24, figures, axes, ("pd", "afsm"))
-    raw = re.compile("|".join(map(re.escape, [*figures, *axes])))
-    drawn = list(drawings(rows))
-    for drawing in drawn:
-        assert not [text for text in [*texts(drawing.figure), drawing.caption] if raw.search(text)]
-    shown = {text for drawing in drawn for text in texts(drawing.figure)}
-    assert {"current variation, A/s", "largest error, rad", "drive delay, s"} <= shown
-    page = report.write(tmp_path, rows, summary(rows), (24, 24), "made")[0].read_text()
-    metrics, _, varied = page.partition("## Varied fields")
-    assert not raw.search(metrics)
-    assert "| largest error, rad | " in metrics
-    assert "| number of rows: completed | 12 | 12 |" in metrics
-    for name in axes:
-        assert re.search(rf"\| {re.escape(quantity_text(name))} \|.*\| `{re.escape(name)}` \|", varied)
-
-
-def test_axes_of_a_map_are_named_by_the_field_of_their_values():
-    first, second = np.repeat([1.0, 2.0], 6), np.tile([5.0, 6.0, 7.0], 4)
-    rows = made(
-        12, {"max_abs_error_rad": first + second}, {"drive.delay_s": first, "disturbance.load": second}
-    )
-    (axes, bar) = next(drawings(rows)).figure.axes
-    assert (axes.get_ylabel(), axes.get_xlabel()) == ("drive delay, s", "disturbance load")
-    assert [text.get_text() for text in axes.get_yticklabels()] == ["1", "2"]
-    assert [text.get_text() for text in axes.get_xticklabels()] == ["5", "6", "7"]
-    assert bar.get_ylabel() == "largest error, rad"
-
-
-def test_scatters_are_of_the_axis_that_their_label_names():
-    axes = {"drive.delay_s": NUMBERS, "plant.coulomb_Nm.0": 3 + NUMBERS**2, "disturbance.load": 7 - NUMBERS}
-    rows = made(24, {"max_abs_error_rad": 0.1 + NUMBERS}, axes)
-    figure = next(drawing.figure for drawing in drawings(rows) if drawing.file == "report_strongest.svg")
-    panels = {panel.get_xlabel(): panel for panel in figure.axes if panel.get_visible()}
-    assert set(panels) == set(map(quantity_text, axes))
-    for name, of_axis in axes.items():
-        dots = panels[quantity_text(name)].get_lines()[0]
-        np.testing.assert_array_equal(dots.get_xdata(), of_axis)
-        np.testing.assert_array_equal(dots.get_ydata(), 0.1 + NUMBERS)
-    assert figure.axes[0].get_ylabel() == "largest error, rad"
