@@ -1,11 +1,24 @@
-"""Coils: copper's resistance, heat against its exact solution and balance, back-EMF as the torque's twin."""
+"""Coils: relaxation, lag, resistance of copper, exact heat, back-EMF with the power of the torque."""
+
+from decimal import Decimal, localcontext
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from scipy.integrate import quad
 
-from spheretwin.electronics.coil import CoilSection, advance_temperature, back_emf, group_coils, is_overheated
+from spheretwin.electronics.coil import (
+    SERIES_TO,
+    CoilSection,
+    advance_lag,
+    advance_temperature,
+    back_emf,
+    current_lag,
+    group_coils,
+    is_overheated,
+    relaxation,
+)
 from spheretwin.models.magnetics import rotor_torque
 
 R, L, PERIOD_S = 1.3, 0.9e-3, 1e-3
@@ -50,23 +63,6 @@ def test_one_period_is_the_exact_exponential(start, watts, log_period, log_capac
     assert made.temperature_degC[0] == pytest.approx(exact, rel=0, abs=1e-14 * (abs(final) + abs(start)))
 
 
-def warmed(current_A, periods):
-    """Temperature at the end of periods of 1 s with a constant current."""
-    made = group_coils(COPPER, R, L, 1.0, 1)
-    for _ in range(periods):
-        advance_temperature(made, made.resistance_ohm * current_A**2)
-    return made.temperature_degC[0]
-
-
-def test_a_constant_current_comes_to_rest_where_copper_lets_it_and_runs_away_beyond():
-    # Rise = 4 K/W R20 i² (1 + 0.0039 rise), at rest only for i² below 1 / (4 R20 0.0039): 7.02 A.
-    cold = 4 * R * 3.0**2
-    rest = 20 + cold / (1 - 0.0039 * cold)
-    assert warmed(3.0, 20_000) == pytest.approx(rest, rel=1e-12)  # 60 time constants and more
-    assert warmed(7.1, 20_000) > 1000
-    assert warmed(7.1, 40_000) > 1.5 * warmed(7.1, 20_000)
-
-
 def test_a_coil_that_is_cooled_at_once_stays_at_the_temperature_around_it():
     made = group_coils(CoilSection(thermal_resistance_K_W=0.0, ambient_degC=40.0), R, L, PERIOD_S, 1)
     advance_temperature(made, np.array([100.0]))
@@ -95,3 +91,60 @@ def test_emf_takes_as_power_what_the_torque_gives(seed, groups):
     np.testing.assert_allclose(emf, gain * (G.T @ rate), rtol=0, atol=1e-14)
     # Rounding of sums of some thirty products of size one.
     assert emf @ current == pytest.approx(torque @ rate, rel=0, abs=1e-13)
+
+
+@pytest.mark.parametrize("time_constant_s", [1e-4, 6.9e-4, 5e-2])
+def test_one_step_is_the_exact_exponential_and_its_mean(time_constant_s):
+    step_s = 5e-4
+    command, current, mean = np.array([3.0, -1.0]), np.array([0.5, 2.0]), np.empty(2)
+    start = current.copy()
+    advance_lag(current_lag(time_constant_s, step_s, 8.0), command, current, mean)
+
+    def exact(t):
+        return command + (start - command) * np.exp(-t / time_constant_s)
+
+    np.testing.assert_allclose(current, exact(step_s), rtol=1e-14)
+    expected = [quad(lambda t, j=j: exact(t)[j], 0, step_s, epsabs=1e-14)[0] / step_s for j in range(2)]
+    np.testing.assert_allclose(mean, expected, rtol=1e-12)
+
+
+def test_without_lag_the_current_is_the_command():
+    command, current, mean = np.array([4.0]), np.zeros(1), np.empty(1)
+    advance_lag(current_lag(0.0, 5e-4, 8.0), command, current, mean)
+    assert current[0] == mean[0] == 4.0
+
+
+SCALES = [*10.0 ** np.linspace(-14, 18, 1000), *np.linspace(0.9 * SERIES_TO, 1.1 * SERIES_TO, 100)]
+
+
+def with_sixty_digits(x):
+    with localcontext() as context:
+        context.prec = 60
+        time = Decimal(x)
+        settled = 1 - (-time).exp()
+        both = settled * settled / 2
+        integrals = (time - settled, settled - both, both, time - settled - both)
+        return [float(number) for number in (settled, *(integral / time for integral in integrals))]
+
+
+def test_every_share_is_exact_at_every_scale():
+    shares = np.array([relaxation(float(x)) for x in SCALES])
+    exact = np.array([with_sixty_digits(float(x)) for x in SCALES])
+    # A few roundings; just above the series' end, the mean square is a difference of numbers fifty times it.
+    np.testing.assert_allclose(shares[:, :4], exact[:, :4], rtol=1e-15)
+    np.testing.assert_allclose(shares[:, 4], exact[:, 4], rtol=1e-14)
+
+
+@given(st.floats(0, 1e300))
+def test_shares_are_shares(x):
+    shares = relaxation(x)
+    assert all(0 <= share <= 1 for share in shares)
+    # Start and end make up the whole, on average as at any moment.
+    assert shares.start_start + 2 * shares.start_settled + shares.settled_settled == pytest.approx(
+        1, rel=1e-14
+    )
+    assert shares.start_settled + shares.settled_settled == pytest.approx(shares.mean, rel=1e-14, abs=1e-300)
+
+
+def test_in_no_time_nothing_has_settled():
+    assert relaxation(0.0) == (0, 0, 1, 0, 0)

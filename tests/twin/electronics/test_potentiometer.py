@@ -1,4 +1,4 @@
-"""The potentiometer against its definition: a line with ends, and a residual of stated size and shape."""
+"""Potentiometer: a line with ends, a residual of stated size and shape, and play of the wiper."""
 
 import numpy as np
 import pytest
@@ -6,19 +6,26 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import ValidationError
 
+from spheretwin import scenario as scenarios
+from spheretwin.electronics.random_streams import noise_table
+from spheretwin.electronics.sensor_chain import SensorsSection
+from spheretwin.electronics.stages import SensorSetup
 from spheretwin.electronics.transducers import (
     HARMONICS,
+    LAG,
     LARGEST_SHARE,
     PotentiometerSection,
     potentiometer,
+    wiper_angle,
     wiper_voltage,
 )
+from spheretwin.session import Session
 
 HALF_rad = np.radians(150)
 FINITE = st.floats(allow_nan=False, allow_infinity=False)
 
 
-def made(seed=0, **fields):
+def track_of(seed=0, **fields):
     section = PotentiometerSection(**fields)
     return potentiometer(section, np.random.default_rng([seed, 1, 0]).random(4))
 
@@ -31,7 +38,7 @@ def residual(track, angles):
 
 @given(FINITE)
 def test_a_track_without_residual_is_a_line_with_ends(angle):
-    volts = wiper_voltage(made(), angle)
+    volts = wiper_voltage(track_of(), angle)
     if abs(angle) >= HALF_rad:
         assert volts == np.copysign(2.5, angle)
     else:
@@ -41,7 +48,7 @@ def test_a_track_without_residual_is_a_line_with_ends(angle):
 
 
 def test_ends_hold_infinity_and_nothing_makes_a_number_of_none():
-    track = made(nonlinearity_rad=0.02)
+    track = track_of(nonlinearity_rad=0.02)
     assert [wiper_voltage(track, angle) for angle in (np.inf, -np.inf)] == [
         wiper_voltage(track, angle) for angle in (HALF_rad, -HALF_rad)
     ]
@@ -52,7 +59,7 @@ def test_ends_hold_infinity_and_nothing_makes_a_number_of_none():
 def test_residual_is_four_harmonics_of_the_track_and_its_peak_is_the_stated_one(seed):
     bound, samples = 0.01, 4096
     # A supply far above what is reached: else the ends would cut the residual off.
-    track = made(seed, nonlinearity_rad=bound)._replace(half_supply_V=1e3)
+    track = track_of(seed, nonlinearity_rad=bound)._replace(half_supply_V=1e3)
     angles = HALF_rad * (2 * np.arange(samples) / samples - 1)
     off = residual(track, angles)
     # Between samples a peak rises above both by at most half its curvature times (π/4096)²; the curvature is
@@ -69,7 +76,7 @@ def test_residual_is_four_harmonics_of_the_track_and_its_peak_is_the_stated_one(
 @pytest.mark.parametrize("seed", range(50))
 def test_the_voltage_rises_with_the_angle_at_the_largest_residual(seed):
     largest = LARGEST_SHARE * 2 * HALF_rad * (1 - 1e-12)
-    track = made(seed, nonlinearity_rad=largest)._replace(half_supply_V=1e3)
+    track = track_of(seed, nonlinearity_rad=largest)._replace(half_supply_V=1e3)
     volts = [wiper_voltage(track, angle) for angle in np.linspace(-HALF_rad, HALF_rad, 1001)]
     assert np.diff(volts).min() > 0
 
@@ -80,10 +87,89 @@ def test_a_residual_with_which_it_might_not_rise_is_refused():
         PotentiometerSection(electrical_angle_rad=1.0, nonlinearity_rad=0.07)
 
 
-def test_the_residual_is_the_channel_s_own_and_keeps_its_shape_at_any_size():
-    angles = np.linspace(-1, 1, 9)
-    first = residual(made(1, nonlinearity_rad=0.01), angles)
-    np.testing.assert_array_equal(residual(made(1, nonlinearity_rad=0.01), angles), first)
-    # The same shape at another size, to the rounding of angles of 1 rad.
-    np.testing.assert_allclose(residual(made(1, nonlinearity_rad=0.02), angles), 2 * first, atol=1e-15)
-    assert np.abs(residual(made(2, nonlinearity_rad=0.01), angles) - first).max() > 1e-3
+WIDTH, SPREAD = 4e-3, 1e-3
+
+
+def made(hysteresis=WIDTH, repeatability=SPREAD):
+    section = PotentiometerSection(hysteresis_rad=hysteresis, repeatability_rad=repeatability)
+    setup = SensorSetup(
+        SensorsSection(), 0, "potentiometer", first_draw=0, faults=False, longest_delay_ticks=0
+    )
+    return section.build(setup)
+
+
+def followed(stage, angles, draws):
+    return np.array([wiper_angle(stage, 0, angle, draw) for angle, draw in zip(angles, draws, strict=True)])
+
+
+def approaches(count, side):
+    """Angles that go to 0 again and again from one side, by way of 0.1 rad on this side."""
+    away = side * np.linspace(0, 0.1, 7)
+    return np.tile(np.concatenate([away, away[::-1]]), count)
+
+
+def slow_wiper(angles, numbers, half, spread):
+    """Wiper that two stops of the joint push; a stop moves when the wiper begins to move the other way."""
+    wiper, direction, stops, path = angles[0], 0, {1: half, -1: half}, []
+    for angle, number in zip(angles, numbers, strict=True):
+        for way in (1, -1):
+            if way * (angle - wiper) > stops[way]:
+                wiper = angle - way * stops[way]
+                if direction != way:
+                    direction = way
+                    stops[-way] = half + spread * np.clip(number / 3, -1, 1)
+        path.append(wiper)
+    return np.array(path)
+
+
+@given(st.lists(st.floats(-0.02, 0.02), min_size=2, max_size=60), st.integers(0, 99))
+def test_wiper_is_its_slow_copy_and_never_jumps(steps, seed):
+    angles = np.cumsum(steps)
+    numbers = np.random.default_rng(seed).normal(size=(len(angles), 2))
+    wiper = followed(made(), angles, numbers)
+    # Sums of angles of 1 rad.
+    np.testing.assert_allclose(
+        wiper, slow_wiper(angles, numbers[:, 0], WIDTH / 2, SPREAD), rtol=0, atol=1e-15
+    )
+    assert np.all(np.abs(np.diff(wiper)) <= np.abs(np.diff(angles)) + 1e-15)
+
+
+def test_hysteresis_is_the_difference_of_readings_from_both_sides():
+    stage, none = made(repeatability=0.0), np.zeros((42, 0))
+    below, above = (followed(stage, approaches(3, side), none)[-1] for side in (-1, 1))
+    assert above - below == pytest.approx(WIDTH, rel=1e-12)
+    assert above == pytest.approx(WIDTH / 2, rel=1e-12)
+    assert stage.play[0, LAG] == above  # the joint is at 0
+
+
+def test_spread_larger_than_the_play_is_refused():
+    message = "expected repeatability_rad of at most half of hysteresis_rad, received 0.003 and 0.004"
+    with pytest.raises(ValidationError, match=message):
+        PotentiometerSection(hysteresis_rad=0.004, repeatability_rad=0.003)
+
+
+def test_wiper_starts_at_the_joint_and_nan_stays_nan():
+    stage, none = made(repeatability=0.0), np.zeros(0)
+    assert wiper_angle(stage, 0, 0.3, none) == 0.3
+    assert np.isnan(wiper_angle(stage, 0, np.nan, none))
+
+
+def test_telemetry_has_the_lead_of_the_wiper_and_snapshots_hold_it():
+    fields = {
+        "sensors.potentiometer.hysteresis_rad": WIDTH,
+        "sensors.potentiometer.repeatability_rad": SPREAD,
+        "duration": 1.0,
+    }
+    with Session(scenarios.load("nutation", {"hardware": "electronics", **fields})) as session:
+        first = session.advance(150)
+        state = session.snapshot()
+        second = session.advance(150).values.tobytes()
+        session.restore(state)
+        assert session.advance(150).values.tobytes() == second
+    numbers = noise_table(0, 0, 150, (("sensors.potentiometer noise", 2),))
+    for channel in range(2):
+        q = first["q_rad"][:, channel]
+        expected = slow_wiper(q, numbers[:, channel], WIDTH / 2, SPREAD) - q
+        np.testing.assert_allclose(first["sensor_state_error_rad"][:, channel], expected, rtol=0, atol=1e-15)
+    assert np.abs(first["sensor_state_error_rad"][:, 0]).max() > WIDTH / 4
+    np.testing.assert_array_equal(first["sensor_state_error_rad"][:, 2], 0)

@@ -319,7 +319,7 @@ class Copy:
         return row
 
 
-def run_and_copy(faults, engine="mujoco", ticks=TICKS):
+def compared_run(faults, engine="mujoco", ticks=TICKS):
     scenario = scenarios.load(
         "nutation",
         {
@@ -332,16 +332,12 @@ def run_and_copy(faults, engine="mujoco", ticks=TICKS):
         assert session.status == "running"
     copy, inputs = Copy(faults, actuator), ("q_rad", "qdot_rad_s", "current_command_A")
     rows = [copy.tick(*each) for each in zip(*(table[name] for name in inputs), strict=True)]
-    check(table, rows)
-    return table, rows
-
-
-def check(table, rows):
     for name in rows[0]:
         expected = np.array([row[name] for row in rows]).reshape(table[name].shape)
         # Rounding of all products and sums, 1e-16 each, on either side; a flipped code would be 1e-5.
         size = np.abs(expected).max()
         np.testing.assert_allclose(table[name], expected, rtol=0, atol=1e-12 * size, err_msg=name)
+    return table, rows
 
 
 @pytest.mark.parametrize(
@@ -354,7 +350,7 @@ def check(table, rows):
     ids=["healthy-mujoco", "faults-mujoco", "faults-lagrangian"],
 )
 def test_the_prototype_is_its_plain_copy(faults, engine):
-    table, _ = run_and_copy(faults, engine)
+    table, _ = compared_run(faults, engine)
     if faults:
         assert np.count_nonzero(table["fault"].any(axis=0)) == len({target for target, *_ in faults})
         # It went through the limits of the voltage, in and out within a period.
@@ -373,7 +369,7 @@ def test_every_way_to_fail_acts_where_it_belongs(kind, mode):
     faults = [(part, mode, 0.03, 0.07, value)]
     if mode == "stuck" and kind in STUCK:
         faults.append((part, mode, 0.08, 0.09, STUCK[kind]))
-    table, rows = run_and_copy(faults, ticks=110)
+    table, rows = compared_run(faults, ticks=110)
     failing = np.flatnonzero(table["fault"].any(axis=1))
     assert failing[0] >= 30
     assert failing[-1] < 90
@@ -387,4 +383,4 @@ def test_every_way_to_fail_acts_where_it_belongs(kind, mode):
 
 @cache
 def healthy_rows():
-    return run_and_copy([], ticks=110)[1]
+    return compared_run([], ticks=110)[1]

@@ -1,4 +1,4 @@
-"""The engine: inertia, payload and integrator of a run, and stepping from compiled code."""
+"""The engine of MuJoCo: inertia and payload of a run, and states that are not finite."""
 
 import mujoco
 import numpy as np
@@ -8,12 +8,9 @@ from spheretwin.models import mjcf
 from spheretwin.models.lagrangian import inertia_matrix
 from spheretwin.plant.mujoco_rotor import MujocoRotor, step
 
-STEP_S = 5e-4
 
-
-def rotor(**changes):
-    return MujocoRotor(**{"mjcf": mjcf.read(actuators.MJCF_PATH), "step_s": STEP_S, "integrator": "RK4"}
-                 | {"modelling_error": 0.0, "payload_kg": 0.0} | changes)  # fmt: skip
+def rotor(modelling_error=0.0, payload_kg=0.0):
+    return MujocoRotor(mjcf.read(actuators.MJCF_PATH), 5e-4, "RK4", modelling_error, payload_kg)
 
 
 def inertia_of(rotor, q):

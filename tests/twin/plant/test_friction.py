@@ -28,21 +28,15 @@ def motion(actuator, resistance, duration, start=START, torque=NONE):
     return steps(rotor, None, resistance, torques, start[:3], start[3:])[:2]
 
 
-def spin(actuator, resistance, duration, rate, torque=0.0):
-    """The third hinge alone, upright: a motion in one dimension, with the inertia J3."""
-    start = np.array([0, 0, 0, 0, 0, rate])
-    q, qdot = motion(actuator, resistance, duration, start, on_gamma(torque))
-    np.testing.assert_array_equal(q[:, :2], 0)
-    return q[:, 2], qdot[:, 2]
-
-
 def test_viscous_friction_is_an_exponential_decay(actuator):
     viscous, rate, duration = 1e-2, 10.0, 0.8
     decay = viscous / actuator.inertia[2]
     step_sizes, errors = np.array([4e-3, 2e-3, 1e-3, STEP_s]), []
     for h in step_sizes:
         resistance = friction(NONE, on_gamma(viscous), SMOOTHING_rad_s, actuator.inertia, h)
-        _, rates = spin(actuator, resistance, duration, rate)
+        q, qdot = motion(actuator, resistance, duration, np.array([0, 0, 0, 0, 0, rate]))
+        np.testing.assert_array_equal(q[:, :2], 0)  # upright, the third hinge alone, with the inertia J3
+        rates = qdot[:, 2]
         errors.append(np.abs(rates - rate * np.exp(-decay * h * np.arange(len(rates)))).max())
     # Half a step is off by x³/6 of the rate, x = decay h/2; summed up, by (decay h)²/24e at 1/decay.
     np.testing.assert_array_less(errors, (decay * step_sizes) ** 2 * rate / (24 * np.e))

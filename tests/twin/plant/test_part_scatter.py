@@ -5,10 +5,8 @@ import pytest
 from pydantic import ValidationError
 
 import spheretwin as st
-from spheretwin.assembly import nominal_magnetics
 from spheretwin.models import actuator as actuators
 from spheretwin.models.base.errors import InputError
-from spheretwin.models.magnetics import torque_model
 from spheretwin.models.scatter import summed_torque_matrix
 from spheretwin.plant.part_scatter import PartScatter, scatter_of
 from spheretwin.scenario.plant_sections import PlantSection
@@ -68,12 +66,3 @@ def test_the_torque_of_a_run_is_that_of_the_scattered_machine():
     # Measured: 1e-4 to 3e-4 of second order, for an effect of the scatter of 2e-2.
     np.testing.assert_allclose(torque[row], expected, rtol=0, atol=1e-3 * size)
     assert np.abs(nominal - expected).max() > 0.01 * size
-
-
-def test_the_controller_does_not_know_the_scatter():
-    session = st.Session(st.load("hold", {f"plant.poles.{name}": value for name, value in SPREAD.items()}))
-    with session:
-        config = session._config
-        nominal = nominal_magnetics(config.scenario, config.files)
-        np.testing.assert_array_equal(nominal.line_axes, torque_model(ACTUATOR).line_axes)
-        assert nominal.pair_gain.shape == (2, 0)

@@ -2,12 +2,10 @@
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from spheretwin import scenario as scenarios
 from spheretwin.simulation import simulate
-from spheretwin.trajectories.rounding import ACCELERATION_FADE_s, Approach, faded
+from spheretwin.trajectories.rounding import ACCELERATION_FADE_s, Approach
 from spheretwin.trajectories.shapes import Hold, Jog, Nutation, Sinusoid
 
 STEP = 1e-5
@@ -47,18 +45,6 @@ def test_rates_and_accelerations_are_derivatives_and_nothing_jumps(kind):
     # The jerk is at most 9 times the difference of accelerations over a tenth of a second.
     largest = np.abs(fine[:, 2]).max()
     assert np.abs(np.diff(fine[:, 2], axis=0)).max() < 1e-4 * 20 * largest / ACCELERATION_FADE_s
-
-
-@given(st.lists(st.floats(-10, 10), min_size=9, max_size=9), st.floats(0.01, 100), st.floats(0, 200))
-def test_what_is_left_is_bounded_and_vanishes(numbers, lasts_s, since):
-    difference = np.reshape(numbers, (3, 3))
-    left = faded(difference, np.array([since]), lasts_s)[0]
-    bound = np.abs(difference)
-    # Of an angle at most all, of a rate 0.2 s a second, of an acceleration 0.02 s²: the polynomials' largest.
-    most = bound[0] + 0.2 * lasts_s * bound[1] + 0.02 * min(lasts_s, ACCELERATION_FADE_s) ** 2 * bound[2]
-    assert np.all(np.abs(left[0]) <= most * (1 + 1e-12) + 1e-300)
-    if since >= lasts_s:
-        np.testing.assert_array_equal(left, 0.0)
 
 
 def test_a_scenario_names_it_and_begins_where_it_does():
