@@ -13,7 +13,9 @@ from spheretwin.session import Session
 SHIPPED, ENGINES = ("pd", "adaptive_fuzzy", "afsm"), ("mujoco", "lagrangian")
 RANDOM = {"disturbance.random_bound_Nm": 0.05}
 WORN = {"plant.coulomb_Nm": [0.004, 0.003, 0.002], "plant.viscous_Nm_s": [1e-4, 1e-4, 2e-4]}
-ASKEW = {"sensors.angle_offset_rad": [0.01, -0.02, 0.005]}
+SENSED = {"detector.detect": True}
+"""With it, MuJoCo's loop is that of the electronics, which is compiled anyway, also with exact sensors."""
+COMPLETE = {"mujoco": {"hardware": "electronics"}, "lagrangian": {"hardware": "prototype"}}
 
 
 def scenario(name="sinusoid", **changes):

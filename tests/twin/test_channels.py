@@ -36,7 +36,7 @@ def test_columns_of_a_stage_are_there_where_it_acts(name, changes, logged):
         assert (name in {signal.name for signal in session.signals}) == logged
 
 
-LAG = {"drive.time_constant_s": 4e-4, "plant.step_s": 2.5e-4, "plant.engine": "lagrangian"}
+LAG = {"drive.time_constant_s": 4e-4, "plant.step_s": 2.5e-4}
 
 
 def lagged_currents(command, time_constant_s, period_s):

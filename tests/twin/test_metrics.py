@@ -148,7 +148,6 @@ def test_a_lost_rank_is_not_reported_as_the_current_limit(allocation):
     overrides = {
         "duration": 0.1,
         "allocation": allocation,
-        "plant.engine": "lagrangian",
         "fault": [
             {"target": f"coil.{group:02d}", "mode": "open", "start_s": 0.05, "reported_to_controller": True}
             for group in range(16)

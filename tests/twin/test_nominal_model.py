@@ -89,9 +89,8 @@ def test_the_lower_of_two_limits_binds(allocation):
 # --- sensors
 
 
-@pytest.mark.parametrize("engine", ENGINES)
-def test_the_rotor_rests_where_the_sensors_see_no_error(engine):
-    stiff = {"controller.stiffness": 900.0, "controller.damping": 60.0, "plant.engine": engine}
+def test_the_rotor_rests_where_the_sensors_see_no_error():
+    stiff = {"controller.stiffness": 900.0, "controller.damping": 60.0}
     run = table(3000, "hold", PD | ASKEW | stiff)
     # Critically damped at 30 1/s: after 3 s the start is gone to exp(-90) of 0.3 rad.
     np.testing.assert_allclose(run["error_rad"][-1], -OFFSET, rtol=0, atol=1e-14)

@@ -104,7 +104,8 @@ def test_a_saved_run_is_that_of_the_command_byte_for_byte_and_replays(run, tmp_p
 def test_both_files_of_a_run_have_the_same_review(tmp_path):
     fault = {"target": "coil.07", "mode": "open", "start_s": 0.02}
     event = {"t_s": 0.03, "set": "disturbance.load", "value": 2.0}
-    run = st.simulate("nutation", SHORT | {"hardware": "electronics", "fault": [fault], "event": [event]})
+    changes = {"duration": 0.05, "hardware": "electronics", "fault": [fault], "event": [event]}
+    run = st.simulate("nutation", changes)
     telemetry, recording = run.save(tmp_path / "run.parquet"), run.save(tmp_path / "run.rrd")
     reviewed = st.review(telemetry, recording)
     first, second = reviewed.figures

@@ -10,13 +10,14 @@ from spheretwin.models.base.errors import InputError
 from spheretwin.scenario.changes import scheduled_changes
 from spheretwin.session import Session
 from spheretwin.simulation import simulate
+from tests.twin.session_cases import SENSED
 
 CHANGES = [
     (50, "controller.law", "pd"),
     (100, "sensors.angle_offset_rad", [0.01, 0.0, 0.0]),
     (150, "disturbance.load", 2.0),
 ]
-HOLD = {"duration": 0.3, "trajectory.angle_rad": [0.1, 0.0, 0.0]}
+HOLD = {"duration": 0.3, "trajectory.angle_rad": [0.1, 0.0, 0.0], **SENSED}
 
 
 @pytest.fixture

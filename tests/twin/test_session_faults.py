@@ -38,7 +38,7 @@ def scenario(hardware="electronics", **changes):
     return scenarios.load(
         "nutation",
         {
-            "hardware": hardware, "seed": 6, "plant.engine": "lagrangian", "fault": PLAN,
+            "hardware": hardware, "seed": 6, "fault": PLAN,
             "detector.detect": True, "watchdog.stale_ticks": 50, "duration": TICKS * 1e-3,
             **changes,
         },
@@ -175,8 +175,7 @@ def test_a_run_of_faults_set_on_the_way_is_replayed(tmp_path):
         (250, "fault.0.end_s", 0.25),
         (300, "fault", []),
     ]
-    electronics = {"hardware": "electronics", "plant.engine": "lagrangian"}
-    recorded(path, changes, ticks=350, name="nutation", **electronics)
+    recorded(path, changes, ticks=350, name="nutation", hardware="electronics")
     assert cli.main(["simulate", "--replay", str(path), "--telemetry", str(again)]) == 0
     first, second = read_parquet(path)[0], read_parquet(again)[0]
     assert second.signals == first.signals

@@ -12,9 +12,9 @@ from spheretwin.models.base.errors import InputError
 from spheretwin.models.telemetry.run_record import Change
 from spheretwin.models.telemetry.signals import common_signals
 from tests.twin.session_cases import (
-    ASKEW,
     ENGINES,
     OWN,
+    SENSED,
     WORN,
     compiled_law,
     plain_law,
@@ -47,14 +47,14 @@ KINDS = [
     ("plant.modelling_torque_Nm", [0.01, 0.0, 0.0], {}),
     ("plant.group_gain", [0.0] + 17 * [1.0], {}),
     ("plant.coulomb_Nm", [0.004, 0.004, 0.004], {}),
-    ("sensors.angle_offset_rad", [0.0, 0.01, 0.0], {}),
+]
+OF_KINDS = [
+    *((engine, *row) for engine in ENGINES for row in KINDS),
+    ("mujoco", "sensors.angle_offset_rad", [0.0, 0.01, 0.0], SENSED),
 ]
 
 
-@pytest.mark.parametrize("engine", ENGINES)
-@pytest.mark.parametrize(
-    ("name", "value", "base"), KINDS, ids=[f"{i}-{row[0]}" for i, row in enumerate(KINDS)]
-)
+@pytest.mark.parametrize(("engine", "name", "value", "base"), OF_KINDS, ids=map(str, range(len(OF_KINDS))))
 def test_a_change_acts_from_its_tick_on_and_not_before(engine, name, value, base):
     at, changes = 40 if base is LIMITED else 340, {"plant.engine": engine, "disturbance.load": 1.0} | base
     unchanged, changed = session(**changes), session(**changes)
@@ -121,21 +121,24 @@ SAME = [
     ("drive.current_limit_A", 8.0), ("plant.payload_kg", 0.0), ("plant.modelling_error", 0.2),
     ("plant.gravity_m_s2", 9.81), ("plant.gravity_m_s2", None), ("nominal.current_limit_A", None),
     ("nominal.inertia_kg_m2", None), ("plant.coulomb_Nm", [0.004, 0.003, 0.002]),
-    ("plant.coulomb_Nm", np.array([0.004, 0.003, 0.002])), ("sensors.angle_offset_rad", (0.01, -0.02, 0.005)),
+    ("plant.coulomb_Nm", np.array([0.004, 0.003, 0.002])),
 ]  # fmt: skip
 
 
 @pytest.mark.parametrize("engine", ENGINES)
 def test_a_change_to_what_is_changes_no_bit(engine, sticky):
-    model = {"plant.mjcf": sticky} if engine == "mujoco" else {}
-    changes = {"plant.engine": engine, "disturbance.load": 1.0} | model | WORN | ASKEW
+    offset = (0.01, -0.02, 0.005) if engine == "mujoco" else (0.0, 0.0, 0.0)
+    model = {"plant.mjcf": sticky, **SENSED} if engine == "mujoco" else {}
+    changes = {"plant.engine": engine, "disturbance.load": 1.0, "sensors.angle_offset_rad": offset}
+    changes |= model | WORN
+    same = [*SAME, ("sensors.angle_offset_rad", offset)]
     unchanged, changed = session(**changes), session(**changes)
     table = [changed.advance(130)]
-    for name, value in SAME:
+    for name, value in same:
         changed.set(name, value)
         table.append(changed.advance(47))
-    assert b"".join(map(rows, table)) == rows(unchanged.advance(130 + 47 * len(SAME)))
-    assert [change.name for change in changed.journal] == [name for name, _ in SAME]
+    assert b"".join(map(rows, table)) == rows(unchanged.advance(130 + 47 * len(same)))
+    assert [change.name for change in changed.journal] == [name for name, _ in same]
     assert changed.scenario == unchanged.scenario
 
 

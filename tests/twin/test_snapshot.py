@@ -10,14 +10,25 @@ import pytest
 
 from spheretwin.inputs import BLOCK_TICKS
 from spheretwin.models.base.errors import InputError
-from tests.twin.session_cases import ASKEW, ENGINES, OWN, SHIPPED, WORN, plain_law, rows, same_future, session
+from tests.twin.session_cases import (
+    COMPLETE,
+    ENGINES,
+    OWN,
+    SENSED,
+    SHIPPED,
+    WORN,
+    plain_law,
+    rows,
+    same_future,
+    session,
+)
 
 
 @pytest.mark.parametrize("engine", ENGINES)
 @pytest.mark.parametrize("law", SHIPPED)
 @pytest.mark.parametrize("at", [0, 1, 437, BLOCK_TICKS, BLOCK_TICKS + 1])
 def test_a_restored_session_goes_on_bit_for_bit(law, engine, at):
-    changes = {"controller.law": law, "plant.engine": engine} | WORN | ASKEW
+    changes = {"controller.law": law, "plant.engine": engine} | WORN | COMPLETE[engine]
     original = session(**changes)
     original.advance(at)
     taken = original.snapshot()
@@ -71,9 +82,8 @@ def test_the_solver_s_warm_start_is_restored(sticky):
     assert rows(other.advance(200)) == expected
 
 
-@pytest.mark.parametrize("engine", ENGINES)
-def test_a_session_that_was_changed_is_restored(engine):
-    original = session(**{"plant.engine": engine})
+def test_a_session_that_was_changed_is_restored():
+    original = session(**SENSED)
     original.advance(200)
     for name, value in [
         ("disturbance.load", 1.5), ("plant.payload_kg", 0.05), ("controller.law", "adaptive_fuzzy"),
@@ -84,7 +94,7 @@ def test_a_session_that_was_changed_is_restored(engine):
         original.advance(30)
     taken = pickle.loads(pickle.dumps(original.snapshot()))
     expected = original.advance(1000)
-    other = session(**{"plant.engine": engine})
+    other = session()
     other.restore(taken)
     assert other.journal == original.journal
     assert other.scenario == original.scenario
@@ -129,7 +139,7 @@ def test_a_snapshot_under_a_law_that_is_missing_is_refused_and_nothing_changes()
 def test_every_part_s_numbers_are_counted_before_anything_is_restored():
     """One number more or fewer anywhere: refused by name, and the session goes on as before."""
     changes = {
-        "hardware": "electronics", "plant.engine": "lagrangian", "detector.detect": True,
+        "hardware": "electronics", "detector.detect": True,
         "fault": [{"target": "adc", "mode": "delay", "value": 2e-3, "start_s": 1.0}],
     }  # fmt: skip
     mine = session(**changes)
