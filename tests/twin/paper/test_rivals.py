@@ -8,15 +8,13 @@ import pytest
 
 from spheretwin.control.laws import LAWS
 from spheretwin.models.telemetry.status import Status
-from spheretwin.paper import page, rival_conditions, rival_results
+from spheretwin.paper import rival_conditions, rival_results
 from spheretwin.paper.experiment import Outcome, Outcomes
 from spheretwin.paper.laws import BY_LAW
-from spheretwin.paper.page import Chapter, rows
 from spheretwin.paper.rival_conditions import ELECTRONICS, FOLDER, HARDWARE, IDEAL, tuned_gains
 from spheretwin.paper.rival_results import results, start_error, within
 from spheretwin.paper.rivals import EXPERIMENT
-from spheretwin.paper.runner import make_plan, run_plan, scenario_of, unexpected_ends
-from spheretwin.scenario.fields import quantity_text
+from spheretwin.paper.runner import make_plan, run_plan, scenario_of
 from spheretwin.study.grid import Grid
 from spheretwin.study.row import Rows
 from spheretwin.study.study import load
@@ -191,41 +189,6 @@ def test_limits_with_the_same_order_are_one_statement():
     assert finding.text.endswith(": within 7.2 and 30 A/s AFSM-ESO has the smallest error")
 
 
-def test_tables_have_one_number_a_cell_in_the_unit_of_their_title():
-    outcomes = made_up(30.0, {"pid": (2e-3, 4e-3, 9e-3), "adrc": (1e-3, 1e-3, 1e-3)})
-    largest, variation, tail = rival_results.errors(IDEAL, outcomes)
-    assert [table.title for table in (largest, variation, tail)] == [
-        f"{IDEAL.title}: largest error, mrad",
-        f"{IDEAL.title}: variation of the commands, A/s",
-        f"{IDEAL.title}: RMS error of the second half, mrad",
-    ]
-    assert largest.head == ("limit, A/s", "law", "m 0.2, L 1", "m 0.5, L 5", "m 0, L 0")
-    rows = [table.rows[:2] for table in (largest, variation, tail)]
-    assert rows[0] == [("30", "ADRC", "1.000", "–", "–"), ("30", "tuned PID", "4.000", "–", "–")]
-    assert [row[2] for row in rows[1]] == ["30.0", "30.0"]
-    assert [row[2] for row in rows[2]] == ["0.100", "0.400"]
-    # Laws that did not run, and so have no number, follow.
-    assert [row[1] for row in largest.rows[2:]] == [
-        law.label for law in BY_LAW.values() if law.law not in ("adrc", "pid")
-    ]
-    assert all(set(row[2:]) == {"–"} for row in largest.rows[2:])
-
-
-def test_gains_have_a_row_each_and_a_column_for_each_limit():
-    table = rival_results.gains_table(IDEAL)
-    assert table.head == ("law", "gain", *(f"limit {limit:g} A/s" for limit in IDEAL.limits_A_s))
-    assert len({row[:2] for row in table.rows}) == len(table.rows)
-    cells = {row[:2]: row[2:] for row in table.rows}
-    for tuned in tuned_gains(IDEAL.study):
-        for name, value in tuned.gains.items():
-            words = quantity_text(name.removeprefix("controller."))
-            cell = cells[BY_LAW[tuned.law].label, words][IDEAL.limits_A_s.index(tuned.limit_A_s)]
-            assert cell == ("off" if value is None else f"{value:.4g}")
-    assert sum(cell != "–" for row in cells.values() for cell in row) == sum(
-        len(tuned.gains) for tuned in tuned_gains(IDEAL.study)
-    )
-
-
 def test_nothing_is_found_where_nothing_ran():
     assert rival_results.findings(Outcomes()) == []
     assert EXPERIMENT.sections(Outcomes()) == []
@@ -239,43 +202,15 @@ def test_the_error_at_the_start_is_the_largest_until_the_rates_agree():
     np.testing.assert_array_equal(start_error(SimpleNamespace(telemetry=table)), [0.3, 0.4, 0.3])
 
 
-@pytest.fixture(scope="module")
-def short():
-    """One seed of two laws, presets and full current under every condition; a tenth as long."""
-    chosen = [
-        case
+@pytest.mark.release("runs all rivals for 15 s; content of paper_rivals has rows and page")
+def test_full_current_is_below_what_any_law_reaches_with_bounded_allocation():
+    """Within the same ±8 A: least norm gives away some of the torque, so that a law may share it better."""
+    cases = [
+        case._replace(fields={**case.fields, "duration": case.fields.get("duration", 0.6)})
         for case in EXPERIMENT.cases()
         if "limit_A_s" not in case.details or case.fields["controller.law"] in ("afsm_eso", "pid")
     ]
-    cases = [
-        case._replace(fields={**case.fields, "duration": case.fields.get("duration", 0.6)}) for case in chosen
-    ]
-    plan = make_plan(EXPERIMENT._replace(cases=lambda: cases), seeds=1)
-    return plan, run_plan(plan)
-
-
-@pytest.mark.release("runs all rivals for 15 s; content of paper_rivals has rows and page")
-def test_rows_and_page_have_what_ran(short, tmp_path):
-    plan, outcomes = short
-    assert unexpected_ends(plan, outcomes) == []
-    json.dumps(rows(plan, outcomes), allow_nan=False)
-    chapter = Chapter(plan.experiment, EXPERIMENT.sections(outcomes), EXPERIMENT.findings(outcomes))
-    written = page.write(tmp_path, [chapter], "")[0].read_text(encoding="utf-8")
-    for hardware in HARDWARE:
-        figure = f"rivals_{hardware.name}.svg"
-        assert (tmp_path / figure).stat().st_size > 0
-        assert f"({figure})" in written
-        for each in load(hardware.study).optimise.gain:
-            assert each.reason in written
-    assert written.count("| rivals | ") == len(IDEAL.conditions) + len(ELECTRONICS.conditions)
-    assert "full current, bounded allocation" in written
-    assert "make tune-rivals" in written
-
-
-@pytest.mark.release("runs all rivals for 15 s; content of paper_rivals has rows and page")
-def test_full_current_is_below_what_any_law_reaches_with_bounded_allocation(short):
-    """Within the same ±8 A: least norm gives away some of the torque, so that a law may share it better."""
-    _, outcomes = short
+    outcomes = run_plan(make_plan(EXPERIMENT._replace(cases=lambda: cases), seeds=1))
     for condition in IDEAL.conditions:
         if condition.perturbed:
             continue
@@ -288,16 +223,3 @@ def test_full_current_is_below_what_any_law_reaches_with_bounded_allocation(shor
         assert min(reached) > limits["bounded"]
         # Least norm along one direction of torque: other directions are some percent better.
         assert min(reached) > 0.9 * limits["least_norm"]
-
-
-@pytest.mark.release("runs all rivals for 14 s; content of paper_rivals has the figure")
-def test_a_figure_has_a_line_a_law_and_the_floors(short):
-    from spheretwin.paper import rivals
-
-    _, outcomes = short
-    axes = rivals.figure(IDEAL, outcomes).figure.axes[0]
-    lines = [np.asarray(line.get_xydata()) for line in axes.lines]
-    entries = [each for each in results(IDEAL, IDEAL.conditions[0], outcomes) if each.limit_A_s is not None]
-    for law in ("afsm_eso", "pid"):
-        points = sorted((each.variation_A_s, 1e3 * each.largest_rad) for each in entries if each.law == law)
-        assert any(np.shape(line) == np.shape(points) and np.allclose(line, points) for line in lines)
