@@ -288,17 +288,6 @@ def test_the_target_keeps_to_the_current_limit_with_its_offset():
     np.testing.assert_array_equal(passed.current_limited_s, 0)  # the limit itself may be commanded
 
 
-def test_offsets_fill_their_bound_and_are_the_groups_own():
-    section = AmplifierSection(**SUPPLY, amplifier_offset_V=1.0, transconductance_A_V=1.0)
-    offset = amplifier(section, 8.0, STEP_S, 400, 9).offset_A
-    # Uniform: the mean of 400 strays by 1 / sqrt(1200); five of these.
-    assert abs(offset.mean()) < 5 / np.sqrt(1200)
-    assert -1 <= offset.min() < -0.95
-    assert 0.95 < offset.max() <= 1
-    np.testing.assert_array_equal(amplifier(section, 8.0, STEP_S, 18, 9).offset_A, offset[:18])
-    np.testing.assert_array_equal(amplifier(AmplifierSection(), 8.0, STEP_S, 18, 9).offset_A, 0)
-
-
 @pytest.mark.parametrize("drops", [{"drop_up_V": 24.0}, {"drop_down_V": 30.0}])
 def test_a_swing_of_nothing_is_refused(drops):
     with pytest.raises(ValueError, match=r"drive\.drop_up_V .*below drive\.supply_V.*24\.0 V"):

@@ -76,18 +76,6 @@ def test_a_stage_touches_its_own_angles_alone(stage):
     assert np.all(np.any(angles[:, own] != q[:, own], axis=0))
 
 
-def test_one_stage_moves_no_draw_of_another():
-    together = sensor_chain(SensorsSection(**STAGES), 3)
-    tracks, converters = together.stage("potentiometer").channels, together.stage("adc").channels
-    for stage, channels in (("potentiometer", tracks), ("adc", converters)):
-        alone = sensor_chain(SensorsSection(**{stage: STAGES[stage]}), 3).stage(stage).channels
-        for number in range(2):
-            for got, expected in zip(alone[number], channels[number], strict=True):
-                np.testing.assert_array_equal(got, expected)
-    assert np.all(np.array(tracks[0].cosine_rad) != np.array(tracks[1].cosine_rad))
-    assert converters[0].offset_V != converters[1].offset_V
-
-
 def test_a_mounting_error_alone_is_added_to_each_angle():
     offset, q = (0.01, -0.02, 0.03), poses(50)
     np.testing.assert_array_equal(measured(SensorsSection(angle_offset_rad=offset), 0, q), q + offset)

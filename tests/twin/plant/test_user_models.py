@@ -274,3 +274,13 @@ def test_what_the_twin_cannot_hold_is_refused_in_one_line(written, edits, part):
     with pytest.raises(InputError, match=re.escape(part)) as caught:
         Session(scenario_of(path))
     assert "\n" not in str(caught.value)
+
+
+def test_a_state_that_is_not_finite_is_counted(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)  # MuJoCo writes its own log into the current folder
+    rotor = MujocoRotor(mjcf.read(actuators.MJCF_PATH), STEP_S, "RK4", 0.0, 0.0)
+    engine = rotor.start(np.zeros(3), np.zeros(3))
+    assert not engine.warnings.any()
+    engine.qdot[0] = 1e11
+    step(engine)
+    assert engine.warnings[mujoco.mjtWarning.mjWARN_BADQVEL] == 1
