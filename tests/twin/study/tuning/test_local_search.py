@@ -16,21 +16,15 @@ GAINS = (
 )
 SWITCH = GAINS[1].switch
 LIMITS = (2.0, 6.0)
+OBJECTIVES = (Objective(metric="copper_loss_J"), Objective(metric="current_variation_A_s", limits=LIMITS))
 OPTIMISE = Optimise(
-    gain=GAINS,
-    objective=(
-        Objective(metric="copper_loss_J"),
-        Objective(metric="current_variation_A_s", limits=LIMITS),
-    ),
-    sampler="local",
-    draws=DRAWS,
-    perturbations=PERTURBATIONS,
+    gain=GAINS, objective=OBJECTIVES, sampler="local", draws=DRAWS, perturbations=PERTURBATIONS
 )
 NEAR = {"controller.stiffness": 100.0, "controller.damping": 1.0, SWITCH: 0.75}
 FAR = {"controller.stiffness": 1.0, "controller.damping": -1.0, SWITCH: 0.25}
 
 
-def kept(number, chosen, *values, ended=Ended.COMPLETED):
+def finished(number, chosen, *values, ended=Ended.COMPLETED):
     return FinishedTrial(number, chosen, Tried(ended, "", list(values), []))
 
 
@@ -39,11 +33,8 @@ def places(chosen):
     return np.array([np.log10(chosen["controller.stiffness"]) / 4, (chosen["controller.damping"] + 1) / 4])
 
 
-def test_trials_are_the_draws_and_the_perturbations_for_each_limit():
-    assert OPTIMISE.planned == DRAWS + len(LIMITS) * PERTURBATIONS
-
-
 def test_the_draws_fill_every_range():
+    assert OPTIMISE.planned == DRAWS + len(LIMITS) * PERTURBATIONS
     points = [proposed(GAINS, OPTIMISE, "key", number, []) for number in range(DRAWS)]
     numbers = np.array([[*places(point), point[SWITCH]] for point in points])
     # A Sobol sequence of 2^6 points has exactly one in each 64th of each coordinate.
@@ -58,8 +49,8 @@ def test_proposals_follow_from_the_key_alone_and_differ_with_it():
 
 @pytest.mark.parametrize(("turn", "start"), [(0, NEAR), (1, FAR)])
 def test_perturbations_are_about_the_best_within_the_limit_whose_turn_it_is(turn, start):
-    earlier = [kept(0, NEAR, 5.0, 1.0), kept(1, FAR, 3.0, 5.0), kept(2, NEAR, 1.0, 9.0)]
-    earlier.append(kept(3, NEAR, 0.0, 1.0, ended=Ended.PRUNED))
+    earlier = [finished(0, NEAR, 5.0, 1.0), finished(1, FAR, 3.0, 5.0), finished(2, NEAR, 1.0, 9.0)]
+    earlier.append(finished(3, NEAR, 0.0, 1.0, ended=Ended.PRUNED))
     late = OPTIMISE.planned - len(LIMITS) + turn
     moved = [proposed(GAINS, OPTIMISE, str(key), late, earlier) for key in range(40)]
     distances = np.abs([places(each) - places(start) for each in moved])
@@ -70,7 +61,7 @@ def test_perturbations_are_about_the_best_within_the_limit_whose_turn_it_is(turn
 
 
 def test_perturbations_narrow():
-    earlier = [kept(0, NEAR, 5.0, 1.0)]
+    earlier = [finished(0, NEAR, 5.0, 1.0)]
     spread = [
         np.std([places(proposed(GAINS, OPTIMISE, str(key), number, earlier))[0] for key in range(200)])
         for number in (DRAWS, OPTIMISE.planned - 2)
@@ -81,8 +72,8 @@ def test_perturbations_narrow():
 
 
 def test_where_nothing_is_within_a_limit_the_nearest_is_perturbed():
-    earlier = [kept(0, FAR, 5.0, 30.0), kept(1, NEAR, 9.0, 20.0, ended=Ended.PRUNED)]
-    earlier.append(kept(2, FAR, 0.0, 0.0, ended=Ended.LOST))
+    earlier = [finished(0, FAR, 5.0, 30.0), finished(1, NEAR, 9.0, 20.0, ended=Ended.PRUNED)]
+    earlier.append(finished(2, FAR, 0.0, 0.0, ended=Ended.LOST))
     moved = proposed(GAINS, OPTIMISE, "key", OPTIMISE.planned - 2, earlier)
     assert np.abs(places(moved) - places(NEAR)).max() < 5 * NARROWEST
 
@@ -90,23 +81,15 @@ def test_where_nothing_is_within_a_limit_the_nearest_is_perturbed():
 def test_every_value_is_within_its_range():
     corner = {"controller.stiffness": 1e4, "controller.damping": -1.0, SWITCH: 1.0}
     for key in range(200):
-        point = places(proposed(GAINS, OPTIMISE, str(key), DRAWS, [kept(0, corner, 5.0, 1.0)]))
+        point = places(proposed(GAINS, OPTIMISE, str(key), DRAWS, [finished(0, corner, 5.0, 1.0)]))
         assert np.all((point >= 0) & (point <= 1))
 
 
 def test_the_best_within_each_limit_is_reported_and_nothing_beyond_the_last_is_completed(tmp_path):
     """Slowness is 100/damping and some noise: a limit on it is one on the damping."""
     objectives = ["miss", {"metric": "slowness", "limits": [0.5, 2.0]}]
-    noisy = study(
-        tmp_path,
-        objectives=objectives,
-        gains=TWO["gains"],
-        seeds=3,
-        sampler="local",
-        draws=30,
-        perturbations=10,
-    )
-    (law,) = tune(noisy, tmp_path).laws
+    search = {"sampler": "local", "draws": 30, "perturbations": 10}
+    (law,) = tune(study(tmp_path, **{**TWO, "objectives": objectives}, **search), tmp_path).laws
     assert len(law.trials) == 50
     completed = [each for each in law.trials if each.tried.ended == Ended.COMPLETED]
     assert all(each.tried.values[1] <= 2.0 for each in completed)
