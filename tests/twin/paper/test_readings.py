@@ -61,19 +61,3 @@ def test_the_finding_names_the_nearest_reading():
     assert "λ = 5" in finding.text
     assert "AFSM's errors then differ from the print by a factor of 1.10 to 1.10 at L = 1 and" in finding.text
     assert readings.findings(made_up(lambda reading: 1.0, READINGS[:3])) == []
-
-
-def test_with_another_slope_the_page_states_how_far_each_law_is_from_the_print():
-    """The ranges over the hinges are computed from the runs; PD, which has no λ, is left out."""
-    ratios = {1.0: np.array([1.4, 1.52, 1.47]), 2.0: np.array([0.85, 0.79, 0.88])}
-    outcomes = made_up(lambda reading: 1.0)
-    slope = READINGS[-1]
-    for m, L in PRINTED_rad:
-        for law in PAPER_LAWS[1:]:
-            printed = np.array(printed_rad(law.law, m, L))
-            outcomes[case(slope, law, m, L).name] = [outcome(ratios[L] * printed, saturated_fraction=0.0)]
-    (section,) = readings.sections(outcomes)
-    ranges = "by a factor of 1.40 to 1.52 at L = 1 and a factor of 0.79 to 0.88 at L = 2"
-    expected = f"With λ = 5 the errors differ from the print: adaptive fuzzy {ranges}, AFSM {ranges}."
-    assert section.text.endswith(expected)
-    assert "PD by" not in section.text

@@ -22,17 +22,6 @@ def row(outcomes, case=NOISY):
     return rows(make_plan(experiment(case), len(outcomes)), {case.name: outcomes})[0]
 
 
-def test_row_has_the_public_face():
-    entry = row(THREE)
-    assert (entry["figure"], entry["case"], entry["controller"], entry["hardware"]) == (
-        "short", "noisy", "afsm", "electronics",
-    )  # fmt: skip
-    assert (entry["m"], entry["L"], entry["seeds"]) == (0.0, 0.0, 3)
-    assert entry["paper"] == [0.01, None, None]
-    assert entry["status"] == "completed"
-    assert entry["statuses"] == {"completed": 3}
-
-
 def test_errors_are_medians_and_ranges():
     entry = row(THREE)
     assert entry["max_abs_error_rad"] == pytest.approx([0.2, 0.4, 0.6])
