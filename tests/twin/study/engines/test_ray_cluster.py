@@ -8,13 +8,10 @@ from spheretwin.models.base.errors import InputError, SpheretwinError
 from spheretwin.study import journal, runner
 from spheretwin.study.engines import engine, ray_worker
 from tests.package_copy import copy_package
-from tests.twin.study.engines.clusters import (
-    LONG_STUDY,
-    ROWS,
-    goes_on_locally,
-    run,
-    same_table,
-    started,
+from tests.twin.study.engines.clusters import LONG_STUDY, ROWS, goes_on_locally, run, same_table, started
+
+pytestmark = pytest.mark.release(
+    "a Ray cluster for 15 to 83 s; test_ray_batches.py and test_ray_refusals.py need none"
 )
 
 # A copy of the package is found before the installed one, whichever way that is installed.
@@ -45,7 +42,6 @@ def blocked_on(node_id, folder):
     return run_unless_blocked
 
 
-@pytest.mark.release("a Ray cluster for 23 to 83 s; test_a_fault_on_a_node_stops_the_study has one")
 def test_a_node_that_is_killed_half_way_loses_nothing(study, machines, wanted, tmp_path, monkeypatch):
     lost = []
     back = engine.Batches.lost
@@ -77,12 +73,7 @@ def test_a_node_that_is_killed_half_way_loses_nothing(study, machines, wanted, t
     assert stored.name == next((wanted / "telemetry").iterdir()).name
 
 
-@pytest.mark.release(
-    "a Ray cluster for 15 s and more; test_ray_batches.py and test_ray_refusals.py need none"
-)
 def test_a_fault_on_a_node_stops_the_study_and_keeps_what_is_finished(study, machines, tmp_path, monkeypatch):
-    carried_out = ray_worker.run_batch
-
     def of_plants_that_differ(job, numbers):
         from spheretwin.study import agreement
         from spheretwin.study.engines import ray_worker
@@ -93,12 +84,10 @@ def test_a_fault_on_a_node_stops_the_study_and_keeps_what_is_finished(study, mac
     monkeypatch.setattr(ray_worker, "run_batch", of_plants_that_differ)
     with pytest.raises(SpheretwinError, match="to be the same on both plants"):
         run(study, tmp_path, machines)
-    monkeypatch.setattr(ray_worker, "run_batch", carried_out)
     assert (tmp_path / "table.parquet").exists()
     assert len((tmp_path / journal.NAME).read_text().splitlines()) < 1 + ROWS
 
 
-@pytest.mark.release("a Ray cluster for 23 to 83 s; test_a_fault_on_a_node_stops_the_study has one")
 def test_a_row_that_takes_its_process_along_is_told_of(study, machines, tmp_path, monkeypatch):
     monkeypatch.setattr(engine, "MOST_LOSSES", 1)
     (tmp_path / "own.py").write_text("import os\n\n\ndef dies(run):\n    os._exit(1)\n")
@@ -107,27 +96,22 @@ def test_a_row_that_takes_its_process_along_is_told_of(study, machines, tmp_path
         run(fatal, tmp_path / "out", machines, limit=1)
 
 
-@pytest.mark.release("a Ray cluster for 23 to 83 s; test_a_fault_on_a_node_stops_the_study has one")
 def test_a_node_with_other_sources_is_refused_in_one_line(study, machines, wanted, tmp_path):
     package = copy_package(tmp_path / "other")
     with (package / "loop.py").open("a") as file:
         file.write("# another one\n")
     (tmp_path / "other" / "sitecustomize.py").write_text(FIRST)
-    environment = {"PYTHONPATH": str(tmp_path / "other")}
-    other = machines.add_node(num_cpus=1, env_vars=environment)
+    other = machines.add_node(num_cpus=1, env_vars={"PYTHONPATH": str(tmp_path / "other")})
     try:
         with pytest.raises(SpheretwinError, match="received other sources; none of its rows") as refusal:
             run(study, tmp_path / "out", machines)
     finally:
         machines.remove_node(other)
     assert "\n" not in str(refusal.value)
-    of_driver, of_local = (
-        (folder / journal.NAME).read_text().splitlines() for folder in (tmp_path / "out", wanted)
-    )
-    assert set(of_driver) <= set(of_local)
+    lines = (set((path / journal.NAME).read_text().splitlines()) for path in (tmp_path / "out", wanted))
+    assert next(lines) <= next(lines)
 
 
-@pytest.mark.release("a Ray cluster for 23 to 83 s; test_a_fault_on_a_node_stops_the_study has one")
 def test_an_address_where_nobody_answers_loses_nothing(study, machines, wanted, tmp_path):
     runner.run(study, tmp_path, limit=20)
     stored = (tmp_path / journal.NAME).read_bytes()
@@ -143,7 +127,6 @@ def test_an_address_where_nobody_answers_loses_nothing(study, machines, wanted, 
 
 
 # The last one: it leaves no cluster.
-@pytest.mark.release("a Ray cluster for 23 to 83 s; test_a_fault_on_a_node_stops_the_study has one")
 def test_a_cluster_that_is_lost_is_told_of_in_one_line(machines, tmp_path):
     source = tmp_path / "long.toml"
     source.write_text(LONG_STUDY)

@@ -19,23 +19,13 @@ def test_who_answers_but_is_no_cluster_is_refused(study, tmp_path, monkeypatch):
             runner.run(study, tmp_path, engine="ray", address=address)
 
 
-@pytest.mark.parametrize(
-    ("options", "message"),
-    [
-        ({"engine": "rya"}, "expected local, ray as engine, received 'rya'; did you mean ray"),
-        ({"address": "auto"}, "expected engine ray for an address, received local"),
-        ({"engine": "ray", "address": "ray://there:10001"}, "expected auto, HOST or HOST:PORT"),
-    ],
-)
-def test_what_cannot_be_meant_is_refused(study, tmp_path, options, message):
-    with pytest.raises(InputError) as refusal:
-        runner.run(study, tmp_path, **options)
-    assert message in str(refusal.value)
+def test_the_address_of_a_client_is_refused(study, tmp_path):
+    with pytest.raises(InputError, match="expected auto, HOST or HOST:PORT"):
+        runner.run(study, tmp_path, engine="ray", address="ray://there:10001")
 
 
 def test_an_installation_without_ray_names_the_extra(study, tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "ray", None)
-    with pytest.raises(
-        InputError, match="expected Ray for the engine ray, which the extra cluster installs: "
-    ):
+    message = "expected Ray for the engine ray, which the extra cluster installs: "
+    with pytest.raises(InputError, match=message):
         runner.run(study, tmp_path, engine="ray")
