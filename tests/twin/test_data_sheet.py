@@ -148,10 +148,15 @@ def test_a_nominal_model_that_equals_the_truth_is_recorded_with_its_values(actua
     assert nominal.delay_s == 2e-3  # what the user states counts
 
 
-def test_the_truth_is_read_once():
-    changes = {"nominal.equals_truth": True, "plant.coulomb_Nm": [1e-3] * 3}
-    with Session(scenarios.load("hold", changes)) as session:
+@pytest.mark.parametrize("at_start", [True, False])
+def test_the_truth_is_read_once(at_start):
+    """Where it is stated to be known, at the start or during a run."""
+    changes = {"nominal.equals_truth": at_start, "nominal.torque_scale": 1.0 if at_start else 1.1}
+    with Session(scenarios.load("hold", changes | {"plant.coulomb_Nm": [1e-3] * 3})) as session:
+        assert (session.scenario.nominal.coulomb_Nm == (1e-3,) * 3) is at_start
+        session.set("nominal.equals_truth", True)
         known = session.scenario.nominal
+        assert (known.coulomb_Nm, known.torque_scale) == ((1e-3,) * 3, 1.0)
         session.set("plant.coulomb_Nm", [4e-3] * 3)
         session.set("drive.supply_V", None)
         session.set("plant.torque_curve", str(actuators.TORQUE_CURVE_PATH))
@@ -160,17 +165,8 @@ def test_the_truth_is_read_once():
         restored = pickle.loads(pickle.dumps(session.snapshot())).scenario
         assert isinstance(restored, ResolvedScenario)
         assert restored == session.scenario
-
-
-def test_set_during_a_run_it_takes_the_truth_of_then():
-    with Session(scenarios.load("hold", {"nominal.torque_scale": 1.1})) as session:
-        session.set("plant.coulomb_Nm", [4e-3] * 3)
-        assert session.scenario.nominal.coulomb_Nm == (0.0,) * 3
-        session.set("nominal.equals_truth", True)
-        nominal = session.scenario.nominal
-        assert (nominal.coulomb_Nm, nominal.torque_scale) == ((4e-3,) * 3, 1.0)
         session.set("nominal.equals_truth", False)
-        assert session.scenario.nominal.coulomb_Nm == (4e-3,) * 3
+        assert session.scenario.nominal.coulomb_Nm == (1e-3,) * 3
 
 
 @pytest.mark.parametrize("knows", [False, True])

@@ -126,14 +126,6 @@ def test_a_mistaken_controller_is_part_of_the_true_model(actuator):
     assert np.abs(change - turning).max() < 1e-3 * np.abs(turning).max()
 
 
-def test_a_scale_that_is_wrong_alone_scales_the_input_alone():
-    model, plain = (linearise(scenario({"nominal.torque_scale": scale}), TILTED) for scale in (1.25, 1.0))
-    np.testing.assert_allclose(model.input_at_rest, 1.25 * plain.input_at_rest, rtol=1e-12, atol=1e-15)
-    np.testing.assert_allclose(1.25 * model.system.B, plain.system.B, rtol=1e-12, atol=1e-11)
-    # Its slopes cancel but for the rounding of their differences.
-    np.testing.assert_allclose(model.system.A, plain.system.A, rtol=0, atol=1e-8)
-
-
 def responses(A, B, C):
     return np.array([C @ np.linalg.solve(1j * w * np.eye(len(A)) - A, B) for w in (1.0, 30.0, 300.0)])
 

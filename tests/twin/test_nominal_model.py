@@ -1,11 +1,8 @@
 """What the controller knows may differ from what is true: nominal matrix, inertia and limit, sensors."""
 
-import shutil
-
 import numpy as np
 import pytest
 
-from spheretwin.models import actuator as actuators
 from spheretwin.models.kinematics import rate_jacobian
 from spheretwin.models.magnetics import torque_matrix
 from tests.twin.passive_cases import ASKEW, ENGINES, OFFSET, PD, STILL, table
@@ -33,15 +30,6 @@ def test_a_scale_and_a_stiffness_are_the_same_to_a_pd_law():
     true, assumed = table(2000, changes=PD), table(2000, changes=PD | changes | {"nominal.torque_scale": 2.0})
     np.testing.assert_array_equal(assumed["allocation_scale"], 1)
     np.testing.assert_array_equal(assumed["q_rad"], true["q_rad"])
-
-
-@pytest.mark.parametrize("engine", ENGINES)
-def test_a_nominal_curve_of_the_same_content_changes_no_byte(engine, tmp_path):
-    path = shutil.copy(actuators.TORQUE_CURVE_PATH, tmp_path / "same.csv")
-    changes = {"plant.engine": engine}
-    one = table(800, changes=changes)
-    other = table(800, changes=changes | {"nominal.torque_curve": str(path)})
-    assert one.values.tobytes() == other.values.tobytes()
 
 
 def test_a_nominal_curve_of_half_the_torque_is_a_scale_of_a_half(actuator, tmp_path):

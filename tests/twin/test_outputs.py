@@ -2,6 +2,7 @@
 
 import os
 import signal
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -46,20 +47,10 @@ def test_telemetry_that_is_refused_leaves_no_recording(session, tmp_path):
 
 
 def test_a_live_view_has_the_tab_and_the_window_that_were_requested(session, monkeypatch):
-    requested = []
-
-    class View:
-        address = ""
-
-        def __init__(self, *_, **options):
-            requested.append(options)
-
-        def close(self):
-            pass
-
-    monkeypatch.setattr(live, "LiveView", View)
+    view = Mock()
+    monkeypatch.setattr(live, "LiveView", view)
     assert Outputs(session, None, None, live=True, view="control", live_window_s=3.0).close() == []
-    assert requested == [{"shown": "control", "window_s": 3.0}]
+    assert view.call_args.kwargs == {"shown": "control", "window_s": 3.0}
 
 
 def test_signals_that_the_parent_has_ignored_stay_ignored():

@@ -147,17 +147,13 @@ def test_a_change_of_the_disturbance_does_not_touch_the_random_stream(at):
     unchanged, changed = session(), session()
     changed.advance(at)
     changed.set("disturbance.load", 2.0)
-    ticks = 2 * BLOCK_TICKS
-    after, expected = (
-        changed.advance(ticks)["disturbance_Nm"],
-        unchanged.advance(at + ticks)["disturbance_Nm"][at:],
-    )
+    after = changed.advance(2 * BLOCK_TICKS)["disturbance_Nm"]
+    expected = unchanged.advance(at + 2 * BLOCK_TICKS)["disturbance_Nm"][at:]
     # 0.05 N·m more, and the same draws: three sums up to 0.15 N·m, each of which rounds by 1.4e-17.
     np.testing.assert_allclose(after - 0.05, expected, rtol=0, atol=4.2e-17)
     changed.set("disturbance.load", 1.0)
-    np.testing.assert_array_equal(
-        changed.advance(ticks)["disturbance_Nm"], unchanged.advance(ticks)["disturbance_Nm"]
-    )
+    after, expected = (each.advance(2 * BLOCK_TICKS)["disturbance_Nm"] for each in (changed, unchanged))
+    np.testing.assert_array_equal(after, expected)
 
 
 def not_compilable(t, reference, measurement, parameters, state, torque):

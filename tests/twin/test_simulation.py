@@ -61,17 +61,15 @@ def test_nutation_is_tracked_from_rest():
     np.testing.assert_array_equal(table["qdot_rad_s"][0], 0)
 
 
+def dispatch_to_python(law, allocate, estimate, **options):
+    return Functions(loops.loop.py_func, law.step, allocate, estimate, ())
+
+
 @pytest.mark.parametrize("name", ["pd", "adaptive_fuzzy", "afsm"])
 def test_compiled_and_uncompiled_loop_agree(name, monkeypatch):
     overrides = {"controller__law": name, "duration": 0.1}
     compiled = run("nutation", **overrides)
-    monkeypatch.setattr(
-        machines,
-        "dispatch",
-        lambda law, allocate, estimate, **options: Functions(
-            loops.loop.py_func, law.step, allocate, estimate, ()
-        ),
-    )
+    monkeypatch.setattr(machines, "dispatch", dispatch_to_python)
     plain = run("nutation", **overrides)
     # Fused multiply-adds round once where Python rounds twice. Where sgn(s) first flips, a rounding may
     # decide its tick; up to there the traces differ by rounding alone.
