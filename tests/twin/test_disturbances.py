@@ -86,15 +86,6 @@ def test_table_goes_by_its_rows(torques):
     np.testing.assert_array_equal(steps, np.array(rows)[[0, 0, 0, 1, 1, 2, 2]])
 
 
-def test_an_edit_of_the_file_changes_no_table_that_is_made(tmp_path, torques):
-    term = TableDisturbance(file=torques)
-    before = sampled(term, 0, 100).tobytes()
-    (tmp_path / "torques.csv").write_text(TORQUES.replace("0.1", "0.2"))
-    assert sampled(term, 0, 100).tobytes() == before
-    assert TableDisturbance(file=torques) != term
-    assert TableDisturbance.model_fields["file"].json_schema_extra == {"path": True}
-
-
 def test_bad_table_is_refused_on_one_line(tmp_path, torques):
     (tmp_path / "torques.csv").write_text(TORQUES.replace("0.3", "2000"))
     with pytest.raises(InputError) as refusal:

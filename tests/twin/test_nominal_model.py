@@ -24,14 +24,6 @@ def test_a_scale_of_the_nominal_matrix_divides_the_currents(engine, scale):
     np.testing.assert_array_equal(assumed["torque_Nm"][0], true["torque_Nm"][0] / scale)
 
 
-def test_a_scale_and_a_stiffness_are_the_same_to_a_pd_law():
-    # The plant gets 1/k of the torque asked for, so PD with k times its gains is as PD without.
-    changes = {"controller.stiffness": 100.0, "controller.damping": 40.0}
-    true, assumed = table(2000, changes=PD), table(2000, changes=PD | changes | {"nominal.torque_scale": 2.0})
-    np.testing.assert_array_equal(assumed["allocation_scale"], 1)
-    np.testing.assert_array_equal(assumed["q_rad"], true["q_rad"])
-
-
 def test_a_nominal_curve_of_half_the_torque_is_a_scale_of_a_half(actuator, tmp_path):
     half = write_curve(tmp_path / "half.csv", actuator.torque_curve, 0.5)
     by_curve = table(300, changes=PD | {"nominal.torque_curve": half})

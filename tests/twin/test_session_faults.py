@@ -1,7 +1,6 @@
 """Faults in sessions: the same bytes at any chunks, restored, in threads, by hand, by event and replayed."""
 
 import pickle
-from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
@@ -59,12 +58,6 @@ def test_chunks_move_no_bit(whole, length):
     with Session(scenario()) as session:
         pieces = [session.advance(min(length, TICKS - tick)).values for tick in range(0, TICKS, length)]
     assert np.concatenate(pieces).tobytes() == whole.tobytes()
-
-
-def test_threads_move_no_bit(whole):
-    with ThreadPoolExecutor(4) as pool:
-        for run in pool.map(simulate, [scenario() for _ in range(4)]):
-            assert run.telemetry.values.tobytes() == whole.tobytes()
 
 
 def test_another_seed_is_another_run(whole):

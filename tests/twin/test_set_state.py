@@ -26,6 +26,10 @@ def test_the_motion_goes_on_from_it_and_it_is_an_entry_of_the_journal(fields):
         session.set_state(POSE, RATES, CURRENTS)
         (change,) = session.journal
         rows = session.advance(30)
+        q_rad = session.q_rad
+        session.set_state(qdot_rad_s=RATES)
+        np.testing.assert_array_equal(session.q_rad, q_rad)  # what is not given stays
+        np.testing.assert_array_equal(session.qdot_rad_s, RATES)
     np.testing.assert_array_equal(rows["q_rad"][0], POSE)
     np.testing.assert_array_equal(rows["qdot_rad_s"][0], RATES)
     # The lag of the coils starts from these currents: their mean over half a period is nearer to them than
@@ -39,15 +43,6 @@ def test_the_motion_goes_on_from_it_and_it_is_an_entry_of_the_journal(fields):
         session.advance(20)
         session.set(change.name, change.value)
         assert session.advance(30).values.tobytes() == rows.values.tobytes()
-
-
-def test_what_is_not_given_stays(fields):
-    with Session(scenarios.load("hold", fields)) as session:
-        session.advance(20)
-        q_rad = session.q_rad
-        session.set_state(qdot_rad_s=RATES)
-        np.testing.assert_array_equal(session.q_rad, q_rad)
-        np.testing.assert_array_equal(session.qdot_rad_s, RATES)
 
 
 def test_a_state_set_at_the_start_is_the_start_of_a_scenario(fields):

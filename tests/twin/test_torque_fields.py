@@ -87,8 +87,3 @@ def test_a_run_is_recorded_and_replayed(tmp_path, capsys):
     assert cli.main(["simulate", "--replay", str(first), "--telemetry", str(again)]) == 0
     assert first.read_bytes() == again.read_bytes()
     assert capsys.readouterr().err == ""
-
-
-def test_linear_models_use_the_field():
-    linear = st.linearise(st.load("ventusff"), [0.1, -0.1, 0.1])
-    assert np.all(np.isfinite(linear.system.A))
