@@ -46,8 +46,7 @@ def test_rows_that_were_run_are_not_run_again_and_are_the_same(ran):
     assert len(ran) == 4
     assert rows(plan, again) == rows(plan, first)
     for name in first:
-        for one, other in zip(first[name], again[name], strict=True):
-            np.testing.assert_array_equal(one.data, other.data)
+        np.testing.assert_array_equal(*([run.data for run in runs[name]] for runs in (first, again)))
     more = make_plan(made, seeds=5)
     run_plan(more, cache=remembering(more))
     assert sorted(scenario.seed for scenario in ran[4:]) == [3, 4]  # threads begin in any order

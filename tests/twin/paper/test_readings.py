@@ -60,4 +60,4 @@ def test_the_finding_names_the_nearest_reading():
     assert not finding.reproduced
     assert "λ = 5" in finding.text
     assert "AFSM's errors then differ from the print by a factor of 1.10 to 1.10 at L = 1 and" in finding.text
-    assert readings.findings(made_up(lambda reading: 1.0, READINGS[:3])) == []
+    assert readings.findings(made_up(lambda _: 1.0, READINGS[:3])) == []

@@ -28,9 +28,7 @@ def test_all_groups_by_hand():
     assert result.least_share == pytest.approx(1.0)
     assert result.singular_value_Nm_per_A == pytest.approx(1.0)
     assert result.rank == 3
-
-
-def test_the_weaker_group_alone_by_hand():
+    # The weaker group alone.
     result = remaining_torque(BY_HAND, ALONG_Z, LIMIT_A, (2,))
     assert result.torque == result.least_norm == pytest.approx(0.5 * LIMIT_A / 2)
     assert result.least_share == pytest.approx(0.25 / 1.25)
@@ -43,7 +41,7 @@ def test_a_lost_direction_leaves_no_torque(opened, rank):
     assert (result.torque, result.least_norm, result.least_share, result.rank) == (0.0, 0.0, 0.0, rank)
 
 
-def test_three_open_groups_of_five_leave_a_plane():
+def test_of_five_groups_two_leave_a_plane():
     G = np.random.default_rng(4).normal(size=(6, 3, 5))
     result = remaining_torque(G, np.ones((6, 3)), LIMIT_A, (0, 2, 4))
     assert (result.rank, result.torque) == (2, 0.0)

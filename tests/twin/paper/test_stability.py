@@ -45,19 +45,16 @@ def test_v_falls_and_is_of_afsm_alone(run):
     course = descent(run)
     assert course.risen < course.fallen
     assert 0 < course.of_parameters < 1
-    pid = simulate(scenarios.load("sinusoid", {**FAST, "duration": 0.1, "controller.law": "pid"}))
-    assert descent(pid) is None
-    torque = {**FAST, "duration": 0.1, "controller.law": "afsm", "controller.level": "torque"}
-    assert descent(simulate(scenarios.load("sinusoid", torque))) is None
+    for other in {"controller.law": "pid"}, {"controller.law": "afsm", "controller.level": "torque"}:
+        assert descent(simulate(scenarios.load("sinusoid", {**FAST, "duration": 0.1, **other}))) is None
 
 
 def test_v_rises_if_the_adaptation_has_the_wrong_sign(run):
     """With the sign of the adaptation turned in the telemetry, the errors of the parameters grow."""
     table = run.telemetry
-    values = table.values.copy()
-    turned = type(table)(table.signals, values)
-    turned["switching_gain"][:] *= -1
-    turned["bound_gain"][:] *= -1
+    turned = type(table)(table.signals, table.values.copy())
+    for gain in ("switching_gain", "bound_gain"):
+        turned[gain][:] *= -1
     other = SimpleNamespace(scenario=run.scenario, telemetry=turned)
     assert descent(other).rises > 0.9
 
@@ -79,9 +76,8 @@ def test_ends_of_a_margin():
 
 def test_a_law_holds_by_its_error_and_its_end():
     assert stability.holds(outcome([0.0, 0.0, 0.99 * stability.HOLDS_rad]))
-    assert not stability.holds(outcome([0.0, 0.0, 1.01 * stability.HOLDS_rad]))
-    assert not stability.holds(outcome(np.nan))
-    assert not stability.holds(outcome(0.0, Status.DIVERGED))
+    for lost in ([0.0, 0.0, 1.01 * stability.HOLDS_rad],), (np.nan,), (0.0, Status.DIVERGED):
+        assert not stability.holds(outcome(*lost))
 
 
 def test_margins_begin_at_what_is_healthy_and_are_compared_with_no_other_plant():
