@@ -17,7 +17,6 @@ def test_runs_on_threads_are_those_made_one_after_the_other():
         {"controller.law": law, "disturbance.load": load, "seed": seed, "plant.engine": engine}
         for law, load, seed, engine in product(SHIPPED, (0.0, 1.0, 2.0), (0, 1), ENGINES)
     ]
-    assert len(runs) == 36
 
     def made(changes):
         return rows(Session(scenario(**changes)).advance(400))
