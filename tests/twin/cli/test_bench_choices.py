@@ -6,10 +6,9 @@ import pytest
 
 from spheretwin import scenario as scenarios
 from spheretwin.bench import Bench
-from spheretwin.cli.bench import choices_of, read, settings_of, shape_settings, written
+from spheretwin.cli.bench import read, settings_of, shape_settings, written
 from spheretwin.models.base.errors import InputError
 from spheretwin.scenario.reading import described_fields, shipped
-from spheretwin.trajectories import SHAPES
 
 
 def setting(name, scenario):
@@ -56,21 +55,14 @@ def test_what_is_no_value_is_refused(text):
         read("plant.step_s", text)
 
 
-def test_every_shape_is_offered_as_it_comes_and_the_present_one_as_it_is():
+def test_the_present_shape_is_offered_as_it_is():
     scenario = scenarios.load(
         "sinusoid", {"trajectory.amplitude_rad": [0.1, 0.1, 0.1 / 3], "plant.engine": "lagrangian"}
     )
     with Bench(scenario) as bench:
-        assert choices_of(bench).targets["coil.17"] == ("open", "short", "gain", "intermittent")
-        for shape in SHAPES:
-            offered = {each.name: each for each in shape_settings(shape, bench)}
-            assert "approach" not in offered
-            expected = {name for name in SHAPES[shape].model_fields if name not in ("shape", "approach")}
-            assert set(offered) == expected
         present = {each.name: each for each in shape_settings("sinusoid", bench)}
         assert present["amplitude_rad"].text == f"0.1 0.1 {0.1 / 3!r}"
         assert present["amplitude_rad"].default == "0.2 0.2 0.2"
-        assert shape_settings("no such shape", bench) == []
 
 
 def test_a_shape_with_a_list_of_tables_is_offered_as_it_is():
