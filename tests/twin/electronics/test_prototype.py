@@ -345,7 +345,9 @@ def compared_run(faults, engine="mujoco", ticks=TICKS):
     [
         ([], "mujoco"),
         (FAULTS, "mujoco"),
-        pytest.param(FAULTS, "lagrangian", marks=pytest.mark.release("compiles another loop, 12 s")),
+        pytest.param(
+            FAULTS, "lagrangian", marks=pytest.mark.release("compiles a loop, 12 s; mujoco has the faults")
+        ),
     ],
     ids=["healthy-mujoco", "faults-mujoco", "faults-lagrangian"],
 )

@@ -170,6 +170,7 @@ def test_closed_loops_on_both_engines_agree(stiction):
     assert np.abs(ideal - first).max() > 1e-3
 
 
+@pytest.mark.release("1 s of plain Python; test_plant_step.py has the torque matrix of a tilted joint")
 @pytest.mark.uncompiled
 def test_true_orientation_drives_the_coils():
     # The torque of the coils is that of a pose with the orientation of the tilted joint.
@@ -265,6 +266,7 @@ def test_a_payload_off_the_axis_is_computed_by_the_equations_of_motion(tmp_path)
     assert_same_steps(*rotors, ([0.4, -0.3, 0.2], [1.0, 2.0, -3.0]))
 
 
+@pytest.mark.release("1 s of plain Python; test_session_settings.py has changes of the plant")
 @pytest.mark.uncompiled
 def test_a_change_during_the_run_acts_and_a_snapshot_restores_it():
     with Session(scenarios.load("hold", {"plant.engine": "lagrangian"})) as session:
