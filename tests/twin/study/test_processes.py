@@ -99,21 +99,6 @@ def test_an_interruption_finishes_the_rows_in_flight_and_writes_the_table(
 
 
 @SAME_IN_LESS
-def test_a_second_process_is_refused_and_the_first_goes_on(tmp_path, command, whole, capfd):
-    folder = tmp_path / "out"
-    process = begun([*command, "--threads", "1"], folder)
-    process.send_signal(signal.SIGSTOP)  # so that it does not end before the other begins
-    second, printed = cli.main(command[len(PROGRAM) :]), capfd.readouterr()
-    process.send_signal(signal.SIGCONT)
-    assert second == cli.BAD_INPUT
-    assert printed.err.startswith("spheretwin: study: expected one process at a time")
-    assert printed.err.count("\n") == 1
-    process.communicate()
-    assert process.returncode == cli.DONE
-    assert table(folder) == table(whole)
-
-
-@SAME_IN_LESS
 def test_where_files_may_not_grow_the_study_ends_in_one_line_and_loses_nothing(
     tmp_path, command, whole, capfd
 ):

@@ -8,10 +8,8 @@ import sys
 
 import pytest
 
-from spheretwin.models.base.errors import InputError, SpheretwinError
-from spheretwin.study import journal
+from spheretwin.models.base.errors import InputError
 from spheretwin.study.tuning.tuning import JOURNAL, tune
-from tests.twin.study.cases import Full
 from tests.twin.study.tuning.cases import FIGURES, TWO, gain, study
 
 TRIALS = 24
@@ -125,18 +123,6 @@ def test_trials_of_another_study_are_refused(tmp_path, other):
     with pytest.raises(InputError, match=ANOTHER_STUDY):
         tune(changed, tmp_path, trials=4)
     assert (tmp_path / JOURNAL).read_bytes() == before
-
-
-def test_a_full_disk_loses_no_trial(tmp_path, monkeypatch):
-    noisy = study(tmp_path, **TWO)
-    opened = journal._opened
-    with monkeypatch.context() as patch:
-        patch.setattr(journal, "_opened", lambda path: Full(opened(path), 2000))
-        with pytest.raises(SpheretwinError, match="could not be written, No space left on device"):
-            tune(noisy, tmp_path, trials=TRIALS)
-    result = tune(noisy, tmp_path, trials=TRIALS)
-    assert result.resumed > 3
-    assert result.laws[0].trials == tune(noisy, tmp_path / "once", trials=TRIALS).laws[0].trials
 
 
 def test_a_damaged_line_is_run_again_and_what_is_finished_is_not(tmp_path, monkeypatch):
