@@ -66,3 +66,19 @@ def started(*arguments, **options):
 def _default_handlers():
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, signal.SIG_DFL)
+
+
+LAW = """
+import os
+import sys
+
+def law(t, reference, measurement, parameters, state, torque):
+    torque[:] = -0.5 * (measurement[0] - reference[0]) - 0.03 * measurement[1]
+    """
+
+
+def under_law(folder, statement):
+    """Return the arguments of a run of hold, whose law also executes a statement at each tick."""
+    (folder / "law.py").write_text(f"{LAW}{statement}\n")
+    law = f"{folder / 'law.py'}:law"
+    return ["simulate", "hold", "--plant.engine", "lagrangian", "--controller.law", law]

@@ -13,7 +13,7 @@ import pytest
 
 from spheretwin.models.base import cache
 from spheretwin.models.telemetry.table import read_parquet
-from tests.twin.cli.calls import COMMAND, call, started
+from tests.twin.cli.calls import COMMAND, call, started, under_law
 
 INSTALLED = str(Path(sys.executable).with_name("spheretwin"))
 
@@ -44,35 +44,14 @@ def test_a_refused_process_says_so_on_one_line_and_exits_2():
     assert done.stderr.startswith("spheretwin: ")
 
 
-LAW = """
-import os
-import sys
-
-
-def holding(t, reference, measurement, parameters, state, torque):
-    torque[:] = -0.5 * (measurement[0] - reference[0]) - 0.03 * measurement[1]
-    if t > 0.1 and not DONE:
-        DONE.append(t)
-        ONCE
-
-
-DONE = []
-"""
-
-
-def with_law(folder, once, *arguments):
-    """Return the arguments of a run of a minute under a law that does something once, after 0.1 s."""
-    path = folder / "law.py"
-    path.write_text(LAW.replace("ONCE", once))
-    law = ["--controller.law", f"{path}:holding", "--plant.engine", "lagrangian"]
-    return ["simulate", "hold", "--duration", "60", *law, *arguments]
+MINUTE = ["--duration", "60"]
 
 
 def test_ctrl_c_keeps_the_run(tmp_path):
     telemetry, recording = tmp_path / "run.parquet", tmp_path / "run.rrd"
     outputs = ["--telemetry", telemetry, "--record", recording, "--json"]
-    once = "print('it runs', file=sys.stderr, flush=True)"
-    with started(*with_law(tmp_path, once, "--live", *outputs)) as process:
+    flags = under_law(tmp_path, "if round(t / 1e-3) == 100: print('it runs', file=sys.stderr, flush=True)")
+    with started(*flags, *MINUTE, "--live", *outputs) as process:
         assert any("it runs" in line for line in process.stderr)
         process.send_signal(signal.SIGINT)
         stdout, stderr = process.communicate()
@@ -85,8 +64,9 @@ def test_ctrl_c_keeps_the_run(tmp_path):
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_a_signal_ends_a_run_and_keeps_its_rows(tmp_path, number):
-    telemetry, once = tmp_path / "run.parquet", f"os.kill(os.getpid(), {int(number)})"
-    result = call(*with_law(tmp_path, once, "--telemetry", telemetry, "--json"))
+    telemetry = tmp_path / "run.parquet"
+    flags = under_law(tmp_path, f"if round(t / 1e-3) == 100: os.kill(os.getpid(), {int(number)})")
+    result = call(*flags, *MINUTE, "--telemetry", telemetry, "--json")
     assert (result.code, result.json["status"]) == (1, "interrupted")
     assert 100 < len(read_parquet(telemetry)[0]) < 60_000
 

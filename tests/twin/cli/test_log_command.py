@@ -124,6 +124,7 @@ def test_a_review_exports_joint_states(files, tmp_path):
     assert np.array_equal(machine.read(out).angle_rad, run["q_measured_rad"])
 
 
+@pytest.mark.release("a process of 2 s without a compiler; runs that have sensors are exported in less")
 @pytest.mark.uncompiled
 def test_a_run_that_gains_sensors_is_exported(tmp_path):
     log, path = tmp_path / "log.parquet", tmp_path / "run.parquet"

@@ -14,7 +14,7 @@ from spheretwin.runtime import Runtime
 from spheretwin.scenario.reading import shipped
 from spheretwin.session import Session
 from spheretwin.viz.terminal.reviews import SignalTolerance
-from tests.twin.cli.calls import call, refusal, succeeded
+from tests.twin.cli.calls import call, refusal, succeeded, under_law
 
 PLANT = ["--plant.engine", "lagrangian"]
 
@@ -81,28 +81,16 @@ def test_a_file_that_cannot_be_completed_fails_the_run_and_keeps_its_figures(mon
     assert result.out.startswith("hold under afsm, ideal hardware: completed")
 
 
-@pytest.fixture
-def law(tmp_path):
-    """Return the flags of a run under a law of which one statement is given."""
-
-    def write(statement):
-        text = "def law(t, reference, measurement, parameters, state, torque):\n    torque[:] = 0\n"
-        (tmp_path / "law.py").write_text(f"{text}    {statement}\n")
-        return ["simulate", "hold", *PLANT, "--controller.law", f"{tmp_path / 'law.py'}:law"]
-
-    return write
-
-
-def test_output_of_a_law_is_not_among_the_json(law):
-    flags = [*law("print('here')"), "--duration", 0.001]
+def test_output_of_a_law_is_not_among_the_json(tmp_path):
+    flags = [*under_law(tmp_path, "print('here')"), "--duration", 0.001]
     result = call(*flags, "--json")
     assert result.json["status"] == "completed"
     assert "here" in result.err
     assert "here" in succeeded(*flags)
 
 
-def test_a_run_without_a_tick_has_no_time_and_no_pose(law):
-    result = call(*law("torque[:] = float('nan')"), "--duration", 0.01)
+def test_a_run_without_a_tick_has_no_time_and_no_pose(tmp_path):
+    result = call(*under_law(tmp_path, "torque[:] = float('nan')"), "--duration", 0.01)
     message = "spheretwin: the run ended before its first tick was complete: diverged\n"
     assert (result.code, result.err) == (cli.FAILED, message)
 
