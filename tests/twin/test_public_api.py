@@ -119,7 +119,7 @@ def test_both_files_of_a_run_have_the_same_review(tmp_path):
 
 
 def test_a_law_of_an_importable_file_is_replayed_also_after_the_file_moved(own, tmp_path, monkeypatch):
-    run = st.simulate("hold", SHORT, law=own.law)
+    run = st.simulate("hold", {"duration": 0.05}, law=own.law)
     assert run.scenario.controller.law == "proportional"
     (out := tmp_path / "out").mkdir()
     path = run.save(out / "run.parquet")
@@ -160,7 +160,7 @@ def test_it_converts_to_the_tables_of_other_packages(run):
 
 
 def test_a_law_that_no_file_holds_is_saved_and_read(own, tmp_path):
-    run = st.simulate("hold", SHORT, law=own.make(3.0))
+    run = st.simulate("hold", {"duration": 0.05}, law=own.make(3.0))
     again = st.read(run.save(tmp_path / "run.parquet"))
     same(again.telemetry, run.telemetry)
     assert again.scenario.controller.law == "made"
