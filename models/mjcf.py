@@ -14,7 +14,7 @@ import html
 import os
 import re
 from collections import OrderedDict
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -56,12 +56,15 @@ class Mjcf:
         to that body.
     warnings : tuple of str
         Warnings of the engine's compiler, one line each.
+    stated_options : frozenset of str
+        Attributes of the element `option` that the file states, such as timestep.
     """
 
     described: mujoco.MjModel
     bare: mujoco.MjModel
     loaded: mujoco.MjModel
     warnings: tuple[str, ...] = ()
+    stated_options: frozenset[str] = frozenset()
 
     @cached_property
     def unknown_to_the_lagrangian(self) -> tuple[str, ...]:
@@ -214,7 +217,19 @@ def _read(path: Path) -> Mjcf:
         _turn_principal_axes_back(model)
     if lost := missing_meshes(mujoco.MjSpec.from_file(str(path)), path):
         lines.append(f"recordings do not draw {', '.join(lost)}: no such files below {path.parent.resolve()}")
-    return Mjcf(*compiled, tuple(f"model {path}: {line}" for line in lines))
+    texts, _ = _texts_and_named(path)
+    return Mjcf(*compiled, tuple(f"model {path}: {line}" for line in lines), _stated_options(texts.values()))
+
+
+_COMMENT = re.compile(rb"<!--.*?-->", re.DOTALL)
+_OPTION = re.compile(rb"<option\b([^>]*)>")
+_ATTRIBUTE = re.compile(rb"([A-Za-z_]+)\s*=")
+
+
+def _stated_options(texts: Iterable[bytes]) -> frozenset[str]:
+    """Return the attributes of the elements `option`: the compiled model does not tell them from defaults."""
+    options = [option for text in texts for option in _OPTION.findall(_COMMENT.sub(b"", text))]
+    return frozenset(name.decode() for option in options for name in _ATTRIBUTE.findall(option))
 
 
 def missing_meshes(spec: mujoco.MjSpec, path: Path) -> dict[str, str]:

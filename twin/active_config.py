@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
+from math import inf
 from typing import Any, NamedTuple, TypeVar
 
-import mujoco
 import numpy as np
 from pydantic import BaseModel
 
@@ -30,20 +30,17 @@ from spheretwin.models.mjcf import Mjcf
 from spheretwin.models.mjcf_reader import HINGES
 from spheretwin.models.telemetry.run_record import Change
 from spheretwin.models.telemetry.signals import Signal, with_more
+from spheretwin.models.torque_field import TorqueField
 from spheretwin.plant.mujoco_rotor import integrator_name
 from spheretwin.scenario.changes import first_tick, scheduled_changes, with_change
 from spheretwin.scenario.files import Files, files_of, nominal_curve, reload_files
+from spheretwin.scenario.hardware import HARDWARE, SCATTER_OF_A_CURVE, amplifier_limit_A
 from spheretwin.scenario.plant_sections import NominalSection, PlantSection, ResolvedNominal, ResolvedPlant
 from spheretwin.scenario.reading import as_plain
 from spheretwin.scenario.sections import ResolvedScenario, Scenario, UserController, UserPath
 from spheretwin.trajectories import SHAPES
 from spheretwin.trajectories.rounding import Triple
 from spheretwin.trajectories.trajectory import Sampled, UserTrajectory, checked
-
-# Defaults of MuJoCo's compiler for values that a file does not state.
-UNWRITTEN_STEP_s = 0.002
-UNWRITTEN_INTEGRATOR = "Euler"
-UNWRITTEN_GRAVITY_m_s2 = (0.0, 0.0, -9.81)
 
 
 def fill_defaults(
@@ -57,9 +54,9 @@ def fill_defaults(
         The first pose is outside the range of the hinges, a list does not fit the actuator, or the law is for
         another control period.
     """
-    actuator, section = files.actuator, scenario.plant
+    actuator, section = files.actuator, _applicable(scenario, files.actuator)
     _check_groups(scenario, actuator)
-    drive = _drive(scenario.drive, actuator.group)
+    drive = _drive(scenario.drive, actuator.group, scenario.hardware)
     if section.thermal.on and drive.supply_V is None:
         raise InputError("scenario: expected a drive.supply_V with plant.thermal.on, received none")
     if drive.coil_coupling:
@@ -94,6 +91,24 @@ def fill_defaults(
     return resolved
 
 
+def _applicable(scenario: Scenario, actuator: Actuator) -> PlantSection:
+    """Return the plant without the errors of the hardware set that its machine cannot have."""
+    plant = scenario.plant
+    for dotted in _inapplicable(scenario, actuator):
+        _, section, name = dotted.split(".")
+        scatter = getattr(plant, section)
+        if getattr(scatter, name) == HARDWARE[scenario.hardware][dotted]:
+            plant = plant.model_copy(update={section: scatter.model_copy(update={name: 0.0})})
+    return plant
+
+
+def _inapplicable(scenario: Scenario, actuator: Actuator) -> list[str]:
+    """Return the fields of the hardware set that the machine cannot have."""
+    if not isinstance(actuator.torque_data, TorqueField):
+        return []
+    return [dotted for dotted in SCATTER_OF_A_CURVE if dotted in HARDWARE[scenario.hardware]]
+
+
 Section = TypeVar("Section", bound=BaseModel)
 
 
@@ -102,12 +117,15 @@ def _with(kind: type[Section], section: BaseModel, **values: Any) -> Section:
     return kind.model_construct(**{**dict(section), **values})
 
 
-def _drive(section: DriveSection, group: CoilGroup) -> ResolvedDrive:
-    """Return the drive: coils, limit and, without a supply, lag are those of the model file unless given."""
+def _drive(section: DriveSection, group: CoilGroup, hardware: str) -> ResolvedDrive:
+    """Return the drive: coils and, without a supply, lag are those of the model file unless given.
+
+    The current limit is the smaller one of the model file and of the amplifiers of the hardware set.
+    """
     sheet = {
         "resistance_ohm": group.resistance_ohm,
         "inductance_H": group.inductance_H,
-        "current_limit_A": group.current_limit_A,
+        "current_limit_A": min(group.current_limit_A, amplifier_limit_A(hardware)),
     }
     drive = _with(ResolvedDrive, section, **_given_or(section, sheet))
     if drive.time_constant_s is not None or drive.supply_V is not None:
@@ -118,7 +136,8 @@ def _drive(section: DriveSection, group: CoilGroup) -> ResolvedDrive:
 def _nominal(scenario: Scenario, drive: ResolvedDrive, actuator: Actuator) -> ResolvedNominal:
     """Return the data sheet of the controller; default of a value: the model file, or the true value."""
     section = scenario.nominal
-    sheet = true_sheet(scenario, drive, actuator) if section.equals_truth else _model_sheet(actuator)
+    known = section.equals_truth
+    sheet = true_sheet(scenario, drive, actuator) if known else _model_sheet(actuator, scenario.hardware)
     return _nominal_of(section, sheet, nominal_curve(scenario))
 
 
@@ -134,14 +153,17 @@ def _given_or(section: BaseModel, sheet: Mapping[str, Any]) -> dict[str, Any]:
 
 
 @reused
-def _model_sheet(actuator: Actuator) -> dict[str, Any]:
-    """Return the nominal values of a model file: ideal sensors, amplifiers and bearings, and the coil lag."""
+def _model_sheet(actuator: Actuator, hardware: str) -> dict[str, Any]:
+    """Return the nominal values of a model file: ideal sensors, amplifiers and bearings, and the coil lag.
+
+    The current limit is the one that holds with the amplifiers of the hardware set.
+    """
     group, ideal = actuator.group, (0.0, 0.0, 0.0)
     return {
         "coulomb_Nm": ideal,
         "viscous_Nm_s": ideal,
         "inertia_kg_m2": tuple(actuator.inertia.tolist()),
-        **drive_sheet(_drive(DriveSection(), group)),
+        **drive_sheet(_drive(DriveSection(), group, hardware)),
         **sensor_sheet(SensorsSection()),
     }
 
@@ -165,10 +187,28 @@ def warnings_of(scenario: Scenario, files: Files) -> list[str]:
     return [
         *files.model.warnings,
         *disagreements(files.actuator),
-        *_overridden(scenario.plant, files.model.described.opt),
+        *_overridden(scenario.plant, files.model),
+        *_hardware_warnings(scenario, files.actuator),
         *(f"the event that sets {change.name} does not occur: the run ends before" for change in late),
         *_late_faults(scenario),
     ]
+
+
+def _hardware_warnings(scenario: Scenario, actuator: Actuator) -> list[str]:
+    """Return a warning for what the hardware set states and the machine does not have or allow."""
+    hardware, warnings = scenario.hardware, []
+    if names := _inapplicable(scenario, actuator):
+        warnings.append(
+            f"hardware {hardware} without {', '.join(names)}: the torque field has all poles in one"
+        )
+    model_A, set_A = actuator.group.current_limit_A, amplifier_limit_A(hardware)
+    smaller_A = min(model_A, set_A)
+    if set_A not in (inf, model_A) and scenario.drive.current_limit_A in (None, smaller_A):
+        warnings.append(
+            f"the current limit is {smaller_A:.10g} A, the smaller one of {model_A:.10g} A of the model file"
+            f" and {set_A:.10g} A of hardware {hardware}"
+        )
+    return warnings
 
 
 def _late_faults(scenario: Scenario) -> list[str]:
@@ -182,19 +222,21 @@ def _late_faults(scenario: Scenario) -> list[str]:
     ]
 
 
-def _overridden(section: PlantSection, option: mujoco.MjOption) -> list[str]:
-    """Return a warning for each value of a model file that the scenario overrides."""
+def _overridden(section: PlantSection, model: Mjcf) -> list[str]:
+    """Return a warning for each value that a model file states and a run does not use."""
+    option, stated, given = model.described.opt, model.stated_options, section.gravity_m_s2
     warnings = []
-    if option.timestep not in (section.step_s, UNWRITTEN_STEP_s):
+    if "timestep" in stated and option.timestep != section.step_s:
         own, used = distinct_texts(option.timestep, section.step_s)
         warnings.append(f"the model's own timestep of {own} s is not used: plant.step_s is {used} s")
     integrator = integrator_name(option.integrator)
-    if integrator not in (section.integrator, UNWRITTEN_INTEGRATOR):
+    if "integrator" in stated and integrator != section.integrator:
         warnings.append(
             f"the model's own integrator {integrator} is not used: plant.integrator is {section.integrator}"
         )
-    given, gravity = section.gravity_m_s2, mjcf.gravity(option)
-    if given is not None and gravity not in ((0.0, 0.0, -given), UNWRITTEN_GRAVITY_m_s2):
+    gravity = mjcf.gravity(option)
+    states_gravity = "gravity" in stated or not any(gravity)  # its flag can switch it off
+    if given is not None and states_gravity and gravity != (0.0, 0.0, -given):
         own = " ".join(f"{component:.10g}" for component in gravity)
         warnings.append(
             f"the model's own gravity of {own} m/s² is not used: plant.gravity_m_s2 is {given:.10g} m/s²"

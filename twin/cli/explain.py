@@ -13,11 +13,19 @@ from spheretwin.cli.options import Parser
 from spheretwin.models.base.errors import InputError, did_you_mean, shown
 from spheretwin.scenario import reading
 from spheretwin.scenario.fields import every_field, unit_of
-from spheretwin.scenario.hardware import HARDWARE, ORIGINS
+from spheretwin.scenario.hardware import HARDWARE, LIMITS, ORIGINS
 from spheretwin.scenario.sections import Scenario
 from spheretwin.viz.terminal.texts import print_facts
 
 DEFAULT = "default"
+
+MODEL_FILE = {
+    "resistance_ohm": "group_resistance_ohm",
+    "inductance_H": "group_inductance_H",
+    "current_limit_A": "group_current_limit_A",
+    "inertia_kg_m2": "inertia of the body rotor",
+}
+"""Fields of `drive` and `nominal` whose default is a number of the model file, and its name there."""
 
 
 class FieldFacts(NamedTuple):
@@ -83,20 +91,46 @@ def _of_hardware(name: str) -> Iterator[FieldFacts]:
     fields = dict(every_field(Scenario))
     for dotted, value in HARDWARE[name].items():
         yield _fact(dotted, value, fields[dotted], ORIGINS[name][dotted])
+    for dotted, limit in LIMITS[name].items():
+        origin = f"{limit.origin}; a smaller limit of the model file holds"
+        yield _fact(dotted, limit.value, fields[dotted], origin)
 
 
 def _of_scenario(source: str, everything: bool) -> Iterator[FieldFacts]:
-    scenario = initial_config(scenarios.load(source), None, None).scenario
+    config = initial_config(scenarios.load(source), None, None)
+    scenario = config.scenario
     given, stated = set(_flat(reading.read(source))), ORIGINS[scenario.hardware]
     for dotted, value, field in reading.described_fields(scenario):
         if dotted in given:
             origin = f"scenario {scenario.name}"
         elif dotted in stated:
             origin = f"hardware {scenario.hardware}: {stated[dotted]}"
+        elif value == field.default:
+            origin = DEFAULT
         else:
-            origin = DEFAULT if value == field.default else "computed from the model file and other fields"
+            origin = _of_machine(dotted, scenario, config.files.actuator.group.current_limit_A)
         if everything or origin != DEFAULT:
             yield _fact(dotted, value, field, origin)
+
+
+def _of_machine(dotted: str, scenario: Scenario, limit_A: float) -> str:
+    """Return the origin of a value that neither the scenario nor the hardware set states.
+
+    Parameters
+    ----------
+    dotted : str
+    scenario : Scenario
+    limit_A : float
+        Current limit of the model file.
+    """
+    section, _, name = dotted.partition(".")
+    knows_truth = section == "nominal" and scenario.nominal.equals_truth
+    if name not in MODEL_FILE or section not in ("drive", "nominal") or knows_truth:
+        return "computed from the model file and other fields"
+    limit = LIMITS[scenario.hardware].get(f"drive.{name}")
+    if limit and limit.value < limit_A:
+        return f"hardware {scenario.hardware}: {limit.origin}, below {limit_A:.10g} A of the model file"
+    return f"model file: {MODEL_FILE[name]}"
 
 
 def _of_field(name: str) -> Iterator[FieldFacts]:

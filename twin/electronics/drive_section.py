@@ -39,6 +39,11 @@ class DriveSection(DelaySection, DacSection, AmplifierSection, CoilSection):
         return self
 
     @property
+    def lag_s(self) -> float:
+        """Time constant of the currents while no voltage is at its limit, s; given if there is no supply."""
+        return cast("float", self.time_constant_s) if self.supply_V is None else 1 / self.bandwidth_rad_s
+
+    @property
     def converts(self) -> bool:
         """True if the setpoint of the amplifiers can differ from the command."""
         return self.delay_s > 0 or not all(kind.ideal(self) for kind in STAGES.values())
@@ -57,20 +62,22 @@ class ResolvedDrive(DriveSection):
     inductance_H: Positive
     current_limit_A: Positive
 
-    @property
-    def lag_s(self) -> float:
-        """Time constant of the currents while no voltage is at its limit."""
-        return cast("float", self.time_constant_s) if self.supply_V is None else 1 / self.bandwidth_rad_s
-
 
 def drive_sheet(drive: ResolvedDrive) -> dict[str, Any]:
     """Return the nominal values of amplifiers and coils, by field of `nominal`."""
     return {
         "current_limit_A": drive.current_limit_A,
-        "delay_s": drive.delay_s,
-        "time_constant_s": drive.lag_s,
         "resistance_ohm": drive.resistance_ohm,
         "inductance_H": drive.inductance_H,
+        **amplifier_sheet(drive),
+    }
+
+
+def amplifier_sheet(drive: DriveSection) -> dict[str, Any]:
+    """Return the nominal values of the amplifiers alone, by field of `nominal`."""
+    return {
+        "delay_s": drive.delay_s,
+        "time_constant_s": drive.lag_s,
         "swing_V": _swing_V(drive),
         "offset_error_A": drive.transconductance_A_V * _offset_V(drive),
         "gain_error": drive.dac_gain_error if drive.dac_bits else 0.0,

@@ -26,12 +26,7 @@ PROTOTYPE = HARDWARE["prototype"]
 VOLTS = ("sensors.potentiometer.electrical_angle_rad", "sensors.potentiometer.supply_V")
 
 COILS = (
-    "drive.resistance_ohm",
-    "drive.inductance_H",
-    "drive.current_limit_A",
     "drive.resistance_per_K",
-    "drive.heat_capacity_J_K",
-    "drive.thermal_resistance_K_W",
     "drive.ambient_degC",
     "drive.shutdown_degC",
 )

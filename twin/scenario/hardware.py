@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from math import radians
+from math import inf, radians
 from typing import Any, NamedTuple
 
-from spheretwin.electronics.drive_section import ResolvedDrive, drive_sheet
+from spheretwin.electronics.drive_section import DriveSection, amplifier_sheet
 from spheretwin.electronics.sensor_chain import SensorsSection, sensor_sheet
 
 NOMINAL = "nominal"
@@ -47,12 +47,7 @@ _DRIVE = {
     "drive.bandwidth_rad_s": Origin(12566.370614359172, "assumed: 2 kHz"),
     "drive.transconductance_A_V": Origin(0.8, "assumed"),
     "drive.amplifier_offset_V": Origin(1e-3, "data sheet of the OPA549, typical; 5 mV at most"),
-    "drive.current_limit_A": Origin(8.0, "data sheet of the OPA549, continuous"),
-    "drive.resistance_ohm": Origin(1.3, "assumed"),
-    "drive.inductance_H": Origin(0.9e-3, "assumed"),
     "drive.resistance_per_K": Origin(0.0039, "property of copper"),
-    "drive.heat_capacity_J_K": Origin(60.0, "assumed"),
-    "drive.thermal_resistance_K_W": Origin(4.0, "assumed"),
     "drive.ambient_degC": Origin(20.0, "assumed"),
     "drive.shutdown_degC": Origin(155.0, "assumed: insulation of class F"),
 }
@@ -117,12 +112,12 @@ def _section(fields: dict[str, Any]) -> dict[str, Any]:
     return section
 
 
-# The controller is designed with the data sheets of its own machine.
+# The controller is designed with the data sheets of its electronics; that of the machine is its model file.
 PROTOTYPE_NOMINAL: dict[str, Any] = {
     f"{NOMINAL}.{name}": value
     for name, value in {
         **_section(PROTOTYPE_BEARINGS),
-        **drive_sheet(ResolvedDrive.model_validate(_section(PROTOTYPE_DRIVE))),
+        **amplifier_sheet(DriveSection.model_validate(_section(PROTOTYPE_DRIVE))),
         **sensor_sheet(SensorsSection.model_validate(_section(PROTOTYPE_SENSORS))),
     }.items()
 }
@@ -139,7 +134,15 @@ HARDWARE: dict[str, dict[str, Any]] = {
     "electronics": _ELECTRONICS,
     "prototype": {**_ELECTRONICS, **_values(_IMPERFECTIONS)},
 }
-"""Hardware sets: fields by dotted name and their values; each field can also be set separately."""
+"""Hardware sets: fields by dotted name and their values; each field can also be set separately.
+
+A set is electronics and tolerances. Resistance, inductance, heat and inertia belong to the machine: its model
+file states them.
+"""
+
+_AMPLIFIERS = {"drive.current_limit_A": Origin(8.0, "data sheet of the OPA549, continuous")}
+LIMITS: dict[str, dict[str, Origin]] = {"ideal": {}, "electronics": _AMPLIFIERS, "prototype": _AMPLIFIERS}
+"""Limits of each hardware set; where the model file states a smaller limit, that one holds."""
 
 _STATED = {
     name: field.origin
@@ -152,6 +155,20 @@ ORIGINS: dict[str, dict[str, str]] = {
     for name, fields in HARDWARE.items()
 }
 """Origin of each value of each hardware set."""
+
+
+SCATTER_OF_A_CURVE = (
+    "plant.poles.gain_error",
+    "plant.poles.angle_error_rad",
+    "plant.poles.distance_error_m",
+    "plant.coils.distance_error_m",
+)
+"""Errors that only a machine with a torque curve can have: a torque field has all poles in one."""
+
+
+def amplifier_limit_A(hardware: str) -> float:
+    """Return the current limit of the amplifiers of a hardware set; infinity if it states none."""
+    return next((limit.value for limit in LIMITS[hardware].values()), inf)
 
 
 def hardware_defaults(fields: dict[str, Any]) -> dict[str, Any]:

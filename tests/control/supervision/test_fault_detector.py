@@ -63,6 +63,7 @@ def test_the_prototype_s_threshold_and_ticks():
 
 def test_the_sheet_of_the_prototype_s_drive_is_its_static_error_and_swing():
     fields = {name.removeprefix("drive."): value for name, value in PROTOTYPE_DRIVE.items()}
+    fields |= {"resistance_ohm": 1.3, "inductance_H": 0.9e-3, "current_limit_A": 8.0}
     sheet = drive_sheet(ResolvedDrive(**fields))
     error_A = sheet["offset_error_A"] + sheet["gain_error"] * sheet["current_limit_A"]
     assert error_A == pytest.approx(PROTOTYPE.static_error_A, rel=1e-14)  # a sum of four products

@@ -16,6 +16,6 @@ def test_what_the_controller_knows_of_plant_and_drive_is_in_the_set(name):
         for dotted in fields
         if dotted.startswith(("plant.", "drive.")) and dotted.partition(".")[2] in NOMINAL
     }
-    assert len(shared) >= 5
+    assert set(shared) == {"drive.delay_s", "plant.coulomb_Nm", "plant.viscous_Nm_s"}
     for dotted, nominal in shared.items():
         assert fields[nominal] == fields[dotted], dotted

@@ -20,7 +20,7 @@ from spheretwin.machine.link.frame_format import DEFAULT_FRAME, Flags
 from spheretwin.machine.link.limits import CoilHeat, Limits
 from spheretwin.machine.link.timing import Distribution
 from spheretwin.machine.link.transports import open_transport
-from spheretwin.models.base.errors import SpheretwinError
+from spheretwin.models.base.errors import InputError, SpheretwinError, distinct_texts
 from spheretwin.scenario.sections import ResolvedScenario, Scenario
 from spheretwin.session import Session
 
@@ -166,17 +166,25 @@ class Link:
         Raises
         ------
         InputError
-            The address or the frames cannot be used, or the frames have no command.
+            The address or the frames cannot be used, the frames have no command, or the link is armed with a
+            current limit above that of the model file.
         """
         frames, complete = frame_format.load(frame).for_both_directions(frame), Session(scenario)
         resolved, groups = complete.initial_scenario, len(complete.actuator.groups)
         limits = limits or Limits(current_A=resolved.nominal.current_limit_A)
+        settings = settings or LinkSettings()
+        limit_A = min(limits.current_A, resolved.nominal.current_limit_A)
+        most_A = complete.actuator.group.current_limit_A
+        if settings.armed and limit_A > most_A:
+            used, stated = distinct_texts(limit_A, most_A)
+            raise InputError(
+                f"link: expected a current limit of at most {stated} A, that of the model file, to arm,"
+                f" received {used} A"
+            )
         period_s = resolved.controller.period_s
         channel = Channel(open_transport(address), frames.command, frames.measurement, groups, report)
         heat = CoilHeat(resolved.drive, limits, period_s)
-        return cls(
-            channel, f"a machine at {address}", settings or LinkSettings(), limits, heat, period_s, **options
-        )
+        return cls(channel, f"a machine at {address}", settings, limits, heat, period_s, **options)
 
     def session(self, scenario: Scenario) -> Session:
         """Return a session of the controller of a scenario whose plant is the machine, ready to run.
