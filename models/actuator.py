@@ -237,8 +237,9 @@ def from_model(model: mujoco.MjModel, torque_data: TorqueData) -> Actuator:
     Raises
     ------
     InputError
-        The model is not a rotor on three hinges about x, y, z amid groups of coils, or has a torque curve and
-        groups that are not two opposite coils.
+        The model is not a rotor on three hinges about x, y, z amid groups of coils, its coils are no
+        cylinders, or it has a torque curve and groups that are not two opposite coils, or poles that are no
+        cylinders.
     """
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
@@ -246,6 +247,8 @@ def from_model(model: mujoco.MjModel, torque_data: TorqueData) -> Actuator:
     check_joint(model, data)
     poles = sites(model, "pole_")
     coils = sites(model, "coil_")
+    if isinstance(torque_data, TorqueCurve):
+        check_cylinders(model, poles)
     R_SR = data.body(body(model, "rotor")).xmat.reshape(3, 3)
     coil_axes = _frozen(_outward_axes(data, coils))
     groups, direction = groups_of(model, coils, coil_axes, torque_data)
@@ -272,11 +275,23 @@ def read_magnet_and_coil(mjcf: Path) -> tuple[Magnet, CoilGeometry]:
     Raises
     ------
     InputError
-        The file cannot be read, or the model lacks poles or coils.
+        The file cannot be read, the model lacks poles or coils, or they are no cylinders.
     """
     model = read(mjcf).described
     check_bounded(model)
-    return _magnet(model, sites(model, "pole_")), read_coil(model)
+    poles = sites(model, "pole_")
+    check_cylinders(model, poles)
+    return _magnet(model, poles), read_coil(model)
+
+
+def check_cylinders(model: mujoco.MjModel, parts: list[int]) -> None:
+    """Check that the sites of poles or of coils are cylinders, as the magnetic model takes them."""
+    for part in parts:
+        kind = mujoco.mjtGeom(model.site_type[part])
+        if kind != mujoco.mjtGeom.mjGEOM_CYLINDER:
+            name, shape = model.site(part).name, kind.name.removeprefix("mjGEOM_").lower()
+            advice = "; `spheretwin magnetics field` computes boxes and spheres" * name.startswith("pole_")
+            raise InputError(f"model: expected {name} as a cylinder, received the shape {shape}{advice}")
 
 
 @cache
@@ -388,13 +403,28 @@ def _collinear_pairs(model: mujoco.MjModel, coils: list[int], axes: NDArray[np.f
 
 
 def _magnet(model: mujoco.MjModel, poles: list[int]) -> Magnet:
+    """Return the common magnet; of poles that are no cylinders, the cylinder around them."""
+    extents = np.array([_extent(model, pole) for pole in poles])
     blank = Magnet(
         remanence_T=number(model, "magnet_remanence_T"),
-        radius_m=shared(model.site_size[poles, 0], "radius of the poles"),
-        length_m=2 * shared(model.site_size[poles, 1], "length of the poles"),
+        radius_m=shared(extents[:, 0], "radius of the poles"),
+        length_m=2 * shared(extents[:, 1], "length of the poles"),
         distance_m=shared(np.linalg.norm(model.site_pos[poles], axis=1), "distance of the poles"),
     )
     return replace(blank, front_radius_m=front_radius(model, blank.radius_m, blank.length_m))
+
+
+def _extent(model: mujoco.MjModel, part: int) -> tuple[float, float]:
+    """Return radius and half length of the cylinder around a site along its z axis, m."""
+    x, y, z = model.site_size[part]
+    shapes, kind = mujoco.mjtGeom, model.site_type[part]
+    if kind == shapes.mjGEOM_BOX:
+        return hypot(x, y), z
+    if kind == shapes.mjGEOM_SPHERE:
+        return x, x
+    if kind == shapes.mjGEOM_ELLIPSOID:
+        return max(x, y), z
+    return x, y + x * (kind == shapes.mjGEOM_CAPSULE)
 
 
 def front_radius(model: mujoco.MjModel, radius_m: float, length_m: float) -> float:
@@ -414,8 +444,9 @@ def front_radius(model: mujoco.MjModel, radius_m: float, length_m: float) -> flo
 
 
 def read_coil(model: mujoco.MjModel) -> CoilGeometry:
-    """Return the common geometry of the coils of a compiled model."""
+    """Return the common geometry of the coils of a compiled model, which are cylinders."""
     coils = sites(model, "coil_")
+    check_cylinders(model, coils)
     coil = CoilGeometry(
         inner_radius_m=number(model, "coil_inner_radius_m"),
         outer_radius_m=shared(model.site_size[coils, 0], "radius of the coils"),

@@ -179,12 +179,22 @@ def angular_velocity(q: NDArray[np.float64], qdot: NDArray[np.float64], rate_S: 
     rate_S[2] = sa * qdot[1] + ca * cb * qdot[2]
 
 
+AT_POLE_rad = 1e-6
+"""Rotations from degrees have errors of 1e-15, which are no direction."""
+
+
 def frame_of_axis(axis: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return a rotation matrix (3, 3) whose third column is the axis."""
-    least = np.eye(3)[np.argmin(np.abs(axis))]
-    first = np.cross(least, axis)
-    first /= np.linalg.norm(first)
-    return np.column_stack([first, np.cross(axis, first), axis])
+    """Return a rotation matrix (3, 3) whose columns point east and north of a unit axis, and along it.
+
+    East is ``z x axis``. An axis within `AT_POLE_rad` of z has no east: its first column is y, as on the
+    meridian of x.
+    """
+    x, y, _ = axis
+    across = np.hypot(x, y)
+    east = np.array([-y, x, 0.0]) / across if across > AT_POLE_rad else np.array([0.0, 1.0, 0.0])
+    north = np.cross(axis, east)
+    north /= np.linalg.norm(north)
+    return np.column_stack([np.cross(north, axis), north, axis])
 
 
 @inlined

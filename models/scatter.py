@@ -30,7 +30,7 @@ class PartErrors(NamedTuple):
     """Errors of k poles or of k coils."""
 
     gain: Array  # (k,) relative error of the remanence, or of the torque per ampere
-    angle_rad: Array  # (k, 2) placement in two directions normal to the nominal axis
+    angle_rad: Array  # (k, 2) placement to the east and to the north of the nominal axis
     distance_m: Array  # (k,) placement along the axis
 
     def axes(self, nominal: Array) -> Array:

@@ -32,7 +32,7 @@ class PartScatter(BaseModel):
     )
     angle_error_rad: Annotated[float, Field(ge=0, le=LARGEST_ANGLE_rad)] = Field(
         0.0,
-        description="largest placement error in each of two directions normal to the axis, rad",
+        description="largest placement error to the east and to the north of the axis, rad",
         json_schema_extra=UNIFORM,
     )
     distance_error_m: Annotated[float, Field(ge=0, le=LARGEST_DISTANCE_m)] = Field(
@@ -40,7 +40,8 @@ class PartScatter(BaseModel):
     )
     errors: tuple[tuple[Gain, Angle, Angle, Distance], ...] | None = Field(
         None,
-        description="error of each part: relative gain, two angles in rad, distance in m; drawn unless given",
+        description="error of each part: relative gain, angles to the east and to the north of its axis in"
+        " the frame of its body (rad), distance (m); drawn unless given",
     )
 
     @property

@@ -15,10 +15,10 @@ import numpy as np
 import rerun as rr
 from numpy.typing import NDArray
 
-from spheretwin.models.actuator import CoilGeometry, read_magnet_and_coil
+from spheretwin.models.actuator import CoilGeometry, read_coil
 from spheretwin.models.base.errors import InputError, without_breaks
 from spheretwin.models.base.mujoco_library import compiler_warnings
-from spheretwin.models.mjcf import fingerprint, missing_meshes
+from spheretwin.models.mjcf import fingerprint, missing_meshes, read
 from spheretwin.viz import theme
 from spheretwin.viz.scene.solids import merged_surface, revolved_surface
 
@@ -256,8 +256,7 @@ def _drawable(mjcf: Path) -> mujoco.MjModel:
 
 def _coils(data: mujoco.MjData, at: list[int], mjcf: Path) -> rr.Mesh3D:
     axes = data.site_xmat[at].reshape(-1, 3, 3)[:, :, 2]
-    _, coil = read_magnet_and_coil(mjcf)
-    return coil_mesh(coil, data.site_xpos[at], axes)
+    return coil_mesh(read_coil(read(mjcf).described), data.site_xpos[at], axes)
 
 
 def _look(model: mujoco.MjModel, data: mujoco.MjData, geom: int) -> MeshLook:
