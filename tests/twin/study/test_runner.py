@@ -2,6 +2,7 @@
 
 import json
 import re
+from unittest.mock import Mock
 
 import pytest
 
@@ -187,15 +188,7 @@ def test_a_folder_that_cannot_be_had_is_refused(tmp_path):
 
 
 def test_a_failure_of_the_table_hides_no_other(tmp_path, monkeypatch):
-    def fails(*_):
-        raise SpheretwinError("table")
-
-    def differs(*_):
-        raise SpheretwinError("plants")
-
-    monkeypatch.setattr(tables, "write", fails)
-    with pytest.raises(SpheretwinError, match="table"):
-        run_rows(study(), tmp_path / "a")
-    monkeypatch.setattr(agreement, "check", differs)
-    with pytest.raises(SpheretwinError, match="plants"):
-        run_rows(study(), tmp_path / "b")
+    for module, name, message in ((tables, "write", "table"), (agreement, "check", "plants")):
+        monkeypatch.setattr(module, name, Mock(side_effect=SpheretwinError(message)))
+        with pytest.raises(SpheretwinError, match=message):
+            run_rows(study(), tmp_path / message)
