@@ -116,16 +116,10 @@ def pinocchio_chain(generator):
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_inertia_matrix_bias_and_orientation_are_pinocchio_s(seed):
+def test_orientation_and_angular_velocity_are_pinocchio_s(seed):
     model, chain = pinocchio_chain(np.random.default_rng(seed))
     data, angles, rates = model.createData(), np.empty(3), np.empty(3)
     for q, qdot in random_states(20, seed):
-        M, bias = of(chain, q, qdot)
-        upper = np.triu(pinocchio.crba(model, data, q))
-        expected = upper + np.triu(upper, 1).T
-        np.testing.assert_allclose(M, expected, rtol=0, atol=ROUNDING * np.abs(expected).max())
-        expected = pinocchio.nonLinearEffects(model, data, q, qdot)
-        np.testing.assert_allclose(bias, expected, rtol=0, atol=ROUNDING * np.abs(expected).max())
         pinocchio.forwardKinematics(model, data, q, qdot)
         ideal_pose(chain, q, qdot, angles, rates)
         np.testing.assert_allclose(rotation(angles), data.oMi[3].rotation, rtol=0, atol=1e-13)
