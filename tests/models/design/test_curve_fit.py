@@ -38,17 +38,6 @@ def test_a_single_bad_sample_is_pointed_at():
     assert curve_check.leave_one_out(curve).worst_deg == pytest.approx(40.0)
 
 
-def test_lookup_of_the_shipped_curve(actuator):
-    # A tenth of the curve's own error: what its table was laid out for. Measured: 2e-7.
-    assert curve_check.largest_lookup_error(actuator.torque_curve) < 1e-6
-
-
-def test_lookup_of_a_coarse_curve_is_worse(actuator):
-    curve = actuator.torque_curve
-    coarse = TorqueCurve(curve.phi_rad[::8], curve.torque_Nm_per_A[::8])
-    assert curve_check.largest_lookup_error(coarse) < 1e-4
-
-
 def test_difference_knows_a_scaled_curve(actuator):
     curve = actuator.torque_curve
     rows = np.r_[0:120:4, 120:721:40]

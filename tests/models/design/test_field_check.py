@@ -10,7 +10,6 @@ from numpy.testing import assert_allclose
 from spheretwin.models.design import direct_summation
 from spheretwin.models.design.direct_summation import Rule
 from spheretwin.models.design.pole_torque import compute_curve
-from spheretwin.models.design.workspace import pose
 from spheretwin.models.magnetics import torque_matrix
 from spheretwin.models.meshes.solids import revolve
 from spheretwin.models.torque_curve import TorqueCurve
@@ -139,39 +138,9 @@ def test_a_pair_s_torque_is_normal_to_its_two_axes(actuator):
     assert torque @ np.cross(pole, axis) < 0  # the coil is pulled towards the pole
 
 
-@pytest.mark.release(
-    "sums over all windings for 1 to 3 s; test_the_content of design_direct_sums has their values"
-)
-def test_model_is_the_direct_sum(compared, actuator):
+def test_the_model_is_the_direct_sum_and_a_wrong_curve_is_not(compared, actuator):
     # Measured: 1e-3 on this coarse quadrature; 1e-4 on the default one.
     assert error_share(compared, actuator) < 3e-3
-
-
-@pytest.mark.release(
-    "sums over all windings for 1 to 3 s; test_the_content of design_direct_sums has their values"
-)
-def test_finer_sums_come_closer(actuator):
-    # The error of the sum falls with its points, and the model is what it tends to.
-    q = pose(TILTS[0], 0.7, 0.3)
-    G = torque_matrix(q, actuator)
-    distance = [
-        np.linalg.norm(direct_summation.direct_torque_matrix(q, actuator, quadrature) - G)
-        for quadrature in (COARSE.halved(), COARSE, direct_summation.STANDARD)
-    ]
-    assert distance[2] < distance[1] < distance[0]
-    assert distance[2] < distance[0] / 5
-
-
-@pytest.mark.release("sums over all windings for 2 s; content of design_direct_sums has their values")
-def test_wrong_polarity_is_found(compared, actuator):
-    polarity = actuator.pole_polarity.copy()
-    polarity[5] *= -1
-    wrong = replace(actuator, pole_polarity=polarity)
-    model = np.array([torque_matrix(q, wrong) for q in compared.q])
-    assert error_share(compared._replace(model=model), actuator) > 0.05
-
-
-def test_wrong_curve_is_found(compared, actuator):
     curve = actuator.torque_curve
     wrong = replace(actuator, torque_data=TorqueCurve(curve.phi_rad, 1.02 * curve.torque_Nm_per_A))
     model = np.array([torque_matrix(q, wrong) for q in compared.q])

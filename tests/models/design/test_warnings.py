@@ -6,13 +6,6 @@ from spheretwin.models import actuator as actuators
 from spheretwin.models.design import geometry_check
 
 
-def test_a_curve_of_another_geometry_is_named_beside_the_parts(actuator):
-    assert geometry_check.of_geometry(actuator) == []
-    coil = replace(actuator.coil, turns=640.0)
-    (line,) = geometry_check.of_geometry(replace(actuator, coil=coil))
-    assert line == "torque curve torque_curve.csv was computed for coil turns 320, the model has 640"
-
-
 def test_a_model_file_is_held_against_a_curve_that_says_what_it_is_for(actuator, tmp_path):
     text = actuators.MJCF_PATH.read_text(encoding="utf-8")
     (path := tmp_path / "mine.xml").write_text(text.replace('_turns" data="320"', '_turns" data="640"'))

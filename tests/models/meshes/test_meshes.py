@@ -257,23 +257,10 @@ def test_the_rotor_clears_everything_up_to_50_degrees(seed, solids):
 
 
 def test_every_element_of_the_scene_is_named(scene):
-    kinds = {
-        mujoco.mjtObj.mjOBJ_BODY: scene.nbody,
-        mujoco.mjtObj.mjOBJ_JOINT: scene.njnt,
-        mujoco.mjtObj.mjOBJ_GEOM: scene.ngeom,
-        mujoco.mjtObj.mjOBJ_SITE: scene.nsite,
-        mujoco.mjtObj.mjOBJ_SENSOR: scene.nsensor,
-        mujoco.mjtObj.mjOBJ_MESH: scene.nmesh,
-        mujoco.mjtObj.mjOBJ_CAMERA: scene.ncam,
-        mujoco.mjtObj.mjOBJ_LIGHT: scene.nlight,
-        mujoco.mjtObj.mjOBJ_MATERIAL: scene.nmat,
-        mujoco.mjtObj.mjOBJ_TEXTURE: scene.ntex,
-        mujoco.mjtObj.mjOBJ_NUMERIC: scene.nnumeric,
-    }
-    for kind, count in kinds.items():
-        assert count > 0
-        unnamed = [i for i in range(count) if not mujoco.mj_id2name(scene, kind, i)]
-        assert not unnamed, (kind, unnamed)
+    for kind in ["body", "jnt", "geom", "site", "sensor", "mesh", "cam", "light", "mat", "tex", "numeric"]:
+        places = getattr(scene, f"name_{kind}adr")
+        assert len(places) > 0, kind
+        assert all(scene.names[place] for place in places), kind
 
 
 def test_the_stator_stands_on_the_floor(scene, committed):
