@@ -122,10 +122,13 @@ def python(code, **environment):
     return subprocess.run(command, env=environment, capture_output=True, text=True, check=True).stdout
 
 
-def ask(package):
+def environment_of(package):
     cache = str(package / "cache")
-    printed = python(RUN, **{**os.environ, "PYTHONPATH": str(package), "SPHERETWIN_CACHE_DIR": cache})
-    answer, hits, callback_hits = map(int, printed.split())
+    return {**os.environ, "PYTHONPATH": str(package), "SPHERETWIN_CACHE_DIR": cache}
+
+
+def ask(package):
+    answer, hits, callback_hits = map(int, python(RUN, **environment_of(package)).split())
     assert hits == callback_hits  # the function and its callback come from entries of their own
     return answer, hits
 
@@ -147,14 +150,9 @@ def test_edited_callee_in_another_file_is_seen(filled):
 @pytest.mark.release("processes of 3 s; test_second_process_compiles_nothing has the cache in one")
 def test_machine_code_is_loaded_without_all_that_can_be_compiled(package):
     """Memory, mathematics, hashes and callbacks work without the modules that compile them."""
-    environment = {
-        **os.environ,
-        "PYTHONPATH": str(package),
-        "SPHERETWIN_CACHE_DIR": str(package / "cache"),
-    }
     run = RUN.replace("caller", "loaded")
-    assert python(run, **environment).strip() == "True"  # compiled, which needs them
-    assert python(run, **environment).strip() == "False"
+    assert python(run, **environment_of(package)).strip() == "True"  # compiled, which needs them
+    assert python(run, **environment_of(package)).strip() == "False"
 
 
 def truncate(content):
@@ -166,11 +164,6 @@ def overwrite(content):
     return content[:middle] + b"garbage in the midst of machine code" + content[middle + 36 :]
 
 
-def of_content(content):
-    pickled = pickle.dumps(content)
-    return lambda _: hashlib.sha256(pickled).digest() + pickled
-
-
 def test_damaged_entries_are_made_again(filled):
     filled_entries = entries(filled)
     assert len(filled_entries) == 3  # the caller, its callee, its callback
@@ -179,6 +172,11 @@ def test_damaged_entries_are_made_again(filled):
     assert ask(filled) == (41, 0)
     assert ask(filled) == (41, 1)
     assert entries(filled) == filled_entries
+
+
+def of_content(content):
+    pickled = pickle.dumps(content)
+    return lambda _: hashlib.sha256(pickled).digest() + pickled
 
 
 DAMAGES = {
@@ -222,8 +220,8 @@ def test_file_in_place_of_the_folder_is_done_without(filled):
 
 @pytest.mark.release("a process of 0.7 s; test_no_folder_at_all_is_done_without has the same refusal")
 def test_full_disk_is_done_without(package):
-    environment = {**os.environ, "PYTHONPATH": str(package), "SPHERETWIN_CACHE_DIR": str(package / "cache")}
-    environment["PYTHONDONTWRITEBYTECODE"] = "1"  # Python itself keeps bytecode that the limit has cut
+    # Python itself keeps bytecode that the limit has cut.
+    environment = {**environment_of(package), "PYTHONDONTWRITEBYTECODE": "1"}
     full = "import resource; resource.setrlimit(resource.RLIMIT_FSIZE, (100, 100))\n"
     assert python(full + RUN, **environment).split() == ["41", "0", "0"]
     assert entries(package) == []
@@ -283,17 +281,6 @@ def test_uncompiled_is_the_plain_function():
 
     assert compiled.uncompiled(numba.njit(double)) is double
     assert compiled.uncompiled(double) is double
-
-
-@pytest.mark.release("a process of 1.2 s; test_no_folder_at_all_is_done_without has the same refusal")
-def test_read_only_home_still_compiles():
-    named = ("XDG_CACHE_HOME", "SPHERETWIN_CACHE_DIR")
-    environment = {key: value for key, value in os.environ.items() if key not in named}
-    code = (
-        "import numpy as np; from spheretwin.models.kinematics import rotation;"
-        "print(rotation(np.zeros(3))[0, 0])"
-    )
-    assert float(python(code, **{**environment, "HOME": "/proc"})) == 1.0
 
 
 def test_damaged_entry_is_no_entry(tmp_path, monkeypatch):

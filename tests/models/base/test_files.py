@@ -7,7 +7,7 @@ import stat
 import numpy as np
 import pytest
 
-from spheretwin.models.base.errors import InputError, SpheretwinError, without_breaks
+from spheretwin.models.base.errors import InputError, SpheretwinError
 from spheretwin.models.base.files import OutputFile, check_writable, whole_file
 from spheretwin.models.telemetry.parquet import PART_ROWS, TelemetryFile
 from spheretwin.models.telemetry.signals import common_signals, width
@@ -49,16 +49,6 @@ def test_link_stays_a_link(tmp_path):
         temporary.write_text("new")
     assert link.is_symlink()
     assert (tmp_path / "real.txt").read_text() == "new"
-
-
-def test_link_to_a_file_that_is_not_there_yet_makes_it(tmp_path):
-    (tmp_path / "folder").mkdir()
-    (link := tmp_path / "link.txt").symlink_to("folder/real.txt")
-    with whole_file(link) as temporary:
-        temporary.write_text("new")
-    assert link.is_symlink()
-    assert os.listdir(tmp_path / "folder") == ["real.txt"]
-    assert link.read_text() == "new"
 
 
 def test_link_in_a_circle_is_bad_input(tmp_path):
@@ -109,11 +99,10 @@ def test_permissions_of_a_replaced_file_stay(tmp_path):
     assert stat.S_IMODE(path.stat().st_mode) == 0o640
 
 
-def test_places_where_no_file_can_be_put(tmp_path):
+def test_a_pipe_is_no_place_for_a_file(tmp_path):
     os.mkfifo(tmp_path / "pipe")
-    for path in (tmp_path, tmp_path / "missing" / "out.txt", tmp_path / "pipe"):
-        with pytest.raises(InputError, match="output: expected"):
-            check_writable(path)
+    with pytest.raises(InputError, match="output: expected"):
+        check_writable(tmp_path / "pipe")
     check_writable(tmp_path / "out.txt")
     assert os.listdir(tmp_path) == ["pipe"]
 
@@ -135,9 +124,6 @@ def test_messages_name_the_requested_file_and_the_cause_without_its_number(tmp_p
         with pytest.raises(SpheretwinError) as failed:
             fill_the_disk(named)
         assert f"{failed.value}" == f"output: {target} could not be written, No space left on device"
-    hidden = OSError(errno.ENOSPC, "[Errno 28] x", str(tmp_path / ".run.parquet.0.part"))
-    assert without_breaks(hidden) == "No space left on device"
-    assert without_breaks(OSError(errno.ENOENT, "x", "a.csv")) == "No such file or directory: a.csv"
 
 
 def test_a_folder_that_came_in_between_is_told_and_the_file_stays(tmp_path):

@@ -13,8 +13,7 @@ import numba
 import numpy as np
 import pytest
 from numba import types
-from numba.core import ccallback, compiler, dispatcher, event, lowering
-from numba.core.runtime import rtsys
+from numba.core import event
 
 import spheretwin
 from spheretwin.models.base import cache, mujoco_library
@@ -24,25 +23,7 @@ from spheretwin.models.base.numba_internals import addresses, functions, machine
 from spheretwin.models.base.numba_internals.functions import NO_ALLOCATION
 from tests.requirements import needs_compiled_functions
 
-NUMBA = [
-    (compiler.CompileResult, "_rebuild"),
-    (compiler.CompileResult, "_reduce"),
-    (rtsys, "initialize"),
-    (ccallback.CFunc, "compile"),
-    (dispatcher.Dispatcher, "enable_caching"),
-    (dispatcher.Dispatcher, "get_call_template"),
-    (dispatcher.Dispatcher, "add_overload"),
-    (dispatcher.Dispatcher, "disable_compile"),
-    (lowering.Lower, "_find_singly_assigned_variable"),
-]
 MODEL = "<mujoco><worldbody><body><joint/><geom size='1'/></body></worldbody></mujoco>"
-
-
-@pytest.mark.parametrize(("owner", "name"), NUMBA)
-def test_numba_has_the_private_names(owner, name):
-    assert hasattr(owner, name), (
-        f"numba {numba.__version__} has no {owner}.{name}: see models/base/numba_internals"
-    )
 
 
 @needs_compiled_functions
@@ -189,11 +170,6 @@ def test_the_addresses_of_mujoco_are_those_that_mj_step_takes():
     step = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p)(mujoco_library.step_address())
     step(*mujoco_library.addresses(model, data))
     assert data.time == model.opt.timestep
-
-
-@pytest.mark.parametrize("name", ["mjcb_time", "mju_user_warning"])
-def test_mujoco_exports_the_pointers(name):
-    assert hasattr(mujoco_library.library(), name), f"MuJoCo {mujoco.__version__} does not export {name}"
 
 
 def test_timers_stop_and_run_again():

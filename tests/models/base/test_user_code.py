@@ -57,33 +57,20 @@ def test_a_dataclass_of_the_file_finds_its_module(tmp_path):
 @pytest.mark.parametrize(
     ("text", "spec", "message"),
     [
-        (None, "gone.py:f", "law: expected a readable file of Python, No such file"),
-        ("", "mine.py", "law: expected path/to/file.py:name, received "),
         ("", "mine.txt:f", "law: expected path/to/file.py:name, received "),
-        ("", "mine.py:", "law: expected path/to/file.py:name, received "),
         ("", "mine.py:a b", "law: expected path/to/file.py:name, received "),
-        ("", "mine.py:f", "law: expected a function in "),
-        ("def double(x): pass\ndef half(x): pass", "mine.py:duble", "received duble; did you mean double?"),
-        ("def double(x): pass\ndef half(x): pass", "mine.py:x", "expected one of double, half in "),
         (
             "from pathlib import Path\nimport numba\n@numba.njit\ndef step(): pass\nclass Mine(Path): pass",
             "mine.py:x",
             "expected one of step, Mine in ",
         ),
         ("from pathlib import Path", "mine.py:f", "law: expected a function in "),
-        ("f = 3", "mine.py:f", "mine.py:f, 3"),
-        ("\nx = (", "mine.py:f", "SyntaxError in line 2: '(' was never closed"),
-        ("\n\nx = 1 / 0", "mine.py:f", "ZeroDivisionError in line 3: division by zero"),
         ("import no_such_module", "mine.py:f", "ModuleNotFoundError in line 1: No module named"),
-        ("raise SystemExit(3)", "mine.py:f", "SystemExit in line 1: 3"),
-        ("raise ValueError('a\\nb')", "mine.py:f", "ValueError in line 1: a b"),
         ("x = '\0'", "mine.py:f", "SyntaxError"),
-        (b"x = '\xff'", "mine.py:f", "SyntaxError"),
     ],
 )
 def test_what_cannot_be_used_is_refused_on_one_line(tmp_path, text, spec, message):
-    if text is not None:
-        (tmp_path / "mine.py").write_bytes(text if isinstance(text, bytes) else text.encode())
+    (tmp_path / "mine.py").write_text(text)
     with pytest.raises(InputError) as refused:
         load_function(str(tmp_path / spec), "law")
     assert message in f"{refused.value}"

@@ -29,27 +29,16 @@ def rows():
 
 
 @pytest.mark.parametrize("chunk", [1, 7, 100])
-def test_each_fault_has_start_end_and_detection(chunk):
-    log, table = FaultLog(), rows()
-    for first in range(0, 100, chunk):
-        log.write(table.rows(first, min(first + chunk, 100)))
-    assert [fault.text() for fault in log.faults] == [
-        "coil.00 open from 0.01 s to 0.02 s, not detected",
-        "coil.01 open from 0.03 s, reported to the controller",
-        "coil.00 open from 0.04 s, detected after 7 ms",
-        "adc noise from 0.06 s, not detected",
-    ]
-
-
-@pytest.mark.parametrize("chunk", [1, 7, 100])
 def test_a_detection_is_of_the_fault_that_has_started_not_of_a_later_one_of_the_group(chunk):
     log, table = FaultLog(), rows()
     table["group_out"][13:20, 0], table["time_to_detection_s"][13:20, 0] = 2, 0.003
     for first in range(0, 100, chunk):
         log.write(table.rows(first, min(first + chunk, 100)))
-    assert [fault.text() for fault in log.faults if fault.part == "coil.00"] == [
+    assert [fault.text() for fault in log.faults] == [
         "coil.00 open from 0.01 s to 0.02 s, detected after 3 ms",
+        "coil.01 open from 0.03 s, reported to the controller",
         "coil.00 open from 0.04 s, detected after 7 ms",
+        "adc noise from 0.06 s, not detected",
     ]
 
 

@@ -44,15 +44,6 @@ def test_row_groups_are_of_some_batches(tmp_path):
     assert groups == [group, PART_ROWS + 13]
 
 
-def test_a_run_with_parts_is_written_as_a_table_is(tmp_path):
-    whole = table(1000)
-    streamed(path := tmp_path / "run.parquet", whole, 50).close({"ticks": "1000"})
-    arrow, group = whole.arrow({**FACTS, "ticks": "1000"}), telemetry_file.GROUP_BATCHES * PART_ROWS
-    groups = [arrow.slice(first, group) for first in range(0, 1000, group)]
-    write_parquet(other := tmp_path / "other", arrow.schema, groups, **PARQUET_FORMAT)
-    assert path.read_bytes() == other.read_bytes()
-
-
 def test_parts_are_streams_that_any_arrow_reader_opens(tmp_path):
     whole = table(200)
     streamed(path := tmp_path / "run.parquet", whole, 50)
@@ -62,29 +53,19 @@ def test_parts_are_streams_that_any_arrow_reader_opens(tmp_path):
     assert result.equals(whole.rows(0, 192).arrow(FACTS), check_metadata=True)
 
 
-def test_chunks_do_not_move_a_byte_of_the_file(tmp_path):
-    whole, written = table(333), set()
+@pytest.mark.parametrize("rows", [PART_ROWS - 1, 333, 1000])
+def test_a_run_in_chunks_of_any_size_has_the_bytes_of_its_table(rows, tmp_path):
+    whole, facts, files = table(rows), {"ticks": str(rows)}, set()
+    arrow, group = whole.arrow(FACTS | facts), telemetry_file.GROUP_BATCHES * PART_ROWS
+    groups = [arrow.slice(first, group) for first in range(0, rows, group)]
+    write_parquet(expected := tmp_path / "expected", arrow.schema, groups, **PARQUET_FORMAT)
     for chunk in (1, 20, 63, 64, 65, 200, 333):
-        streamed(path := tmp_path / "run.parquet", whole, chunk).close({})
-        written.add(path.read_bytes())
-    assert len(written) == 1
-
-
-def test_a_run_without_parts_is_written_as_a_table_is(tmp_path):
-    whole = table(PART_ROWS - 1)
-    streamed(path := tmp_path / "run.parquet", whole, 10).close({"ticks": "63"})
-    whole.write_parquet(other := tmp_path / "other.parquet", {**FACTS, "ticks": "63"})
-    assert path.read_bytes() == other.read_bytes()
-
-
-def test_rows_that_wait_are_no_more_than_a_part(tmp_path):
-    file = TelemetryFile(path := tmp_path / "run.parquet", SIGNALS, FACTS)
-    whole = table(10 * PART_ROWS)
-    for first in range(0, len(whole), 10):
-        file.write(whole.rows(first, first + 10))
-        assert sum(map(len, file._waiting)) < PART_ROWS
-    file.close({})
-    assert read_parquet(path)[0].values.tobytes() == whole.values.tobytes()
+        streamed(path := tmp_path / "run.parquet", whole, chunk).close(facts)
+        files.add(path.read_bytes())
+    assert files == {expected.read_bytes()}
+    if rows < PART_ROWS:
+        whole.write_parquet(path, FACTS | facts)
+        assert files == {path.read_bytes()}
 
 
 def test_columns_that_come_and_go_are_nan_where_they_are_not(tmp_path):
@@ -140,14 +121,6 @@ def test_a_link_stays_a_link_and_parts_lie_beside_the_file_itself(tmp_path):
     assert link.is_symlink()
     assert os.listdir(elsewhere) == ["real.parquet"]
     assert read_parquet(link)[0].values.tobytes() == whole.values.tobytes()
-
-
-def test_a_file_that_was_there_stays_until_the_new_one_is_whole(tmp_path):
-    (path := tmp_path / "run.parquet").write_text("what was there before")
-    file = streamed(path, table(200), 50)
-    assert path.read_text() == "what was there before"
-    file.close({})
-    assert len(read_parquet(path)[0]) == 200
 
 
 def test_only_a_file_that_is_not_closed_can_be_recovered(tmp_path):

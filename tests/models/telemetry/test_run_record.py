@@ -1,12 +1,8 @@
 """What a telemetry file says of its run: typed, and the same texts as ever."""
 
-import json
-
-import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from spheretwin.models.base.errors import InputError
 from spheretwin.models.telemetry.run_record import Change, RunRecord
 from spheretwin.models.telemetry.status import Status
 
@@ -30,36 +26,3 @@ records = st.builds(
 @given(records)
 def test_a_record_comes_back_from_its_texts(record):
     assert RunRecord.from_metadata(record.metadata()) == record
-
-
-def test_the_texts_are_those_that_files_have_always_had():
-    record = RunRecord(
-        {"seed": 3}, (Change(7, "disturbance.load", 2.0),), 20, {"/m.xml": None}, {"python": "3"}
-    )
-    known = {
-        "scenario": '{"seed": 3}',
-        "journal": '[[7, "disturbance.load", 2.0]]',
-        "ticks": "20",
-        "files": '{"/m.xml": null}',
-        "versions": '{"python": "3"}',
-    }
-    assert record.metadata() == known
-    assert list(record.metadata()) == list(known)  # a file's bytes follow their order
-
-
-def test_what_older_files_do_not_say_is_nothing():
-    record = RunRecord.from_metadata({"scenario": "{}", "journal": "[]", "ticks": "1"})
-    assert (record.files, record.versions, record.status) == ({}, {}, None)
-
-
-def test_a_status_that_is_none_is_refused():
-    with pytest.raises(InputError, match="received 'flying'"):
-        RunRecord.from_metadata({"scenario": "{}", "journal": "[]", "ticks": "1", "status": "flying"})
-
-
-@pytest.mark.parametrize("missing", ["scenario", "journal", "ticks"])
-def test_a_record_needs_what_a_run_is_made_of(missing):
-    known = {"scenario": "{}", "journal": json.dumps([]), "ticks": "1"}
-    del known[missing]
-    with pytest.raises(InputError, match=f"received no {missing}"):
-        RunRecord.from_metadata(known)

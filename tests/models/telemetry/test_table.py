@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from spheretwin.models.base import files
-from spheretwin.models.base.errors import InputError, SpheretwinError
+from spheretwin.models.base.errors import InputError
 from spheretwin.models.telemetry.checksums import write_parquet
 from spheretwin.models.telemetry.signals import common_signals, offsets, width
 from spheretwin.models.telemetry.table import PARQUET_FORMAT, Table, read_parquet
@@ -14,10 +13,7 @@ SIGNALS = common_signals(18)
 
 @pytest.fixture
 def table():
-    values = np.random.default_rng(0).normal(size=(20, width(SIGNALS)))
-    values[3, 5] = 5e-324  # the smallest number, and one that no decimal holds
-    values[4, 5] = 0.1 + 0.2
-    return Table(SIGNALS, values)
+    return Table(SIGNALS, np.random.default_rng(0).normal(size=(20, width(SIGNALS))))
 
 
 def test_a_table_has_the_names_of_its_columns_in_order(table):
@@ -33,30 +29,6 @@ def test_columns_are_views_by_name(table):
     first = offsets(SIGNALS)["q_rad"]
     np.testing.assert_array_equal(table.values[2, first : first + 3], 7.0)
     np.testing.assert_array_equal(table.rows(2, 5)["q_rad"], table["q_rad"][2:5])
-
-
-def test_unknown_column_names_the_known_ones(table):
-    with pytest.raises(InputError, match=r"expected one of t_s, q_rad.* received colour"):
-        table["colour"]
-
-
-def test_misspelt_column_gets_a_suggestion(table):
-    with pytest.raises(InputError, match=r"received q_rads; did you mean q_rad\?"):
-        table["q_rads"]
-
-
-def test_rows_of_the_wrong_width_are_refused():
-    with pytest.raises(InputError, match="expected rows of"):
-        Table(SIGNALS, np.zeros((3, 4)))
-
-
-def test_parquet_keeps_every_bit_unit_and_word(table, tmp_path):
-    path = tmp_path / "run.parquet"
-    table.write_parquet(path, {"scenario": '{"a": 1}'})
-    again, metadata = read_parquet(path)
-    assert again.values.tobytes() == table.values.tobytes()
-    assert again.signals == SIGNALS
-    assert metadata["scenario"] == '{"a": 1}'
 
 
 def test_parquet_columns_are_what_pandas_and_polars_expect(table, tmp_path):
@@ -97,22 +69,7 @@ def test_every_byte_of_a_file_is_checked(table, tmp_path):
             read_parquet(path)
 
 
-def test_failed_write_leaves_nothing(table, tmp_path, monkeypatch):
-    monkeypatch.setattr(files.os, "replace", _fail)
-    (old := tmp_path / "run.parquet").write_text("what was there before")
-    with pytest.raises(SpheretwinError, match="disk full"):
-        table.write_parquet(old, {})
-    assert [path.name for path in tmp_path.iterdir()] == ["run.parquet"]
-    assert old.read_text() == "what was there before"
-
-
-def _fail(*_):
-    raise OSError("disk full")
-
-
-def test_unwritable_place_and_foreign_file_are_bad_input(table, tmp_path):
-    with pytest.raises(InputError, match="writable"):
-        table.write_parquet(tmp_path / "missing" / "run.parquet", {})
+def test_a_foreign_file_is_bad_input(tmp_path):
     (foreign := tmp_path / "foreign.parquet").write_text("no parquet")
     with pytest.raises(InputError, match="expected a telemetry file"):
         read_parquet(foreign)
