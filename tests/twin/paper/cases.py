@@ -7,21 +7,17 @@ from spheretwin.paper.experiment import Case, Experiment, Outcome, ResultTable, 
 from spheretwin.paper.page import of_axis, spread_deg
 
 SHORT = {"duration": 0.2, "plant.engine": "lagrangian"}
-NOISY = Case("noisy", "tilt", {**SHORT, "hardware": "electronics"}, details={"paper": [0.01, None, None]})
+NOISY = Case("noisy", "tilt", {**SHORT, "plant.engine": "mujoco", "hardware": "electronics"})
 IDEAL = Case("ideal", "tilt", SHORT, is_random=False)
 # 5 N·m: PD cannot hold it, and the rotor leaves its workspace.
-LOST = Case(
-    "lost", "hold", {"duration": 1.0, "controller.law": "pd", "disturbance.load": 100.0}, is_random=False
-)
+HEAVY = {"duration": 1.0, "controller.law": "pd", "disturbance.load": 100.0}
+LOST = Case("lost", "hold", HEAVY, is_random=False)
 
 
 def sections(outcomes):
     rows = [(name, spread_deg(of_axis(runs, "max_abs_error", 0))) for name, runs in outcomes.items()]
-    return [
-        Section(
-            "What | was found", "In *words*, and <b>no tag</b>.", [ResultTable("Errors", ("case", "α"), rows)]
-        )
-    ]
+    tables = [ResultTable("Errors", ("case", "α"), rows)]
+    return [Section("What | was found", "In *words*, and <b>no tag</b>.", tables)]
 
 
 def outcome(error=0.0, status=Status.COMPLETED, data=None, **figures):

@@ -65,29 +65,27 @@ def test_the_controller_knows_the_parts_of_a_stage_but_not_the_mass(stage, actua
     assert (nominal.angle_noise_rad, nominal.angle_resolution_rad) == accuracy(run.sensors)
 
 
-@pytest.mark.release("3 s; content of the budget has its rows")
 @pytest.mark.uncompiled
 def test_a_stage_is_run_for_each_seed_where_it_draws_and_only_there():
     def rows(stage, seed):
-        return simulate(scenario(stage, duration=0.01, seed=seed)).telemetry.values.tobytes()
+        return simulate(scenario(stage, duration=0.003, seed=seed)).telemetry.values.tobytes()
 
     drawn = [stage.name for stage in STAGES if rows(stage, 0) != rows(stage, 1)]
     assert drawn == [stage.name for stage in STAGES if stage.is_random]
 
 
-@pytest.mark.parametrize("name", ["voltage limit", "amplifier bandwidth", "drive offset and gain"])
-def test_what_a_drive_s_stage_needs_beside_is_no_error(name):
+@pytest.mark.uncompiled
+def test_what_a_drive_s_stage_needs_beside_is_no_error():
     """Amplifiers of ample voltage and bandwidth are currents at once, but for the offsets of the stage."""
-    stage = BY_NAME[name]
-    ample = {**BY_NAME["voltage limit"].other_fields, **BY_NAME["amplifier bandwidth"].other_fields}
-    wide = {**stage.overrides, **ample}
+    limit, bandwidth = BY_NAME["voltage limit"], BY_NAME["amplifier bandwidth"]
+    wide = {**limit.other_fields, **bandwidth.other_fields}
     wide |= {f"drive.dac_{each}": 0 for each in ("offset_V", "gain_error", "inl_lsb", "bits")}
     wide |= {f"drive.{each}": 0 for each in ("drop_up_V", "drop_down_V", "amplifier_offset_V")}
-    run = simulate(scenarios.load("tilt", {"controller.law": "pd", **wide, "duration": 0.3}))
-    ideal = simulate(scenario(BY_NAME[IDEAL], duration=0.3))
-    # A lag of 1e-7 s beside a period of 1e-3 s: a part in 1e4 of how far a current moves in a period.
-    apart = np.abs(run.telemetry["q_rad"] - ideal.telemetry["q_rad"]).max()
-    assert apart < 1e-4 * np.abs(ideal.telemetry["q_rad"]).max()
+    ideal = simulate(scenario(BY_NAME[IDEAL], duration=0.03)).telemetry["q_rad"]
+    for stage in (limit, bandwidth, BY_NAME["drive offset and gain"]):
+        apart = simulate(scenario(stage, duration=0.03, **wide)).telemetry["q_rad"] - ideal
+        # A lag of 1e-7 s beside a period of 1e-3 s: a part in 1e4 of how far a current moves in a period.
+        assert 0 < np.abs(apart).max() < 1e-4 * np.abs(ideal).max()
 
 
 def test_single_sensor_errors_are_compared_with_the_estimator():

@@ -10,7 +10,7 @@ from spheretwin.paper.runner import EVERY, compare_plants, make_plan, run_plan, 
 from spheretwin.study.agreement import BOUND
 from tests.twin.paper.cases import IDEAL, NOISY, experiment
 
-OPEN = NOISY._replace(name="open", fields={"duration": 0.2, "hardware": "electronics"})
+OPEN = NOISY._replace(name="open", fields={"duration": 0.2})
 
 
 def test_the_plant_is_the_fast_one_unless_said_or_the_model_is_more():
