@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from copy import deepcopy
+from dataclasses import dataclass, replace
+from types import FunctionType
 from typing import Annotated, Any, NamedTuple
 
 import numpy as np
@@ -60,9 +62,9 @@ class Law:
         `control.compensators.prediction`.
         `state` is the law's memory, changed in place. A plain Python function works; one that numba
         compiles runs at the speed of the shipped laws. It must write all three torques at every call:
-        a missing or non-finite torque ends the run as ``diverged``. So does an exception in compiled
-        code; `Session.law_error` and `Run.law_error` hold it. An exception in plain Python is raised to
-        the caller; one that would end the process, such as `SystemExit`, is raised as `LawError`.
+        a missing or non-finite torque ends the run as ``diverged``. So does an exception, whose rows
+        before it remain; `Session.law_error` and `Run.law_error` hold it as a `LawError`. A step in plain
+        Python that returns a value, or writes no torque, raises a `LawError`, too.
         Compiled code is not checked for reads and writes outside the arrays: they corrupt other memory of
         the process or end it. With ``controller.check_bounds`` they are exceptions.
     parameters : (n,) array
@@ -156,6 +158,19 @@ class Law:
                 f"law {self.name}: expected period_s as a number above 0, received {shown(period_s)}"
             )
 
+    def for_a_run(self) -> Law:
+        """Return the law with a memory of its own: an object whose method or call is the step is copied.
+
+        Compiled code has no memory but `state`. What a function encloses, global variables, and objects that
+        cannot be copied, such as one with a socket, are shared between runs of one `Law`: keep memory in
+        `state`, or name the law by its file, which is run again for each run.
+        """
+        try:
+            step = _independent(self.step)
+        except Exception:  # objects of users may raise anything
+            return self
+        return self if step is self.step else replace(self, step=step)
+
     def check_period(self, period_s: float) -> None:
         """Check a control period (s) against the one that the law is designed for.
 
@@ -167,6 +182,17 @@ class Law:
         if self.period_s is not None and abs(period_s - self.period_s) > SAME_PERIOD * self.period_s:
             own, received = distinct_texts(self.period_s, period_s)
             raise InputError(f"law {self.name}: expected a control period of {own} s, received {received} s")
+
+
+def _independent(step: Callable[..., Any]) -> Callable[..., Any]:
+    """Return a step that shares no object with another run; the same if it holds none."""
+    if hasattr(step, "py_func"):  # compiled: its closure is constant
+        return step
+    if isinstance(
+        step, FunctionType
+    ):  # what it encloses belongs to the caller, such as a list of its own rows
+        return step
+    return deepcopy(step)
 
 
 def _numbers(law: str, field: str, value: ArrayLike) -> NDArray[np.float64]:

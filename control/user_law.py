@@ -15,7 +15,7 @@ from pydantic import Field, create_model
 from spheretwin.control.law import Law, NominalModel
 from spheretwin.control.law_components.parameters import COMPENSATORS, LawParameters, named
 from spheretwin.models.base.errors import InputError, shown
-from spheretwin.models.base.user_code import load_with_digest
+from spheretwin.models.base.user_code import load_again, load_with_digest
 
 
 def parameters_of(reference: str) -> type[LawParameters]:
@@ -46,27 +46,37 @@ _CLASSES: dict[tuple[str, int], tuple[Any, type[LawParameters]]] = {}
 
 
 def _parameter_class(reference: str, law_object: Any, digest: str) -> type[LawParameters]:
+    base = _base_class(reference, law_object)
+    fields: Any = {"law": (Literal[reference], named(reference))}
+    model = create_model(base.__name__, __base__=(_FromFile, base), __module__=base.__module__, **fields)
+    kind = cast("type[LawParameters]", model)
+    kind.source = digest
+    return kind
+
+
+def _base_class(reference: str, law_object: Any) -> type[LawParameters]:
+    """Return the parameter class that an object of a file is, or that builds it.
+
+    Raises
+    ------
+    InputError
+        The object is no law.
+    """
     if isinstance(law_object, type) and issubclass(law_object, LawParameters):
         if isabstract(law_object):
             raise InputError(f"law {reference}: expected a class with build(known), received one without")
         common, own = LawParameters.model_fields, law_object.model_fields
         if taken_names := [name for name in COMPENSATORS if own[name].annotation != common[name].annotation]:
             raise InputError(f"law {reference}: expected no parameter named {taken_names[0]}, received one")
-        base = law_object
-    elif isinstance(law_object, Law):
-        base = _parameters_of_law(law_object)
-    elif callable(law_object) and not isinstance(law_object, type):
-        base = _parameters_of_law(_without_memory(reference, law_object))
-    else:
-        raise InputError(
-            f"law {reference}: expected a subclass of LawParameters, a Law, or a function,"
-            f" received {shown(law_object)}"
-        )
-    fields: Any = {"law": (Literal[reference], named(reference))}
-    model = create_model(base.__name__, __base__=(_FromFile, base), __module__=base.__module__, **fields)
-    kind = cast("type[LawParameters]", model)
-    kind.source = digest
-    return kind
+        return law_object
+    if isinstance(law_object, Law):
+        return _parameters_of_law(law_object)
+    if callable(law_object) and not isinstance(law_object, type):
+        return _parameters_of_law(_without_memory(reference, law_object))
+    raise InputError(
+        f"law {reference}: expected a subclass of LawParameters, a Law, or a function,"
+        f" received {shown(law_object)}"
+    )
 
 
 def reference_of(law: Law | None) -> str | None:
@@ -88,6 +98,14 @@ def reference_of(law: Law | None) -> str | None:
 
 class _FromFile(LawParameters):
     """Base of the parameter classes of user files; unpickling builds the class again from the file."""
+
+    def build(self, known: NominalModel) -> Law:
+        """Return the law; one in plain Python is of a new module: no run has the memory of another."""
+        law: Any = super().build(known)  # type: ignore[safe-super]  # of the class that follows this one
+        if not isinstance(law, Law) or hasattr(law.step, "py_func"):
+            return law
+        fresh = _base_class(self.law, load_again(self.law))
+        return fresh.model_construct(**dict(self)).build(known)
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Return the reference to the file, then the values of the parameters."""

@@ -33,6 +33,7 @@ from spheretwin.models.base.compiled import (
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.base.function_identity import is_of_package
 from spheretwin.models.base.numba_internals.addresses import function_at
+from spheretwin.models.base.numba_internals.callbacks import report_error
 from spheretwin.models.base.numba_internals.functions import Dispatcher
 from spheretwin.models.base.vectors import WIDTH, load, total, vector
 from spheretwin.models.telemetry.signals import MOTION_SIGNALS, offsets, width
@@ -255,9 +256,8 @@ def dispatch(
     """
     is_user = is_user_law(law)
     if not COMPILES or (is_user and not isinstance(law.step, Dispatcher)):
-        return Functions(
-            uncompiled(loop), uncompiled(law.step), allocate, estimate and uncompiled(estimate), ()
-        )
+        step = _step_that_writes(law) if is_user else uncompiled(law.step)
+        return Functions(uncompiled(loop), step, allocate, estimate and uncompiled(estimate), ())
     try:
         law_callback = compiled_callback(laws.SIGNATURE, law.step, check_bounds=check_bounds)
     except Exception as error:  # numba also raises errors of other kinds, such as AttributeError
@@ -272,6 +272,30 @@ def dispatch(
         callbacks.append(compiled_callback(estimators.SIGNATURE, estimate))
     addresses = [callback.address for callback in callbacks]
     return Functions(loop, addresses[0], addresses[1], addresses[2] if estimate else 0, tuple(callbacks))
+
+
+def _step_that_writes(law: Law) -> Callable[..., None]:
+    """Return the step of a user law in plain Python, whose exceptions end the run as those of compiled code.
+
+    A returned value, or no torque, is an exception.
+    """
+    step = uncompiled(law.step)
+
+    def call(
+        t: float, reference: Array, measurement: Array, parameters: Array, state: Array, torque: Array
+    ) -> None:
+        try:
+            returned = step(t, reference, measurement, parameters, state, torque)
+            if returned is not None or np.all(np.isnan(torque)):
+                received = "no torque" if returned is None else "a returned value, which is not used"
+                raise ValueError(f"{received}: write the torque into the last argument, torque[:] = …")
+        except KeyboardInterrupt:
+            raise
+        except BaseException as error:  # the user's code may raise anything
+            if not report_error(error):
+                raise
+
+    return call
 
 
 def is_user_law(law: Law) -> bool:

@@ -90,7 +90,7 @@ class Runtime:
     row_width : int
         Numbers in a row of the telemetry.
     law_error : LawError or None
-        Exception of the law in compiled code. An exception of a law in plain Python is raised instead.
+        Exception of the law.
 
     Raises
     ------
@@ -183,7 +183,7 @@ class Runtime:
         return ticks, code
 
     def _run(self, inputs: loops.Inputs, log: NDArray[np.float64]) -> tuple[int, int]:
-        """Run the loop and store the first exception of a compiled law."""
+        """Run the loop and store the first exception of the law."""
         if not self._may_raise:
             with outside_turn:
                 done = self.loop(inputs, *self._parts, log)

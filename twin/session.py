@@ -99,8 +99,9 @@ class Session:
         self.journal: tuple[Change, ...] = tuple(start)
         self.events: tuple[Change, ...] = ()
         self._status = Status.RUNNING
-        self._config = initial_config(scenario, law, trajectory, files)
-        self._own_laws = UserLaws().with_law(law)
+        own = law.for_a_run() if isinstance(law, Law) else law
+        self._config = initial_config(scenario, own, trajectory, files)
+        self._own_laws = UserLaws().with_law(own)
         self.initial_scenario = self.scenario
         self.law_reference = reference_of(law)
         self._planned = scheduled_changes(self.initial_scenario)
@@ -137,7 +138,7 @@ class Session:
 
     @property
     def law_error(self) -> LawError | None:
-        """Exception of a compiled law, which ended the run; one of a law in plain Python is raised."""
+        """Exception of the law, which ended the run."""
         return self._runtime.law_error
 
     @property
@@ -397,11 +398,9 @@ class Session:
         started = time.perf_counter()
         try:
             ticks, code = self._runtime.run(inputs, log)
-        except BaseException as error:  # a law in plain Python: the tick is incomplete
+        except BaseException:  # an interruption of a law in plain Python: the tick is incomplete
             self._status = Status.DIVERGED
-            if isinstance(error, Exception | KeyboardInterrupt):
-                raise
-            raise LawError.of(self.law.name, self.t_s, error) from error  # `error` would end the process
+            raise
         self.loop_s += time.perf_counter() - started
         self.tick += ticks
         self._status = BY_CODE[code]

@@ -115,6 +115,19 @@ def load_with_digest(reference: str, what: str) -> tuple[Any, str]:
     return defined[name], digest
 
 
+def load_again(reference: str) -> Any:
+    """Run the file of a loaded object again; return the object of the new module.
+
+    It shares no global variable with the loaded one. Within `only_loaded` the loaded object is returned.
+    """
+    path, name = Path(os.path.expanduser(file_of(reference))), reference.rpartition(":")[2]
+    module, digest = _LOADED[path]
+    if not getattr(_THREAD, "only_loaded", False):
+        with _AGAIN:
+            module = _run(path, _SOURCES[digest], digest, "law")
+    return vars(module)[name]
+
+
 @contextlib.contextmanager
 def only_loaded() -> Iterator[None]:
     """Let this thread neither read nor run a file again that this process has loaded: it must not wait."""
@@ -127,8 +140,14 @@ def only_loaded() -> Iterator[None]:
 
 _THREAD = threading.local()
 
+_AGAIN = threading.RLock()
+"""Files run again one at a time: the working folder, which they may change, is that of the process."""
+
 _LOADED: dict[Path, tuple[ModuleType, str]] = {}
 """Last content of each file: its module and its digest."""
+
+_SOURCES: dict[str, bytes] = {}
+"""Content of files by its digest."""
 
 
 def _read(path: Path, what: str) -> tuple[ModuleType, str]:
@@ -137,6 +156,7 @@ def _read(path: Path, what: str) -> tuple[ModuleType, str]:
     except (OSError, ValueError) as error:  # ValueError: a zero in the path
         raise InputError(f"{what}: expected a readable file of Python, {without_breaks(error)}") from None
     digest = hashlib.sha256(source).hexdigest()
+    _SOURCES[digest] = source
     return _module(path, source, digest, what), digest
 
 
@@ -147,16 +167,23 @@ def _is_of(module: ModuleType, value: Any) -> bool:
 
 @lru_cache(maxsize=32)
 def _module(path: Path, source: bytes, digest: str, what: str) -> ModuleType:
-    """Run a file as a module, once for each content.
+    """Run a file as a module, once for each content."""
+    return _run(path, source, digest, what)
 
-    It is compiled from that content: the import system would use an older `.pyc` for a file that was edited
-    within the same second, and would create a cache folder.
+
+def _run(path: Path, source: bytes, digest: str, what: str) -> ModuleType:
+    """Run a file as a module.
+
+    It is compiled from its content: the import system would use an older `.pyc` for a file that was edited
+    within the same second, and would create a cache folder. A change of the working folder ends with it:
+    paths of the caller are relative to the folder before.
     """
     module = ModuleType(f"spheretwin_user_{path.stem}_{digest[:12]}")
     module.__file__ = str(path)
     sys.modules[module.__name__] = module  # dataclasses and pickles look their module up by its name
     try:
-        with contextlib.redirect_stdout(sys.stderr):  # its output must not mix with the figures on stdout
+        # Its output must not mix with the figures on stdout.
+        with contextlib.chdir("."), contextlib.redirect_stdout(sys.stderr):
             exec(compile(source, str(path), "exec"), vars(module))
     except KeyboardInterrupt:
         del sys.modules[module.__name__]

@@ -220,7 +220,7 @@ def test_what_a_plain_law_raises_is_told_in_one_line_and_keeps_the_json_alone(tm
     assert out == ""
     messages = [line for line in err.splitlines() if line != "here"]
     assert messages == [
-        "spheretwin: law fails: expected a torque at 0 s, received ZeroDivisionError: division by zero"
+        "spheretwin: law fails: expected a torque at 0.051 s, received ZeroDivisionError: division by zero"
     ]
 
 

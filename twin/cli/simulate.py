@@ -15,11 +15,10 @@ from spheretwin import outputs, replay
 from spheretwin import scenario as scenarios
 from spheretwin.cli.common import interruptible, keep_viewer, print_json, print_message, warn
 from spheretwin.cli.options import Parser, number
-from spheretwin.loop import is_user_law
 from spheretwin.machine import export
 from spheretwin.machine.twin_file import read_twin
 from spheretwin.metrics import BAND_rad
-from spheretwin.models.base.errors import InputError, LawError, SpheretwinError
+from spheretwin.models.base.errors import InputError, SpheretwinError
 from spheretwin.models.base.mujoco_library import timers_stopped
 from spheretwin.models.telemetry.checksums import NO_CHECKSUMS, has_checksums
 from spheretwin.models.telemetry.fault_log import FaultLog
@@ -239,16 +238,9 @@ def _report_files(
 
 @contextlib.contextmanager
 def _code_of_the_user(session: Session, as_json: bool) -> Iterator[None]:
-    """Report an exception of a plain user law on one line; redirect its output away from the JSON."""
-    try:
-        with contextlib.redirect_stdout(sys.stderr) if as_json else contextlib.nullcontext():
-            yield
-    except SpheretwinError:
-        raise
-    except Exception as error:  # the user's code may raise anything
-        if not is_user_law(session.law):
-            raise
-        raise LawError.of(session.law.name, session.t_s, error) from error
+    """Raise the exception of a user law after the run; redirect its output away from the JSON."""
+    with contextlib.redirect_stdout(sys.stderr) if as_json else contextlib.nullcontext():
+        yield
     if session.law_error:
         raise session.law_error
 

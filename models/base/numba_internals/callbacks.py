@@ -117,6 +117,14 @@ def callback_errors(receiver: Callable[[BaseException], None]) -> Iterator[None]
                 sys.unraisablehook = before
 
 
+def report_error(error: BaseException) -> bool:
+    """Pass an exception of plain Python to the receiver of this thread, if there is one."""
+    receiver = _CALLBACK_ERRORS.receiver
+    if receiver:
+        receiver(error)
+    return receiver is not None
+
+
 def _receive(unraisable: Any) -> None:
     """Pass on the exception of a callback; leave every other to the hook that was there before."""
     # Numba names the compiler's context as the place, whatever the callback is.

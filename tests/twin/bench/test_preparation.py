@@ -1,6 +1,7 @@
 """Files and code of the user: outside the threads that serve pages and the loop, and with a time limit."""
 
 import os
+import sys
 import threading
 import time
 
@@ -16,11 +17,13 @@ from tests.twin.bench.cases import FREE, done, said
 from tests.waiting import wait_for
 
 LAW = """
+import sys
 import threading
 from spheretwin.control.law import Law
 from spheretwin.control.law_components.parameters import LawParameters
 
-RUN_IN = [threading.current_thread().name]
+RUN_IN = vars(sys).setdefault("names_of_threads", [])  # common to all modules of this file
+RUN_IN.append(threading.current_thread().name)
 
 class Mine(LawParameters):
     gain: float = 1.0
@@ -50,8 +53,7 @@ def test_code_of_the_user_runs_only_in_threads_of_preparations(tmp_path):
             assert bench.command(name, **arguments).wait(None) == "done"
         assert settings_of(bench.fields())  # what the page reads
         assert bench.state().law == f"{file}:Mine"
-        module = bench._bench_state.driver.session.law.step.__globals__
-        names = module["RUN_IN"]
+    names = vars(sys).pop("names_of_threads")
     assert len(names) >= 4
     assert set(names) <= {"prepare set", "prepare reset"}
 

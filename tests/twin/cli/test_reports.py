@@ -90,7 +90,7 @@ def test_output_of_a_law_is_not_among_the_json(tmp_path):
 
 
 def test_a_run_without_a_tick_has_no_time_and_no_pose(tmp_path):
-    result = call(*under_law(tmp_path, "torque[:] = float('nan')"), "--duration", 0.01)
+    result = call(*under_law(tmp_path, "torque[:] = float('inf')"), "--duration", 0.01)
     message = "spheretwin: the run ended before its first tick was complete: diverged\n"
     assert (result.code, result.err) == (cli.FAILED, message)
 
