@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spheretwin.models.base.compiled import allocation_free, compiled
+from spheretwin.models.base.errors import InputError
 from spheretwin.models.joint_chain import JointChain, torque_on_hinges, update_ideal_motion
 from spheretwin.models.magnetics import SCRATCH_COLUMNS, TorqueModel, fill_torque_matrix, rotor_torque
 from spheretwin.plant.friction import Friction, slow_down
@@ -56,6 +57,63 @@ class Parameters(NamedTuple):
     """Poles, groups and torque curve, with their scatter."""
 
 
+LONGEST_STEP_s = 1.0
+
+
+@allocation_free
+def _has(values: Array, size: int) -> bool:
+    """True if a vector has a number of entries, all finite."""
+    has = values.shape[0] == size
+    if has:
+        for i in range(size):
+            has = has and abs(values[i]) < np.inf
+    return has
+
+
+@allocation_free
+def check_parameters(parameters: Parameters) -> None:
+    """Check the numbers of parameters; compiled code would read beyond the end of a shorter array.
+
+    Raises
+    ------
+    InputError
+        An array has another length, or a number is not finite or out of its range.
+    """
+    magnetics, groups = parameters.magnetics, parameters.magnetics.group_axes.shape[1]
+    inertia = parameters.inertia_kg_m2
+    if not (_has(inertia, 3) and inertia[0] > 0 and inertia[1] > 0 and inertia[2] > 0):
+        raise InputError("plant: expected inertia_kg_m2 of 3 finite numbers above 0, received others")
+    if not (_has(parameters.coulomb_Nm, 3) and _has(parameters.viscous_Nm_s, 3)):
+        raise InputError("plant: expected coulomb_Nm and viscous_Nm_s of 3 finite numbers, received others")
+    if not (_has(parameters.constant_torque_Nm, 3) and _has(parameters.spring_Nm_rad, 3)):
+        raise InputError(
+            "plant: expected constant_torque_Nm and spring_Nm_rad of 3 finite numbers, received others"
+        )
+    if not _has(parameters.torque_gain, groups):
+        raise InputError("plant: expected torque_gain of one finite number for each group, received others")
+    if not (abs(parameters.weight_moment_Nm) < np.inf and 0 < parameters.friction_smoothing_rad_s < np.inf):
+        raise InputError(
+            "plant: expected a finite weight_moment_Nm, friction_smoothing_rad_s above 0, received others"
+        )
+    lines, pairs = magnetics.line_axes.shape[0], magnetics.pair_gain.shape[1]
+    if magnetics.line_weights.shape[0] != lines or magnetics.pair_stretch.shape[1] != pairs:
+        raise InputError("plant: expected magnetics with arrays of matching lengths, received others")
+
+
+@allocation_free
+def _check_state(state: State) -> None:
+    if not (_has(state.q_rad, 3) and _has(state.qdot_rad_s, 3)):
+        raise InputError("plant: expected q_rad and qdot_rad_s of 3 finite numbers, received others")
+
+
+@allocation_free
+def _check_load(disturbance: Array, dt: float) -> None:
+    if not _has(disturbance, 3):
+        raise InputError("plant: expected a disturbance of 3 finite numbers, received others")
+    if not 0 < dt <= LONGEST_STEP_s:
+        raise InputError("plant: expected a step dt above 0, up to 1 s, received another")
+
+
 @compiled
 def torque_matrix(q: Array, parameters: Parameters) -> Array:
     """Return the torque matrix at a pose: torque on the rotor, stator frame, of one ampere in each group.
@@ -69,7 +127,15 @@ def torque_matrix(q: Array, parameters: Parameters) -> Array:
     Returns
     -------
     (3, n) array, N·m/A
+
+    Raises
+    ------
+    InputError
+        Angles or parameters of another length, not finite or out of range.
     """
+    check_parameters(parameters)
+    if not _has(q, 3):
+        raise InputError("plant: expected q_rad of 3 finite numbers, received others")
     groups = parameters.torque_gain.shape[0]
     G = np.empty((3, groups))
     scratch = np.empty((parameters.magnetics.line_weights.shape[0], SCRATCH_COLUMNS))
@@ -100,7 +166,26 @@ def step(state: State, currents: Array, disturbance: Array, parameters: Paramete
     -------
     State
         Of new arrays. The ends of the workspace are not checked.
+
+    Raises
+    ------
+    InputError
+        An array of another length, or a number that is not finite or out of range. The checks cost 2 % of a
+        step; `Plants` makes them once for many steps.
     """
+    check_parameters(parameters)
+    _check_state(state)
+    _check_load(disturbance, dt)
+    if not _has(currents, parameters.torque_gain.shape[0]):
+        raise InputError("plant: expected currents of one finite number for each group, received others")
+    return step_of_checked(state, currents, disturbance, parameters, dt)
+
+
+@compiled
+def step_of_checked(
+    state: State, currents: Array, disturbance: Array, parameters: Parameters, dt: float
+) -> State:
+    """Return the state after one step of arguments that the caller has checked, as `step` does."""
     groups = parameters.torque_gain.shape[0]
     # Few allocations: with one for each vector the step takes half as long again.
     G, vectors = np.empty((3, groups)), np.empty((10, max(3, groups)))
@@ -130,7 +215,19 @@ def roll_out(
         Steps under each row of currents.
     q : (m, 3) array, rad
         Result: angles after each row of currents.
+
+    Raises
+    ------
+    InputError
+        As `step`; of the currents only the shape is checked, and the number of steps is at least 0.
     """
+    check_parameters(parameters)
+    _check_state(state)
+    _check_load(disturbance, dt)
+    if currents.shape[1] != parameters.torque_gain.shape[0] or q.shape != (currents.shape[0], 3) or steps < 0:
+        raise InputError(
+            "plant: expected currents (m, groups), q (m, 3) and steps from 0 on, received others"
+        )
     groups = parameters.torque_gain.shape[0]
     G, vectors = np.empty((3, groups)), np.empty((10, max(3, groups)))
     scratch = np.empty((parameters.magnetics.line_weights.shape[0], SCRATCH_COLUMNS))

@@ -7,11 +7,11 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from spheretwin.models.base.errors import InputError
+from spheretwin.models.base.errors import InputError, shown
 from spheretwin.models.magnetics import TorqueModel, scratch_of
 from spheretwin.plant import lanes
 from spheretwin.plant.lanes import LANES, LaneField
-from spheretwin.plant.plant_step import Parameters, State, roll_out
+from spheretwin.plant.plant_step import LONGEST_STEP_s, Parameters, State, check_parameters, roll_out
 
 Array = NDArray[np.float64]
 Plant = int | NDArray[np.integer] | NDArray[np.bool_]
@@ -113,14 +113,24 @@ class Plants:
 
         Parameters
         ----------
-        q_rad, qdot_rad_s : (3,) or (m, 3) arrays
-            For all, or for each.
+        q_rad, qdot_rad_s : (3,) or (m, 3) arrays, or float
+            For all, or for each; a number is that of every hinge.
         plants : int, indices or mask, optional
             Which plants; default: all.
+
+        Raises
+        ------
+        InputError
+            Another shape, or a number that is not finite; nothing is changed.
         """
-        for first, values in ((lanes.Q, q_rad), (lanes.QDOT, qdot_rad_s)):
+        count = len(np.atleast_2d(self._read(lanes.Q)[plants]))
+        states = [
+            (first, _checked(name, values if np.ndim(values) else np.full(3, values), count, 3))
+            for first, name, values in ((lanes.Q, "q_rad", q_rad), (lanes.QDOT, "qdot_rad_s", qdot_rad_s))
+        ]
+        for first, given in states:
             present = self._read(first)
-            present[plants] = np.asarray(values, np.float64)
+            present[plants] = given if isinstance(plants, slice) or np.ndim(plants) else given[0]
             self._write(first, present)
 
     def set_parameters(self, number: int, parameters: Parameters) -> None:
@@ -157,6 +167,7 @@ class Plants:
             self._each("currents", currents, self.groups),
             self._each("disturbance", disturbance),
         )
+        _check_steps(dt, steps)
         general = self._advance_general(currents[None], disturbance, dt, steps)
         self._write(lanes.HELD, -(disturbance + self._constant_Nm))
         lanes.advance(self.blocks, self.field, currents, dt, steps, self._slows)
@@ -178,6 +189,7 @@ class Plants:
             Another shape, or a number that is not finite.
         """
         torque_q = self._each("torque_q", torque_q)
+        _check_steps(dt, steps)
         general = self._advance_general(np.zeros((1, len(self), self.groups)), -torque_q, dt, steps)
         self._write(lanes.HELD, torque_q - self._constant_Nm)
         lanes.advance(self.blocks, self.field, np.empty((0, self.groups)), dt, steps, self._slows)
@@ -211,6 +223,7 @@ class Plants:
             )
         if not np.all(np.isfinite(sequence)):
             raise InputError("plants: expected finite currents, received others")
+        _check_steps(dt, steps)
         reached = np.empty((len(sequence), len(self), 3))
         disturbance = self._each("disturbance", disturbance)
         general = self._advance_general(sequence, disturbance, dt, steps, reached)
@@ -223,6 +236,7 @@ class Plants:
         return reached
 
     def _set(self, number: int, parameters: Parameters) -> None:
+        check_parameters(parameters)
         model, field = parameters.magnetics, self.field
         if model.line_axes.shape != field.line_axes[0].shape or model.group_axes.shape[1] != self.groups:
             raise InputError(
@@ -310,13 +324,7 @@ class Plants:
 
     def _each(self, name: str, values: ArrayLike, width: int = 3) -> Array:
         """Return values for each plant, (n, width)."""
-        given = np.asarray(values, np.float64)
-        if given.shape not in ((width,), (len(self), width)) or not np.all(np.isfinite(given)):
-            raise InputError(
-                f"plants: expected {name} of {width} finite numbers, for all or for each of {len(self)},"
-                f" received {'an array of ' + str(given.shape) if given.size > width else given}"
-            )
-        return np.ascontiguousarray(np.broadcast_to(given, (len(self), width)))
+        return np.ascontiguousarray(_checked(name, values, len(self), width))
 
     def _read(self, first: int) -> Array:
         rows = self.blocks[:, first : first + 3 * LANES].reshape(-1, 3, LANES)
@@ -328,3 +336,23 @@ class Plants:
         complete[: len(values)] = values
         rows = complete.reshape(-1, LANES, 3).transpose(0, 2, 1)
         self.blocks[:, first : first + 3 * LANES] = rows.reshape(len(self.blocks), -1)
+
+
+def _checked(name: str, values: ArrayLike, count: int, width: int) -> Array:
+    """Return values for each of some plants, (count, width)."""
+    given = np.asarray(values, np.float64)
+    if given.shape not in ((width,), (count, width)) or not np.all(np.isfinite(given)):
+        raise InputError(
+            f"plants: expected {name} of {width} finite numbers, for all or for each of {count},"
+            f" received {'an array of ' + str(given.shape) if given.size > width else given}"
+        )
+    return np.broadcast_to(given, (count, width))
+
+
+def _check_steps(dt: float, steps: int) -> None:
+    if not 0 < dt <= LONGEST_STEP_s:
+        raise InputError(
+            f"plants: expected a step dt above 0, up to {LONGEST_STEP_s:g} s, received {shown(dt)}"
+        )
+    if not isinstance(steps, int | np.integer) or steps < 0:
+        raise InputError(f"plants: expected steps as a whole number from 0 on, received {shown(steps)}")

@@ -22,7 +22,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spheretwin.models.base.compiled import allocation_free, compiled
-from spheretwin.plant.plant_step import Parameters, State, step
+from spheretwin.plant.plant_step import Parameters, State
+from spheretwin.plant.plant_step import step_of_checked as step
 
 Array = NDArray[np.float64]
 
