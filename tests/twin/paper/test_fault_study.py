@@ -9,26 +9,9 @@ from spheretwin import scenario as scenarios
 from spheretwin.control.supervision.fault_detector import LEAST_SHARE
 from spheretwin.control.supervision.watchdog import Reason
 from spheretwin.models.telemetry.status import Status
-from spheretwin.paper import fault_latency, fault_sections, fault_study
+from spheretwin.paper import fault_cases, fault_latency, fault_sections, fault_study
 from spheretwin.paper.experiment import Outcome, Outcomes
-from spheretwin.paper.fault_cases import (
-    ALONE,
-    BASE,
-    BOUNDED,
-    DETECTING,
-    HEALTHY,
-    HEALTHY_ELECTRONICS,
-    OF_GROUPS,
-    OF_PARTS,
-    RELEASE,
-    REPORTED,
-    UNREPORTED,
-    failures,
-    of_groups,
-    of_part,
-    on_other_engine,
-    shorted,
-)
+from spheretwin.paper.fault_cases import DETECTING, OF_GROUPS, OF_PARTS, REPORTED, of_groups, of_part
 from spheretwin.paper.fault_outcomes import FaultData, RemainingTorque, reason, reduce, row_fields, tracks
 from spheretwin.paper.page import rows
 from spheretwin.paper.runner import make_plan, run_plan, scenario_of, unexpected_ends
@@ -37,7 +20,9 @@ from spheretwin.simulation import simulate
 
 # Nine open groups that leave a tenth of the torque needed; a pair that does not track if it is not reported.
 MANY, PAIR = (2, 3, 4, 9, 10, 11, 14, 15, 16), (0, 1)
-DROPOUT = next(each for each in failures() if (each.part, each.mode) == ("encoder.gamma", "dropout"))
+DROPOUT = next(
+    each for each in fault_cases.failures() if (each.part, each.mode) == ("encoder.gamma", "dropout")
+)
 MUJOCO = {"plant.engine": "mujoco"}
 
 
@@ -53,9 +38,13 @@ def run_cases(cases, seeds):
 
 @pytest.fixture(scope="module")
 def study():
-    cases = [HEALTHY, HEALTHY_ELECTRONICS, *(of_part(DROPOUT, way) for way in OF_PARTS)]
+    cases = [
+        fault_cases.HEALTHY,
+        fault_cases.HEALTHY_ELECTRONICS,
+        *(of_part(DROPOUT, way) for way in OF_PARTS),
+    ]
     cases += [of_groups(groups, way) for groups in ((0,), PAIR, MANY) for way in OF_GROUPS]
-    return run_cases([on_mujoco(case) for case in (*cases, shorted((0,), DETECTING))], seeds=2)
+    return run_cases([on_mujoco(case) for case in (*cases, fault_cases.shorted((0,), DETECTING))], seeds=2)
 
 
 def row(study, case):
@@ -63,27 +52,17 @@ def row(study, case):
 
 
 def outcome(ratio, status=Status.COMPLETED, **more_of_it):
-    data = FaultData(
-        start_s=1.0,
-        after_rad=0.01 * ratio,
-        healthy_rad=0.01,
-        ended_s=5.0,
-        is_finite=True,
-        stop_reason=Reason.NONE,
-        stopped_s=float("nan"),
-        is_reported=True,
-        least_norm=True,
-        remaining=None,
-        latencies_s=(),
-        driven_ticks=(),
-        false_detections=0,
-    )._replace(**more_of_it)
+    errors = {"after_rad": 0.01 * ratio, "healthy_rad": 0.01, "is_finite": True}
+    ends = {"start_s": 1.0, "ended_s": 5.0, "stop_reason": Reason.NONE, "stopped_s": float("nan")}
+    reported = {"is_reported": True, "least_norm": True, "remaining": None}
+    detected = {"latencies_s": (), "driven_ticks": (), "false_detections": 0}
+    data = FaultData(**{**errors, **ends, **reported, **detected, **more_of_it})
     return Outcome(status, {"max_abs_error_rad": [0.0] * 3}, np.zeros(3), data)
 
 
 def test_the_error_without_a_failure_is_the_median_of_its_seeds():
     runs = [outcome(ratio) for ratio in (1.0, 2.0, 9.0)]
-    text = fault_sections.parts_section(Outcomes({HEALTHY_ELECTRONICS.name: runs})).text
+    text = fault_sections.parts_section(Outcomes({fault_cases.HEALTHY_ELECTRONICS.name: runs})).text
     assert f"{np.degrees(0.02):.2f}°" in text
     assert f"{np.degrees(0.09):.2f}°" not in text
 
@@ -96,46 +75,48 @@ def test_every_run_ends_with_a_status_and_numbers(study):
 
 def test_single_group_and_pair_track_where_told_or_found_and_else_not(study):
     for groups in ((0,), PAIR):
-        for way in (REPORTED, DETECTING, BOUNDED):
+        for way in (REPORTED, DETECTING, fault_cases.BOUNDED):
             entry = row(study, of_groups(groups, way))
             assert (entry["tracks"], entry["reason"], entry["rank"]) == (2, None, 3)
             assert 0.9 < entry["error_ratio_range"][0] <= entry["error_ratio_range"][1] < 1.15
             assert entry["wrongly_found"] == 0
             are_found = [[time_s is not None for time_s in times] for times in entry["time_to_detection_s"]]
             assert are_found == [[way is DETECTING] * len(groups)] * 2
-        untold = row(study, of_groups(groups, UNREPORTED))
+        untold = row(study, of_groups(groups, fault_cases.UNREPORTED))
         assert untold["tracks"] == 0
         assert "of the commanded torque is delivered" in untold["reason"]
 
 
 def test_errors_are_those_of_the_healthy_run_with_the_same_seed(study):
     _, outcomes = study
-    case = on_mujoco(of_groups(PAIR, UNREPORTED))
+    case = on_mujoco(of_groups(PAIR, fault_cases.UNREPORTED))
     for seed, run in enumerate(outcomes[case.name]):
         errors = [
             np.abs(simulate(scenarios.load("nutation", {**fields, "seed": seed})).telemetry["error_rad"])
-            for fields in (case.fields_of(seed), {**BASE, **MUJOCO})
+            for fields in (case.fields_of(seed), {**fault_cases.BASE, **MUJOCO})
         ]
         first = round(run.data.start_s / 1e-3)
         assert case.seeded_fields(seed)["fault.0.start_s"] == pytest.approx(run.data.start_s)
         assert (run.data.after_rad, run.data.healthy_rad) == tuple(error[first:].max() for error in errors)
         np.testing.assert_array_equal(*(error[: first + 1] for error in errors))  # nothing has failed yet
         assert np.any(errors[0][first + 1 :] != errors[1][first + 1 :])
-    for run in outcomes[HEALTHY.name]:
+    for run in outcomes[fault_cases.HEALTHY.name]:
         assert (run.data.ratio, run.data.start_s) == (1.0, 0.0)
 
 
 def test_the_reference_has_the_allocation_and_the_window_of_the_faulty_run(study):
     _, outcomes = study
-    bounded = scenario_of(on_mujoco(of_groups(PAIR, BOUNDED)), None, 1)
-    run = outcomes[of_groups(PAIR, BOUNDED).name][1]
+    bounded = scenario_of(on_mujoco(of_groups(PAIR, fault_cases.BOUNDED)), None, 1)
+    run = outcomes[of_groups(PAIR, fault_cases.BOUNDED).name][1]
     error = np.abs(simulate(bounded.model_copy(update={"fault": ()})).telemetry["error_rad"])
     assert run.data.healthy_rad == error[round(run.data.start_s / 1e-3) :].max()
     # It leaves the workspace before the end: the window of the reference ends there too.
-    case = of_part(DROPOUT, ALONE)
+    case = of_part(DROPOUT, fault_cases.ALONE)
     run = outcomes[case.name][0]
     assert run.status == Status.LEFT_WORKSPACE
-    healthy = simulate(scenario_of(on_mujoco(HEALTHY_ELECTRONICS), None, 0)).telemetry["error_rad"]
+    healthy = simulate(scenario_of(on_mujoco(fault_cases.HEALTHY_ELECTRONICS), None, 0)).telemetry[
+        "error_rad"
+    ]
     window = slice(round(run.data.start_s / 1e-3), round(run.data.ended_s / 1e-3))
     assert run.data.healthy_rad == np.abs(healthy[window]).max()
 
@@ -143,22 +124,19 @@ def test_the_reference_has_the_allocation_and_the_window_of_the_faulty_run(study
 def opened(group, start_s, end_s=5.0, **changes):
     """One open group in the nutation of the study, with a detector."""
     fault = {"target": f"coil.{group:02d}", "mode": "open", "start_s": start_s, "detection": True}
-    return simulate(
-        scenarios.load("nutation", {**BASE, **MUJOCO, "fault": [fault], "duration": end_s, **changes})
-    )
+    fields = {**fault_cases.BASE, **MUJOCO, "fault": [fault], "duration": end_s, **changes}
+    return simulate(scenarios.load("nutation", fields))
 
 
 def test_an_idle_group_is_not_detected_until_it_is_driven():
     """The longest time in which a group is commanded less than the threshold: a fault that starts there."""
-    healthy = simulate(scenarios.load("nutation", {**BASE, **MUJOCO}))
+    healthy = simulate(scenarios.load("nutation", {**fault_cases.BASE, **MUJOCO}))
     threshold_A = LEAST_SHARE * healthy.actuator.group.current_limit_A
-    with Session(scenarios.load("nutation", {**BASE, "detector.detect": True})) as session:
+    with Session(scenarios.load("nutation", {**fault_cases.BASE, "detector.detect": True})) as session:
         # What the study takes for the threshold of the detector.
         assert threshold_A == session._runtime._controller.supervision.detector.threshold_A
     idle = np.abs(healthy.telemetry["current_command_A"]) <= threshold_A
-    length, end, group = max(
-        (length, end, group) for group in range(18) for length, end in stretches(idle[:, group])
-    )
+    length, end, group = max((*each, group) for group in range(18) for each in stretches(idle[:, group]))
     assert length >= 50
     begin = end - length
     # Cut off within the idle stretch it is not detected, and otherwise some ticks after it.
@@ -201,26 +179,21 @@ def test_too_little_torque_or_the_watchdog_is_the_reason(study):
     assert entry["torque_left_over_needed"] < 0.5
     assert entry["least_norm_torque_over_needed"] <= entry["torque_left_over_needed"]
     assert entry["reason"].endswith("by least norm")
-    released, alone = (row(study, of_part(DROPOUT, way)) for way in (RELEASE, ALONE))
+    released, alone = (row(study, of_part(DROPOUT, way)) for way in (fault_cases.RELEASE, fault_cases.ALONE))
     assert (released["reason"], released["status"]) == ("no fresh measurement", "failsafe")
     assert alone["status"] == "left_workspace"
 
 
 @pytest.mark.release("compiles a loop for 12 s; the cross-check compares the engines")
 def test_the_other_engine_agrees():
-    _, outcomes = run_cases([make((0,), REPORTED) for make in (of_groups, on_other_engine)], seeds=2)
+    _, outcomes = run_cases(
+        [make((0,), REPORTED) for make in (of_groups, fault_cases.on_other_engine)], seeds=2
+    )
     ((one, other),) = fault_study.engine_pairs(outcomes, REPORTED)
     assert fault_study.agree(one, other)
     assert fault_study.difference_rad(one, other) < 1e-12  # 10,000 steps that round otherwise
     apart = other._replace(data=other.data._replace(after_rad=other.data.after_rad + 2e-9))
     assert not fault_study.agree(one, apart)
-
-
-def test_map_of_pairs_has_pairs_below_and_single_groups_on_the_diagonal(study):
-    ratios = fault_sections.ratios(study[1], UNREPORTED)
-    there = np.argwhere(np.isfinite(ratios)).tolist()
-    assert there == [[0, 0], [1, 0]]
-    assert ratios[1, 0] == row(study, of_groups(PAIR, UNREPORTED))["error_ratio"]
 
 
 def test_tracking_is_to_complete_and_to_stay_within_twice():
@@ -236,29 +209,24 @@ def test_a_lost_direction_is_the_first_reason(study):
 
 
 def test_a_run_that_ends_before_the_fault_has_no_ratio():
-    data = reduce(opened(0, 1.0, 0.5))
-    assert np.isnan(data.ratio)
+    assert np.isnan(reduce(opened(0, 1.0, 0.5)).ratio)
     assert json.loads(json.dumps(row_fields([outcome(float("nan"))]), allow_nan=False))["error_ratio"] is None
 
 
 def test_a_figure_parts_the_good_from_the_bad_with_the_fewest_errors():
     assert fault_study.split([2.0, 3.0, 5.0], [0.5, 1.0]) == (1.5, 1.0)
-    parted = fault_study.split([0.9, 2.0, 3.0, 4.0], [0.5, 1.0, 1.2])
-    assert parted.at == pytest.approx(1.6)
-    assert parted.rightly == pytest.approx(6 / 7)
+    assert fault_study.split([0.9, 2.0, 3.0, 4.0], [0.5, 1.0, 1.2]) == pytest.approx((1.6, 6 / 7))
     assert fault_study.split([1.0], []).rightly == 1.0
 
 
 def test_shares_are_not_rounded_up_to_all():
-    assert fault_sections.percent([True] * 2000 + [False]) == "99.9 %"
-    assert fault_sections.percent([True, True]) == "100 %"
-    assert fault_sections.percent([False] * 2000 + [True]) == "0.1 %"
+    flags = {"99.9 %": [True] * 2000 + [False], "100 %": [True, True], "0.1 %": [False] * 2000 + [True]}
+    assert [fault_sections.percent(each) for each in flags.values()] == list(flags)
 
 
 def test_the_ten_smallest_sets_that_do_not_track_are_listed():
-    remaining = RemainingTorque(
-        torque=0.5, least_norm=0.4, least_share=0.3, singular_value_Nm_per_A=0.1, rank=3
-    )
+    shares = {"torque": 0.5, "least_norm": 0.4, "least_share": 0.3}
+    remaining = RemainingTorque(**shares, singular_value_Nm_per_A=0.1, rank=3)
     sets = {tuple(range(size)): [outcome(100.0, remaining=remaining)] for size in range(14, 1, -1)}
     listed = fault_study._smallest(sets | {(0,): [outcome(1.0, remaining=remaining)]}, REPORTED)
     assert len(listed) == fault_study.LISTED == 10

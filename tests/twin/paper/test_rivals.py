@@ -9,7 +9,7 @@ import pytest
 from spheretwin.control.laws import LAWS
 from spheretwin.models.telemetry.status import Status
 from spheretwin.paper import rival_conditions, rival_results
-from spheretwin.paper.experiment import Outcome, Outcomes
+from spheretwin.paper.experiment import Outcomes
 from spheretwin.paper.laws import BY_LAW
 from spheretwin.paper.rival_conditions import ELECTRONICS, FOLDER, HARDWARE, IDEAL, tuned_gains
 from spheretwin.paper.rival_results import results, start_error, within
@@ -21,6 +21,7 @@ from spheretwin.study.study import load
 from spheretwin.study.tuning import gains as tuning_gains
 from spheretwin.study.tuning import trials
 from spheretwin.viz.theme import LAW_COLOURS, LAW_MARKS
+from tests.twin.paper import cases
 
 COMPILES = pytest.mark.release("compiles a loop for 12 s; the rows of ideal hardware check the search")
 
@@ -98,16 +99,12 @@ def test_seeds_of_the_search_are_none_of_the_page():
 
 
 def test_conditions_state_what_the_controller_knows():
-    by_name = {
-        (hardware.name, condition.name): {**hardware.fields, **condition.fields}
-        for hardware in HARDWARE
-        for condition in hardware.conditions
-    }
     for hardware in HARDWARE:
-        friction = by_name[hardware.name, "friction 5 mN·m, nominal 2 mN·m"]
+        by_name = {each.name: {**hardware.fields, **each.fields} for each in hardware.conditions}
+        friction = by_name["friction 5 mN·m, nominal 2 mN·m"]
         assert friction["plant.coulomb_Nm"] == [5e-3] * 3
         assert friction["nominal.coulomb_Nm"] == [2e-3] * 3
-        delay = by_name[hardware.name, "1 ms of unknown delay"]
+        delay = by_name["1 ms of unknown delay"]
         assert delay["drive.delay_s"] - delay["nominal.delay_s"] == pytest.approx(1e-3)
 
 
@@ -125,19 +122,15 @@ def test_group_gains_are_drawn_from_the_seed_of_each_run():
 
 def outcome(error, variation, status=Status.COMPLETED):
     """With the same error on all hinges."""
-    figures = {
-        "current_variation_A_s": variation,
-        "max_abs_error_rad": [error] * 3,
-        "tail_rms_error_rad": [error / 10] * 3,
-    }
-    return Outcome(status, figures, np.full(3, error), np.full(3, error / 20))
+    figures = {"current_variation_A_s": variation, "tail_rms_error_rad": [error / 10] * 3}
+    return cases.outcome(error, status, np.full(3, error / 20), **figures)
 
 
 def made_up(limit, by_law):
     """Outcomes of laws by the errors of their seeds."""
     tuned = {gains.law: gains for gains in tuned_gains(IDEAL.study) if gains.limit_A_s == limit}
-    cases = {law: rival_conditions.tuned_case(IDEAL, IDEAL.conditions[0], tuned[law]) for law in by_law}
-    return Outcomes({cases[law].name: [outcome(e, limit) for e in by_law[law]] for law in by_law})
+    of_law = {law: rival_conditions.tuned_case(IDEAL, IDEAL.conditions[0], tuned[law]) for law in by_law}
+    return Outcomes({of_law[law].name: [outcome(e, limit) for e in by_law[law]] for law in by_law})
 
 
 def test_results_are_medians_and_no_numbers_if_a_run_was_lost():
@@ -167,9 +160,9 @@ def test_findings_say_where_rivals_are_level_or_better(errors, expected):
     assert finding.text == f"{IDEAL.title}, {IDEAL.conditions[0].name}: within 30 A/s {expected}"
 
 
-def test_nothing_is_found_where_nothing_ran():
-    assert rival_results.findings(made_up(30.0, {"adrc": (0.9e-3,)})) == []  # our own law did not run
-    assert rival_results.findings(Outcomes()) == []
+def test_nothing_is_found_where_nothing_or_not_our_law_ran():
+    without_our_law = made_up(30.0, {"adrc": (0.9e-3,)})
+    assert rival_results.findings(without_our_law) == rival_results.findings(Outcomes()) == []
     assert EXPERIMENT.sections(Outcomes()) == []
 
 
@@ -184,12 +177,12 @@ def test_the_error_at_the_start_is_the_largest_until_the_rates_agree():
 @pytest.mark.release("runs all rivals for 15 s; content of paper_rivals has rows and page")
 def test_full_current_is_below_what_any_law_reaches_with_bounded_allocation():
     """Within the same ±8 A: least norm gives away some of the torque, so that a law may share it better."""
-    cases = [
+    short = [
         case._replace(fields={**case.fields, "duration": case.fields.get("duration", 0.6)})
         for case in EXPERIMENT.cases()
         if "limit_A_s" not in case.details or case.fields["controller.law"] in ("afsm_eso", "pid")
     ]
-    outcomes = run_plan(make_plan(EXPERIMENT._replace(cases=lambda: cases), seeds=1))
+    outcomes = run_plan(make_plan(EXPERIMENT._replace(cases=lambda: short), seeds=1))
     for condition in IDEAL.conditions:
         if condition.perturbed:
             continue

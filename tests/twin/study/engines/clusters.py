@@ -12,18 +12,11 @@ name = "small"
 scenario = "sinusoid"
 samples = 120
 telemetry = [7]
-[fields]
-duration = 0.1
-hardware = "electronics"
-[[axis]]
-field = "plant.modelling_error"
-kind = "uniform"
-low = -0.2
-high = 0.5
-[[axis]]
-field = "disturbance.load"
-kind = "values"
-values = [0.0, 1.0]
+fields = { duration = 0.1, hardware = "electronics" }
+axis = [
+    { field = "plant.modelling_error", kind = "uniform", low = -0.2, high = 0.5 },
+    { field = "disturbance.load", kind = "values", values = [0.0, 1.0] },
+]
 """
 
 ROWS = 240
