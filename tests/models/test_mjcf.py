@@ -2,6 +2,7 @@
 
 import os
 import shutil
+from itertools import product
 
 import mujoco
 import numpy as np
@@ -137,21 +138,8 @@ def test_files_that_name_each_other_are_looked_into_once(tmp_path):
     assert inertia(path)[0] == 2.219e-3
 
 
-CUBE = """v -1.00 -1.00 -1.00
-v 1.00 -1.00 -1.00
-v -1.00 1.00 -1.00
-v 1.00 1.00 -1.00
-v -1.00 -1.00 1.00
-v 1.00 -1.00 1.00
-v -1.00 1.00 1.00
-v 1.00 1.00 1.00
-f 1 3 4 2
-f 5 6 8 7
-f 1 2 6 5
-f 3 7 8 4
-f 1 5 7 3
-f 2 4 8 6
-"""
+CUBE = "".join(f"v {x}.00 {y}.00 {z}.00\n" for z, y, x in product((-1, 1), repeat=3))
+CUBE += "".join(f"f {face}\n" for face in ("1 3 4 2", "5 6 8 7", "1 2 6 5", "3 7 8 4", "1 5 7 3", "2 4 8 6"))
 HEAVY = '<geom type="mesh" mesh="cube" mass="1.5"/>'
 ASSET = '<mesh name="cube" file="{}" scale="0.04 0.04 0.04"/>'
 
@@ -245,6 +233,11 @@ EDGES = {"extension": "", "option": "", "flag": "", "body": "", "joint": "", "se
          "geom": 'contype="0" conaffinity="0"'}  # fmt: skip
 COLLIDING = 'contype="1" conaffinity="1"'
 PAIR = '<contact><pair geom1="ball" geom2="floor"/></contact>'
+EQUALITY = '<equality><joint joint1="hinge"/></equality>'
+FIXED_TENDON = '<tendon><fixed><joint joint="hinge" coef="1"/></fixed></tendon>'
+SPATIAL_TENDON = '<tendon><spatial><site site="anchor"/><site site="tip"/></spatial></tendon>'
+MOTOR = '<actuator><motor joint="hinge"/></actuator>'
+PLUGIN = '<actuator><plugin joint="hinge" instance="pid"/></actuator>'
 PID = '<extension><plugin plugin="mujoco.pid"><instance name="pid"/></plugin></extension>'
 FLEX = (
     '<deformable><flex name="f" dim="1" body="rotor world" vertex="0 0 0 0 0 1" element="0 1"/></deformable>'
@@ -266,27 +259,11 @@ NEEDED = {
     "damping": ({"joint": 'damping="1"'}, ["damping"], DAMPER),
     "damping of higher order": ({"joint": 'damping="0 1"'}, ["damping"], DAMPER),
     "armature": ({"joint": 'armature="1"'}, ["armature"], 0),
-    "equality": (
-        {"sections": '<equality><joint joint1="hinge"/></equality>'}, ["equality"], CONSTRAINT
-    ),
-    "fixed tendon": (
-        {"sections": '<tendon><fixed><joint joint="hinge" coef="1"/></fixed></tendon>'},
-        ["tendon"],
-        CONSTRAINT | PASSIVE,
-    ),
-    "spatial tendon": (
-        {"sections": '<tendon><spatial><site site="anchor"/><site site="tip"/></spatial></tendon>'},
-        ["tendon"],
-        CONSTRAINT | PASSIVE,
-    ),
-    "actuator": (
-        {"sections": '<actuator><motor joint="hinge"/></actuator>'}, ["actuator"], ACTUATION | PASSIVE
-    ),
-    "plugin": (
-        {"extension": PID, "sections": '<actuator><plugin joint="hinge" instance="pid"/></actuator>'},
-        ["actuator", "plugin"],
-        ACTUATION | PASSIVE,
-    ),
+    "equality": ({"sections": EQUALITY}, ["equality"], CONSTRAINT),
+    "fixed tendon": ({"sections": FIXED_TENDON}, ["tendon"], CONSTRAINT | PASSIVE),
+    "spatial tendon": ({"sections": SPATIAL_TENDON}, ["tendon"], CONSTRAINT | PASSIVE),
+    "actuator": ({"sections": MOTOR}, ["actuator"], ACTUATION | PASSIVE),
+    "plugin": ({"extension": PID, "sections": PLUGIN}, ["actuator", "plugin"], ACTUATION | PASSIVE),
     "contact": ({"geom": COLLIDING}, ["contact"], CONSTRAINT),
     "contact switched off": ({"geom": COLLIDING, "flag": 'contact="disable"'}, [], 0),
     "pair": ({"sections": PAIR}, ["contact"], CONSTRAINT),

@@ -101,17 +101,6 @@ def test_singular_values_and_copper_loss(actuator):
         assert_allclose(figures.copper_W_per_Nm2[i], heat, rtol=1e-10)
 
 
-def test_opposite_layers_lose_every_direction(actuator):
-    # With the lower layer turned over, the two coils of each group cancel.
-    polarity = actuator.pole_polarity * np.where(actuator.pole_axes[:, 2] > 0, 1, -1)
-    figures = capability(random_poses(3), replace(actuator, pole_polarity=polarity))
-    assert np.all(figures.least_norm_Nm == 0)
-    assert np.all(figures.best_Nm == 0)
-    assert np.all(np.isinf(figures.condition))
-    assert np.all(np.isinf(figures.copper_W_per_Nm2))
-    assert_allclose(np.linalg.norm(figures.weak_direction, axis=1), 1)
-
-
 # The workspace
 
 

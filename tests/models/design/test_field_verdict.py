@@ -21,20 +21,13 @@ def coarse(monkeypatch):
 @pytest.mark.release(
     "sums over all windings for 0.7 to 7.5 s; content of design_direct_sums has their values"
 )
-def test_the_shipped_actuator_passes_and_is_told_by_tilt(actuator, monkeypatch):
+def test_the_shipped_actuator_passes(actuator, monkeypatch):
     monkeypatch.setattr(field_verdict, "SCATTER_POSES", 1)
     verdict = field_verdict.judge(actuator, poses=2)
-    assert [band.tilt_deg for band in verdict.by_tilt] == [(0, 12), (12, 24)]
-    assert sum(band.poses for band in verdict.by_tilt) == 2
-    for band in verdict.by_tilt:
-        assert band.median_relative_error <= band.largest_relative_error
-        assert band.median_relative_error < 5e-4  # measured: 1.7e-4
-    torque, quadrature, scatter, *published = verdict.checks
-    assert len(published) == 5
-    assert torque.value == max(band.largest_error_of_largest_torque for band in verdict.by_tilt)
+    assert max(band.median_relative_error for band in verdict.by_tilt) < 5e-4  # measured: 1.7e-4
+    torque, _, scatter, *_ = verdict.checks
     assert torque.value < 1e-3  # measured: 2e-4
     assert 1e-3 < scatter.value < scatter.bound  # of second order; measured: 4e-3
-    assert quadrature.value == verdict.sources.quadrature_of_largest_torque
     assert broken(verdict.checks) == verdict.warnings == []
     assert verdict.sources.curve_between_samples_of_peak < 1e-4
     assert verdict.sources.lookup_of_peak < 1e-6

@@ -62,18 +62,8 @@ def turned_to(axis):
 def flux_linkage(R_SR, group, actuator):
     """Flux of the 16 magnets through the turns of one group, Wb."""
     poles = zip(actuator.pole_axes @ R_SR.T, actuator.pole_polarity, strict=True)
-    pieces = direct_summation.cylinders(actuator.magnet, STACKED)
     magnets = magpylib.Collection(
-        [
-            magpylib.magnet.Cylinder(
-                polarization=(0, 0, polarity * actuator.magnet.remanence_T),
-                dimension=(2 * radius, top - bottom),
-                position=0.5 * (top + bottom) * pole,
-                orientation=turned_to(pole),
-            )
-            for pole, polarity in poles
-            for radius, bottom, top in pieces
-        ]
+        [direct_summation.pole_magnet(actuator.magnet, *pole, STACKED) for pole in poles]
     )
     points, area = area_of_turns(actuator.coil)
     linkage = 0.0

@@ -61,7 +61,9 @@ def test_a_lost_direction_is_told_and_meets_no_need(actuator):
     (warning,) = verdict.warnings
     assert warning.startswith("the torque matrix loses the direction (")
     assert warning.endswith("at 2 of 2 tilts")
-    assert all(row.condition == np.inf and row.best_Nm == 0 for row in verdict.by_tilt)
+    for row in verdict.by_tilt:
+        assert row.condition == row.copper_W_per_Nm2 == np.inf
+        assert row.best_Nm == row.least_norm_Nm == 0
     assert broken(verdict.checks) == ["need"]
     assert verdict.checks[-1].value == np.inf
 

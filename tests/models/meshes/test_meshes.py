@@ -276,15 +276,3 @@ def test_the_scene_changes_nothing_but_the_looks(scene):
     assert scene.opt.timestep == alone.opt.timestep
     assert scene.opt.integrator == alone.opt.integrator
     assert scene.opt.disableflags == alone.opt.disableflags
-
-
-def test_a_noisy_run_of_the_scene_brings_no_warning(scene):
-    data = mujoco.MjData(scene)
-    random = np.random.default_rng(0)
-    for _ in range(1000):
-        data.qfrc_applied[:] = random.normal(0.0, 0.3, scene.nv)
-        mujoco.mj_step(scene, data)
-    assert data.time == pytest.approx(1000 * scene.opt.timestep)
-    assert np.isfinite(data.qpos).all()
-    assert np.ptp(data.qpos) > 1e-3
-    assert not any(warning.number for warning in data.warning)
