@@ -164,16 +164,6 @@ def overwrite(content):
     return content[:middle] + b"garbage in the midst of machine code" + content[middle + 36 :]
 
 
-def test_damaged_entries_are_made_again(filled):
-    filled_entries = entries(filled)
-    assert len(filled_entries) == 3  # the caller, its callee, its callback
-    for path in filled_entries:
-        path.write_bytes(overwrite(path.read_bytes()))
-    assert ask(filled) == (41, 0)
-    assert ask(filled) == (41, 1)
-    assert entries(filled) == filled_entries
-
-
 def of_content(content):
     pickled = pickle.dumps(content)
     return lambda _: hashlib.sha256(pickled).digest() + pickled
@@ -207,15 +197,6 @@ def test_entry_that_cannot_be_used_is_made_again(tmp_path, monkeypatch, damage):
     (path,) = (path for path in tmp_path.rglob("*") if path.is_file())
     path.write_bytes(damage(path.read_bytes()))
     assert [hits(), hits()] == [0, 1]
-
-
-@pytest.mark.release("a process of 0.7 s; test_no_folder_at_all_is_done_without has the same refusal")
-def test_file_in_place_of_the_folder_is_done_without(filled):
-    (folder,) = (filled / "cache").iterdir()
-    shutil.rmtree(folder)
-    folder.write_text("no folder")
-    assert ask(filled) == (41, 0)
-    assert folder.read_text() == "no folder"
 
 
 @pytest.mark.release("a process of 0.7 s; test_no_folder_at_all_is_done_without has the same refusal")

@@ -33,16 +33,17 @@ def test_a_clone_that_make_has_set_up_names_its_target(monkeypatch, tmp_path):
     assert extras.install_command("bench", "plots") == f"make -C {tmp_path} extras EXTRAS='bench plots'"
 
 
-def test_an_environment_with_pip_uses_its_own_python(monkeypatch, tmp_path):
-    installed(monkeypatch, Installed(), pip=True)
-    assert extras.install_command("rl") == f"{sys.executable} -m pip install 'spheretwin[rl]'"
-    installed(monkeypatch, Installed(tmp_path.as_uri()), pip=True)
-    assert extras.install_command("rl") == f"{sys.executable} -m pip install -e '{tmp_path}[rl]'"
-
-
-def test_an_environment_without_pip_uses_uv(monkeypatch):
-    installed(monkeypatch, Installed(), pip=False)
-    assert extras.install_command("rl") == f"uv pip install --python {sys.executable} 'spheretwin[rl]'"
+@pytest.mark.parametrize(
+    ("url", "pip", "command"),
+    [
+        (None, True, "{python} -m pip install 'spheretwin[rl]'"),
+        ("file:///clone", True, "{python} -m pip install -e '/clone[rl]'"),
+        (None, False, "uv pip install --python {python} 'spheretwin[rl]'"),
+    ],
+)
+def test_an_environment_uses_its_own_python(monkeypatch, url, pip, command):
+    installed(monkeypatch, Installed(url), pip=pip)
+    assert extras.install_command("rl") == command.format(python=sys.executable)
 
 
 def test_every_extra_of_the_package_has_a_purpose():

@@ -109,10 +109,9 @@ def test_a_pipe_is_no_place_for_a_file(tmp_path):
 
 def test_messages_name_the_requested_file_and_the_cause_without_its_number(tmp_path):
     path = tmp_path / "missing" / "run.rrd"
-    for write in (check_writable, OutputFile):
-        with pytest.raises(InputError) as refused:
-            write(path)
-        assert f"{refused.value}" == f"output: expected a writable path, No such file or directory: {path}"
+    with pytest.raises(InputError) as refused:
+        OutputFile(path)
+    assert f"{refused.value}" == f"output: expected a writable path, No such file or directory: {path}"
     target = tmp_path / "run.parquet"
 
     def fill_the_disk(named):

@@ -19,7 +19,6 @@ from spheretwin.models.telemetry.partial_files import list_of
 from spheretwin.models.telemetry.signals import common_signals
 from spheretwin.models.telemetry.table import read_parquet
 from tests.models.telemetry.streams import GAIN, PART_ROWS, parts_beside, streamed, table
-from tests.waiting import wait_for
 
 pytestmark = pytest.mark.usefixtures("short_parts")
 
@@ -57,22 +56,6 @@ def kill(process):
     process.send_signal(signal.SIGKILL)
     process.communicate()
     assert process.returncode == -signal.SIGKILL
-
-
-def test_a_process_killed_while_it_writes_leaves_its_first_rows(tmp_path):
-    path = tmp_path / "run.parquet"
-    process = streaming(path, 64 * 1500)
-    wait_for(
-        lambda: (
-            sum(part.stat().st_size for part in tmp_path.glob(".run.parquet.*.parts/*")) >= size_of(64 * 6)
-        )
-    )
-    kill(process)
-    assert not path.exists()
-    rows = join(parts_beside(path), path)
-    assert rows % 64 == 0
-    assert rows >= 64 * 5  # a sixth batch may be torn: the stream is longer than its rows
-    assert read_parquet(path)[0].values.tobytes() == table(64 * 1500).rows(0, rows).values.tobytes()
 
 
 def test_a_killed_process_loses_only_the_rows_that_waited(tmp_path):
