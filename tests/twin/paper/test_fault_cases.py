@@ -9,27 +9,9 @@ import pytest
 from spheretwin import scenario as scenarios
 from spheretwin.faults.targets import TARGETS
 from spheretwin.paper import fault_cases
-from spheretwin.paper.fault_cases import (
-    BOUNDED,
-    DETECTING,
-    OF_GROUPS,
-    OF_PARTS,
-    REPORTED,
-    SAMPLE,
-    SCENARIO,
-    UNREPORTED,
-    VALUES,
-    cases,
-    failures,
-    of_groups,
-    of_part,
-    on_other_engine,
-    sample,
-    shorted,
-    start_s,
-)
+from spheretwin.paper.fault_cases import DETECTING, OF_GROUPS, OF_PARTS, failures, of_groups, of_part
 
-ALL = cases()
+ALL = fault_cases.cases()
 
 
 def test_every_group_and_pair_is_there():
@@ -61,22 +43,22 @@ def test_every_set_has_its_ways_and_a_sample_runs_on_the_other_engine():
         "drawn": 2000 * ways,
         "part": len(failures()) * len(OF_PARTS),
         "short": 18,
-        "MuJoCo": len(sample()) * ways,
+        "MuJoCo": len(fault_cases.sample()) * ways,
     }
-    assert len(sample()) == -(-2171 // SAMPLE)
+    assert len(fault_cases.sample()) == -(-2171 // fault_cases.SAMPLE)
 
 
 def test_ways_change_nothing_but_what_they_say():
     loaded = {
         way.name: scenarios.load("nutation", of_groups((3, 11), way).fields).model_dump() for way in OF_GROUPS
     }
-    base = loaded[UNREPORTED.name]
+    base = loaded[fault_cases.UNREPORTED.name]
     assert (base["plant"]["modelling_error"], base["disturbance"]["load"]) == (0.2, 1.0)
     assert [fault["target"] for fault in base["fault"]] == ["coil.03", "coil.11"]
-    for way, field in ((REPORTED, "reported_to_controller"), (DETECTING, "detection")):
+    for way, field in ((fault_cases.REPORTED, "reported_to_controller"), (DETECTING, "detection")):
         changed = tuple({**fault, field: True} for fault in base["fault"])
         assert loaded[way.name] == {**base, "fault": changed}
-    assert loaded[BOUNDED.name] == {**loaded[REPORTED.name], "allocation": "bounded"}
+    assert loaded[fault_cases.BOUNDED.name] == {**loaded[fault_cases.REPORTED.name], "allocation": "bounded"}
 
 
 def test_every_mode_of_every_shared_part_is_there_with_a_value_where_it_needs_one():
@@ -89,7 +71,7 @@ def test_every_mode_of_every_shared_part_is_there_with_a_value_where_it_needs_on
         for mode in target.modes
     }
     assert there == wanted
-    assert {kind for kind, _ in VALUES} <= set(TARGETS)
+    assert {kind for kind, _ in fault_cases.VALUES} <= set(TARGETS)
     for failure in failures():
         for way in OF_PARTS:
             scenario = scenarios.load("nutation", of_part(failure, way).fields)  # refuses what lacks a value
@@ -107,8 +89,8 @@ def test_a_limit_leaves_some_of_each_kind(limit):
 
 def test_starts_are_spread_evenly_over_the_whole_run():
     """No tick is left out, and none is more likely: the fifths of the run have a fifth of the starts each."""
-    run = scenarios.load(SCENARIO)
-    starts = np.array([start_s(f"set {name}", seed) for name in range(200) for seed in range(20)])
+    run = scenarios.load(fault_cases.SCENARIO)
+    starts = np.array([fault_cases.start_s(f"set {name}", seed) for name in range(200) for seed in range(20)])
     ticks = starts / run.controller.period_s
     np.testing.assert_allclose(ticks, np.round(ticks), atol=1e-6)
     assert 0.0 <= starts.min() < 0.01
@@ -120,18 +102,18 @@ def test_starts_are_spread_evenly_over_the_whole_run():
 
 def test_all_ways_and_engines_of_a_set_share_the_start_of_a_seed_and_other_seeds_have_others():
     def starts(case, seed):
-        faults = scenarios.load(SCENARIO, {**case.fields_of(seed), "seed": seed}).fault
+        faults = scenarios.load(fault_cases.SCENARIO, {**case.fields_of(seed), "seed": seed}).fault
         return {fault.start_s for fault in faults}
 
     for groups in ((3,), (3, 11), (1, 4, 7, 9)):
-        both = [make(groups, way) for make in (of_groups, on_other_engine) for way in OF_GROUPS]
+        both = [make(groups, way) for make in (of_groups, fault_cases.on_other_engine) for way in OF_GROUPS]
         drawn = [[starts(case, seed) for case in both] for seed in range(5)]
         assert all(one == of_seed[0] and len(one) == 1 for of_seed in drawn for one in of_seed)
         assert len({one for of_seed in drawn for one in of_seed[0]}) == 5
     for failure in failures()[:3]:
         assert len(set.union(*(starts(of_part(failure, way), 0) for way in OF_PARTS))) == 1
-    (alone,) = starts(shorted((3,), DETECTING), 1)
-    assert alone == start_s("group 3", 1)
+    (alone,) = starts(fault_cases.shorted((3,), DETECTING), 1)
+    assert alone == fault_cases.start_s("group 3", 1)
 
 
 def test_only_what_is_drawn_or_a_sample_runs_once():
