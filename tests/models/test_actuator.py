@@ -85,13 +85,12 @@ def test_arrays_are_frozen(actuator):
         ('<frame euler="0 28 0">', '<frame euler="0 29 0">', "one coil opposite coil_upper00"),
     ],
 )  # fmt: skip
-def test_an_invalid_actuator_is_reported_in_one_line(tmp_path, old, new, part):
+def test_an_invalid_actuator_is_refused(tmp_path, old, new, part):
     assert old in TEXT
     meshes = f'meshdir="{actuators.FOLDER / "assets"}"'
     (path := tmp_path / "mine.xml").write_text(TEXT.replace(old, new).replace('meshdir="assets"', meshes))
-    with pytest.raises(InputError, match=re.escape(part)) as caught:
+    with pytest.raises(InputError, match=re.escape(part)):
         actuators.load(path)
-    assert "\n" not in str(caught.value)
 
 
 def test_groups_are_as_many_as_the_file_has(tmp_path):
@@ -189,7 +188,7 @@ def test_a_run_takes_every_drive_that_a_model_may_have(tmp_path, limit, resistan
     assert simulate(scenario).status == "completed"
 
 
-def test_an_invalid_path_is_reported_in_one_line():
+def test_an_invalid_path_is_refused():
     with pytest.raises(InputError, match="expected an MJCF file") as caught:
         actuators.load(Path("x" * 20_000))
     assert len(str(caught.value)) < 1000

@@ -1,8 +1,7 @@
-"""The general joint against Pinocchio, MuJoCo, its energy, and the closed forms of the ideal joint."""
+"""The general joint against MuJoCo, its energy, and the closed forms of the ideal joint."""
 
 import mujoco
 import numpy as np
-import pinocchio
 import pytest
 
 from spheretwin.models import actuator as actuators
@@ -93,50 +92,23 @@ def test_inertia_matrix_and_bias_are_mujoco_s(seed):
         np.testing.assert_allclose(bias, data.qfrc_bias, rtol=0, atol=ROUNDING * np.abs(bias).max())
 
 
-def pinocchio_chain(generator):
-    """A random chain built through Pinocchio's own functions, and the same as a `JointChain`.
-
-    The point masses of ours are made by `read_chain` of a model in which every body stands at the origin.
-    """
-    model, at, bodies, here = pinocchio.Model(), 0, "", np.zeros(3)
-    model.gravity.linear = 10 * generator.normal(size=3)
-    for name in ("alpha", "beta", "gamma"):
-        axis, step = generator.normal(size=3), 0.05 * generator.normal(size=3)
-        axis, here = axis / np.linalg.norm(axis), here + step
-        joint = pinocchio.JointModelRevoluteUnaligned(axis)
-        at = model.addJoint(at, joint, pinocchio.SE3(np.eye(3), step), name)
-        mass, centre, tensor = random_inertial(generator)
-        model.appendBodyToJoint(at, pinocchio.Inertia(mass, centre, tensor), pinocchio.SE3.Identity())
-        entries = tensor[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]
-        inertial = f'<inertial pos="{text(here + centre)}" mass="{mass:.17g}" fullinertia="{text(entries)}"/>'
-        bodies += f'<body><joint axis="{text(axis)}" pos="{text(here)}"/>{inertial}'
-    option = f'<option gravity="{text(model.gravity.linear)}"/>'
-    mjcf_text = f"<mujoco>{option}<worldbody>{bodies}{'</body>' * 3}</worldbody></mujoco>"
-    return model, read_chain(mujoco.MjModel.from_xml_string(mjcf_text))
-
-
 @pytest.mark.parametrize("seed", range(5))
-def test_orientation_and_angular_velocity_are_pinocchio_s(seed):
-    model, chain = pinocchio_chain(np.random.default_rng(seed))
-    data, angles, rates = model.createData(), np.empty(3), np.empty(3)
+def test_orientation_angular_velocity_and_power_are_mujoco_s(seed):
+    model = random_machine(seed)
+    data, chain, angles, rates = mujoco.MjData(model), read_chain(model), np.empty(3), np.empty(3)
+    rotor, torque_S, torque_q = data.body("gamma"), np.array([0.3, -0.2, 0.5]), np.empty(3)
+    mujoco.mj_forward(model, data)
+    upright = rotor.xmat.reshape(3, 3).copy()
     for q, qdot in random_states(20, seed):
-        pinocchio.forwardKinematics(model, data, q, qdot)
+        data.qpos[:], data.qvel[:] = q, qdot
+        mujoco.mj_forward(model, data)
         ideal_pose(chain, q, qdot, angles, rates)
-        np.testing.assert_allclose(rotation(angles), data.oMi[3].rotation, rtol=0, atol=1e-13)
-        velocity = pinocchio.getVelocity(model, data, 3, pinocchio.ReferenceFrame.LOCAL_WORLD_ALIGNED)
+        np.testing.assert_allclose(rotation(angles) @ upright, rotor.xmat.reshape(3, 3), rtol=0, atol=1e-13)
         # Rates near the singularity are large; their product with the Jacobian cancels.
         size = 1e-13 * max(1.0, np.abs(rates).max())
-        np.testing.assert_allclose(rate_jacobian(angles) @ rates, velocity.angular, rtol=0, atol=size)
-
-
-def test_torque_on_the_hinges_has_the_power_of_the_torque_on_the_rotor():
-    model, chain = pinocchio_chain(np.random.default_rng(7))
-    data, torque_S, torque_q = model.createData(), np.array([0.3, -0.2, 0.5]), np.empty(3)
-    for q, qdot in random_states(20):
-        pinocchio.forwardKinematics(model, data, q, qdot)
-        velocity = pinocchio.getVelocity(model, data, 3, pinocchio.ReferenceFrame.LOCAL_WORLD_ALIGNED)
+        np.testing.assert_allclose(rate_jacobian(angles) @ rates, rotor.cvel[:3], rtol=0, atol=size)
         hinge_torque(chain, q, torque_S, torque_q)
-        assert torque_q @ qdot == pytest.approx(torque_S @ velocity.angular, abs=1e-13)
+        assert torque_q @ qdot == pytest.approx(torque_S @ rotor.cvel[:3], abs=1e-13)
 
 
 def tilted(model, tilt=0.02):

@@ -1,5 +1,6 @@
 """The torque curve's file: written, read back, refused."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -85,15 +86,12 @@ COMPUTED_FOR = "# Computed for coil turns:"
         ([COMPUTED_FOR, HEADER, *BUMP], "number after Computed for coil turns:, received none"),
     ],
 )
-def test_bad_csv_is_refused_on_one_line(tmp_path, lines, complaint):
+def test_bad_csv_is_refused(tmp_path, lines, complaint):
     path = tmp_path / "curve.csv"
     path.write_text("\n".join(lines), encoding="utf-8")
-    with pytest.raises(InputError) as refusal:
+    with pytest.raises(InputError, match=re.escape(complaint)) as refusal:
         torque_curve.read(path)
-    message = str(refusal.value)
-    assert complaint in message
-    assert str(path) in message
-    assert "\n" not in message
+    assert str(path) in str(refusal.value)
 
 
 def test_spreadsheet_s_csv_is_read(tmp_path):
@@ -106,7 +104,6 @@ def test_spreadsheet_s_csv_is_read(tmp_path):
     assert_allclose(curve.torque_Nm_per_A, np.sin(curve.phi_rad), atol=1e-6)
 
 
-def test_missing_csv_is_refused_on_one_line(tmp_path):
-    with pytest.raises(InputError, match="expected a readable text file") as refusal:
+def test_missing_csv_is_refused(tmp_path):
+    with pytest.raises(InputError, match="expected a readable text file"):
         torque_curve.read(tmp_path / "absent.csv")
-    assert "\n" not in str(refusal.value)

@@ -215,12 +215,11 @@ ROWS = [f"{t},{p},{0.01 * (t % 180 != 0)},0,0.01" for t in range(0, 181, 30) for
         ([HEAD, *(row.replace("0.01", "1e9") for row in ROWS)], "a peak between 1e-12 and 1e+06 N·m/A"),
     ],
 )
-def test_a_bad_file_is_reported_in_one_line(tmp_path, lines, complaint):
+def test_a_bad_file_is_refused(tmp_path, lines, complaint):
     (path := tmp_path / "field.csv").write_text("\n".join(lines) + "\n")
     with pytest.raises(InputError, match=re.escape(complaint)) as caught:
         torque_field.read(path)
     assert str(caught.value).startswith(f"torque field {path}: ")
-    assert "\n" not in str(caught.value)
 
 
 def written(tmp_path, *replacements):
@@ -243,10 +242,9 @@ def written(tmp_path, *replacements):
         ('"torque_field.csv"', '"elsewhere.csv"', "elsewhere.csv: expected a readable text file"),
     ],
 )
-def test_bad_groups_are_reported_in_one_line(tmp_path, old, new, complaint):
-    with pytest.raises(InputError, match=re.escape(complaint)) as caught:
+def test_bad_groups_are_refused(tmp_path, old, new, complaint):
+    with pytest.raises(InputError, match=re.escape(complaint)):
         actuators.load(written(tmp_path, (old, new)))
-    assert "\n" not in str(caught.value)
 
 
 def test_a_group_may_have_one_coil(tmp_path):

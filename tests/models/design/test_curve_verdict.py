@@ -13,6 +13,10 @@ from spheretwin.models.design import curve_check
 from spheretwin.models.torque_curve import TorqueCurve
 from tests.models.design.quadrature import sample_coarsely
 
+pytestmark = pytest.mark.release(
+    "recomputes a torque curve for 1.4 to 1.9 s; test_pole_torque.py has its parts"
+)
+
 TEXT = actuators.MJCF_PATH.read_text(encoding="utf-8")
 
 
@@ -22,7 +26,6 @@ def few_samples(monkeypatch):
     sample_coarsely(monkeypatch)
 
 
-@pytest.mark.release("recomputes a torque curve for 1.4 to 1.9 s; test_pole_torque.py has its parts")
 def test_a_weaker_magnet_is_a_factor_and_no_difference_in_shape(actuator):
     curve = actuator.torque_curve
     rows = np.r_[0:120:4, 120:721:20]
@@ -31,7 +34,6 @@ def test_a_weaker_magnet_is_a_factor_and_no_difference_in_shape(actuator):
     # The shipped samples are rounded to 12 decimals, 5e-11 of the peak.
     assert judged.geometry.scale == pytest.approx(0.93, abs=1e-6)
     assert judged.geometry.scaled.worst < 1e-6
-    assert judged.geometry.as_given.worst == pytest.approx(0.07, rel=0.01)
     assert judged.peak.peak_Nm_per_A == pytest.approx(0.93 * curve.peak_Nm_per_A, rel=0.01)
     assert 0 < judged.leave_one_out.rms < 0.01
     assert 0 < judged.lookup_error < 1e-4
@@ -46,7 +48,6 @@ def computed():
         return curve_check.compute()
 
 
-@pytest.mark.release("recomputes a torque curve for 1.4 to 1.9 s; test_pole_torque.py has its parts")
 def test_a_computed_curve_is_bounded(computed):
     mesh, lookup = computed.checks
     assert broken(computed.checks) == computed.warnings == []
@@ -59,7 +60,6 @@ def test_a_computed_curve_is_bounded(computed):
     np.testing.assert_allclose(again.torque_Nm_per_A, computed.curve.torque_Nm_per_A, rtol=0, atol=5.1e-13)
 
 
-@pytest.mark.release("recomputes a torque curve for 1.4 to 1.9 s; test_pole_torque.py has its parts")
 @pytest.mark.usefixtures("few_samples")
 def test_a_table_that_misses_the_spline_breaks_its_bound_alone(monkeypatch):
     right = curve_check.lookup_table
@@ -70,7 +70,6 @@ def test_a_table_that_misses_the_spline_breaks_its_bound_alone(monkeypatch):
     assert computed.lookup_error == pytest.approx(1e-5, rel=0.1)
 
 
-@pytest.mark.release("recomputes a torque curve for 1.4 to 1.9 s; test_pole_torque.py has its parts")
 @pytest.mark.usefixtures("few_samples")
 def test_a_model_with_nothing_but_poles_and_coils_has_a_curve(tmp_path, computed):
     (path := tmp_path / "mine.xml").write_text(TEXT.replace("group_resistance_ohm", "elsewhere"))

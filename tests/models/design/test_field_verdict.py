@@ -11,6 +11,10 @@ from spheretwin.models.design import field_check as field_verdict
 from spheretwin.models.torque_curve import TorqueCurve
 from tests.models.design.quadrature import sum_coarsely
 
+pytestmark = pytest.mark.release(
+    "sums over all windings for 0.7 to 7.5 s; content of design_direct_sums has their values"
+)
+
 
 @pytest.fixture
 def coarse(monkeypatch):
@@ -18,9 +22,6 @@ def coarse(monkeypatch):
     sum_coarsely(monkeypatch)
 
 
-@pytest.mark.release(
-    "sums over all windings for 0.7 to 7.5 s; content of design_direct_sums has their values"
-)
 def test_the_shipped_actuator_passes(actuator, monkeypatch):
     monkeypatch.setattr(field_verdict, "SCATTER_POSES", 1)
     verdict = field_verdict.judge(actuator, poses=2)
@@ -34,9 +35,6 @@ def test_the_shipped_actuator_passes(actuator, monkeypatch):
     assert not verdict.curve_is_of_another_geometry
 
 
-@pytest.mark.release(
-    "sums over all windings for 0.7 to 7.5 s; content of design_direct_sums has their values"
-)
 @pytest.mark.usefixtures("coarse")
 def test_a_wrong_matrix_is_not_attributed_to_the_curve(actuator, monkeypatch):
     right = direct_summation.fill_torque_matrix
@@ -52,9 +50,6 @@ def test_a_wrong_matrix_is_not_attributed_to_the_curve(actuator, monkeypatch):
     assert not verdict.curve_is_of_another_geometry
 
 
-@pytest.mark.release(
-    "sums over all windings for 0.7 to 7.5 s; content of design_direct_sums has their values"
-)
 @pytest.mark.usefixtures("coarse")
 def test_a_wrong_curve_is_found_and_named(actuator):
     curve = actuator.torque_curve
@@ -67,9 +62,6 @@ def test_a_wrong_curve_is_found_and_named(actuator):
     assert verdict.curve_is_of_another_geometry
 
 
-@pytest.mark.release(
-    "sums over all windings for 0.7 to 7.5 s; content of design_direct_sums has their values"
-)
 def test_few_poses_come_from_all_bands(actuator, monkeypatch):
     monkeypatch.setattr(direct_summation, "direct_torque_matrix", lambda *_: np.ones((3, 18)))
     verdict = field_verdict.judge(actuator, poses=7, seed=3)

@@ -103,24 +103,17 @@ def test_what_the_verb_writes_is_read_back_and_runs(tmp_path, capsys):
 @pytest.mark.parametrize(
     ("pole", "complaint"),
     [
-        (
-            'size="0.006 0.004" pos="0.028 0 0" zaxis="1 0 0"',
-            "expected magnets within the faces of the coils at 0.031 m",
-        ),
-        (
-            'type="ellipsoid" size="0.006 0.004 0.004" pos="0.02 0 0"',
-            "expected pole_0 as a cylinder, box or sphere",
-        ),
+        ('size="0.006 0.004" pos="0.028 0 0" zaxis="1 0 0"', "within the faces of the coils at 0.031 m"),
+        ('type="ellipsoid" size="0.006 0.004 0.004" pos="0.02 0 0"', "pole_0 as a cylinder, box or sphere"),
     ],
 )
-def test_magnets_that_do_not_fit_are_reported_in_one_line(tmp_path, pole, complaint):
-    with pytest.raises(InputError, match=complaint) as caught:
+def test_magnets_that_do_not_fit_are_refused(tmp_path, pole, complaint):
+    with pytest.raises(InputError, match=complaint):
         rotor_field.compute(written(tmp_path, pole))
-    assert "\n" not in str(caught.value)
 
 
 @pytest.mark.parametrize("flags", [["--step", "7"], ["--step", "0"], ["--degree", "2"], ["--degree", "x"]])
-def test_bad_flags_are_reported_in_one_line(flags, capsys):
+def test_bad_flags_are_refused(flags, capsys):
     assert cli.main(["magnetics", "field", *flags]) == 2
     error = capsys.readouterr().err
     assert error.startswith("spheretwin: command line: argument")

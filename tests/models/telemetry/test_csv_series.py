@@ -1,5 +1,7 @@
 """Series of the user's: read as spreadsheets write them, held or joined by lines, refused by line."""
 
+import re
+
 import numpy as np
 import pytest
 
@@ -47,12 +49,9 @@ def test_it_is_read_as_it_is_written(tmp_path, content):
     ],
 )
 def test_an_invalid_series_is_refused_by_line(tmp_path, content, complaint):
-    with pytest.raises(InputError) as refusal:
+    with pytest.raises(InputError, match=re.escape(complaint)) as refusal:
         reading(tmp_path, content)
-    message = str(refusal.value)
-    assert message.startswith(f"bench {tmp_path / 'some.csv'}: ")
-    assert complaint in message
-    assert "\n" not in message
+    assert str(refusal.value).startswith(f"bench {tmp_path / 'some.csv'}: ")
 
 
 @pytest.mark.parametrize("name", ["absent.csv", ".", "a\0b"])

@@ -65,10 +65,8 @@ def test_an_invalid_part_is_refused(kind, after_a_good_one, tmp_path):
     FOREIGN[kind](foreign)
     arrow_stream(good, table(10).arrow(FACTS))
     before = sorted(os.listdir(tmp_path))
-    with pytest.raises(InputError, match="expected an Arrow stream of a run") as caught:
+    with pytest.raises(InputError, match=rf"{foreign}.*expected an Arrow stream of a run"):
         join([good, foreign] if after_a_good_one else [foreign], tmp_path / "joined.parquet")
-    assert str(foreign) in str(caught.value)
-    assert "\n" not in str(caught.value)
     assert sorted(os.listdir(tmp_path)) == before
 
 
@@ -113,10 +111,8 @@ def test_a_stream_that_is_torn_before_it_has_a_whole_batch_is_refused(stream, tm
     (part := tmp_path / "000000.arrows").touch()
     for size in range(ends[1]):
         part.write_bytes(content[:size])
-        with pytest.raises(InputError, match="expected a part with a whole batch of rows") as caught:
+        with pytest.raises(InputError, match=rf"{part}.*expected a part with a whole batch of rows"):
             join([part], tmp_path / "joined.parquet")
-        assert str(part) in str(caught.value)
-        assert "\n" not in str(caught.value)
     assert os.listdir(tmp_path) == ["000000.arrows"]
 
 
