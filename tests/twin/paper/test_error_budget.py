@@ -6,15 +6,7 @@ import pytest
 from spheretwin import scenario as scenarios
 from spheretwin.electronics.sensor_chain import accuracy
 from spheretwin.paper import error_budget
-from spheretwin.paper.error_budget import (
-    ALL,
-    ELECTRONICS,
-    IDEAL,
-    PROTOTYPE,
-    STAGES,
-    WITH_RATES,
-    WITHOUT_ERROR,
-)
+from spheretwin.paper.error_budget import ALL, ELECTRONICS, IDEAL, PROTOTYPE, STAGES, WITH_RATES
 from spheretwin.paper.experiment import Outcomes
 from spheretwin.scenario.hardware import PROTOTYPE_NOMINAL
 from spheretwin.session import Session
@@ -22,7 +14,6 @@ from spheretwin.simulation import simulate
 from tests.twin.paper.cases import outcome
 
 BY_NAME = {stage.name: stage for stage in STAGES}
-SECTIONS = ("sensors", "estimator", "drive", "plant", "nominal")
 
 
 def scenario(stage, **more):
@@ -31,8 +22,8 @@ def scenario(stage, **more):
 
 def test_single_stages_together_are_the_prototype():
     single = [dotted for stage in STAGES if stage.name not in (ELECTRONICS, ALL) for dotted in stage.fields]
-    assert set(single) | set(WITHOUT_ERROR) | set(PROTOTYPE_NOMINAL) == set(PROTOTYPE)
-    assert not set(single) & set(WITHOUT_ERROR)
+    assert set(single) | set(error_budget.WITHOUT_ERROR) | set(PROTOTYPE_NOMINAL) == set(PROTOTYPE)
+    assert not set(single) & set(error_budget.WITHOUT_ERROR)
     named = {"delay", "quantisation", "sensor noise", "sensor nonlinearity", "friction", "voltage limit"}
     assert {IDEAL, ALL, "amplifier bandwidth", *named} <= set(BY_NAME)
 
@@ -41,7 +32,7 @@ def test_single_stages_together_are_the_prototype():
 def test_a_set_is_that_of_the_scenario(name):
     resolved = scenario(BY_NAME[name])
     whole = scenarios.load("tilt", {"hardware": name, "controller.law": "pd"})
-    for section in SECTIONS:
+    for section in ("sensors", "estimator", "drive", "plant", "nominal"):
         assert getattr(resolved, section) == getattr(whole, section)
 
 
@@ -103,9 +94,8 @@ def test_the_part_that_changes_most_is_named():
     errors[ELECTRONICS] = errors[ALL] = [1.0, 1.0, 1.0]
     errors[WITH_RATES] = [0.29, 0.0, 0.0]
     errors |= {stage.name: errors[WITH_RATES] for stage in STAGES if stage.base == WITH_RATES}
-    outcomes = Outcomes(
-        {error_budget.case("pd", stage).name: [outcome(errors[stage.name])] for stage in STAGES}
-    )
+    cases = {error_budget.case("pd", stage).name: [outcome(errors[stage.name])] for stage in STAGES}
+    outcomes = Outcomes(cases)
     assert error_budget._most(outcomes, "pd") == "PD, friction (β +2.000°)"
     del outcomes["pd: delay"]
     assert error_budget._most(outcomes, "pd") == ""

@@ -6,7 +6,7 @@ from scipy.optimize import linprog
 
 from spheretwin.models import actuator
 from spheretwin.models.design.capability import torque_matrices
-from spheretwin.paper.fault_outcomes import MOST, remaining_torque
+from spheretwin.paper.fault_outcomes import MOST, RemainingTorque, remaining_torque
 
 # Four groups about x, y, z and, at half the torque, about z again.
 BY_HAND = np.array([[[1.0, 0, 0, 0], [0, 1.0, 0, 0], [0, 0, 1.0, 0.5]]])
@@ -21,18 +21,13 @@ def path(poses, seed=0):
 
 
 def test_all_groups_by_hand():
-    result = remaining_torque(BY_HAND, ALONG_Z, LIMIT_A, ())
-    assert result.torque == pytest.approx(1.5 * LIMIT_A / 2)
     # Least norm asks the stronger for twice the current: 1 to 0.5, and 1.25 of torque at the limit.
-    assert result.least_norm == pytest.approx(1.25 * LIMIT_A / 2)
-    assert result.least_share == pytest.approx(1.0)
-    assert result.singular_value_Nm_per_A == pytest.approx(1.0)
-    assert result.rank == 3
+    expected = RemainingTorque(1.5 * LIMIT_A / 2, 1.25 * LIMIT_A / 2, 1.0, 1.0, 3)
+    assert remaining_torque(BY_HAND, ALONG_Z, LIMIT_A, ()) == pytest.approx(expected)
     # The weaker group alone.
-    result = remaining_torque(BY_HAND, ALONG_Z, LIMIT_A, (2,))
-    assert result.torque == result.least_norm == pytest.approx(0.5 * LIMIT_A / 2)
-    assert result.least_share == pytest.approx(0.25 / 1.25)
-    assert result.singular_value_Nm_per_A == pytest.approx(0.5)
+    expected = RemainingTorque(0.5 * LIMIT_A / 2, 0.5 * LIMIT_A / 2, 0.25 / 1.25, 0.5, 3)
+    assert remaining_torque(BY_HAND, ALONG_Z, LIMIT_A, (2,)) == pytest.approx(expected)
+    assert remaining_torque(BY_HAND, np.zeros((1, 3)), LIMIT_A, ()).torque == MOST  # nothing is needed
 
 
 @pytest.mark.parametrize(("opened", "rank"), [((2, 3), 2), ((0, 2, 3), 1)])
@@ -86,7 +81,3 @@ def test_what_comes_is_what_currents_for_all_groups_give(opened):
     assert shares.min() >= result.least_share - 1e-12
     # 20,000 directions come within 0.03 rad of the worst one, whose share is the least to second order.
     assert shares.min() == pytest.approx(result.least_share, abs=1e-3)
-
-
-def test_nothing_wanted_is_nothing_lacking():
-    assert remaining_torque(BY_HAND, np.zeros((1, 3)), LIMIT_A, ()).torque == MOST

@@ -69,9 +69,8 @@ def test_reaching_is_the_first_time_on_the_surface(run):
 
 
 def test_ends_of_a_margin():
-    assert stability.ends_of([True, True, False, True]) == (1, 2)
-    assert stability.ends_of([True, True]) == (1, None)
-    assert stability.ends_of([False, True]) == (None, 0)
+    held = [True, True, False, True], [True, True], [False, True]
+    assert list(map(stability.ends_of, held)) == [(1, 2), (1, None), (None, 0)]
 
 
 def test_a_law_holds_by_its_error_and_its_end():

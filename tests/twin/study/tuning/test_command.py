@@ -127,18 +127,18 @@ def test_the_best_within_each_limit_is_written_and_printed(optimise, tmp_path, c
     assert some_off == ("off" in printed)
 
 
-@pytest.mark.parametrize(
-    ("objective", "words"),
-    [
-        ({"metric": "max_abs_error_rad"}, "worst largest error, rad"),
-        ({"metric": "max_abs_error_rad", "of": ("alpha", "beta")}, "worst largest error, rad (alpha, beta)"),
-        ({"metric": "current_variation_A_s", "over": "median"}, "median current variation, A/s"),
-        ({"metric": "rms_torque_Nm", "over": "geometric_mean"}, "geometric mean rms torque, N·m"),
-        ({"metric": "slowness"}, "worst slowness"),
-    ],
-)
-def test_objectives_are_words_with_their_unit(objective, words):
-    made = Objective(**objective)
+OBJECTIVES = {
+    "worst largest error, rad": {"metric": "max_abs_error_rad"},
+    "worst largest error, rad (alpha, beta)": {"metric": "max_abs_error_rad", "of": ("alpha", "beta")},
+    "median current variation, A/s": {"metric": "current_variation_A_s", "over": "median"},
+    "geometric mean rms torque, N·m": {"metric": "rms_torque_Nm", "over": "geometric_mean"},
+    "worst slowness": {"metric": "slowness"},
+}
+
+
+@pytest.mark.parametrize("words", OBJECTIVES)
+def test_objectives_are_words_with_their_unit(words):
+    made = Objective(**OBJECTIVES[words])
     trial = {"trial": 1, "gains": {}, "fields": {"controller.damping": 1.0}, "ended": "completed"}
     trial |= {"values": {made.called: 2.0}, "fresh": None, "fresh_reason": None}
     head, _ = report.chosen({"start": None, "best": [trial]})
