@@ -35,114 +35,43 @@ def several(calls):
 
 
 HELP = [
-    "--help",
-    *(f"{verb} --help" for verb in cli.VERBS),
-    "magnetics curve --help",
-    "magnetics check --help",
-    "magnetics map --help",
-    "log check --help",
-    "simulate tilt --help run",
-    "simulate hold --help controller.governor",
-    "bench --help watchdog",
-    "simulate hold --help fault",
-    "simulate --help trajectory --controller.law pid",
-    "simulate hold --help controler",
-]
+    "--help", *(f"{verb} --help" for verb in cli.VERBS), "magnetics curve --help", "magnetics check --help",
+    "magnetics map --help", "log check --help", "simulate tilt --help run",
+    "simulate hold --help controller.governor", "bench --help watchdog", "simulate hold --help fault",
+    "simulate --help trajectory --controller.law pid", "simulate hold --help controler",
+]  # fmt: skip
 
 EXPLAIN = [
-    "explain hardware prototype --json",
-    "explain hardware electronics",
-    "explain hardware x",
-    "explain scenario nutation",
-    "explain scenario tilt --all --json",
-    "explain plant.coulomb_Nm",
-    "explain drive --json",
-    "explain plant.coulomb",
-    "explain hardware ideal x",
-    "explain trajectory",
+    "explain hardware prototype --json", "explain hardware electronics", "explain hardware x",
+    "explain scenario nutation", "explain scenario tilt --all --json", "explain plant.coulomb_Nm",
+    "explain drive --json", "explain plant.coulomb", "explain hardware ideal x", "explain trajectory",
     "explain scenario x",
-]
+]  # fmt: skip
 
 REFUSED = [
-    "",
-    "fly",
-    "simulte",
-    "simulate",
-    "simulate x",
-    "simulate hold x",
-    "simulate hold --duration",
-    "simulate hold --duration 1 --duration 2",
-    "simulate hold --record a.rrd --record b.rrd",
-    "simulate hold --record=",
-    "simulate hold --recrod a.rrd",
-    "simulate hold --metric x",
-    "simulate hold --metric nothing.py:f",
-    "simulate hold --replay a.parquet",
-    "simulate --replay nothing.parquet",
-    "simulate --replay a.rrd",
-    "simulate --seed=2",
-    "simulate hold --view control",
-    "simulate hold --json --json",
-    "simulate hold --record nowhere/a.rrd",
-    "simulate hold --telemetry nowhere/a.parquet",
-    "simulate hold --plant.mjcf nothing.xml",
-    "simulate hold --plant.torque_curve nothing.csv",
-    "bench hold x",
-    "bench nowhere",
-    "bench --port 70000",
-    "bench --hold-after -1",
-    "crosscheck x",
-    "crosscheck --states 0",
-    "crosscheck --mjcf nothing.xml",
-    "crosscheck --out a --figure-format gif",
-    "reproduce",
-    "reproduce figure99",
-    "reproduce figure6 --seeds 0",
-    "reproduce figure6 figure6 --limit 0",
-    "reproduce all --plant x",
-    "sweep",
-    "sweep x",
-    "sweep paper --limit 0",
-    "sweep paper --row x",
-    "sweep paper --row 0123456789abcdef",
-    "sweep paper --optimise",
-    "sweep paper --trials 3",
-    "sweep paper --row 1 --out a",
-    "sweep paper --optimise --row 1",
-    "sweep paper --engine x",
-    "sweep paper --address x",
-    "sweep nothing.toml",
-    "sweep rivals_ideal --optimise --limit 3",
-    "review",
-    "review nothing.parquet",
-    "review a --tolerance gate",
-    "review a b --tolerance gat",
-    "review a --merge b.rrd",
-    "review a b --merge c.txt",
-    "review a b --export c.csv",
-    "review a --export d.txt",
-    "review a.txt",
-    "recover",
-    "recover a.rrd",
-    "recover a.rrd --out b.parquet",
-    "recover nothing.parquet --out b.parquet",
-    "recover a --out b",
-    "magnetics",
-    "magnetics x",
-    "magnetics check --poses 0",
-    "magnetics curve --csv a.csv --out b.csv",
-    "magnetics curve --csv nothing.csv",
-    "magnetics map --need 0",
-    "magnetics map --largest-tilt 86",
-    "magnetics check --mjcf nothing.xml",
-    "log check",
-    "log check a.txt",
-    "log check nothing.csv --accept gap",
-    "explain",
-    "explain x",
-    "--x",
-    "explain x --y",
-]
+    "", "fly", "simulte", "simulate", "simulate x", "simulate hold x", "simulate hold --duration",
+    "simulate hold --duration 1 --duration 2", "simulate hold --record a.rrd --record b.rrd",
+    "simulate hold --record=", "simulate hold --recrod a.rrd", "simulate hold --metric x",
+    "simulate hold --metric nothing.py:f", "simulate hold --replay a.parquet",
+    "simulate --replay nothing.parquet", "simulate --replay a.rrd", "simulate --seed=2",
+    "simulate hold --view control", "simulate hold --json --json", "simulate hold --record nowhere/a.rrd",
+    "simulate hold --telemetry nowhere/a.parquet", "simulate hold --plant.mjcf nothing.xml",
+    "simulate hold --plant.torque_curve nothing.csv", "bench hold x", "bench nowhere", "bench --port 70000",
+    "bench --hold-after -1", "crosscheck x", "crosscheck --states 0", "crosscheck --mjcf nothing.xml",
+    "crosscheck --out a --figure-format gif", "reproduce", "reproduce figure99",
+    "reproduce figure6 --seeds 0", "reproduce figure6 figure6 --limit 0", "reproduce all --plant x", "sweep",
+    "sweep x", "sweep paper --limit 0", "sweep paper --row x", "sweep paper --row 0123456789abcdef",
+    "sweep paper --optimise", "sweep paper --trials 3", "sweep paper --row 1 --out a",
+    "sweep paper --optimise --row 1", "sweep paper --engine x", "sweep paper --address x",
+    "sweep nothing.toml", "sweep rivals_ideal --optimise --limit 3", "review", "review nothing.parquet",
+    "review a --tolerance gate", "review a b --tolerance gat", "review a --merge b.rrd",
+    "review a b --merge c.txt", "review a b --export c.csv", "review a --export d.txt", "review a.txt",
+    "recover", "recover a.rrd", "recover a.rrd --out b.parquet", "recover nothing.parquet --out b.parquet",
+    "recover a --out b", "magnetics", "magnetics x", "magnetics check --poses 0",
+    "magnetics curve --csv a.csv --out b.csv", "magnetics curve --csv nothing.csv", "magnetics map --need 0",
+    "magnetics map --largest-tilt 86", "magnetics check --mjcf nothing.xml", "log check", "log check a.txt",
+    "log check nothing.csv --accept gap", "explain", "explain x", "--x", "explain x --y",
+]  # fmt: skip
 
 
 def refusals():
@@ -187,15 +116,8 @@ def runs():
             f"simulate nutation --duration 0.05 --json {lagrangian}",
             f"simulate nutation --duration 0.05 {lagrangian}",
             [
-                "simulate",
-                "nutation",
-                "--duration",
-                "0.05",
-                "--plant.engine",
-                "lagrangian",
-                "--fault",
-                FAULTS,
-                "--json",
+                "simulate", "nutation", "--duration", "0.05", "--plant.engine", "lagrangian", "--fault",
+                FAULTS, "--json",
             ],
             f"simulate sinusoid --controller.law pd --disturbance.load 900 --json {lagrangian}",
             f"simulate sinusoid --controller.law pd --disturbance.load 900 {lagrangian}",
@@ -206,7 +128,7 @@ def runs():
             f"simulate --replay {folder}/c.parquet",
             f"simulate --replay {folder}/b.parquet --seed 3",
         ]
-    )
+    )  # fmt: skip
 
 
 def reviews():
@@ -217,20 +139,15 @@ def reviews():
     )
     text = several(
         [
-            f"review {a}",
-            f"review {a} --json",
-            f"review {a} {b}",
-            f"review {a} {b} {c} --json",
+            f"review {a}", f"review {a} --json", f"review {a} {b}", f"review {a} {b} {c} --json",
             f"review {a} {b} --tolerance {folder}/narrow.toml",
             f"review {a} {b} --tolerance {folder}/narrow.toml --json",
-            f"review {a} {a} --tolerance {folder}/narrow.toml",
-            f"review {c}",
-            f"review {a} --export {folder}/a.csv",
-            f"review {a} {b} --figures {folder}/figures",
+            f"review {a} {a} --tolerance {folder}/narrow.toml", f"review {c}",
+            f"review {a} --export {folder}/a.csv", f"review {a} {b} --figures {folder}/figures",
             f"review {a} {b} --merge {folder}/{{}}.rrd".format("merged"),
             f"recover {a} --out {folder}/again.parquet",
         ]
-    )
+    )  # fmt: skip
     (folder / "merged.rrd").unlink()
     page = re.sub(
         r"(?s)<(script|style)\b.*?</\1>", "", (folder / "figures" / "review.html").read_text(encoding="utf-8")
@@ -285,15 +202,10 @@ def magnetics():
 
 
 CASES = {
-    "command_help": lambda: several(HELP),
-    "command_explain": lambda: several(EXPLAIN),
-    "command_refusals": refusals,
-    "command_runs": runs,
-    "command_reviews": reviews,
-    "command_sweeps": sweeps,
-    "command_logs": logs,
-    "command_magnetics": magnetics,
-}
+    "command_help": lambda: several(HELP), "command_explain": lambda: several(EXPLAIN),
+    "command_refusals": refusals, "command_runs": runs, "command_reviews": reviews, "command_sweeps": sweeps,
+    "command_logs": logs, "command_magnetics": magnetics,
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("name", CASES)

@@ -115,46 +115,29 @@ COMBINATIONS = {
         for name in ("duration", "plant.mjcf", "seed", "controller", "nothing", "fault.0")
     ]
     + [
-        {"event": [EVENT, {**EVENT, "value": "much"}]},
-        {"event": [{**EVENT, "t_s": -1}]},
+        {"event": [EVENT, {**EVENT, "value": "much"}]}, {"event": [{**EVENT, "t_s": -1}]},
         {"event": [{"t_s": 1}]},
         {"event": [{**EVENT, "t_s": 0.5, "value": 5e9}, {**EVENT, "set": "controller.law", "value": "pdd"}]},
-        {"event": {"a": 1}},
-        {"event": [3]},
-        {"event.1.t_s": 3},
+        {"event": {"a": 1}}, {"event": [3]}, {"event.1.t_s": 3},
     ],
     "faults": [
         {"fault": [{**COIL, **more}]}
         for more in (
-            {"mode": "gain"},
-            {"mode": "gain", "value": 9.0},
-            {"mode": "open", "value": 1.0},
-            {"start_s": -1.0},
-            {"start_s": 1.0, "end_s": 0.5},
-            {"target": "coil"},
-            {"target": "coil.x"},
+            {"mode": "gain"}, {"mode": "gain", "value": 9.0}, {"mode": "open", "value": 1.0},
+            {"start_s": -1.0}, {"start_s": 1.0, "end_s": 0.5}, {"target": "coil"}, {"target": "coil.x"},
             {"target": "coil.99"},
             {"target": "encoder.alpha", "mode": "stuck", "reported_to_controller": True},
-            {"target": "encoder.delta"},
-            {"target": "pot.beta", "mode": "open"},
-            {"target": "supply", "mode": "short"},
-            {"mode": "bored"},
-            {"detect": True},
-            {"target": "adc.alpha", "mode": "stuck"},
-            {"target": "dac.02", "mode": "stuck"},
+            {"target": "encoder.delta"}, {"target": "pot.beta", "mode": "open"},
+            {"target": "supply", "mode": "short"}, {"mode": "bored"}, {"detect": True},
+            {"target": "adc.alpha", "mode": "stuck"}, {"target": "dac.02", "mode": "stuck"},
         )
     ]
     + [{"fault": [COIL, COIL]}, {"fault": [COIL, {**COIL, "mode": "short"}]}],
     "laws": [
         {"controller.law": "pd", "controller.integral": 3.0},
-        {"controller.law": "afsm", "controller.stiffness": 2.0},
-        {"controller.law": "nothing.py:Law"},
-        {"controller.law": "Law"},
-        {"controller.law": ["pd"]},
-        {"controller.preset": "x"},
-        {"estimator.kind": "x"},
-        {"allocation": "x"},
-        {"hardware": "protoype"},
+        {"controller.law": "afsm", "controller.stiffness": 2.0}, {"controller.law": "nothing.py:Law"},
+        {"controller.law": "Law"}, {"controller.law": ["pd"]}, {"controller.preset": "x"},
+        {"estimator.kind": "x"}, {"allocation": "x"}, {"hardware": "protoype"},
     ],
     "trajectories": [{"trajectory": {"shape": shape}} for shape in ("table", "waypoints", "steps", "spiral")]
     + [
@@ -166,26 +149,17 @@ COMBINATIONS = {
     "disturbances": [
         {"disturbance.terms": [term]}
         for term in (
-            {"kind": "x"},
-            {},
-            {"kind": "steps", "times_s": [1.0], "torques_Nm": []},
-            {"kind": "table"},
+            {"kind": "x"}, {}, {"kind": "steps", "times_s": [1.0], "torques_Nm": []}, {"kind": "table"},
             {"kind": "steps", "times_s": [1.0, 0.5], "torques_Nm": [[0, 0, 0], [0, 0, 1]]},
-            {"kind": "sinusoidal", "frequency_Hz": -1.0},
-            {"kind": "constant", "torque_Nm": [1, 2]},
+            {"kind": "sinusoidal", "frequency_Hz": -1.0}, {"kind": "constant", "torque_Nm": [1, 2]},
             {"kind": "random", "bound_Nm": -1},
         )
     ],
     "names": [
-        {"controler.law": "pd"},
-        {"law": "pd"},
-        {"plant.x.y": 1},
-        {"seed.deep": 1},
-        {"fault.0.known": True},
-        {"load": 1},
-        {"a..b": 1},
+        {"controler.law": "pd"}, {"law": "pd"}, {"plant.x.y": 1}, {"seed.deep": 1}, {"fault.0.known": True},
+        {"load": 1}, {"a..b": 1},
     ],
-}
+}  # fmt: skip
 
 
 def messages_about_combinations():
@@ -217,19 +191,12 @@ def results_of_changes():
     content = {}
     base = scenarios.load("sinusoid", {"controller.law": "pid", "hardware": "electronics", "fault": [COIL]})
     changes = [
-        ("controller.law", "afsm"),
-        ("controller.law", "pd"),
-        ("trajectory.shape", "hold"),
-        ("fault", {"target": "coil.05", "mode": "open"}),
-        ("fault", []),
-        ("estimator.kind", "kalman"),
-        ("disturbance.load", 2.0),
-        ("nominal.equals_truth", True),
-        ("nominal.modelling_error", 0.1),
-        ("fault.0.mode", "short"),
-        ("disturbance.terms", [{"kind": "constant"}]),
+        ("controller.law", "afsm"), ("controller.law", "pd"), ("trajectory.shape", "hold"),
+        ("fault", {"target": "coil.05", "mode": "open"}), ("fault", []), ("estimator.kind", "kalman"),
+        ("disturbance.load", 2.0), ("nominal.equals_truth", True), ("nominal.modelling_error", 0.1),
+        ("fault.0.mode", "short"), ("disturbance.terms", [{"kind": "constant"}]),
         ("trajectory", {"shape": "hold", "angle_rad": [0.1, 0, 0]}),
-    ]
+    ]  # fmt: skip
     before = dict(_flat(json.loads(base.model_dump_json())))
     for name, value in changes:
         try:
@@ -277,27 +244,13 @@ def schedules():
 
 
 FLAGS = [
-    ["--duration", "2"],
-    ["--duration=2"],
-    ["--duration"],
-    ["x"],
-    ["--plant.initial-rad", "0", "0.1", "-0.2"],
-    ["--name", "12"],
-    ["--seed", "true"],
-    ["--seed", "null"],
-    ["--plant.mjcf", "7"],
-    ["--event.0.t-s", "1", "--event.0.set", "duration"],
-    ["--seed", "1e3"],
-    ["--duration", "1e999"],
-    ["--duration", "inf"],
-    ["--duration", "nan"],
-    ["--a", "[1, 2]"],
-    ["--a", '{"b": 1}'],
-    ["--controller.law", "pd", "--controller.law", "pid"],
-    ["--duration="],
-    ["--a", "-1"],
+    ["--duration", "2"], ["--duration=2"], ["--duration"], ["x"], ["--plant.initial-rad", "0", "0.1", "-0.2"],
+    ["--name", "12"], ["--seed", "true"], ["--seed", "null"], ["--plant.mjcf", "7"],
+    ["--event.0.t-s", "1", "--event.0.set", "duration"], ["--seed", "1e3"], ["--duration", "1e999"],
+    ["--duration", "inf"], ["--duration", "nan"], ["--a", "[1, 2]"], ["--a", '{"b": 1}'],
+    ["--controller.law", "pd", "--controller.law", "pid"], ["--duration="], ["--a", "-1"],
     ["--a", "1", "b", "false"],
-]
+]  # fmt: skip
 
 
 def flags():
@@ -317,21 +270,10 @@ OBJECTIVE = {"metric": "rms_torque_Nm"}
 
 STUDIES = (
     [
-        {"scenario": "x"},
-        {"name": ""},
-        {"name": "a/b"},
-        {"seeds": 0},
-        {"samples": 3},
-        {"metrics": ["x"]},
-        {"metrics": []},
-        {"law": [{}]},
-        {"law": [{"law": "x"}]},
-        {"law": [{"law": "pd"}, {"law": "pd"}]},
-        {"fields": {"x": 1}},
-        {"fields": {"duration": -1}},
-        {"axis": [AXIS, AXIS]},
-        {"axis": [{**AXIS, "field": "x"}]},
-        {"axis": [{**AXIS, "values": []}]},
+        {"scenario": "x"}, {"name": ""}, {"name": "a/b"}, {"seeds": 0}, {"samples": 3}, {"metrics": ["x"]},
+        {"metrics": []}, {"law": [{}]}, {"law": [{"law": "x"}]}, {"law": [{"law": "pd"}, {"law": "pd"}]},
+        {"fields": {"x": 1}}, {"fields": {"duration": -1}}, {"axis": [AXIS, AXIS]},
+        {"axis": [{**AXIS, "field": "x"}]}, {"axis": [{**AXIS, "values": []}]},
         {"axis": [{**AXIS, "values": [1.0, 1.0]}]},
         {"axis": [{**AXIS, "zip": "a"}, {"field": "seed", "kind": "values", "values": [1], "zip": "a"}]},
         {"axis": [{**AXIS, "kind": "uniform"}]},
@@ -349,13 +291,8 @@ STUDIES = (
         {"axis": [{**AXIS, "field": "seed"}]},
         {"axis": [{**AXIS, "field": "controller.law", "values": ["pd", "pid"]}]},
         {"axis": [{**AXIS, "field": "name", "values": ["x", "y"]}]},
-        {"axis": [{**AXIS, "field": "event.0.t_s"}]},
-        {"design": "x"},
-        {"samples": 0},
-        {"seed": -1},
-        {"common_seeds": 1},
-        {"x": 1},
-        {"optimise": {"gain": [], "objective": [OBJECTIVE]}},
+        {"axis": [{**AXIS, "field": "event.0.t_s"}]}, {"design": "x"}, {"samples": 0}, {"seed": -1},
+        {"common_seeds": 1}, {"x": 1}, {"optimise": {"gain": [], "objective": [OBJECTIVE]}},
         {"optimise": {"gain": [GAIN], "objective": [OBJECTIVE] * 3}},
         {"optimise": {"gain": [GAIN], "objective": []}},
         {"optimise": {"gain": [GAIN, GAIN], "objective": [OBJECTIVE]}},
@@ -363,19 +300,9 @@ STUDIES = (
     + [
         {"optimise": {"gain": [{**GAIN, **more}], "objective": [OBJECTIVE]}}
         for more in (
-            {"low": 2.0},
-            {"low": 3.0},
-            {"low": 0.0, "log": True},
-            {"start": 0.5},
-            {"start": 2.0},
-            {"start": 2.5},
-            {"sets": [{"field": "x"}]},
-            {"field": "", "sets": [{"field": "x"}]},
-            {"field": ""},
-            {"field": "nothing"},
-            {"law": "x"},
-            {"name": "n" * 101},
-            {"reason": "r" * 201},
+            {"low": 2.0}, {"low": 3.0}, {"low": 0.0, "log": True}, {"start": 0.5}, {"start": 2.0},
+            {"start": 2.5}, {"sets": [{"field": "x"}]}, {"field": "", "sets": [{"field": "x"}]},
+            {"field": ""}, {"field": "nothing"}, {"law": "x"}, {"name": "n" * 101}, {"reason": "r" * 201},
             {
                 "field": "",
                 "name": "n",
@@ -387,35 +314,20 @@ STUDIES = (
     + [
         {"optimise": {"gain": [GAIN], "objective": [{**OBJECTIVE, **more}]}}
         for more in (
-            {"metric": "x"},
-            {"of": ["alpha"]},
-            {"metric": "rms_error_rad", "of": ["alpha", "alpha"]},
-            {"over": "x"},
-            {"limits": [2.0, 1.0]},
-            {"limits": [0.0]},
-            {"direction": "maximise", "over": "geometric_mean"},
-            {"direction": "maximise", "limits": [1.0]},
-            {"limits": [1.0]},
-            {"metric": "rms_error_rad", "of": ["delta"]},
+            {"metric": "x"}, {"of": ["alpha"]}, {"metric": "rms_error_rad", "of": ["alpha", "alpha"]},
+            {"over": "x"}, {"limits": [2.0, 1.0]}, {"limits": [0.0]},
+            {"direction": "maximise", "over": "geometric_mean"}, {"direction": "maximise", "limits": [1.0]},
+            {"limits": [1.0]}, {"metric": "rms_error_rad", "of": ["delta"]},
         )
     ]
     + [
         {"optimise": {"gain": [GAIN], "objective": [OBJECTIVE, {**OBJECTIVE, "over": "median"}], **more}}
         for more in (
-            {},
-            {"sampler": "local"},
-            {"sampler": "x"},
-            {"trials": 0},
-            {"trials": 100001},
-            {"fresh": -1},
-            {"fresh": 1001},
-            {"together": 0},
-            {"draws": 0},
-            {"perturbations": 0},
-            {"prune": 1},
+            {}, {"sampler": "local"}, {"sampler": "x"}, {"trials": 0}, {"trials": 100001}, {"fresh": -1},
+            {"fresh": 1001}, {"together": 0}, {"draws": 0}, {"perturbations": 0}, {"prune": 1},
         )
     ]
-)
+)  # fmt: skip
 
 
 def made_rows(fields):
@@ -434,18 +346,12 @@ def schemas():
 
 CASES = {
     "scenario_fields": fields_of_scenarios,
-    "scenario_schema": lambda: schema_text(Scenario.model_json_schema()),
-    "scenario_hardware": hardware_sets,
-    "scenario_shipped": defaults_of_shipped_scenarios,
-    "scenario_messages": messages_about_values,
-    "scenario_combinations": messages_about_combinations,
-    "scenario_changes": messages_about_changes,
-    "scenario_changed_fields": results_of_changes,
-    "scenario_schedule": schedules,
-    "scenario_flags": flags,
-    "study_messages": messages_about_studies,
-    "study_schema": schemas,
-}
+    "scenario_schema": lambda: schema_text(Scenario.model_json_schema()), "scenario_hardware": hardware_sets,
+    "scenario_shipped": defaults_of_shipped_scenarios, "scenario_messages": messages_about_values,
+    "scenario_combinations": messages_about_combinations, "scenario_changes": messages_about_changes,
+    "scenario_changed_fields": results_of_changes, "scenario_schedule": schedules, "scenario_flags": flags,
+    "study_messages": messages_about_studies, "study_schema": schemas,
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("name", CASES)
