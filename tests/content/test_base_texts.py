@@ -41,40 +41,15 @@ def texts():
     for _ in range(30):
         deep = [deep]
     errors_ = [
-        OSError(2, "x", "a.txt"),
-        OSError(2, "x", f"a{errors.HIDDEN}"),
-        OSError(2, "x", "a", None, "b"),
-        OSError("plain"),
-        ValueError("a\n b\t c"),
-        ValueError(),
-        RecursionError("deep"),
-        UnicodeDecodeError("utf-8", b"\xff", 0, 1, "bad"),
-        KeyError("k"),
-    ]
+        OSError(2, "x", "a.txt"), OSError(2, "x", f"a{errors.HIDDEN}"), OSError(2, "x", "a", None, "b"),
+        OSError("plain"), ValueError("a\n b\t c"), ValueError(), RecursionError("deep"),
+        UnicodeDecodeError("utf-8", b"\xff", 0, 1, "bad"), KeyError("k"),
+    ]  # fmt: skip
     values = [
-        None,
-        True,
-        3,
-        1.5,
-        "text",
-        "a\nb",
-        b"x",
-        [],
-        [1, None],
-        (1, 2),
-        {},
-        {"a": [False, {"b": None}]},
-        deep,
-        list(range(100)),
-        {i: i for i in range(100)},
-        np.zeros(3),
-        np.arange(500),
-        np.float64(0.5),
-        10**5000,
-        "x" * 500,
-        Raises(),
-        [[[["x"]]]],
-    ]
+        None, True, 3, 1.5, "text", "a\nb", b"x", [], [1, None], (1, 2), {}, {"a": [False, {"b": None}]},
+        deep, list(range(100)), {i: i for i in range(100)}, np.zeros(3), np.arange(500), np.float64(0.5),
+        10**5000, "x" * 500, Raises(), [[[["x"]]]],
+    ]  # fmt: skip
     lines = [
         f"{error!r}: {errors.without_breaks(error)} | {errors.exception_text(error)}" for error in errors_
     ]
@@ -88,15 +63,10 @@ def texts():
     lines += [
         repr(errors.distinct_texts(*numbers))
         for numbers in (
-            (1.0, 2.0),
-            (1.0, 1.0),
-            (1.0, 1.0 + 1e-9),
-            (1.0, 1 + 2**-52),
-            (0.1 + 0.2, 0.3),
-            (1 / 3, 2 / 3),
+            (1.0, 2.0), (1.0, 1.0), (1.0, 1.0 + 1e-9), (1.0, 1 + 2**-52), (0.1 + 0.2, 0.3), (1 / 3, 2 / 3),
             (1e300, 1.0, 1.00000001),
         )
-    ]
+    ]  # fmt: skip
     lines += [
         errors.did_you_mean(text, ("hold", "nutation", "tilt")) or "none"
         for text in ("hodl", "nutatoin", "x", "", "t" * 500, "til")
@@ -109,17 +79,13 @@ def texts():
 
 
 CHECKS = [
-    Check("low", "a", 3, 0.5, 1.0, "w"),
-    Check("high", "b", 1, 1.5, 1.0, "w", "rad"),
+    Check("low", "a", 3, 0.5, 1.0, "w"), Check("high", "b", 1, 1.5, 1.0, "w", "rad"),
     Check("equal", "c", 1, 1.0, 1.0, "w", "N·m", 1.0),
     Check("between", "d", 1, 0.0123456, 0.02, "w", "s", 0.01, {"x": 1.0, "y": float("nan")}),
-    Check("below", "e", 1, 0.005, 0.02, "w", "1", 0.01),
-    Check("nan", "f", 1, float("nan"), 1.0, "w"),
-    Check("none", "g", 0, None, 1.0, "w"),
-    Check("free", "h", 1, 123456.0, None, "w", "A"),
-    Check("inf", "i", 1, float("inf"), 2e-5, "w"),
-    Check("zero", "j", 1, 0.0, 1e-2, "w"),
-]
+    Check("below", "e", 1, 0.005, 0.02, "w", "1", 0.01), Check("nan", "f", 1, float("nan"), 1.0, "w"),
+    Check("none", "g", 0, None, 1.0, "w"), Check("free", "h", 1, 123456.0, None, "w", "A"),
+    Check("inf", "i", 1, float("inf"), 2e-5, "w"), Check("zero", "j", 1, 0.0, 1e-2, "w"),
+]  # fmt: skip
 
 
 def checks():
@@ -132,34 +98,18 @@ def user_files():
     folder = scratch("user_files")
     for name, text in {
         "good": "from math import sin\ndef law(x):\n    return 2 * x\nVALUE = 3\ndef Other():\n    pass\n",
-        "syntax": "x = 1\ndef law(:\n",
-        "raises": "x = 1\n\n\n1 / 0\n",
-        "deep": "def f():\n    raise ValueError('a\\nb')\nf()\n",
-        "empty": "",
-        "values": "A = 1\n",
+        "syntax": "x = 1\ndef law(:\n", "raises": "x = 1\n\n\n1 / 0\n",
+        "deep": "def f():\n    raise ValueError('a\\nb')\nf()\n", "empty": "", "values": "A = 1\n",
         "quits": "raise SystemExit(3)\n",
-    }.items():
+    }.items():  # fmt: skip
         (folder / f"{name}.py").write_text(text)
     (folder / "bytes.py").write_bytes(b"x = '\xff'\n")
     lines = []
     for reference in (
-        "good.py:law",
-        "good.py:lwa",
-        "good.py:VALUE",
-        "good.py:sin",
-        "good.py:",
-        ":law",
-        "good",
-        "syntax.py:law",
-        "raises.py:law",
-        "deep.py:f",
-        "empty.py:law",
-        "values.py:law",
-        "none.py:law",
-        "a\0.py:law",
-        "quits.py:law",
-        "bytes.py:law",
-    ):
+        "good.py:law", "good.py:lwa", "good.py:VALUE", "good.py:sin", "good.py:", ":law", "good",
+        "syntax.py:law", "raises.py:law", "deep.py:f", "empty.py:law", "values.py:law", "none.py:law",
+        "a\0.py:law", "quits.py:law", "bytes.py:law",
+    ):  # fmt: skip
         path = f"{folder}/{reference}"
         lines.append(f"{reference}: {user_code.is_reference(path)}")
         for load in (user_code.load_function, user_code.load_named):
@@ -174,23 +124,13 @@ def user_files():
 
 
 CSV = {
-    "good": "t_s,a,b\n0,1,2\n0.5,3,4\n1.5,-1,0\n",
-    "comments": "# c\n\nb, a ,t_s\n# d\n1,2,0\n3,4,1e-3\n",
-    "order": "t_s,a,b\n0,1,2\n0,3,4\n",
-    "near": "t_s,a,b\n1,1,2\n1.0000000001,3,4\n",
-    "short": "t_s,a,b\n0,1\n",
-    "word": "# x\nt_s,a,b\n0,1,x\n",
-    "large": "t_s,a,b\n0,1,2e9\n",
-    "nan": "t_s,a,b\n0,nan,2\n",
-    "missing": "t_s,a\n0,1\n",
-    "twice": "t_s,a,b,a\n0,1,2,3\n",
-    "empty": "",
-    "head": "t_s,a,b\n",
-    "long": "t_s,a,b\n1e99,1,2\n",
-    "quote": 't_s,"a",b\n0,"1",2\n',
-    "negative": "t_s,a,b\n-1,1,2\n0,1,2\n",
-    "bom": "\ufefft_s,a,b\n0,1,2\n",
-}
+    "good": "t_s,a,b\n0,1,2\n0.5,3,4\n1.5,-1,0\n", "comments": "# c\n\nb, a ,t_s\n# d\n1,2,0\n3,4,1e-3\n",
+    "order": "t_s,a,b\n0,1,2\n0,3,4\n", "near": "t_s,a,b\n1,1,2\n1.0000000001,3,4\n",
+    "short": "t_s,a,b\n0,1\n", "word": "# x\nt_s,a,b\n0,1,x\n", "large": "t_s,a,b\n0,1,2e9\n",
+    "nan": "t_s,a,b\n0,nan,2\n", "missing": "t_s,a\n0,1\n", "twice": "t_s,a,b,a\n0,1,2,3\n", "empty": "",
+    "head": "t_s,a,b\n", "long": "t_s,a,b\n1e99,1,2\n", "quote": 't_s,"a",b\n0,"1",2\n',
+    "negative": "t_s,a,b\n-1,1,2\n0,1,2\n", "bom": "\ufefft_s,a,b\n0,1,2\n",
+}  # fmt: skip
 
 
 def series():
@@ -218,24 +158,13 @@ def columns():
     """Signals, their headings and places, and what tables refuse."""
     lines = []
     for arguments in (
-        ("a", "rad", 1, "m"),
-        ("a", "rad", 3, "m"),
-        ("a", "rad", 2, "m", ("x", "y")),
-        ("", "rad", 1, "m"),
-        (3, "rad", 1, "m"),
-        ("a\n", "rad", 1, "m"),
-        ("a", 1, 1, "m"),
-        ("a", "rad", 0, "m"),
-        ("a", "rad", True, "m"),
-        ("a", "rad", 1.0, "m"),
-        ("a", "rad", 1, "m\x00"),
-        ("a", "rad", 2, "m", ("x",)),
-        ("a", "rad", 1, "m", ("x,y",)),
-        ("a", "rad", 1, "m", ("",)),
-        ("a", "rad", 1, "m", "x"),
-        ("a", "1", 1, "m", (), ("on", "off")),
+        ("a", "rad", 1, "m"), ("a", "rad", 3, "m"), ("a", "rad", 2, "m", ("x", "y")), ("", "rad", 1, "m"),
+        (3, "rad", 1, "m"), ("a\n", "rad", 1, "m"), ("a", 1, 1, "m"), ("a", "rad", 0, "m"),
+        ("a", "rad", True, "m"), ("a", "rad", 1.0, "m"), ("a", "rad", 1, "m\x00"),
+        ("a", "rad", 2, "m", ("x",)), ("a", "rad", 1, "m", ("x,y",)), ("a", "rad", 1, "m", ("",)),
+        ("a", "rad", 1, "m", "x"), ("a", "1", 1, "m", (), ("on", "off")),
         ("a", "1", 1, "m", (), ("on", "o,f")),
-    ):
+    ):  # fmt: skip
         lines += [f"{arguments}: {result(Signal, *arguments)}"]
     common = signals.common_signals(18)
     lines += [f"{signal}, {signal.headings()[:4]}" for signal in common]
@@ -264,13 +193,9 @@ def columns():
         lines.append(f"{again.signals} {again.values.tolist()} {metadata}")
     lines.append(result(read_parquet, path.with_name("none.parquet")))
     for log in (
-        np.zeros((2, 3)),
-        np.zeros((2, 4)),
-        np.zeros((2, 3), dtype=np.float32),
-        np.zeros((3, 2)).T,
-        [[0.0] * 3],
-        np.zeros(3),
-    ):
+        np.zeros((2, 3)), np.zeros((2, 4)), np.zeros((2, 3), dtype=np.float32), np.zeros((3, 2)).T,
+        [[0.0] * 3], np.zeros(3),
+    ):  # fmt: skip
         lines.append(result(check_rows, log, 3))
     buffer = TelemetryBuffer(pair, 5)
     buffer.write(table.rows(0, 2))
@@ -294,17 +219,10 @@ def record():
     lines = tree(texts)
     lines.append(repr(RunRecord.from_metadata(texts) == made))
     for change in (
-        {"scenario": "3"},
-        {"scenario": "{"},
-        {"journal": "[1]"},
-        {"journal": '[["x", 1, 2]]'},
-        {"ticks": "x"},
-        {"status": "x"},
-        {"status": "complete"},
-        {"first_tick": "x"},
-        {"files": "[]"},
+        {"scenario": "3"}, {"scenario": "{"}, {"journal": "[1]"}, {"journal": '[["x", 1, 2]]'},
+        {"ticks": "x"}, {"status": "x"}, {"status": "complete"}, {"first_tick": "x"}, {"files": "[]"},
         {"versions": "1"},
-    ):
+    ):  # fmt: skip
         lines.append(f"{change}: {result(RunRecord.from_metadata, {**texts, **change})}")
     for name in texts:
         others = {key: text for key, text in texts.items() if key != name}
@@ -342,13 +260,9 @@ def events():
     scale[700] = 0.0
     fault = table["fault"]
     (
-        fault[100:300, 0],
-        fault[200:, 1],
-        fault[400:600, 2],
-        fault[500:700, 0],
-        fault[600:, 2],
+        fault[100:300, 0], fault[200:, 1], fault[400:600, 2], fault[500:700, 0], fault[600:, 2],
         fault[0:50, 3],
-    ) = 1, 2, 1, 2, 2, 1
+    ) = 1, 2, 1, 2, 2, 1  # fmt: skip
     out, delay = table["group_out"], table["time_to_detection_s"]
     delay[:] = -1.0
     out[130:, 0], delay[130:, 0] = 1, 0.03
@@ -372,14 +286,9 @@ def events():
 
 
 CASES = {
-    "base_texts": texts,
-    "base_checks": checks,
-    "base_user_files": user_files,
-    "telemetry_series": series,
-    "telemetry_columns": columns,
-    "telemetry_record": record,
-    "telemetry_events": events,
-}
+    "base_texts": texts, "base_checks": checks, "base_user_files": user_files, "telemetry_series": series,
+    "telemetry_columns": columns, "telemetry_record": record, "telemetry_events": events,
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("name", CASES)

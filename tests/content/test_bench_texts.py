@@ -59,56 +59,28 @@ def differences(before, after, prefix=""):
 COIL = {"target": "coil.07", "mode": "open"}
 
 SCRIPT = [
-    ("start", {}, 20),
-    ("set", {"name": "disturbance.load", "value": 0.5}, 10),
-    ("hold", {}, 30),
-    ("snapshot", {"name": "s"}, 1),
-    ("point", {"pose_rad": [0.1, -0.05, 0.2]}, 150),
-    ("jog", {"rates_rad_s": [0.05, -0.1, 0.3]}, 60),
-    ("add_fault", {"fault": COIL}, 20),
-    ("add_fault", {"fault": {**COIL, "target": "coil.02"}}, 5),
-    ("clear_faults", {"place": 0}, 5),
-    ("clear_faults", {"place": 7}, 0),
-    ("manual", {"group": 4, "current_A": 0.3}, 10),
-    ("manual", {"currents_A": [0.01] * 18}, 10),
-    ("manual", {"group": 99}, 0),
+    ("start", {}, 20), ("set", {"name": "disturbance.load", "value": 0.5}, 10), ("hold", {}, 30),
+    ("snapshot", {"name": "s"}, 1), ("point", {"pose_rad": [0.1, -0.05, 0.2]}, 150),
+    ("jog", {"rates_rad_s": [0.05, -0.1, 0.3]}, 60), ("add_fault", {"fault": COIL}, 20),
+    ("add_fault", {"fault": {**COIL, "target": "coil.02"}}, 5), ("clear_faults", {"place": 0}, 5),
+    ("clear_faults", {"place": 7}, 0), ("manual", {"group": 4, "current_A": 0.3}, 10),
+    ("manual", {"currents_A": [0.01] * 18}, 10), ("manual", {"group": 99}, 0),
     ("trajectory", {"fields": {"shape": "sinusoid", "frequency_Hz": 1.0}}, 80),
     ("set", {"name": "trajectory.frequency_Hz", "value": 0.8}, 40),
     ("set", {"name": "controller.law", "value": "pid"}, 20),
-    ("set", {"name": "plant.step_s", "value": 0.00025}, 5),
-    ("limits", {"rate_rad_s": 0.4}, 5),
-    ("limits", {}, 0),
-    ("limits", {"rate_rad_s": -1.0}, 0),
-    ("restore", {"name": "x"}, 0),
-    ("restore", {"name": "s"}, 20),
-    ("speed", {"factor": 2.0}, 5),
-    ("set", {"name": "seed", "value": 5}, 5),
-    ("set", {"name": "hardware", "value": "electronics"}, 0),
-    ("pause", {}, 10),
-    ("step", {"ticks": 7}, 10),
-    ("reset", {}, 5),
-    ("start", {}, 30),
-    ("off", {}, 10),
-    ("stop", {}, 10),
-    ("hold", {}, 5),
-    ("restore", {"name": "s"}, 0),
-    ("reset", {}, 0),
-    ("load", {"source": "tilt", "overrides": QUIET}, 0),
-    ("start", {}, 25),
-    ("set", {"name": "manual.currents_A", "value": None}, 0),
-    ("trajectory", {"fields": {"shape": "hold", "approach": {"x": 1}}}, 0),
-    ("grant", {"to": "nobody"}, 0),
-    ("keep", {}, 0),
-    ("record", {"telemetry": "FOLDER/r.parquet"}, 15),
-    ("keep", {}, 5),
-    ("save", {"file": "FOLDER/saved.toml"}, 0),
-    ("replay", {"file": "FOLDER/r.parquet"}, 5),
-    ("hold", {}, 5),
-    ("set", {"name": "disturbance.load", "value": 1000.0}, 1500),
-    ("hold", {}, 3),
-    ("snapshot", {"name": "t"}, 0),
-    ("reset", {}, 0),
-]
+    ("set", {"name": "plant.step_s", "value": 0.00025}, 5), ("limits", {"rate_rad_s": 0.4}, 5),
+    ("limits", {}, 0), ("limits", {"rate_rad_s": -1.0}, 0), ("restore", {"name": "x"}, 0),
+    ("restore", {"name": "s"}, 20), ("speed", {"factor": 2.0}, 5), ("set", {"name": "seed", "value": 5}, 5),
+    ("set", {"name": "hardware", "value": "electronics"}, 0), ("pause", {}, 10), ("step", {"ticks": 7}, 10),
+    ("reset", {}, 5), ("start", {}, 30), ("off", {}, 10), ("stop", {}, 10), ("hold", {}, 5),
+    ("restore", {"name": "s"}, 0), ("reset", {}, 0), ("load", {"source": "tilt", "overrides": QUIET}, 0),
+    ("start", {}, 25), ("set", {"name": "manual.currents_A", "value": None}, 0),
+    ("trajectory", {"fields": {"shape": "hold", "approach": {"x": 1}}}, 0), ("grant", {"to": "nobody"}, 0),
+    ("keep", {}, 0), ("record", {"telemetry": "FOLDER/r.parquet"}, 15), ("keep", {}, 5),
+    ("save", {"file": "FOLDER/saved.toml"}, 0), ("replay", {"file": "FOLDER/r.parquet"}, 5), ("hold", {}, 5),
+    ("set", {"name": "disturbance.load", "value": 1000.0}, 1500), ("hold", {}, 3),
+    ("snapshot", {"name": "t"}, 0), ("reset", {}, 0),
+]  # fmt: skip
 
 
 def a_script_of_commands():
@@ -154,36 +126,14 @@ def a_script_of_operators():
     clock = Clock()
     operators, lines = Operators(2.0, 10.0, clock), []
     steps = [
-        (0, "register", "a"),
-        (1, "register", "b"),
-        (1, "ask", "b"),
-        (1, "ask", "c"),
-        (1, "ask", "b"),
-        (2, "check", "b"),
-        (2, "check", None),
-        (2, "grant", "b", "c"),
-        (2, "grant", "a", "x"),
-        (3, "grant", "a", "c"),
-        (3, "check", "a"),
-        (4, "leave", "c"),
-        (4, "leave", "b"),
-        (5, "check_silence"),
-        (6, "check_silence"),
-        (6.5, "check_silence"),
-        (7, "check_silence"),
-        (7, "ask", "d"),
-        (8, "register", "a"),
-        (16.9, "check_silence"),
-        (17.5, "check_silence"),
-        (18, "register", "a"),
-        (18.5, "check_silence"),
-        (19, "ask", "a"),
-        (30, "check_silence"),
-        (31, "check_silence"),
-        (32, "register", "e"),
-        (33, "ask", "f"),
-        (42.5, "check_silence"),
-    ]
+        (0, "register", "a"), (1, "register", "b"), (1, "ask", "b"), (1, "ask", "c"), (1, "ask", "b"),
+        (2, "check", "b"), (2, "check", None), (2, "grant", "b", "c"), (2, "grant", "a", "x"),
+        (3, "grant", "a", "c"), (3, "check", "a"), (4, "leave", "c"), (4, "leave", "b"), (5, "check_silence"),
+        (6, "check_silence"), (6.5, "check_silence"), (7, "check_silence"), (7, "ask", "d"),
+        (8, "register", "a"), (16.9, "check_silence"), (17.5, "check_silence"), (18, "register", "a"),
+        (18.5, "check_silence"), (19, "ask", "a"), (30, "check_silence"), (31, "check_silence"),
+        (32, "register", "e"), (33, "ask", "f"), (42.5, "check_silence"),
+    ]  # fmt: skip
     steps += [(50, "register", f"client {place}") for place in range(70)]
     for now, name, *arguments in steps:
         clock.now = now
@@ -203,18 +153,10 @@ def a_script_of_the_pace():
     clock = Clock()
     pace, lines, t_s = Pace(clock), [], 0.0
     for speed, took_s in [
-        *[(1.0, 0.001)] * 8,
-        *[(1.0, 0.015)] * 3,
-        *[(2.0, 0.006)] * 4,
-        *[(1.0, 0.3)] * 2,
-        *[(0.1, 0.001)] * 3,
-        *[(1e6, 0.002)] * 4,
-        *[(1e6, 0.012)] * 2,
-        *[(1.0, 0.004)] * 4,
-        *[(1.0, 0.01)] * 2,
-        (20.0, 0.0041),
+        *[(1.0, 0.001)] * 8, *[(1.0, 0.015)] * 3, *[(2.0, 0.006)] * 4, *[(1.0, 0.3)] * 2, *[(0.1, 0.001)] * 3,
+        *[(1e6, 0.002)] * 4, *[(1e6, 0.012)] * 2, *[(1.0, 0.004)] * 4, *[(1.0, 0.01)] * 2, (20.0, 0.0041),
         (20.0, 0.0039),
-    ]:
+    ]:  # fmt: skip
         pace.speed = speed
         ticks, wait_s = pace.ticks(1e-3), pace.wait_s()
         clock.now += wait_s + took_s
@@ -296,13 +238,10 @@ def choices():
 
 
 CASES = {
-    "bench_script": a_script_of_commands,
-    "bench_shapes": shapes_of_modes,
-    "bench_operators": a_script_of_operators,
-    "bench_pace": a_script_of_the_pace,
-    "bench_arguments": arguments_of_commands,
-    "bench_choices": choices,
-}
+    "bench_script": a_script_of_commands, "bench_shapes": shapes_of_modes,
+    "bench_operators": a_script_of_operators, "bench_pace": a_script_of_the_pace,
+    "bench_arguments": arguments_of_commands, "bench_choices": choices,
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("name", CASES)

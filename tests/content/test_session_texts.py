@@ -59,27 +59,16 @@ def of_sessions():
         report("after changes", session, session.advance(15))
         lines += [f"journal {change}" for change in session.journal]
         for name, value in (
-            ("duration", 1.0),
-            ("x", 1),
-            ("controller.law", "x"),
-            ("plant.engine", "mujoco"),
-            (3, 1),
-            ("controller.period_s", 0.01),
-            ("disturbance.load", "x"),
-            ("trajectory.frequency_Hz", -1.0),
-            ("drive.supply_V", 24.0),
-            ("sensors.adc.bits", 12),
+            ("duration", 1.0), ("x", 1), ("controller.law", "x"), ("plant.engine", "mujoco"), (3, 1),
+            ("controller.period_s", 0.01), ("disturbance.load", "x"), ("trajectory.frequency_Hz", -1.0),
+            ("drive.supply_V", 24.0), ("sensors.adc.bits", 12),
             ("fault", {"target": "coil.77", "mode": "open"}),
-        ):
+        ):  # fmt: skip
             attempt(f"set {name} {value}", session.set, name, value)
         for given in (
-            {},
-            {"q_rad": [3.0, 0, 0]},
-            {"q_rad": [1, 2]},
-            {"current_A": [0.0]},
-            {"current_A": [99.0] * 18},
+            {}, {"q_rad": [3.0, 0, 0]}, {"q_rad": [1, 2]}, {"current_A": [0.0]}, {"current_A": [99.0] * 18},
             {"qdot_rad_s": [float("nan"), 0, 0]},
-        ):
+        ):  # fmt: skip
             attempt(f"set_state {given}", session.set_state, **given)
         for ticks in (-1, 1.5, "x", True, 10**13):
             attempt(f"advance {ticks}", session.advance, ticks)
@@ -218,12 +207,8 @@ def of_outputs():
     )
     attempt("folder", outputs.check, [folder])
     for rate, record, period_s in (
-        (None, None, 1e-3),
-        (10.0, None, 1e-3),
-        (1000.0, one, 1e-3),
-        (1000.1, one, 1e-3),
-        (999.9, one, 1e-3),
-    ):
+        (None, None, 1e-3), (10.0, None, 1e-3), (1000.0, one, 1e-3), (1000.1, one, 1e-3), (999.9, one, 1e-3),
+    ):  # fmt: skip
         attempt(
             f"rate {rate} {record and record.name} {period_s}", outputs.check_rate, rate, record, period_s
         )
@@ -247,15 +232,12 @@ def of_outputs():
         plan = replay.read(one)
         lines.append(f"plan {plan.scenario.name}, {plan.ticks}, {plan.journal}, {plan.first_tick}")
     for title, change in (
-        ("ticks", {"ticks": 0}),
-        ("first", {"first_tick": 120}),
+        ("ticks", {"ticks": 0}), ("first", {"first_tick": 120}),
         ("law", {"journal": (Change(3, "controller.law", "mine"),)}),
-        ("file", {"files": {str(actuators.MJCF_PATH): "0" * 64}}),
-        ("scenario", {"scenario": {}}),
-        ("field", {"scenario": {"x": 1}}),
-        ("change", {"journal": (Change(3, "x", 1),)}),
+        ("file", {"files": {str(actuators.MJCF_PATH): "0" * 64}}), ("scenario", {"scenario": {}}),
+        ("field", {"scenario": {"x": 1}}), ("change", {"journal": (Change(3, "x", 1),)}),
         ("value", {"journal": (Change(3, "plant.mjcf", 3),)}),
-    ):
+    ):  # fmt: skip
         other = folder / f"{title}.parquet"
         table.write_parquet(other, replace(record, **change).metadata())
         attempt(f"replay {title}", replay.read, other)
@@ -267,11 +249,8 @@ def of_outputs():
 
 
 CASES = {
-    "run_sinks": of_sinks,
-    "run_outputs": of_outputs,
-    "run_sessions": of_sessions,
-    "run_objects": run_objects,
-}
+    "run_sinks": of_sinks, "run_outputs": of_outputs, "run_sessions": of_sessions, "run_objects": run_objects,
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("name", CASES)
