@@ -31,15 +31,12 @@ PACKAGES = (
 VOLATILE = (
     (rf"(\b(?:python|{PACKAGES})[ =]+v?'?)\d+\.\d[\w.+-]*", r"\1VERSION"),
     (r"\d{4}-\d\d-\d\d[T ]\d\d:\d\d(:\d\d(\.\d+)?)?( ?UTC|Z|\+00:00)?", "TIME"),
-    (r"\b[0-9a-f]{40,64}\b", "DIGEST"),
-    (r"crosscheck, \d+\.\d s", "crosscheck, DURATION"),
+    (r"\b[0-9a-f]{40,64}\b", "DIGEST"), (r"crosscheck, \d+\.\d s", "crosscheck, DURATION"),
     (r"(\"?(?:wall_s|realtime_factor)\"?:? )(?:[\d.e+-]+|null|None)", r"\1DURATION"),
-    (r"simulated in \d+\.\d+ s: \S+ times", "simulated in DURATION"),
-    (r"(open it: +)\S*rerun\b", r"\1rerun"),
-    (r"(\"versions\": )\{[^}]*\}", r"\1VERSIONS"),
-    (r"(which the extra \w+ installs: ).*", r"\1COMMAND"),
+    (r"simulated in \d+\.\d+ s: \S+ times", "simulated in DURATION"), (r"(open it: +)\S*rerun\b", r"\1rerun"),
+    (r"(\"versions\": )\{[^}]*\}", r"\1VERSIONS"), (r"(which the extra \w+ installs: ).*", r"\1COMMAND"),
     (r"\b[0-9a-f]{8}-[0-9a-f]{4}-[0-9a-f]{4}-[0-9a-f]{4}-[0-9a-f]{12}\b", "UUID"),
-)
+)  # fmt: skip
 """Texts that vary by machine, version or time, and their placeholders. A case adds its own by `replaced`."""
 
 

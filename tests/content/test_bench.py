@@ -21,33 +21,15 @@ from tests.viz.bench import fake
 IDENTITY = re.compile(r"[0-9a-f]{8}-[0-9a-f]{4}-[0-9a-f]{4}-[0-9a-f]{4}-[0-9a-f]{12}")
 
 LATER = {
-    "mode": "point",
-    "running": False,
-    "stopped": True,
-    "law": "pd & <b>",
-    "t_s": 2.5,
-    "speed": 0.5,
-    "realtime_factor": 0.4567,
-    "q_rad": (0.2, 0.1, -0.4),
-    "q_ref_rad": (0.25, 0.15, -0.35),
-    "error_mrad": 12.345,
-    "error_deg": 0.7073,
-    "current_A": tuple(3.5 - 0.5 * np.arange(fake.GROUPS)),
-    "temperature_C": tuple(20.0 + 1.5 * np.arange(fake.GROUPS)),
-    "torque_margin": 1.75,
-    "saturated": True,
-    "status": "failsafe",
-    "reason": "a coil is too hot",
-    "faults": ("coil.07 open from 1 s", "supply off"),
-    "pending": (("plant.engine", "mujoco"), ("seed", "3")),
-    "snapshots": ("last", "before"),
-    "recording": ("bench.rrd",),
-    "completed_files": ("a.parquet",),
-    "note": "a note",
-    "operator": None,
-    "watching": ("page 1", "page 2"),
-    "asking": ("page 2",),
-}
+    "mode": "point", "running": False, "stopped": True, "law": "pd & <b>", "t_s": 2.5, "speed": 0.5,
+    "realtime_factor": 0.4567, "q_rad": (0.2, 0.1, -0.4), "q_ref_rad": (0.25, 0.15, -0.35),
+    "error_mrad": 12.345, "error_deg": 0.7073, "current_A": tuple(3.5 - 0.5 * np.arange(fake.GROUPS)),
+    "temperature_C": tuple(20.0 + 1.5 * np.arange(fake.GROUPS)), "torque_margin": 1.75, "saturated": True,
+    "status": "failsafe", "reason": "a coil is too hot", "faults": ("coil.07 open from 1 s", "supply off"),
+    "pending": (("plant.engine", "mujoco"), ("seed", "3")), "snapshots": ("last", "before"),
+    "recording": ("bench.rrd",), "completed_files": ("a.parquet",), "note": "a note", "operator": None,
+    "watching": ("page 1", "page 2"), "asking": ("page 2",),
+}  # fmt: skip
 
 
 class _Names:

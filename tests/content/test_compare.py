@@ -22,19 +22,12 @@ def test_rounding_is_no_difference(expected, actual):
 @pytest.mark.parametrize(
     ("expected", "actual"),
     [
-        ("error 1.0 mrad", "error 1.0 rad"),
-        ("error 1.0 mrad", "error 1.000002 mrad"),
-        ("rows 1000000", "rows 1000001"),
-        ("mean 0.0", "mean 2e-12"),
-        ("mean 1.0", "mean -1.0"),
-        ("colour #12e567ff", "colour #12e568ff"),
-        ("run_1", "run_2"),
-        ("a\nb", "b\na"),
-        ("a\nb", "a"),
-        ("a", "a\na"),
-        ("value 1.0", "value nan"),
+        ("error 1.0 mrad", "error 1.0 rad"), ("error 1.0 mrad", "error 1.000002 mrad"),
+        ("rows 1000000", "rows 1000001"), ("mean 0.0", "mean 2e-12"), ("mean 1.0", "mean -1.0"),
+        ("colour #12e567ff", "colour #12e568ff"), ("run_1", "run_2"), ("a\nb", "b\na"), ("a\nb", "a"),
+        ("a", "a\na"), ("value 1.0", "value nan"),
     ],
-)
+)  # fmt: skip
 def test_content_is_a_difference(expected, actual):
     assert difference(expected, actual)
 

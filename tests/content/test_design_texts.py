@@ -157,13 +157,9 @@ def published():
 
 
 CASES = {
-    "design_direct_sums": direct_sums,
-    "design_field_verdict": verdict_of_the_field,
-    "design_curves": curves,
-    "design_workspaces": workspaces,
-    "design_geometry": geometry,
-    "design_published": published,
-}
+    "design_direct_sums": direct_sums, "design_field_verdict": verdict_of_the_field, "design_curves": curves,
+    "design_workspaces": workspaces, "design_geometry": geometry, "design_published": published,
+}  # fmt: skip
 
 
 RELEASE = {"design_field_verdict": "recomputes a field for 1.3 s; other cases have the form of a verdict"}

@@ -143,12 +143,8 @@ def magnetics_pages() -> str:
         patch.object(curve_check, "compute", lambda *_: computed_curve()),
     ):
         parts = [
-            ("check",),
-            ("check", "--json"),
-            ("map", "--need", "2"),
-            ("map", "--json"),
-            ("curve", "--json"),
-        ]
+            ("check",), ("check", "--json"), ("map", "--need", "2"), ("map", "--json"), ("curve", "--json"),
+        ]  # fmt: skip
         outputs = [command("magnetics", *part) for part in parts]
     return "\n".join([folder_text(write, scratch("magnetics")), *outputs])
 
@@ -184,13 +180,10 @@ def formats() -> str:
 
 
 CASES: Cases = {
-    "page_formats": formats,
-    **{f"study_{name}": partial(study_page, name) for name in STUDIES},
-    "tuning_page": tuning_page,
-    "crosscheck_page": crosscheck_page,
-    "magnetics_pages": magnetics_pages,
+    "page_formats": formats, **{f"study_{name}": partial(study_page, name) for name in STUDIES},
+    "tuning_page": tuning_page, "crosscheck_page": crosscheck_page, "magnetics_pages": magnetics_pages,
     "html_page": html_page,
-}
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("name", CASES)

@@ -36,11 +36,8 @@ def decimated_electronics() -> str:
 def payload() -> str:
     """A run under another law with a payload, ended by the watchdog."""
     changes = {
-        "hardware": "electronics",
-        "watchdog.on": True,
-        "controller.law": "pd",
-        "plant.payload_kg": 0.4,
-    }
+        "hardware": "electronics", "watchdog.on": True, "controller.law": "pd", "plant.payload_kg": 0.4,
+    }  # fmt: skip
     session = session_of("sinusoid", duration=0.4, **changes)
     return recording_text(recording(_file("payload"), session, 250, Status.FAILSAFE, shown="coils"))
 
@@ -120,14 +117,10 @@ def _file(name: str) -> Path:
 
 
 CASES: Cases = {
-    "recording_every_row": every_row,
-    "recording_decimated": decimated_electronics,
-    "recording_payload": payload,
-    "recording_recovered": recovered,
-    "recording_live": live_view,
-    "recording_merged": merged,
-    "recording_side_by_side": side_by_side,
-}
+    "recording_every_row": every_row, "recording_decimated": decimated_electronics,
+    "recording_payload": payload, "recording_recovered": recovered, "recording_live": live_view,
+    "recording_merged": merged, "recording_side_by_side": side_by_side,
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("name", CASES)

@@ -32,12 +32,9 @@ def run_files() -> dict[str, Path]:
         "other": {"controller.law": "pd", "disturbance.load": 1.5},
         "slow": {"controller.period_s": 2e-3, "seed": 7},
         "electronics": {
-            "hardware": "electronics",
-            "fault": FAULTS,
-            "watchdog.on": True,
-            "controller.law": "afsm_eso",
+            "hardware": "electronics", "fault": FAULTS, "watchdog.on": True, "controller.law": "afsm_eso",
         },
-    }
+    }  # fmt: skip
     files = {}
     for name, fields in changes.items():
         scenario = scenarios.load("tilt", {"plant.engine": "lagrangian", "duration": 0.4, **fields})
@@ -162,11 +159,8 @@ def terminal() -> str:
     """Tables and texts of the terminal that no verb prints from constructed runs, also in colour."""
     figures = {"law_metric": 3, **SUMMARY}
     figures |= {
-        "warnings": ["a [warning]"],
-        "notes": ["a note"],
-        "realtime_factor": 12.3456,
-        "overshoot_rad": None,
-    }
+        "warnings": ["a [warning]"], "notes": ["a note"], "realtime_factor": 12.3456, "overshoot_rad": None,
+    }  # fmt: skip
 
     def all_tables() -> None:
         for status, why in (
@@ -231,17 +225,11 @@ def fault_texts() -> str:
 
 
 CASES: Cases = {
-    "review_terminal": reviews,
-    "review_json": review_json,
-    "review_page": review_page,
-    "review_merge": review_merge,
-    "review_recover": recoveries,
-    "review_exported": exported,
-    "review_faults": fault_texts,
-    "review_simulate": simulations,
-    "terminal_tables": terminal,
+    "review_terminal": reviews, "review_json": review_json, "review_page": review_page,
+    "review_merge": review_merge, "review_recover": recoveries, "review_exported": exported,
+    "review_faults": fault_texts, "review_simulate": simulations, "terminal_tables": terminal,
     "terminal_many_events": many_events,
-}
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("name", CASES)

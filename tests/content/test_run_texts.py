@@ -87,13 +87,10 @@ def of_parts():
     listed += [
         {
             "trajectory.approach": {
-                "start_s": 0.01,
-                "lasts_s": 0.02,
-                "angle_rad": [0.01, 0.0, 0.02],
-                "shape_s": 0.5,
+                "start_s": 0.01, "lasts_s": 0.02, "angle_rad": [0.01, 0.0, 0.02], "shape_s": 0.5,
             }
         }
-    ]
+    ]  # fmt: skip
     listed += [
         {"disturbance.terms": [{"kind": kind, **more}]}
         for kind, more in (
@@ -148,16 +145,9 @@ def of_faults():
 
 
 SECTIONS = (
-    "sensors.",
-    "drive.",
-    "plant.",
-    "estimator.",
-    "watchdog.",
-    "detector.",
-    "nominal.",
-    "controller.",
+    "sensors.", "drive.", "plant.", "estimator.", "watchdog.", "detector.", "nominal.", "controller.",
     "disturbance.",
-)
+)  # fmt: skip
 
 
 def varied(value):

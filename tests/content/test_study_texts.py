@@ -63,12 +63,9 @@ LAWS = [{"law": "pd"}, {"law": "pid", "integral": [1.0, 2.0, 3.0]}]
 
 def row_facts(row):
     return {
-        "number": row.number,
-        "seed": row.seed,
-        "values": dict(row.values),
-        "law": dict(row.law or {}),
+        "number": row.number, "seed": row.seed, "values": dict(row.values), "law": dict(row.law or {}),
         "repeat": row.repeat,
-    }
+    }  # fmt: skip
 
 
 def rows_of_a_grid():
@@ -99,14 +96,10 @@ def table_of_a_study():
     rows = statistics.read(folder / "table.parquet")
     facts = {
         "columns": {field.name: str(field.type) for field in table.schema},
-        "rows": [dict(row.items()) for row in table.to_pylist()],
-        "failures": rows.failures.tolist(),
-        "complaints": rows.complaints.tolist(),
-        "laws": rows.laws.tolist(),
-        "main": rows.main,
-        "summary": statistics.summary(rows),
-        "metadata": metadata,
-    }
+        "rows": [dict(row.items()) for row in table.to_pylist()], "failures": rows.failures.tolist(),
+        "complaints": rows.complaints.tolist(), "laws": rows.laws.tolist(), "main": rows.main,
+        "summary": statistics.summary(rows), "metadata": metadata,
+    }  # fmt: skip
     markdown, _ = report.write(folder, rows, statistics.summary(rows), (len(table), 30), "my study.toml")
     return lines(facts) + "\n" + markdown.read_text(encoding="utf-8")
 
@@ -151,14 +144,10 @@ def trials_of_each_sampler():
         gains = (
             tuning.gain(start=100.0),
             {
-                "name": "both",
-                "low": 1.0,
-                "high": 4.0,
-                "optional": True,
-                "sets": [{"field": "controller.damping", "factor": 2.0, "power": 0.5}],
-                "start": 2.0,
+                "name": "both", "low": 1.0, "high": 4.0, "optional": True,
+                "sets": [{"field": "controller.damping", "factor": 2.0, "power": 0.5}], "start": 2.0,
             },
-        )
+        )  # fmt: skip
         chosen = tuning.study(
             folder,
             ("miss", {"metric": "slowness", "over": "median"}),

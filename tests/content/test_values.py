@@ -156,14 +156,11 @@ def shapes() -> str:
     """Solids, meshes and poses of the scene."""
     outline = [(1.0, 0.0), (2.0, 0.5), (1.5, 3.0), (0.5, 2.0)]
     surfaces = {
-        "revolved": solids.revolved_surface(outline, 7),
-        "tube": solids.tube(0.5, 1.5, -1.0, 2.0, 6),
-        "cylinder": solids.cylinder(0.7, 0.1, 0.9, 5),
-        "zone": solids.zone(2.0, -1.0, 1.5, 4, 9),
-        "bar": solids.bar((1.0, 2.0, 3.0)),
-        "reversed": solids.reversed_(solids.bar((1.0, 2.0, 3.0))),
+        "revolved": solids.revolved_surface(outline, 7), "tube": solids.tube(0.5, 1.5, -1.0, 2.0, 6),
+        "cylinder": solids.cylinder(0.7, 0.1, 0.9, 5), "zone": solids.zone(2.0, -1.0, 1.5, 4, 9),
+        "bar": solids.bar((1.0, 2.0, 3.0)), "reversed": solids.reversed_(solids.bar((1.0, 2.0, 3.0))),
         "merged": solids.merged_surface([solids.bar((1.0, 2.0, 3.0)), solids.cylinder(0.7, 0.1, 0.9, 5)]),
-    }
+    }  # fmt: skip
     lines = [
         f"{name} {array(surface.positions)} {array(surface.triangles)}" for name, surface in surfaces.items()
     ]
@@ -182,12 +179,9 @@ def shapes() -> str:
 
 
 CASES: Cases = {
-    "values_ranges": ranges,
-    "values_decimated": decimated,
-    "values_quantities": every_quantity,
-    "values_colours": colours,
-    "values_shapes": shapes,
-}
+    "values_ranges": ranges, "values_decimated": decimated, "values_quantities": every_quantity,
+    "values_colours": colours, "values_shapes": shapes,
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("name", CASES)

@@ -57,13 +57,9 @@ def array(values: object) -> str:
     finite = flat[there]
     scale = np.abs(finite).max()
     statistics = {
-        "first": finite[0],
-        "last": finite[-1],
-        "min": finite.min(),
-        "max": finite.max(),
-        "mean": finite.mean(),
-        "weighted": np.mean(places[there] * finite),
-    }
+        "first": finite[0], "last": finite[-1], "min": finite.min(), "max": finite.max(),
+        "mean": finite.mean(), "weighted": np.mean(places[there] * finite),
+    }  # fmt: skip
     if values.ndim > 1:  # neighbours within a row exchange their places
         columns = 1 + np.arange(values.shape[-1])
         weights = np.broadcast_to(columns / columns[-1] if len(columns) else columns, values.shape).ravel()[
