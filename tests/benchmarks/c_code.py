@@ -24,14 +24,11 @@ CASES = {
     "AFSM": {"controller.law": "afsm"},
     "AFSM-ESO": {"controller.law": "afsm_eso"},
     "AFSM-ESO `prototype`, Kalman": {
-        "controller.law": "afsm_eso",
-        "controller.preset": "prototype",
-        "estimator.kind": "kalman",
-        "nominal.delay_s": 1.5e-3,
-        "nominal.coulomb_Nm": [2e-3] * 3,
+        "controller.law": "afsm_eso", "controller.preset": "prototype", "estimator.kind": "kalman",
+        "nominal.delay_s": 1.5e-3, "nominal.coulomb_Nm": [2e-3] * 3,
     },
     "PID, bounded allocation": {"controller.law": "pid", "allocation": "bounded"},
-}
+}  # fmt: skip
 RUN = {"plant.engine": "lagrangian", "duration": 1.0, "nominal.current_limit_A": 1.5, "disturbance.load": 1.0}
 CORES = {
     "Cortex-M4, float": ["-mcpu=cortex-m4", "-mfloat-abi=hard", "-mfpu=fpv4-sp-d16", "-DST_SINGLE"],

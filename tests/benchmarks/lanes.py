@@ -114,17 +114,13 @@ def ratios():
     """Measure everything."""
     taken = fastest(
         {
-            "single": single({}),
-            "lockstep": lockstep({}),
-            "single, friction": single(FRICTION),
-            "lockstep, friction": lockstep(FRICTION),
-            "single, no field": single_without_field(),
-            "lockstep, no field": lockstep_without_field(),
-            "torques": environment("torque"),
+            "single": single({}), "lockstep": lockstep({}), "single, friction": single(FRICTION),
+            "lockstep, friction": lockstep(FRICTION), "single, no field": single_without_field(),
+            "lockstep, no field": lockstep_without_field(), "torques": environment("torque"),
             "currents": environment("current"),
         },
         rounds=9,
-    )
+    )  # fmt: skip
     return [
         ratio("one plant over one of 64, rotor and field", taken["single"], taken["lockstep"], at_least=2.0),
         ratio(

@@ -254,23 +254,15 @@ def ratios() -> list[dict[str, object]]:
         )
     inner = fastest(
         {
-            "loop": loop_seconds,
-            "bare": bare_seconds,
-            "lagrangian": lagrangian_seconds,
-            "G_t": torque_matrix_seconds,
-            "plant step": plant_step_seconds,
-            "bounded": bounded_seconds,
-            "single": single_tick_seconds,
-            "tick": tick_seconds,
-            "set-up": set_up_seconds,
-            "brief run": brief_run_seconds,
-            "brief loop": brief_loop_seconds,
-            "electronics": hardware_seconds("electronics"),
-            "ideal": hardware_seconds("ideal"),
+            "loop": loop_seconds, "bare": bare_seconds, "lagrangian": lagrangian_seconds,
+            "G_t": torque_matrix_seconds, "plant step": plant_step_seconds, "bounded": bounded_seconds,
+            "single": single_tick_seconds, "tick": tick_seconds, "set-up": set_up_seconds,
+            "brief run": brief_run_seconds, "brief loop": brief_loop_seconds,
+            "electronics": hardware_seconds("electronics"), "ideal": hardware_seconds("ideal"),
             "prototype": hardware_seconds("prototype"),
         },
         rounds=9,
-    )
+    )  # fmt: skip
     threads = fastest({"one": threads_seconds(1), "two": threads_seconds(2)}, rounds=5)
     outer = fastest({"plain": plain_seconds, "loop": loop_seconds}, rounds=3)
     bare, loop = inner["bare"], inner["loop"]

@@ -32,14 +32,9 @@ def test_plain_loop_runs_the_same_physics():
         rotor.model, rotor.data, actuator, scenario, law, reference, table["disturbance_Nm"], TICKS
     )
     names = (
-        "q_rad",
-        "qdot_rad_s",
-        "error_rad",
-        "torque_command_Nm",
-        "torque_Nm",
-        "current_command_A",
+        "q_rad", "qdot_rad_s", "error_rad", "torque_command_Nm", "torque_Nm", "current_command_A",
         "current_A",
-    )
+    )  # fmt: skip
     scale = {name: np.abs(table[name][:TICKS]).max() for name in names}
     for tick, row in enumerate(rows):
         for name, value in zip(names, row, strict=True):

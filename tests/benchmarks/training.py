@@ -76,13 +76,10 @@ def errors_of_policy(model, scaling):
 def error_of_pid(scenario, period_s):
     """RMS error (rad) of the same episode under PID with its default gains."""
     changes = {
-        "trajectory.angle_rad": list(scenario.trajectory.angle_rad),
-        "seed": scenario.seed,
-        "duration": scenario.duration,
-        "plant.engine": "lagrangian",
-        "controller.law": "pid",
+        "trajectory.angle_rad": list(scenario.trajectory.angle_rad), "seed": scenario.seed,
+        "duration": scenario.duration, "plant.engine": "lagrangian", "controller.law": "pid",
         "controller.period_s": period_s,
-    }
+    }  # fmt: skip
     run = st.simulate("hold", changes)
     return float(np.sqrt(np.mean(np.sum(run.telemetry["error_rad"] ** 2, axis=1))))
 

@@ -92,13 +92,10 @@ def run_or_save(example: Example) -> None:
 
 
 PARSERS = [
-    SkipParser(),
-    CodeBlockParser("python", run_or_save),
-    CodeBlockParser("sh", run_shell),
-    CodeBlockParser("toml", parse_or_save(tomllib.loads)),
-    CodeBlockParser("json", parse_or_save(json.loads)),
+    SkipParser(), CodeBlockParser("python", run_or_save), CodeBlockParser("sh", run_shell),
+    CodeBlockParser("toml", parse_or_save(tomllib.loads)), CodeBlockParser("json", parse_or_save(json.loads)),
     CodeBlockParser("c", parse_or_save(lambda code: None)),
-]
+]  # fmt: skip
 
 
 def examples(page: Path) -> list[Example]:

@@ -33,14 +33,11 @@ def scenario(law: str, engine: str = "mujoco") -> Scenario:
 def study(law: str, rows: int) -> Study:
     """Return a study of rows that differ in modelling error and, by their seeds, in random torque."""
     fields = {
-        "name": "peers",
-        "scenario": SCENARIO,
-        "samples": rows,
-        "fields": {"duration": ROW_s, "plant.engine": "lagrangian", **CONDITIONS[law]},
-        "law": [{"law": law}],
+        "name": "peers", "scenario": SCENARIO, "samples": rows,
+        "fields": {"duration": ROW_s, "plant.engine": "lagrangian", **CONDITIONS[law]}, "law": [{"law": law}],
         "metrics": list(FIGURES),
         "axis": [{"field": "plant.modelling_error", "kind": "uniform", "low": -0.2, "high": 0.5}],
-    }
+    }  # fmt: skip
     return made(fields, "peers")
 
 

@@ -22,11 +22,8 @@ class Report:
     def __init__(self, as_json: bool) -> None:
         self._as_json = as_json
         self._rows: dict[str, list[dict[str, object]]] = {
-            "not_installed": [],
-            "agreement": [],
-            "times": [],
-            "ratios": [],
-        }
+            "not_installed": [], "agreement": [], "times": [], "ratios": [],
+        }  # fmt: skip
 
     def finished(self) -> bool:
         """Print the JSON if it is asked for; return True if no bound was missed."""
