@@ -24,9 +24,9 @@ def made(count, figures, axes, laws=("pd",), lost=()):
     statuses[list(lost)] = "left_workspace"
     listed = [{"field": field, "kind": "values"} for field in axes]
     fields = {"name": "made", "description": "It was made.", "axis": listed}
-    texts = np.full(count, "", dtype=object)
-    named = np.array([laws[place % len(laws)] for place in range(count)], dtype=object)
-    keys = np.array([f"{place:016x}" for place in range(count)], dtype=object)
+    texts, keys, named = np.full((3, count), "", dtype=object)
+    keys[:] = [f"{place:016x}" for place in range(count)]
+    named[:] = [laws[place % len(laws)] for place in range(count)]
     return Rows(fields, np.arange(count), keys, named, statuses, texts, axes, figures)
 
 
@@ -56,10 +56,8 @@ def test_rank_correlations_are_scipy_s_where_rows_are_few():
     rank = ranked(list(x), y)
     assert not rank.is_partial
     assert rank.chance == 1.96 / np.sqrt(20 - 1)
-    for place in range(3):
-        expected = stats.spearmanr(x[place], y).statistic
-        # The same sums in another order.
-        assert rank.by_value[place] == pytest.approx(expected, abs=1e-14)
+    # The same sums in another order.
+    np.testing.assert_allclose(rank.by_value, [stats.spearmanr(each, y).statistic for each in x], atol=1e-14)
 
 
 def test_what_is_partial_is_the_correlation_of_what_fits_of_the_others_leave():
@@ -116,19 +114,17 @@ def test_a_study_of_one_row_has_a_page(tmp_path):
     assert "Only the seed differs." in (tmp_path / "report.md").read_text()
 
 
-DAMAGED = r"(row group 0, rows 0 to 23|the footer).*: the file is damaged|magic"
-
-
 def test_a_damaged_table_is_refused_with_its_place(tmp_path):
     run_rows(loads(), tmp_path)
     path = tmp_path / "table.parquet"
-    content, whole = path.read_bytes(), read(path)
-    assert len(whole.numbers) == 24
+    content = path.read_bytes()
+    assert len(read(path).numbers) == 24
+    message = r"(row group 0, rows 0 to 23|the footer).*: the file is damaged|magic"
     for bit in np.random.default_rng(0).integers(8 * len(content), size=40).tolist():
         damaged = bytearray(content)
         damaged[bit // 8] ^= 1 << bit % 8
         path.write_bytes(damaged)
-        with pytest.raises(InputError, match=DAMAGED):
+        with pytest.raises(InputError, match=message):
             read(path)
 
 
