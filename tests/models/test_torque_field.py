@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose, assert_array_equal
 from scipy.interpolate import CubicSpline
 
 from spheretwin.export.plant_code import magnetic_tables
@@ -66,9 +67,7 @@ def test_the_shipped_actuator_is_the_same_as_a_curve_and_as_a_field(actuator):
 def test_the_compiled_matrix_is_the_sum_of_the_spline_over_the_coils(second):
     for q in random_poses(100):
         # The same polynomials, summed in another order: rounding of torques of 0.02 N·m/A.
-        np.testing.assert_allclose(
-            torque_matrix(q, second), summed_torque_matrix(q, second), rtol=0, atol=1e-16 * 32
-        )
+        assert_allclose(torque_matrix(q, second), summed_torque_matrix(q, second), rtol=0, atol=1e-16 * 32)
 
 
 def test_the_spline_is_the_product_of_periodic_cubic_splines(second):
@@ -81,7 +80,7 @@ def test_the_spline_is_the_product_of_periodic_cubic_splines(second):
     for axis in random_axes(50):
         theta, azimuth = np.arccos(axis[2]), np.arctan2(axis[1], axis[0]) % (2 * np.pi)
         expected = CubicSpline(phi, along_theta(theta), bc_type="periodic")(azimuth)
-        np.testing.assert_allclose(second.torque_data.torque(axis[None])[0], expected, rtol=0, atol=1e-15)
+        assert_allclose(second.torque_data.torque(axis[None])[0], expected, rtol=0, atol=1e-15)
 
 
 def test_the_error_of_the_spline_falls_with_the_fourth_power_of_the_step():
@@ -90,13 +89,13 @@ def test_the_error_of_the_spline_falls_with_the_fourth_power_of_the_step():
         field = TorqueField(harmonics(directions(latitudes, 2 * (latitudes - 1))))
         errors.append(np.abs(field.torque(axes) - harmonics(axes)).max())
     orders = np.log2(np.array(errors[:-1]) / errors[1:])
-    np.testing.assert_allclose(orders, 4, atol=0.3)  # the next power at steps of 12 degrees
+    assert_allclose(orders, 4, atol=0.3)  # the next power at steps of 12 degrees
 
 
 def test_the_second_actuator_has_the_harmonics_of_its_firmware(second):
     samples = second.torque_data.torque_Nm_per_A
     expected = harmonics(directions(*samples.shape[:2]))
-    np.testing.assert_allclose(samples, expected, rtol=0, atol=1e-9)  # decimals of the file
+    assert_allclose(samples, expected, rtol=0, atol=1e-9)  # decimals of the file
     assert second.torque_data.peak_Nm_per_A == pytest.approx(0.0197, abs=5e-5)
     axes = random_axes(2000)
     error = np.abs(second.torque_data.torque(axes) - harmonics(axes)).max()
@@ -108,10 +107,10 @@ def test_poles_of_the_sphere_are_no_seam(second):
         ring = np.array([[1e-9 * np.cos(a), 1e-9 * np.sin(a), z] for a in np.linspace(0, 2 * np.pi, 13)])
         values = second.torque_data.torque(ring)
         # Slopes of some 0.1 N·m/A per radian, over 1e-9.
-        np.testing.assert_allclose(values, np.broadcast_to(values[0], values.shape), rtol=0, atol=1e-9)
+        assert_allclose(values, np.broadcast_to(values[0], values.shape), rtol=0, atol=1e-9)
     axes = np.array([[-1.0, 1e-17, 0.0], [-1.0, -1e-17, 0.0], [1.0, 0.0, 0.0], [1.0, -1e-17, 0.0]])
     first, last, start, end = second.torque_data.torque(axes)
-    np.testing.assert_allclose([first, start], [last, end], rtol=0, atol=1e-15)
+    assert_allclose([first, start], [last, end], rtol=0, atol=1e-15)
 
 
 def test_a_positive_current_attracts_a_north_pole(second):
@@ -129,8 +128,8 @@ def test_groups_and_directions_are_those_of_the_model_file(second):
     assert second.coil_direction.tolist() == [1] * 4 + [-1] * 4 + [1] * 8
     q = np.array([0.1, -0.2, 0.4])
     of_coils = second.torque_data.torque(second.coil_axes @ rotation(q)) @ rotation(q).T
-    np.testing.assert_allclose(torque_matrix(q, second)[:, 1], of_coils[1] - of_coils[5], rtol=0, atol=1e-16)
-    np.testing.assert_allclose(torque_matrix(q, second)[:, 4], of_coils[8] + of_coils[9], rtol=0, atol=1e-16)
+    assert_allclose(torque_matrix(q, second)[:, 1], of_coils[1] - of_coils[5], rtol=0, atol=1e-16)
+    assert_allclose(torque_matrix(q, second)[:, 4], of_coils[8] + of_coils[9], rtol=0, atol=1e-16)
 
 
 def test_inductances_follow_the_directions_of_the_currents(second):
@@ -139,14 +138,14 @@ def test_inductances_follow_the_directions_of_the_currents(second):
     M, turned = (mutual_inductance(each) for each in (second, replace(second, coil_direction=reversed_group)))
     sign = np.ones(8)
     sign[1] = -1
-    np.testing.assert_allclose(turned, M * np.outer(sign, sign), rtol=1e-12)
+    assert_allclose(turned, M * np.outer(sign, sign), rtol=1e-12)
     assert np.abs(M).max() > 0
 
 
 def test_a_scaled_model_has_scaled_torques(second):
     model, q, G = scaled(torque_model(second), 1.2), np.array([0.1, 0.2, 0.3]), np.empty((3, 8))
     fill_torque_matrix(q, model, G, scratch_of(model))
-    np.testing.assert_allclose(G, 1.2 * torque_matrix(q, second), rtol=0, atol=1e-16)  # rounding
+    assert_allclose(G, 1.2 * torque_matrix(q, second), rtol=0, atol=1e-16)  # rounding
 
 
 def test_scatter_of_coils_is_exact_and_of_poles_is_refused(second):
@@ -158,7 +157,7 @@ def test_scatter_of_coils_is_exact_and_of_poles_is_refused(second):
     model = scattered_model(second, scatter)
     for q in random_poses(5):
         fill_torque_matrix(q, model, G, scratch_of(model))
-        np.testing.assert_allclose(G, summed_torque_matrix(q, second, scatter), rtol=0, atol=1e-15)
+        assert_allclose(G, summed_torque_matrix(q, second, scatter), rtol=0, atol=1e-15)
         assert np.abs(G - torque_matrix(q, second)).max() > 1e-4
     poles = errors.poles._replace(gain=np.full(8, 0.01))
     for wrong in (
@@ -176,7 +175,7 @@ def test_a_file_is_read_back_in_any_order(tmp_path, second):
     (path := tmp_path / "field.csv").write_text("\n".join([*lines[:2], *rows]))
     again = torque_field.read(path)
     assert isinstance(again, TorqueField)
-    np.testing.assert_array_equal(again.torque_Nm_per_A, field.torque_Nm_per_A)
+    assert_array_equal(again.torque_Nm_per_A, field.torque_Nm_per_A)
     assert again.name == "torque field field.csv"
     assert isinstance(torque_field.read(actuators.TORQUE_CURVE_PATH), TorqueCurve)
 
@@ -256,7 +255,7 @@ def test_a_group_may_have_one_coil(tmp_path):
     assert actuator.groups.shape == (16, 1)
     q = np.array([0.1, -0.2, 0.4])
     of_coils = actuator.torque_data.torque(actuator.coil_axes @ rotation(q)) @ rotation(q).T
-    np.testing.assert_allclose(torque_matrix(q, actuator), of_coils.T, rtol=0, atol=1e-16)
+    assert_allclose(torque_matrix(q, actuator), of_coils.T, rtol=0, atol=1e-16)
 
 
 def test_a_torque_curve_needs_opposite_coils(tmp_path, second):
