@@ -1,5 +1,7 @@
 """What tests of laws share: a law called as the loop calls it, beside a slow copy, and on one axis alone."""
 
+from itertools import count
+
 import numba
 import numpy as np
 
@@ -9,6 +11,13 @@ from spheretwin.models.base.compiled import compiled_callback
 
 PERIOD = 1e-3
 TICKS = 200
+WEAK = {
+    "plant.engine": "lagrangian",
+    "disturbance.load": 0.0,
+    "drive.current_limit_A": 2.0,
+    "nominal.current_limit_A": 2.0,
+}
+"""Currents that give a fifth of the torque that a step of the reference requires."""
 
 
 @numba.njit
@@ -17,18 +26,30 @@ def by_address(address, t, reference, measurement, parameters, state, torque):
     law_at(address)(t, reference, measurement, parameters, state, torque)
 
 
+def machine_code(law):
+    """Return the machine code of a law as a function of reference and measurement, and the law's state."""
+    compiled = compiled_callback(SIGNATURE, law.step)  # called as a function, it would run as Python
+    state, torque, ticks = law.state.copy(), np.empty(3), count()
+
+    def call(reference, measurement):
+        t = PERIOD * next(ticks)
+        by_address(compiled.address, t, reference, measurement, law.parameters, state, torque)
+        return torque
+
+    return call, state
+
+
 def known(actuator, delay_s=0.0, period_s=PERIOD):
     return NominalModel(period_s, delay_s, actuator.inertia)
 
 
 def follows(law, slow):
     """Hold the torque and what is logged of a law's machine code against a slow copy, on random inputs."""
-    compiled = compiled_callback(SIGNATURE, law.step)
+    call, state = machine_code(law)
     generator = np.random.default_rng(0)
-    state, torque = law.state.copy(), np.empty(3)
-    for tick in range(TICKS):
+    for _ in range(TICKS):
         reference, measurement = generator.normal(size=(3, 3)), generator.normal(size=(3, 3))
-        by_address(compiled.address, PERIOD * tick, reference, measurement, law.parameters, state, torque)
+        torque = call(reference, measurement)
         wanted, logged = slow(reference, measurement)
         # Sums of some hundred numbers, rounded by 1e-16 of the largest each.
         np.testing.assert_allclose(torque, wanted, rtol=1e-11, atol=1e-11 * np.abs(wanted).max())

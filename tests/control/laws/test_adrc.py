@@ -1,11 +1,9 @@
-"""ADRC: the poles of its observer, what the observer finds, and that nothing winds up."""
+"""ADRC: its equations, the poles of its observer and what the observer finds."""
 
 import numpy as np
 import pytest
 
-from spheretwin import scenario as scenarios
 from spheretwin.control.laws.adrc import ADRC, observer_gains
-from spheretwin.simulation import simulate
 from tests.control.laws.cases import PERIOD, follows, known
 
 
@@ -77,24 +75,3 @@ def test_the_observer_converges_at_the_rate_of_its_poles(actuator):
         np.testing.assert_allclose(row, left, atol=1e-9)
         left = (A - np.outer(L, A[0])) @ left
     assert np.abs(missed[-1]).max() < 1e-9  # e^(−40) 40² of 23 is 2e-13
-
-
-def test_a_constant_load_is_observed_and_leaves_no_error():
-    fields = {"controller.law": "adrc", "plant.payload_kg": 0.05, "disturbance.load": 1.0}
-    run = simulate(scenarios.load("hold", {**fields, "plant.engine": "lagrangian", "duration": 2.0}))
-    assert run.status == "completed"
-    # The slowest pole, γ's observer at −40, leaves (40·2)² e^(−80) of the start, 1e-31; the rest is rounding.
-    assert np.abs(run.telemetry["error_rad"][-100:]).max() < 1e-13
-
-
-def test_the_current_limit_does_not_enter_what_is_observed():
-    """A step far beyond the currents: with no load and a true model, nothing but coupling is observed."""
-    weak = {"drive.current_limit_A": 2.0, "nominal.current_limit_A": 2.0, "disturbance.load": 0.0}
-    fields = {"controller.law": "adrc", "controller.bandwidth": 80.0, "plant.engine": "lagrangian"}
-    run = simulate(scenarios.load("hold", fields | weak))
-    assert run.status == "completed"
-    assert run.telemetry["allocation_scale"].min() < 0.2
-    start = run.telemetry["error_rad"][0]
-    assert np.max(-np.sign(start) * run.telemetry["error_rad"] / np.abs(start)) < 0.5
-    asked = np.abs(run.telemetry["torque_command_Nm"]).max()
-    assert np.abs(run.telemetry["observed_torque_Nm"]).max() < 0.05 * asked

@@ -1,4 +1,4 @@
-"""Computed torque: exact cancellation of the model, and what a load leaves with and without an integral."""
+"""Computed torque: exact cancellation of the model, and what a load leaves without an integral."""
 
 import numpy as np
 import pytest
@@ -70,31 +70,11 @@ def test_errors_of_an_undisturbed_nutation_decay_in_closed_form():
     assert coarse / fine == pytest.approx(4.0, rel=0.25)  # of first order
 
 
-def held(**more):
+def test_without_an_integral_a_constant_load_leaves_its_share_of_the_stiffness(actuator):
     loaded = {"controller.law": "computed_torque", "disturbance.load": 1.0, "plant.engine": "lagrangian"}
-    return simulate(scenarios.load("hold", loaded | more))
-
-
-def test_a_constant_load_leaves_no_error_with_an_integral():
-    run = held(**{"plant.payload_kg": 0.05})
-    assert run.status == "completed"
-    # After 3 s three poles at −40 have left (40·3)² e^(−40·3) of the start, 1e-48; the rest is rounding.
-    assert np.abs(run.telemetry["error_rad"][-100:]).max() < 1e-14
-
-
-def test_a_constant_load_leaves_its_share_of_the_stiffness_without(actuator):
-    run = held(**TWO_POLES)
+    run = simulate(scenarios.load("hold", loaded | TWO_POLES))
     q, load = run.telemetry["q_rad"][-1], run.telemetry["disturbance_Nm"][-1]
     left = np.linalg.solve(inertia_matrix(q, actuator.inertia), -load) / POLE**2
     assert np.abs(left).min() > 0.01
     # Two poles at −20 have left 60 e^(−60) of the start; the rest is rounding.
     np.testing.assert_allclose(run.telemetry["error_rad"][-1], left, rtol=1e-9)
-
-
-def test_the_current_limit_holds_the_integral():
-    weak = {"drive.current_limit_A": 2.0, "nominal.current_limit_A": 2.0, "disturbance.load": 0.0}
-    run = held(**weak)
-    assert run.status == "completed"
-    assert run.telemetry["allocation_scale"].min() < 0.2
-    start = run.telemetry["error_rad"][0]
-    assert np.max(-np.sign(start) * run.telemetry["error_rad"] / np.abs(start)) < 0.5

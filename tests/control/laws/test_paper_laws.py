@@ -1,28 +1,14 @@
 """The compiled laws against slow copies of the paper's equations, written for this test."""
 
-import numba
 import numpy as np
 import pytest
 
-from spheretwin.control.controller import law_at
-from spheretwin.control.law import SIGNATURE, NominalModel
 from spheretwin.control.laws.adaptive_fuzzy import AdaptiveFuzzy
 from spheretwin.control.laws.afsm import AFSM
 from spheretwin.control.laws.pd import PD
-from spheretwin.models.base.compiled import compiled_callback
+from tests.control.laws.cases import PERIOD, known, machine_code
 
-PERIOD = 1e-3
 CENTRES = np.array([-3, -1.5, 0, 1.5, 3])
-
-
-@numba.njit
-def by_address(address, t, reference, measurement, parameters, state, torque):
-    """Call a law as the loop does: its machine code."""
-    law_at(address)(t, reference, measurement, parameters, state, torque)
-
-
-def known(actuator):
-    return NominalModel(PERIOD, 0.0, actuator.inertia)
 
 
 def each_axis(kind):
@@ -71,13 +57,12 @@ def test_law_follows_the_paper(actuator, kind, level):
         level=level, **{name: (value[0], 2 * value[1], value[2] / 3) for name, value in each_axis(kind)}
     )
     law, slow = gains.build(known(actuator)), SlowLaw(gains, actuator.inertia)
-    compiled = compiled_callback(SIGNATURE, law.step)  # called as a function, it would run as Python
+    call, _ = machine_code(law)
     generator = np.random.default_rng(0)
-    state, torque = law.state.copy(), np.empty(3)
-    for tick in range(500):
+    for _ in range(500):
         reference = generator.normal(size=(3, 3))
         measurement = reference[:2] + 0.3 * generator.normal(size=(2, 3))
-        by_address(compiled.address, PERIOD * tick, reference, measurement, law.parameters, state, torque)
+        torque = call(reference, measurement)
         # 500 Euler steps of up to 75 sums: accumulated rounding.
         np.testing.assert_allclose(torque, slow.torque(reference, measurement), rtol=1e-9, atol=1e-12)
 
