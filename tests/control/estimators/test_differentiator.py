@@ -26,6 +26,37 @@ def gain(frequency):
     return np.abs((L2 * s + L3) / (s**3 + L1 * s**2 + L2 * s + L3))
 
 
+class SlowDifferentiator:
+    """The implicit step in the units of the angle, its cubic solved by the eigenvalues of a matrix."""
+
+    def __init__(self, bandwidth, period, noise):
+        self.T, self.L = period, noise * (bandwidth / 1.646549) ** 3
+        self.z = None
+
+    def __call__(self, angle):
+        T, L = self.T, self.L
+        self.z = np.array([angle, 0.0, 0.0]) if self.z is None else self.z
+        z = np.array([[1, T, T**2 / 2], [0, 1, T], [0, 0, 1]]) @ self.z
+        ahead = z[0] - angle
+        sign, limited, cube = np.sign(ahead), min(abs(ahead), 1.1 * L * T**3), 0.0
+        if abs(ahead) > limited:  # in the third root of the error
+            roots = np.roots([1, 2 * L ** (1 / 3) * T, 2.12 * L ** (2 / 3) * T**2, limited - abs(ahead)])
+            cube = roots[np.abs(roots.imag) <= 1e-9 * np.abs(roots)].real.max()
+        push = 2.12 * L ** (2 / 3) * cube * T + 1.5 * limited / T
+        self.z = np.array([angle + sign * cube**3, z[1] - sign * push, z[2] - sign * limited / T**2])
+        return self.z[1]
+
+
+def test_machine_code_is_the_slow_copy():
+    generator = np.random.default_rng(2)
+    angle = 0.2 * np.sin(0.01 * np.arange(600)) + generator.normal(scale=NOISE, size=600)
+    angle[300:] += 0.5
+    slow = SlowDifferentiator(150.0, PERIOD, NOISE)
+    result = estimates(built("differentiator", bandwidth_rad_s=150.0), on_all_axes(angle))[:, 0]
+    # The eigenvalues are rounded, magnified by the slope's 1/T.
+    np.testing.assert_allclose(result, [slow(sample) for sample in angle], rtol=1e-8, atol=1e-9)
+
+
 def test_linear_likeness_is_the_mean_slope_of_the_powers():
     # Price's theorem: the mean slope at a normal number is the mean product with it, E |n|^(p+1).
     slopes = COEFFICIENTS * 2 ** ((POWERS + 1) / 2) * gamma((POWERS + 2) / 2) / np.sqrt(np.pi)
