@@ -38,3 +38,20 @@ def test_every_allocation_runs_and_says_what_it_is(name):
     run = simulate(scenarios.load("hold", {"allocation": name, "duration": 0.02}))
     assert run.status == Status.COMPLETED
     assert np.isfinite(run.telemetry.values).all()
+
+
+@pytest.mark.parametrize("name", ALLOCATIONS)
+def test_every_allocation_gives_no_current_for_no_torque_or_in_a_lost_direction(name, actuator):
+    call = compiled_callback(SIGNATURE, ALLOCATIONS[name])
+    lost = np.zeros((3, 18))
+    lost[:2] = np.random.default_rng(0).normal(size=(2, 18))
+    at_rest = torque_matrix(np.zeros(3), actuator)
+    for G, torque_S, expected in (
+        (lost, [0.1, 0.2, 0.3], 0),
+        (lost, [1e3, 0.0, 0.0], 0),
+        (at_rest, [0.0, 0.0, 0.0], 1),
+        (at_rest, [1e-300, 0.0, 0.0], 1),
+    ):
+        current = np.full(18, np.nan)
+        assert call(G, np.array(torque_S), LIMIT_A, current, np.full((5, 18), np.nan)) == expected
+        assert np.abs(current).max() < 1e-290
