@@ -64,12 +64,8 @@ def test_the_front_is_that_of_all_trials(tmp_path, sampler):
 @pytest.mark.parametrize("over", ["worst", "median"])
 @pytest.mark.parametrize("objectives", [("miss",), ("miss", "slowness")], ids=len)
 def test_pruning_loses_nothing(tmp_path, objectives, over):
-    noisy = study(
-        tmp_path,
-        objectives=[{"metric": each, "over": over} for each in objectives],
-        gains=TWO["gains"],
-        seeds=5,
-    )
+    listed = [{"metric": each, "over": over} for each in objectives]
+    noisy = study(tmp_path, listed, TWO["gains"], seeds=5)
     (law,) = tune(noisy, tmp_path, trials=40).laws
     pruned = [each for each in law.trials if each.tried.ended == Ended.PRUNED]
     assert len(pruned) > 5
