@@ -27,18 +27,12 @@ SIGNALS = common_signals(18)
 
 STREAM = """
 import sys
-import numpy as np
 from pathlib import Path
-from spheretwin.models.telemetry import parquet as telemetry_file
-from spheretwin.models.telemetry.signals import common_signals, width
-from spheretwin.models.telemetry.table import Table
-SIGNALS = common_signals(18)
-telemetry_file.PART_ROWS = 64
+from spheretwin.models.telemetry import parquet
+from tests.models.telemetry.streams import PART_ROWS, streamed, table
+parquet.PART_ROWS = PART_ROWS
 path, rows, seed, pause = Path(sys.argv[1]), int(sys.argv[2]), int(sys.argv[3]), sys.argv[4] == "pause"
-whole = Table(SIGNALS, np.random.default_rng(seed).normal(size=(rows, width(SIGNALS))))
-file = telemetry_file.TelemetryFile(path, SIGNALS, {"scenario": '{"a": 1}', "ticks": "0"})
-for first in range(0, rows, 10):
-    file.write(whole.rows(first, first + 10))
+file = streamed(path, table(rows, seed=seed), 10)
 if pause:
     print("written", flush=True)
     sys.stdin.read()
