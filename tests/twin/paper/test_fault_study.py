@@ -196,6 +196,12 @@ def test_the_other_engine_agrees():
     assert not fault_study.agree(one, apart)
 
 
+def test_map_of_pairs_has_pairs_below_and_single_groups_on_the_diagonal(study):
+    ratios = fault_sections.ratios(study[1], fault_cases.UNREPORTED)
+    assert np.argwhere(np.isfinite(ratios)).tolist() == [[0, 0], [1, 0]]
+    assert ratios[1, 0] == row(study, of_groups(PAIR, fault_cases.UNREPORTED))["error_ratio"]
+
+
 def test_tracking_is_to_complete_and_to_stay_within_twice():
     lost = Status.LEFT_WORKSPACE
     runs = [outcome(2.0), outcome(2.001), outcome(1.0, lost), outcome(float("nan"), lost)]
