@@ -11,7 +11,6 @@ import tempfile
 from collections.abc import Callable, Iterator
 from importlib import import_module
 from pathlib import Path
-from typing import Any
 
 import pytest
 
@@ -77,12 +76,19 @@ def check(name: str, cases: Cases) -> None:
     )
 
 
-def with_release(cases: Cases, reasons: dict[str, str]) -> list[Any]:
-    """Return the names of cases as parameters of a test; some have the mark `release` with a reason."""
-    return [
+def content_test(cases: Cases, release: dict[str, str] | None = None) -> Callable[[str], None]:
+    """Return the test of some cases; those with a reason run in the release suite only."""
+    reasons = release or {}
+    names = [
         pytest.param(name, marks=pytest.mark.release(reasons[name])) if name in reasons else name
         for name in cases
     ]
+
+    @pytest.mark.parametrize("name", names)
+    def test_content(name: str) -> None:
+        check(name, cases)
+
+    return test_content
 
 
 def all_cases() -> dict[str, Cases]:

@@ -1,7 +1,6 @@
 """Content of the base and of telemetry: messages, checks, user code, columns, series, events, faults."""
 
 import numpy as np
-import pytest
 
 from spheretwin.models.base import errors, files, user_code
 from spheretwin.models.base.checks import Check, bound_shares, broken
@@ -12,7 +11,7 @@ from spheretwin.models.telemetry.run_record import Change, RunRecord
 from spheretwin.models.telemetry.signals import Signal
 from spheretwin.models.telemetry.status import Events, Level, Status
 from spheretwin.models.telemetry.table import Table, TelemetryBuffer, check_rows, read_parquet
-from tests.content.content import check, scratch
+from tests.content.content import content_test, scratch
 from tests.content.values import tree
 
 
@@ -291,6 +290,4 @@ CASES = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("name", CASES)
-def test_the_content_is_the_approved_one(name):
-    check(name, CASES)
+test_content = content_test(CASES)

@@ -3,7 +3,6 @@
 import dataclasses
 
 import numpy as np
-import pytest
 
 from spheretwin import scenario as scenarios
 from spheretwin.bench.commands import COMMANDS
@@ -22,7 +21,7 @@ from spheretwin.models.base.errors import InputError
 from spheretwin.models.telemetry.table import read_parquet
 from spheretwin.session import Session
 from spheretwin.trajectories import SHAPES
-from tests.content.content import check, scratch
+from tests.content.content import content_test, scratch
 from tests.content.values import array, tree
 from tests.twin.bench.cases import QUIET, bench
 
@@ -244,6 +243,4 @@ CASES = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("name", CASES)
-def test_the_content_is_the_approved_one(name):
-    check(name, CASES)
+test_content = content_test(CASES)

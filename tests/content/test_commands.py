@@ -6,10 +6,9 @@ import os
 import re
 
 import numpy as np
-import pytest
 
 from spheretwin import cli, machine
-from tests.content.content import check, command, scratch
+from tests.content.content import command, content_test, scratch
 from tests.content.values import tree
 
 TIMES = re.compile(
@@ -208,6 +207,4 @@ CASES = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("name", CASES)
-def test_the_content_is_the_approved_one(name):
-    check(name, CASES)
+test_content = content_test(CASES)

@@ -20,7 +20,7 @@ from spheretwin.models.design import (
     workspace,
 )
 from spheretwin.models.design.direct_summation import Quadrature, Rule
-from tests.content.content import check, with_release
+from tests.content.content import content_test
 from tests.content.values import array, number, tree
 
 FEW = Quadrature(near=Rule(2, 4, 8, 4), far=Rule(2, 2, 6, 2))
@@ -165,6 +165,4 @@ CASES = {
 RELEASE = {"design_field_verdict": "recomputes a field for 1.3 s; other cases have the form of a verdict"}
 
 
-@pytest.mark.parametrize("name", with_release(CASES, RELEASE))
-def test_the_content_is_the_approved_one(name):
-    check(name, CASES)
+test_content = content_test(CASES, RELEASE)

@@ -3,7 +3,6 @@
 from types import SimpleNamespace
 
 import numpy as np
-import pytest
 
 from spheretwin.models.telemetry.status import Level, Status
 from spheretwin.viz.comparison.runs import Spectrum
@@ -18,7 +17,7 @@ from spheretwin.viz.figures import (
     over_time,
 )
 from spheretwin.viz.figures.style import PAPER_WIDTHS_in, fit_width
-from tests.content.content import Cases, check
+from tests.content.content import Cases, content_test
 from tests.content.figures import figure_text
 from tests.viz.comparison.compared import RAMP, SIGNALS, SPIKE, VALUE, T_s, run_of
 from tests.viz.figures import drawn
@@ -383,6 +382,4 @@ def _text(draw) -> str:
 CASES: Cases = {f"figure_{name}": (lambda draw=draw: _text(draw)) for name, draw in FIGURES.items()}
 
 
-@pytest.mark.parametrize("name", CASES)
-def test_content(name):
-    check(name, CASES)
+test_content = content_test(CASES)

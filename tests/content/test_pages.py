@@ -5,7 +5,6 @@ from pathlib import Path
 from unittest.mock import patch
 
 import numpy as np
-import pytest
 
 from spheretwin.cli import crosscheck as crosscheck_verb
 from spheretwin.crosscheck import suite
@@ -16,7 +15,7 @@ from spheretwin.study.tuning import report as tuning_report
 from spheretwin.study.tuning.trials import Ended, FinishedTrial, Tried
 from spheretwin.study.tuning.tuning import Holdout, LawResult, ReportedTrial, TuningResult
 from spheretwin.viz.pages import magnetics, markdown
-from tests.content.content import Cases, check, command, scratch
+from tests.content.content import Cases, command, content_test, scratch
 from tests.content.figures import captured
 from tests.content.pages import folder_text, html_text
 from tests.content.values import tree
@@ -186,6 +185,4 @@ CASES: Cases = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("name", CASES)
-def test_content(name):
-    check(name, CASES)
+test_content = content_test(CASES)

@@ -6,14 +6,13 @@ from functools import partial
 from unittest.mock import patch
 
 import numpy as np
-import pytest
 
 from spheretwin.control.estimators import noise_and_lag
 from spheretwin.paper import EXPERIMENTS, page, runner
 from spheretwin.paper.experiment import Case, Experiment
 from spheretwin.paper.page import chapter_of, rows
 from spheretwin.paper.runner import Plan, PlanResult
-from tests.content.content import Cases, check, scratch, with_release
+from tests.content.content import Cases, content_test, scratch
 from tests.content.pages import folder_text
 from tests.content.runs import made_run
 from tests.content.values import tree
@@ -97,6 +96,4 @@ RELEASE = {
 }
 
 
-@pytest.mark.parametrize("name", with_release(CASES, RELEASE))
-def test_content(name):
-    check(name, CASES)
+test_content = content_test(CASES, RELEASE)

@@ -3,7 +3,6 @@
 from pathlib import Path
 
 import numpy as np
-import pytest
 
 from spheretwin.models.telemetry.status import Level, Status
 from spheretwin.provenance import facts_of
@@ -15,7 +14,7 @@ from spheretwin.viz.recording.live import LiveView
 from spheretwin.viz.recording.part import RecordingSubject
 from spheretwin.viz.recording.reader import rewrite
 from spheretwin.viz.recording.recorder import Recorder
-from tests.content.content import Cases, check, scratch
+from tests.content.content import Cases, content_test, scratch
 from tests.content.recordings import recording_text
 from tests.content.runs import FAULTS, PERIOD_s, recording, rows_of, session_of, write
 
@@ -123,6 +122,4 @@ CASES: Cases = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("name", CASES)
-def test_content(name):
-    check(name, CASES)
+test_content = content_test(CASES)

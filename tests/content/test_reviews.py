@@ -4,7 +4,6 @@ from functools import cache
 from pathlib import Path
 
 import numpy as np
-import pytest
 
 from spheretwin import scenario as scenarios
 from spheretwin.models.telemetry.fault_log import FaultLog
@@ -15,7 +14,7 @@ from spheretwin.viz.recording.recorder import Recorder
 from spheretwin.viz.terminal import reviews as reviews_printed
 from spheretwin.viz.terminal import runs, tables, texts
 from spheretwin.viz.terminal.texts import Verdict
-from tests.content.content import Cases, check, command, printed, scratch
+from tests.content.content import Cases, command, content_test, printed, scratch
 from tests.content.pages import folder_text
 from tests.content.recordings import recording_text
 from tests.content.runs import FAULTS, made_run
@@ -232,6 +231,4 @@ CASES: Cases = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("name", CASES)
-def test_content(name):
-    check(name, CASES)
+test_content = content_test(CASES)

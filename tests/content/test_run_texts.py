@@ -3,7 +3,6 @@
 import json
 
 import numpy as np
-import pytest
 
 from spheretwin import scenario as scenarios
 from spheretwin.active_config import initial_config
@@ -16,7 +15,7 @@ from spheretwin.scenario.sections import Scenario
 from spheretwin.session import Session
 from spheretwin.simulation import simulate
 from spheretwin.trajectories import SHAPES
-from tests.content.content import check, scratch
+from tests.content.content import content_test, scratch
 from tests.content.short_runs import LAGRANGIAN, SHORT, brief
 from tests.content.values import array, number, tree
 
@@ -246,6 +245,4 @@ CASES = {
 }
 
 
-@pytest.mark.parametrize("name", CASES)
-def test_the_content_is_the_approved_one(name):
-    check(name, CASES)
+test_content = content_test(CASES)

@@ -2,7 +2,6 @@
 
 import json
 
-import pytest
 from pydantic import TypeAdapter
 from pydantic_core import PydanticUndefined
 
@@ -17,7 +16,7 @@ from spheretwin.study import study as studies
 from spheretwin.study.axes import AnyAxis
 from spheretwin.study.grid import Grid
 from spheretwin.study.study import Study
-from tests.content.content import check
+from tests.content.content import content_test
 from tests.content.values import tree
 
 NAMES = [name for name, _ in every_field(Scenario)]
@@ -354,6 +353,4 @@ CASES = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("name", CASES)
-def test_the_content_is_the_approved_one(name):
-    check(name, CASES)
+test_content = content_test(CASES)

@@ -15,7 +15,7 @@ from spheretwin.models.telemetry.table import read_parquet
 from spheretwin.provenance import facts_of
 from spheretwin.session import Session
 from spheretwin.simulation import follow, simulate
-from tests.content.content import check, scratch
+from tests.content.content import content_test, scratch
 from tests.content.short_runs import LAGRANGIAN, SHORT, brief
 from tests.content.values import array, number, tree
 
@@ -253,6 +253,4 @@ CASES = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("name", CASES)
-def test_the_content_is_the_approved_one(name):
-    check(name, CASES)
+test_content = content_test(CASES)

@@ -3,7 +3,6 @@
 import json
 
 import pyarrow.parquet as parquet
-import pytest
 
 from spheretwin.study import report, statistics
 from spheretwin.study import study as studies
@@ -14,7 +13,7 @@ from spheretwin.study.tuning import report as tuning_page
 from spheretwin.study.tuning.gains import section_of
 from spheretwin.study.tuning.sampler import warnings_only
 from spheretwin.study.tuning.tuning import tune
-from tests.content.content import check, scratch
+from tests.content.content import content_test, scratch
 from tests.content.values import tree
 from tests.twin.study.cases import LOADS, study, values
 from tests.twin.study.tuning import cases as tuning
@@ -172,6 +171,4 @@ CASES = {
 }
 
 
-@pytest.mark.parametrize("name", CASES)
-def test_the_content_is_the_approved_one(name):
-    check(name, CASES)
+test_content = content_test(CASES)

@@ -4,14 +4,13 @@ from inspect import signature
 from itertools import product
 
 import numpy as np
-import pytest
 
 from spheretwin.viz import decimation, quantities, theme
 from spheretwin.viz.comparison import runs
 from spheretwin.viz.layout import extents, styles, view
 from spheretwin.viz.layout.extents import ExtentTracker, PlotChannel
 from spheretwin.viz.scene import entities, meshes, solids
-from tests.content.content import Cases, check
+from tests.content.content import Cases, content_test
 from tests.content.runs import FAULTS, rows_of, session_of
 from tests.content.values import array, number
 from tests.viz.comparison.compared import RAMP, SPIKE, SQUARE, VALUE, run_of
@@ -184,6 +183,4 @@ CASES: Cases = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("name", CASES)
-def test_content(name):
-    check(name, CASES)
+test_content = content_test(CASES)
