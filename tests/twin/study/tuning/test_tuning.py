@@ -9,11 +9,12 @@ from spheretwin.control.laws.pid import PID
 from spheretwin.study.grid import Grid
 from spheretwin.study.row import Rows
 from spheretwin.study.runner import run
-from spheretwin.study.study import made
 from spheretwin.study.tuning import gains
 from spheretwin.study.tuning import trials as trial
 from spheretwin.study.tuning.trials import Ended
 from spheretwin.study.tuning.tuning import tune
+from tests.twin.study.cases import study as swept_study
+from tests.twin.study.cases import values as axis
 from tests.twin.study.tuning.cases import TWO, gain, study
 
 SAMPLERS = ("tpe", "nsga2", "random", "local")
@@ -113,22 +114,11 @@ def test_the_first_trial_is_the_start_and_fresh_seeds_are_others(tmp_path):
 def test_the_start_is_what_a_sweep_of_the_study_gives(tmp_path):
     """Same rows, same seeds: at gains that are the law's own, the worst row of the sweep's table."""
     metric = "max_abs_error_rad"
-    ours = made(
-        {
-            "name": "own",
-            "scenario": "tilt",
-            "fields": {"duration": 0.05, "hardware": "electronics"},
-            "fast": False,
-            "law": [{"law": "pid"}],
-            "axis": [{"field": "plant.payload_kg", "kind": "values", "values": [0.0, 0.05]}],
-            "seeds": 2,
-            "optimise": {
-                "gain": [gain("damping", 50.0, 500.0, start=PID().damping[0])],
-                "objective": [{"metric": metric, "of": ["alpha", "beta"]}],
-            },
-        },
-        "own",
-    )
+    objective = {"metric": metric, "of": ["alpha", "beta"]}
+    start = gain("damping", 50.0, 500.0, start=PID().damping[0])
+    fields = {"duration": 0.05, "hardware": "electronics", "controller.law": "pid"}
+    more = {"optimise": {"gain": [start], "objective": [objective]}, "seeds": 2, "fast": False}
+    ours = swept_study(axis("plant.payload_kg", 0.0, 0.05), scenario="tilt", fields=fields, **more)
     (law,) = tune(ours, tmp_path, trials=1).laws
     swept = parquet.read_table(run(ours, tmp_path).table)[metric].to_pylist()
     assert [each[0] for each in law.start.finished.tried.by_row] == [max(of_row[:2]) for of_row in swept]
