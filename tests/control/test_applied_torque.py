@@ -8,8 +8,7 @@ from scipy.integrate import quad
 from spheretwin import scenario as scenarios
 from spheretwin.control.applied_torque import applied_torque, estimate_applied_torque
 from spheretwin.control.law import Law
-from spheretwin.models.base.state import restore_state, save_state
-from spheretwin.models.kinematics import generalised_torque, rate_jacobian
+from spheretwin.models.kinematics import rate_jacobian
 from spheretwin.models.magnetics import torque_matrix
 from spheretwin.models.telemetry.signals import ANGLES, Signal
 from spheretwin.session import Session
@@ -54,28 +53,6 @@ def test_mean_current_is_that_of_the_delayed_and_lagged_command(delay, lag_s):
         np.testing.assert_allclose(mine.mean[0], mean / PERIOD_S, rtol=1e-8, atol=1e-9)
 
 
-def test_torque_on_the_hinges_is_the_transposed_jacobian_s():
-    generator = np.random.default_rng(0)
-    for _ in range(50):
-        q, torque_S, torque_q = generator.uniform(-1.3, 1.3, 3), generator.normal(size=3), np.empty(3)
-        generalised_torque(q, torque_S, torque_q)
-        # Three products each: rounding.
-        np.testing.assert_allclose(torque_q, rate_jacobian(q).T @ torque_S, rtol=0, atol=1e-15)
-
-
-def test_a_restored_state_gives_the_same_result():
-    one, other = (applied_torque(True, 4, PERIOD_S, 1.5e-3, 7e-4) for _ in range(2))
-    generator = np.random.default_rng(1)
-    G, pose = generator.normal(size=(3, 4)), np.array([0.1, 0.2, 0.3])
-    for _ in range(5):
-        estimate_applied_torque(one, pose, G, generator.normal(size=4))
-    restore_state(other, save_state(one), "belief")
-    command = generator.normal(size=4)
-    for each in (one, other):
-        estimate_applied_torque(each, pose, G, command)
-    np.testing.assert_array_equal(save_state(one), save_state(other))
-
-
 @numba.njit
 def asking_step(t, reference, measurement, parameters, state, torque):
     for i in range(3):
@@ -96,10 +73,9 @@ def test_where_the_model_is_true_it_is_the_torque_of_the_coils(engine):
     np.testing.assert_array_equal(table["believed_Nm"][0], 0)
     actuator = Session(scenario).actuator
     for row in range(99):
-        torque_q = np.empty(3)
+        q = table["q_rad"][row]
         # One physics step a period, so that what is logged is the mean over the period.
-        torque_S = torque_matrix(table["q_rad"][row], actuator) @ table["current_A"][row]
-        generalised_torque(table["q_rad"][row], torque_S, torque_q)
+        torque_q = rate_jacobian(q).T @ torque_matrix(q, actuator) @ table["current_A"][row]
         # Sums of 18 products of 1e-2 N·m in another order.
         np.testing.assert_allclose(table["believed_Nm"][row + 1], torque_q, rtol=0, atol=1e-15)
 

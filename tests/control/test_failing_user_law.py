@@ -4,16 +4,13 @@ import json
 import sys
 import threading
 
-import numba
 import pytest
 
 from spheretwin import cli
 from spheretwin import scenario as scenarios
 from spheretwin.control.law import Law
-from spheretwin.models.base.errors import LawError
 from spheretwin.models.base.numba_internals.callbacks import callback_errors
 from spheretwin.models.telemetry.table import read_parquet
-from spheretwin.session import Session
 from spheretwin.simulation import simulate
 
 FILE = """
@@ -165,82 +162,12 @@ def test_under_a_watchdog_the_line_has_the_time_of_the_exception(file, capfd):
     assert printed(capfd, "--controller.law", f"{file}:raises", *watched) == (1, "", message)
 
 
-@pytest.mark.parametrize(
-    ("metric", "received"),
-    [("leaves", "SystemExit: 0"), ("closes", "GeneratorExit"), ("strange", "Strange: so it is")],
-)
-def test_what_a_metric_raises_is_one_line_and_exit_1(file, metric, received, capfd):
-    line = f"metric metric_{metric}: expected a figure, it raised {received}"
-    code, out, err = printed(capfd, "--metric", f"{file}:metric_{metric}")
-    assert (code, err) == (1, "")
-    assert [f"warning  {line}"] == [each for each in out.splitlines() if "raised" in each]
-    code, out, err = printed(capfd, "--metric", f"{file}:metric_{metric}", "--json")
-    assert (code, err) == (1, "")
-    assert json.loads(out)[f"metric_{metric}"] is None
-    assert line in json.loads(out)["warnings"]
-
-
-@pytest.mark.parametrize("law", RAISED)
-def test_a_row_whose_law_raises_has_failed(file, law, tmp_path, capfd):
-    (source := tmp_path / "study.toml").write_text(
-        'name = "failing"\nscenario = "hold"\nfields = {duration = 0.05}\n'
-        f'law = [{{law = "{file}:{law}"}}]\n'
-        '[[axis]]\nfield = "disturbance.load"\nkind = "values"\nvalues = [0.0, 1.0]\n'
-    )
-    assert cli.main(["sweep", str(source), "--out", str(tmp_path / "out"), "--json"]) == 1
-    out, err = capfd.readouterr()
-    (report,) = json.loads(out)["summary"].values()
-    assert report["statuses"] == {"failed": 2}
-    assert err.startswith("spheretwin: sweep: 2 of 2 rows failed, the first with key ")
-    assert err.endswith(f"{RAISED[law]}\n")
-    assert err.count("\n") == 1
-
-
-def test_a_row_whose_metric_raises_has_failed(file, tmp_path, capfd):
-    (source := tmp_path / "study.toml").write_text(
-        'name = "failing"\nscenario = "hold"\nfields = {duration = 0.01}\n'
-        f'metrics = ["rms_error_rad", "{file}:metric_leaves"]\n'
-    )
-    assert cli.main(["sweep", str(source), "--out", str(tmp_path / "out"), "--json"]) == 1
-    out, err = capfd.readouterr()
-    assert json.loads(out)["failed"] == 1
-    assert "1 of 1 rows failed" in err
-    assert "it raised SystemExit: 0" in err
-    assert err.count("\n") == 1
-
-
-def test_sys_exit_in_a_law_does_not_end_the_program_that_simulates():
-    def leaves(t, reference, measurement, parameters, state, torque):
-        sys.exit(0)
-
-    run = simulate(scenarios.load("hold"), law=Law("leaves", leaves, [], []))
-    assert (run.status, len(run.telemetry)) == ("diverged", 0)
-    assert isinstance(run.law_error, LawError)
-    assert isinstance(run.law_error.__cause__, SystemExit)
-
-
 def test_ctrl_c_in_a_law_stays_ctrl_c():
     def interrupted(t, reference, measurement, parameters, state, torque):
         raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
         simulate(scenarios.load("hold"), law=Law("interrupted", interrupted, [], []))
-
-
-def test_a_session_that_is_restored_has_no_error_any_more():
-    @numba.njit
-    def raises(t, reference, measurement, parameters, state, torque):
-        torque[:] = 0.0
-        if t > 0.0205:
-            raise ValueError("lost")
-
-    with Session(scenarios.load("hold"), Law("raises", raises, [], [])) as session:
-        before = session.snapshot()
-        assert len(session.advance(100)) == 21
-        assert (session.status, session.ended) == ("diverged", True)
-        assert "ValueError: lost" in str(session.law_error)
-        session.restore(before)
-        assert (session.law_error, session.status) == (None, "running")
 
 
 def test_exceptions_of_other_threads_go_where_they_went(monkeypatch):
@@ -293,22 +220,6 @@ def test_why_a_law_does_not_compile_is_one_line(file, law, capfd):
     assert printed(capfd, "--controller.law", f"{file}:{law}") == (2, "", message)
 
 
-@pytest.mark.parametrize("law", ["outside", "outside_below"])
-@pytest.mark.parametrize("verb", ["simulate", "sweep"])
-def test_a_law_that_writes_outside_its_arrays_is_found_on_request(file, law, verb, tmp_path, capfd):
-    message = f"law {law}: expected a torque at 0 s, received IndexError: index is out of bounds\n"
-    checked = ["--controller.law", f"{file}:{law}", "--controller.check-bounds", "true"]
-    if verb == "simulate":
-        assert printed(capfd, *checked) == (1, "", f"spheretwin: {message}")
-        return
-    (source := tmp_path / "study.toml").write_text(
-        'name = "outside"\nscenario = "hold"\nfields = {duration = 0.01}\n'
-        f'law = [{{law = "{file}:{law}", check_bounds = true}}]\n'
-    )
-    assert cli.main(["sweep", str(source), "--out", str(tmp_path / "out"), "--json"]) == 1
-    assert capfd.readouterr().err.endswith(message)
-
-
 @pytest.mark.release("compiles two laws again for 3 s; other tests run laws with bounds checks")
 @pytest.mark.parametrize("law", ["pd", "afsm_eso"])
 def test_bounds_checks_change_no_bit_of_a_law_that_keeps_to_its_arrays(law):
@@ -322,3 +233,50 @@ def test_bounds_checks_change_no_bit_of_a_law_that_keeps_to_its_arrays(law):
     ]
     assert [run.status for run in runs] == ["completed"] * 2
     assert runs[0].telemetry.values.tobytes() == runs[1].telemetry.values.tobytes()
+
+
+def failures_of_a_sweep(folder, capfd, fields):
+    """Run a study whose rows all fail; return its report and the line of the failure."""
+    (source := folder / "study.toml").write_text(f'name = "failing"\nscenario = "hold"\n{fields}\n')
+    assert cli.main(["sweep", str(source), "--out", str(folder / "out"), "--json"]) == 1
+    out, err = capfd.readouterr()
+    assert err.count("\n") == 1
+    return json.loads(out), err
+
+
+@pytest.mark.parametrize("law", RAISED)
+def test_a_row_whose_law_raises_has_failed(file, law, tmp_path, capfd):
+    axis = '[[axis]]\nfield = "disturbance.load"\nkind = "values"\nvalues = [0.0, 1.0]'
+    fields = f'fields = {{duration = 0.05}}\nlaw = [{{law = "{file}:{law}"}}]\n{axis}'
+    report, err = failures_of_a_sweep(tmp_path, capfd, fields)
+    assert [each["statuses"] for each in report["summary"].values()] == [{"failed": 2}]
+    assert err.startswith("spheretwin: sweep: 2 of 2 rows failed, the first with key ")
+    assert err.endswith(f"{RAISED[law]}\n")
+
+
+def test_a_row_whose_metric_raises_has_failed(file, tmp_path, capfd):
+    fields = f'fields = {{duration = 0.01}}\nmetrics = ["rms_error_rad", "{file}:metric_leaves"]'
+    report, err = failures_of_a_sweep(tmp_path, capfd, fields)
+    assert report["failed"] == 1
+    assert "1 of 1 rows failed" in err
+    assert "it raised SystemExit: 0" in err
+
+
+@pytest.mark.parametrize("law", ["outside", "outside_below"])
+def test_a_law_that_writes_outside_its_arrays_is_found_on_request(file, law, tmp_path, capfd):
+    message = f"law {law}: expected a torque at 0 s, received IndexError: index is out of bounds\n"
+    checked = ["--controller.law", f"{file}:{law}", "--controller.check-bounds", "true"]
+    assert printed(capfd, *checked) == (1, "", f"spheretwin: {message}")
+    fields = f'fields = {{duration = 0.01}}\nlaw = [{{law = "{file}:{law}", check_bounds = true}}]'
+    assert failures_of_a_sweep(tmp_path, capfd, fields)[1].endswith(message)
+
+
+@pytest.mark.parametrize(
+    ("metric", "received"),
+    [("leaves", "SystemExit: 0"), ("closes", "GeneratorExit"), ("strange", "Strange: so it is")],
+)
+def test_what_a_metric_raises_is_a_warning_and_exit_1(file, metric, received, capfd):
+    code, out, err = printed(capfd, "--metric", f"{file}:metric_{metric}", "--json")
+    report = json.loads(out)
+    assert (code, err, report[f"metric_{metric}"]) == (1, "", None)
+    assert f"metric metric_{metric}: expected a figure, it raised {received}" in report["warnings"]
