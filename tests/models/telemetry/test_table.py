@@ -56,7 +56,7 @@ def test_another_reader_can_compare_the_checksums_of_pages(table, tmp_path):
         pyarrow.parquet.ParquetFile(path, page_checksum_verification=True).read()
 
 
-@pytest.mark.release("flips every byte for 2 s; test_checksums.py has each kind of damage")
+@pytest.mark.release("flips every byte for 2 s; test_damage.py has each kind of damage")
 def test_every_byte_of_a_file_is_checked(table, tmp_path):
     """Magic, pages with their headers, footer, its length and its checksum."""
     table.write_parquet(path := tmp_path / "run.parquet", {"scenario": "{}"})
