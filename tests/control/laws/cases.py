@@ -71,6 +71,26 @@ class Asked:
         return self.all[-1 - periods] if periods < len(self.all) else np.zeros(3)
 
 
+class SlowIntegral:
+    """Slow copy of a law with a torque (N·m) that is integrated, and tracks what was applied."""
+
+    def __init__(self, gains, inertia, delay_s):
+        self.gains, self.J, self.asked = gains, inertia, Asked(delay_s)
+        self.integral = np.zeros(3)
+
+    def named(self, *names):
+        """Gains of each axis by name."""
+        return [np.array(getattr(self.gains, name)) for name in names]
+
+
+UNDISTURBED = {
+    "plant.engine": "lagrangian", "plant.step_s": 2.5e-4, "plant.modelling_error": 0.0,
+    "plant.modelling_torque_Nm": [0.0, 0.0, 0.0], "disturbance.load": 0.0,
+    "disturbance.random_bound_Nm": 0.0, "drive.time_constant_s": 0.0,
+}  # fmt: skip
+"""A plant that is as the nominal model has it, and acts at once."""
+
+
 def on_an_axis(law, inertia, start, seconds, period_s, load_Nm=0.0):
     """Course of (error, rate, first logged) of β at rest on the others: a double integrator, stepped exactly.
 

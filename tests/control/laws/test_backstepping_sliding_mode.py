@@ -7,32 +7,27 @@ from spheretwin import scenario as scenarios
 from spheretwin.control.laws.backstepping_sliding_mode import BacksteppingSlidingMode
 from spheretwin.models.lagrangian import coriolis_matrix, inertia_matrix
 from spheretwin.simulation import simulate
-from tests.control.laws.cases import PERIOD, Asked, follows, known
+from tests.control.laws.cases import PERIOD, UNDISTURBED, SlowIntegral, follows, known
 
 
-class Slow:
+class Slow(SlowIntegral):
     """The law as its docstring has it, as matrices."""
 
-    def __init__(self, gains, inertia, delay_s):
-        self.gains, self.J, self.asked = gains, inertia, Asked(delay_s)
-        self.adapted = np.zeros(3)
-
     def __call__(self, reference, measurement):
-        g = self.gains
-        slope, h, beta, layer, rate = map(
-            np.array, (g.surface_slope, g.reaching_gain, g.switching, g.layer, g.adaptation_rate)
+        slope, h, beta, layer, rate = self.named(
+            "surface_slope", "reaching_gain", "switching", "layer", "adaptation_rate"
         )
         q, qdot, believed = measurement
         e, e_rate = q - reference[0], qdot - reference[1]
         s = e_rate + slope * e
         tracking = np.sqrt(slope * rate / (slope + h))
-        self.adapted += PERIOD * tracking * (believed - self.asked())
+        self.integral += PERIOD * tracking * (believed - self.asked())
         torque = inertia_matrix(q, self.J) @ (reference[2] - slope * e_rate)
         torque += coriolis_matrix(q, qdot, self.J) @ (reference[1] - slope * e)
-        torque += self.adapted - self.J * h * (s + beta * np.clip(s / layer, -1, 1))
-        self.adapted -= PERIOD * self.J * rate * s
+        torque += self.integral - self.J * h * (s + beta * np.clip(s / layer, -1, 1))
+        self.integral -= PERIOD * self.J * rate * s
         self.asked.all.append(torque)
-        return torque, np.concatenate([s, self.adapted])
+        return torque, np.concatenate([s, self.integral])
 
 
 @pytest.mark.parametrize("delay_s", [0.0, 2.25e-3])
@@ -47,17 +42,15 @@ def test_law_follows_its_equations(actuator, delay_s):
     follows(gains.build(known(actuator, delay_s)), Slow(gains, actuator.inertia, delay_s))
 
 
-UNDISTURBED = {
-    "plant.engine": "lagrangian", "plant.step_s": 2.5e-4, "plant.modelling_error": 0.0,
-    "plant.modelling_torque_Nm": [0.0, 0.0, 0.0], "plant.initial_rad": [0.01, -0.01, 0.02],
-    "disturbance.load": 1.0, "disturbance.random_bound_Nm": 0.0, "drive.time_constant_s": 0.0,
-    "nominal.equals_truth": True, "controller.law": "backstepping_sliding_mode", "duration": 0.3,
+LOADED = UNDISTURBED | {
+    "plant.initial_rad": [0.01, -0.01, 0.02], "disturbance.load": 1.0, "duration": 0.3,
+    "nominal.equals_truth": True, "controller.law": "backstepping_sliding_mode",
 }  # fmt: skip
 
 
 def course(period_s, actuator):
     """V of the docstring along a loaded nutation without model error, and what its decrease is said to be."""
-    run = simulate(scenarios.load("nutation", UNDISTURBED | {"controller.period_s": period_s}))
+    run = simulate(scenarios.load("nutation", LOADED | {"controller.period_s": period_s}))
     assert run.telemetry["allocation_scale"].min() == 1.0
     g, J, telemetry = run.scenario.controller, actuator.inertia, run.telemetry
     slope, h, rate = g.surface_slope[0], g.reaching_gain[0], g.adaptation_rate[0]

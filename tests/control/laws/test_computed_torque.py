@@ -7,21 +7,17 @@ from spheretwin import scenario as scenarios
 from spheretwin.control.laws.computed_torque import ComputedTorque
 from spheretwin.models.lagrangian import coriolis_matrix, inertia_matrix
 from spheretwin.simulation import simulate
-from tests.control.laws.cases import PERIOD, Asked, follows, known
+from tests.control.laws.cases import PERIOD, UNDISTURBED, SlowIntegral, follows, known
 
 
-class Slow:
+class Slow(SlowIntegral):
     """The law as its docstring has it, as matrices."""
 
-    def __init__(self, gains, inertia, delay_s):
-        self.gains, self.inertia, self.asked = gains, inertia, Asked(delay_s)
-        self.integral = np.zeros(3)
-
     def __call__(self, reference, measurement):
-        kp, kd, ki = (np.array(g) for g in (self.gains.stiffness, self.gains.damping, self.gains.integral))
+        kp, kd, ki = self.named("stiffness", "damping", "integral")
         q, qdot, believed = measurement
         e, e_rate = q - reference[0], qdot - reference[1]
-        M, C = inertia_matrix(q, self.inertia), coriolis_matrix(q, qdot, self.inertia)
+        M, C = inertia_matrix(q, self.J), coriolis_matrix(q, qdot, self.J)
         self.integral += PERIOD * np.sqrt(ki / kd) * (believed - self.asked())
         torque = M @ (reference[2] - kd * e_rate - kp * e) + C @ qdot + self.integral
         self.integral -= PERIOD * M @ (ki * e)
@@ -35,18 +31,11 @@ def test_law_follows_its_equations(actuator, delay_s):
     follows(gains.build(known(actuator, delay_s)), Slow(gains, actuator.inertia, delay_s))
 
 
-UNDISTURBED = {
-    "plant.engine": "lagrangian",
-    "plant.step_s": 2.5e-4,
-    "plant.modelling_error": 0.0,
-    "plant.modelling_torque_Nm": [0.0, 0.0, 0.0],
-    "disturbance.load": 0.0,
-    "disturbance.random_bound_Nm": 0.0,
-    "drive.time_constant_s": 0.0,
-    "controller.law": "computed_torque",
-}
 POLE = 20.0
-TWO_POLES = {"controller.stiffness": POLE**2, "controller.damping": 2 * POLE, "controller.integral": 0.0}
+TWO_POLES = {
+    "controller.law": "computed_torque", "controller.stiffness": POLE**2, "controller.damping": 2 * POLE,
+    "controller.integral": 0.0,
+}  # fmt: skip
 
 
 def decay_missed(period_s):
@@ -71,7 +60,7 @@ def test_errors_of_an_undisturbed_nutation_decay_in_closed_form():
 
 
 def test_without_an_integral_a_constant_load_leaves_its_share_of_the_stiffness(actuator):
-    loaded = {"controller.law": "computed_torque", "disturbance.load": 1.0, "plant.engine": "lagrangian"}
+    loaded = {"disturbance.load": 1.0, "plant.engine": "lagrangian"}
     run = simulate(scenarios.load("hold", loaded | TWO_POLES))
     q, load = run.telemetry["q_rad"][-1], run.telemetry["disturbance_Nm"][-1]
     left = np.linalg.solve(inertia_matrix(q, actuator.inertia), -load) / POLE**2

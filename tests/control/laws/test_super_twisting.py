@@ -8,30 +8,25 @@ from scipy.linalg import solve_continuous_lyapunov
 
 from spheretwin.control.laws.super_twisting import SuperTwisting
 from spheretwin.models.lagrangian import coriolis_matrix, inertia_matrix
-from tests.control.laws.cases import PERIOD, Asked, follows, known, on_an_axis
+from tests.control.laws.cases import PERIOD, SlowIntegral, follows, known, on_an_axis
 
 
-class Slow:
+class Slow(SlowIntegral):
     """The law as its docstring has it, as matrices."""
 
-    def __init__(self, gains, inertia, delay_s):
-        self.gains, self.J, self.asked = gains, inertia, Asked(delay_s)
-        self.twisted = np.zeros(3)
-
     def __call__(self, reference, measurement):
-        g = self.gains
-        slope, k1, k2, mu = map(np.array, (g.surface_slope, g.root_gain, g.twisting_gain, g.linear_share))
+        slope, k1, k2, mu = self.named("surface_slope", "root_gain", "twisting_gain", "linear_share")
         q, qdot, believed = measurement
         e_rate = qdot - reference[1]
         s = e_rate + slope * (q - reference[0])
         phi1 = np.sqrt(np.abs(s)) * np.sign(s) + mu * s
         phi2 = phi1 * (0.5 / np.sqrt(np.abs(s)) + mu)
-        self.twisted += PERIOD * slope / sqrt(3) * (believed - self.asked())
+        self.integral += PERIOD * slope / sqrt(3) * (believed - self.asked())
         torque = inertia_matrix(q, self.J) @ (reference[2] - slope * e_rate - k1 * phi1)
-        torque += coriolis_matrix(q, qdot, self.J) @ qdot + self.twisted
-        self.twisted -= PERIOD * self.J * k2 * phi2
+        torque += coriolis_matrix(q, qdot, self.J) @ qdot + self.integral
+        self.integral -= PERIOD * self.J * k2 * phi2
         self.asked.all.append(torque)
-        return torque, np.concatenate([s, self.twisted])
+        return torque, np.concatenate([s, self.integral])
 
 
 @pytest.mark.parametrize("delay_s", [0.0, 2.25e-3])
