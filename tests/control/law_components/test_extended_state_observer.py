@@ -145,38 +145,6 @@ def test_the_response_has_one_sign_for_all_poles():
             assert least >= -1e-14 * largest.max(), (a, b)
 
 
-def worst(bandwidths, rates, times):
-    """Errors at the ticks of an observer, while the disturbance of a double integrator has the given rates.
-
-    The rotor is integrated by the equations of a triple integrator over each piece of constant rate.
-    """
-    gains = np.array(observer_gains(*bandwidths, PERIOD))
-    A = np.array([[1, PERIOD, 0.5 * PERIOD**2], [0, 1, PERIOD], [0, 0, 1]])
-    true, known, errors = np.zeros(3), np.zeros(3), []
-    for pieces in rates:
-        for rate, s in zip(pieces, times, strict=True):
-            step = np.array([[1, s, 0.5 * s**2], [0, 1, s], [0, 0, 1]])
-            true = step @ true + rate * np.array([s**3 / 6, s**2 / 2, s])
-        known = A @ known
-        known = known + gains * (true[0] - known[0])
-        errors.append(known - true)
-    return np.array(errors)
-
-
-@pytest.mark.parametrize("bandwidths", TUNINGS)
-def test_no_disturbance_of_bounded_rate_passes_the_bound_and_a_steady_one_attains_it(bandwidths):
-    generator, bound = np.random.default_rng(0), stated(bandwidths, zero_order_hold=False)
-    times = np.full(4, PERIOD / 4)
-    for period in (1, 7, 50, 400, 1000):  # rates that change their sign after so many ticks, or at random
-        square = np.sign(np.sin(np.pi * (np.arange(2000) + 0.5) / period))
-        errors = worst(bandwidths, np.repeat(square[:, None], 4, axis=1), times)
-        assert (np.abs(errors) <= bound * (1 + 1e-6)).all()
-        drawn = generator.choice([-1.0, 1.0], (2000 // period, 4)).repeat(period, axis=0)
-        assert (np.abs(worst(bandwidths, drawn, times)) <= bound * (1 + 1e-6)).all()
-    attained = np.abs(worst(bandwidths, np.ones((2000, 4)), times)).max(axis=0)
-    np.testing.assert_allclose(attained, bound, rtol=1e-6)
-
-
 @pytest.mark.parametrize(("bandwidths", "share"), [((800.0, 20.0), 0.0025), ((800.0, 400.0), 0.033)])
 def test_the_bound_of_continuous_time_is_passed_by_a_staircase(bandwidths, share):
     """So that the sampled one is needed: at 1 kHz its third factor is larger by what is expected."""

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 from scipy.linalg import solve_discrete_lyapunov
 
-from spheretwin.control.law_components.feedback import triple_pole
 from spheretwin.control.laws.lqi import LQI, regulator
 from spheretwin.control.laws.pid import PID
 from spheretwin.models.base.errors import InputError
@@ -42,14 +41,6 @@ def test_poles_obey_the_return_difference(weights):
     # Sampling moves the gains by half a period times the fastest pole, up to 400 1/s.
     size = max(weights[0] ** 0.5, weights[1], weights[2] ** (1 / 3)) ** np.array([2, 4, 6])
     np.testing.assert_allclose(results / size, np.square(weights)[[1, 0, 2]] / size, atol=1e-3)
-
-
-def test_a_triple_pole_is_among_its_gains():
-    w = 40.0
-    gains = regulator(3**0.5 * w**2, 3**0.5 * w, w**3, 1e-6)
-    np.testing.assert_allclose(
-        gains, triple_pole(w), rtol=1e-4
-    )  # half a period times the pole, 2e-5, a few times
 
 
 def test_law_is_the_feedback_with_these_gains(actuator):

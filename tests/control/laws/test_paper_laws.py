@@ -80,18 +80,6 @@ def test_estimates_are_logged_as_they_are(actuator):
     np.testing.assert_allclose(state[12:15], 10 * np.abs(s) * (1 + np.abs(s) + s**2) * PERIOD)
 
 
-def test_without_its_rates_afsm_is_the_adaptive_fuzzy_law(actuator):
-    still = AFSM(switching_rate=0.0, bound_rate=0.0).build(known(actuator))
-    fuzzy = AdaptiveFuzzy().build(known(actuator))
-    states = [still.state.copy(), fuzzy.state.copy()]
-    generator = np.random.default_rng(1)
-    for _ in range(20):
-        measurement, torques = generator.normal(size=(2, 3)), np.empty((2, 3))
-        for law, state, torque in zip((still, fuzzy), states, torques, strict=True):
-            law.step(0.0, np.zeros((3, 3)), measurement, law.parameters, state, torque)
-        np.testing.assert_array_equal(torques[0], torques[1])
-
-
 def test_no_error_asks_for_no_switching(actuator):
     # sgn(0) = 0: on the surface the law must not push to either side.
     law = AFSM().build(known(actuator))
