@@ -15,6 +15,7 @@ from pathlib import Path
 import pytest
 
 from spheretwin import cli
+from spheretwin.models.base.errors import SpheretwinError
 from tests.content.compare import difference
 
 FOLDER = Path(__file__).parent
@@ -110,6 +111,15 @@ def _columns(count: int) -> Iterator[None]:
         os.environ.pop("COLUMNS")
         if before is not None:
             os.environ["COLUMNS"] = before
+
+
+def refusal(call: Callable[..., object], *arguments: object, **named: object) -> str:
+    """Return the message of a refusal; of accepted input, that it was accepted."""
+    try:
+        call(*arguments, **named)
+    except SpheretwinError as error:
+        return str(error)
+    return "accepted"
 
 
 def printed(call: Callable[[], object], columns: int = 80) -> str:

@@ -2,8 +2,6 @@
 
 import dataclasses
 
-import numpy as np
-
 from spheretwin import scenario as scenarios
 from spheretwin.bench.commands import COMMANDS
 from spheretwin.bench.modes import (
@@ -21,8 +19,9 @@ from spheretwin.models.base.errors import InputError
 from spheretwin.models.telemetry.table import read_parquet
 from spheretwin.session import Session
 from spheretwin.trajectories import SHAPES
+from tests.content import values
 from tests.content.content import content_test, scratch
-from tests.content.values import array, tree
+from tests.content.values import array, lines, tree
 from tests.twin.bench.cases import QUIET, bench
 
 VARIABLE = {"missed", "missed_share", "realtime_factor"}
@@ -30,18 +29,7 @@ VARIABLE = {"missed", "missed_share", "realtime_factor"}
 
 
 def plain(value):
-    """Return a value as nested keys and values."""
-    if dataclasses.is_dataclass(value) and not isinstance(value, type):
-        return {field.name: plain(getattr(value, field.name)) for field in dataclasses.fields(value)}
-    if hasattr(value, "_asdict"):
-        return {name: plain(inside) for name, inside in value._asdict().items()}
-    if isinstance(value, dict):
-        return {str(name): plain(inside) for name, inside in value.items()}
-    if isinstance(value, np.ndarray):
-        return array(value)
-    if isinstance(value, list | tuple):
-        return [plain(inside) for inside in value]
-    return value if isinstance(value, str | int | float | bool | None) else repr(value)
+    return values.plain(value, lambda leaf: leaf if isinstance(leaf, float) else repr(leaf))
 
 
 def differences(before, after, prefix=""):
@@ -202,7 +190,7 @@ def shapes_of_modes():
                     "shape": plain(shape.model_dump(mode="json")),
                     "approach": plain(approach),
                 }
-    return "\n".join(tree(content))
+    return lines(content)
 
 
 def arguments_of_commands():
@@ -233,7 +221,7 @@ def choices():
             "fields": list(map(row, settings_of(made.fields()[:3]))),
             "shape": {name: list(map(row, shape_settings(name, made))) for name in (*SHAPES, "x")},
         }
-    return "\n".join(tree(content))
+    return lines(content)
 
 
 CASES = {

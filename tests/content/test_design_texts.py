@@ -1,6 +1,6 @@
 """Content of the offline design: sums of few points, curves, surveys, checks, and messages about geometry."""
 
-from dataclasses import fields, is_dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -20,31 +20,20 @@ from spheretwin.models.design import (
     workspace,
 )
 from spheretwin.models.design.direct_summation import Quadrature, Rule
+from tests.content import values
 from tests.content.content import content_test
-from tests.content.values import array, number, tree
+from tests.content.values import number
 
 FEW = Quadrature(near=Rule(2, 4, 8, 4), far=Rule(2, 2, 6, 2))
 NOISE = 1e-11
 
 
-def plain(value):
-    if hasattr(value, "_asdict"):
-        return {name: plain(inside) for name, inside in value._asdict().items()}
-    if is_dataclass(value) and not isinstance(value, type):
-        return {field.name: plain(getattr(value, field.name)) for field in fields(value)}
-    if isinstance(value, np.ndarray):
-        return array(value)
-    if isinstance(value, dict):
-        return {str(name): plain(inside) for name, inside in value.items()}
-    if isinstance(value, list | tuple):
-        return [plain(inside) for inside in value]
-    if isinstance(value, float | np.floating) and abs(value) < NOISE:
-        return "rounding"
-    return value if isinstance(value, str | int | bool | None) else number(value)
+def leaf(value):
+    return "rounding" if isinstance(value, float | np.floating) and abs(value) < NOISE else number(value)
 
 
 def lines(value):
-    return "\n".join(tree(plain(value)))
+    return values.lines(values.plain(value, leaf))
 
 
 def displaced(actuator):

@@ -16,23 +16,10 @@ from spheretwin.study import study as studies
 from spheretwin.study.axes import AnyAxis
 from spheretwin.study.grid import Grid
 from spheretwin.study.study import Study
-from tests.content.content import content_test
-from tests.content.values import tree
+from tests.content.content import content_test, refusal
+from tests.content.values import lines
 
 NAMES = [name for name, _ in every_field(Scenario)]
-
-
-def lines(value):
-    return "\n".join(tree(value))
-
-
-def refusal(call, *arguments):
-    """Return the message of a refusal; of accepted input, that it was accepted."""
-    try:
-        call(*arguments)
-    except InputError as error:
-        return str(error)
-    return "accepted"
 
 
 def without_words(schema):

@@ -15,7 +15,7 @@ from spheretwin.models.telemetry.table import read_parquet
 from spheretwin.provenance import facts_of
 from spheretwin.session import Session
 from spheretwin.simulation import follow, simulate
-from tests.content.content import content_test, scratch
+from tests.content.content import content_test, refusal, scratch
 from tests.content.short_runs import LAGRANGIAN, SHORT, brief
 from tests.content.values import array, number, tree
 
@@ -34,11 +34,7 @@ def of_sessions():
             lines.extend(brief(table))
 
     def attempt(title, call, *arguments, **named):
-        try:
-            call(*arguments, **named)
-            lines.append(f"{title}: accepted")
-        except (InputError, SpheretwinError) as error:
-            lines.append(f"{title}: {error}")
+        lines.append(f"{title}: {refusal(call, *arguments, **named)}")
 
     events = [
         {"t_s": 0.005, "set": "disturbance.load", "value": 0.5},

@@ -14,13 +14,9 @@ from spheretwin.study.tuning.gains import section_of
 from spheretwin.study.tuning.sampler import warnings_only
 from spheretwin.study.tuning.tuning import tune
 from tests.content.content import content_test, scratch
-from tests.content.values import tree
+from tests.content.values import lines
 from tests.twin.study.cases import LOADS, study, values
 from tests.twin.study.tuning import cases as tuning
-
-
-def lines(value):
-    return "\n".join(tree(value))
 
 
 def rows_of_shipped_studies():

@@ -1,6 +1,8 @@
 """Values as text: numbers with nine digits, long arrays by what shows lost rows, order and scale."""
 
+import dataclasses
 import math
+from collections.abc import Callable
 
 import numpy as np
 
@@ -79,6 +81,26 @@ def words(texts: list) -> str:
         return repr([str(text) for text in texts])
     distinct = list(dict.fromkeys(map(str, texts)))
     return f"{len(texts)} texts, {len(distinct)} different: {distinct[:12]!r} … {distinct[-4:]!r}"
+
+
+def plain(value: object, leaf: Callable[[object], object] = repr) -> object:
+    """Return a value as nested keys and values; `leaf` is what becomes of numbers and other objects."""
+    if isinstance(value, np.ndarray):
+        return array(value)
+    if hasattr(value, "_asdict"):
+        value = value._asdict()
+    elif dataclasses.is_dataclass(value) and not isinstance(value, type):
+        value = {field.name: getattr(value, field.name) for field in dataclasses.fields(value)}
+    if isinstance(value, dict):
+        return {str(name): plain(inside, leaf) for name, inside in value.items()}
+    if isinstance(value, list | tuple):
+        return [plain(inside, leaf) for inside in value]
+    return value if isinstance(value, str | bool | int | None) else leaf(value)
+
+
+def lines(value: object) -> str:
+    """Return the lines of nested keys and values as one text."""
+    return "\n".join(tree(value))
 
 
 def tree(value: object, indent: int = 0) -> list[str]:
