@@ -37,21 +37,14 @@ needs_a_browser = pytest.mark.skipif(
 )
 
 FLAGS = (
-    "--headless",
-    "--no-sandbox",
-    "--disable-gpu",
-    "--use-angle=swiftshader",
-    "--enable-unsafe-swiftshader",
-    "--disable-quic",
-    "--disable-dev-shm-usage",
-    "--no-first-run",
-    "--disable-background-networking",
-    "--disable-component-update",
-    "--disable-sync",
-    "--hide-scrollbars",
-    "--remote-debugging-port=0",
+    "--headless", "--no-sandbox", "--disable-gpu", "--use-angle=swiftshader", "--enable-unsafe-swiftshader",
+    "--disable-quic", "--disable-dev-shm-usage", "--no-first-run", "--disable-background-networking",
+    "--disable-component-update", "--disable-sync", "--hide-scrollbars", "--remote-debugging-port=0",
     "--host-resolver-rules=MAP * ~NOTFOUND, EXCLUDE 127.0.0.1, EXCLUDE localhost",
-)
+)  # fmt: skip
+
+FRAME_S = 0.1
+"""Time between two frames: without a graphics processor, frames as often as possible take all cores."""
 
 HERE = ("127.0.0.1", "localhost", "::1")
 
@@ -60,12 +53,9 @@ WITHIN = ("data:", "blob:", "about:")
 
 
 _KEYS = {
-    " ": ("Space", 32),
-    "Enter": ("Enter", 13),
-    "Escape": ("Escape", 27),
-    "Tab": ("Tab", 9),
+    " ": ("Space", 32), "Enter": ("Enter", 13), "Escape": ("Escape", 27), "Tab": ("Tab", 9),
     "Backspace": ("Backspace", 8),
-}
+}  # fmt: skip
 # A page answers within milliseconds once its process is there; this is for a busy machine.
 _ANSWER_S = 20.0
 
@@ -87,17 +77,10 @@ class Browser:
     ----------
     size : (int, int)
         Width and height of its pages, pixels.
-    flags : str
-        More of Chromium's own flags.
-    frame_s : float
-        Time between two frames of a page: a picture is computed without a graphics processor, and as often as
-        it can be it takes all cores. Zero does not slow it down.
     """
 
-    def __init__(self, size=(1280, 800), flags=(), frame_s=0.1):
+    def __init__(self, size=(1280, 800)):
         self.size = size
-        self._frame_s = frame_s
-        self._flags = flags
         self._answers, self._pages = {}, {}
         self._ids = itertools.count(1)
         self._arrived = threading.Condition()
@@ -105,13 +88,14 @@ class Browser:
 
     def __enter__(self):
         self._profile = tempfile.mkdtemp(prefix="browser-")
-        command = [CHROMIUM, *FLAGS, *self._flags, f"--user-data-dir={self._profile}", "about:blank"]
+        command = [CHROMIUM, *FLAGS, f"--user-data-dir={self._profile}", "about:blank"]
         quiet = {"stdin": subprocess.DEVNULL, "stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
         self._process = subprocess.Popen(
             command, env={**os.environ, "HOME": self._profile, "TMPDIR": self._profile}, **quiet
         )
         try:
-            self._socket = connect(self._address(), max_size=None, compression=None, proxy=None)
+            unlimited = {"max_size": None, "open_timeout": None, "ping_timeout": None}
+            self._socket = connect(self._address(), compression=None, proxy=None, **unlimited)
         except BaseException:
             self._end()
             raise
@@ -140,9 +124,7 @@ class Browser:
         self._pages[session] = page
         for domain in ("Page", "Runtime", "Network", "Log"):
             page.command(f"{domain}.enable")
-        if self._frame_s:
-            source = page_scripts.SLOW % (1000 * self._frame_s)
-            page.command("Page.addScriptToEvaluateOnNewDocument", source=source)
+        page.command("Page.addScriptToEvaluateOnNewDocument", source=page_scripts.SLOW % (1000 * FRAME_S))
         page.command("Target.setAutoAttach", autoAttach=True, waitForDebuggerOnStart=True, flatten=True)
         page.resize(*(size or self.size))
         page.go(url)
@@ -264,24 +246,13 @@ class Page:
 
     def resize(self, width, height):
         """Give it a size in pixels."""
-        self.command(
-            "Emulation.setDeviceMetricsOverride",
-            width=width,
-            height=height,
-            deviceScaleFactor=1,
-            mobile=False,
-        )
+        scale = {"deviceScaleFactor": 1, "mobile": False}
+        self.command("Emulation.setDeviceMetricsOverride", width=width, height=height, **scale)
 
     def evaluate(self, javascript, within_s=None):
         """Value of an expression, as JSON holds it; a promise is waited for."""
-        answer = self.command(
-            "Runtime.evaluate",
-            within_s=within_s,
-            expression=javascript,
-            returnByValue=True,
-            awaitPromise=True,
-            userGesture=True,
-        )
+        options = {"returnByValue": True, "awaitPromise": True, "userGesture": True}
+        answer = self.command("Runtime.evaluate", within_s=within_s, expression=javascript, **options)
         if "exceptionDetails" in answer:
             details = answer["exceptionDetails"]
             raise BrowserError(details.get("exception", {}).get("description", details["text"]))
@@ -348,10 +319,6 @@ class Page:
         """Wait until it has drawn some frames more."""
         self.front()
         self.evaluate(page_scripts.DRAWN % frames)
-
-    def frames_per_second(self, seconds=2.0):
-        """How often it draws, over some seconds."""
-        return self.evaluate(page_scripts.FRAMES % (1000 * seconds))
 
     def heard(self, method, parameters):
         """Keep one event of the browser's."""

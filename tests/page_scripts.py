@@ -67,14 +67,3 @@ DRAWN = """new Promise((done) => {
   const draw = (left) => left ? requestAnimationFrame(() => draw(left - 1)) : done(true);
   draw(%d);
 })"""
-
-FRAMES = """new Promise((done) => {
-  const began = performance.now();
-  let frames = 0;
-  const draw = () => {
-    const passed = performance.now() - began;
-    if (passed > %f) done(frames / passed * 1000);
-    else { frames += 1; requestAnimationFrame(draw); }
-  };
-  requestAnimationFrame(draw);
-})"""
