@@ -96,11 +96,3 @@ def test_a_restored_session_continues_with_the_applied_torque(nominal):
         session.advance(37)
         other.restore(session.snapshot())
         assert other.advance(50).values.tobytes() == session.advance(50).values.tobytes()
-
-
-def test_a_change_outside_the_law_keeps_the_applied_torque(tmp_path):
-    scenario = scenarios.load("hold")
-    with Session(scenario, asking()) as unchanged, Session(scenario, asking()) as changed:
-        changed.advance(20)
-        changed.set("plant.group_gain", [1.0] * 18)  # builds the controller anew
-        assert changed.advance(20).values.tobytes() == unchanged.advance(40).rows(20, 40).values.tobytes()
