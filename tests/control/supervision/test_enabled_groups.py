@@ -16,25 +16,25 @@ from spheretwin.control.supervision.enabled_groups import (
     mark_faulty_groups,
     mask_disabled_groups,
 )
-from spheretwin.models.base.state import restore_state, save_state
 from spheretwin.models.magnetics import torque_matrix
 
 COUNT, LIMIT_A = 18, 8.0
 
 
-def told(*places):
+def at(*places):
     return np.isin(np.arange(COUNT), places)
 
 
-def without(places):
+def without(places, G):
     made = groups(COUNT)
-    mark_faulty_groups(made, told(*places), 0.5)
+    mark_faulty_groups(made, at(*places), 0.5)
+    mask_disabled_groups(made, G)
     return made
 
 
-def allocated(name, G, torque, limit=LIMIT_A):
+def allocated(name, G, torque):
     current = np.full(COUNT, 7.0)
-    share = ALLOCATIONS[name](G, torque, limit, current, np.empty((SCRATCH_ROWS, COUNT)))
+    share = ALLOCATIONS[name](G, torque, LIMIT_A, current, np.empty((SCRATCH_ROWS, COUNT)))
     return current, share
 
 
@@ -47,10 +47,8 @@ def allocated(name, G, torque, limit=LIMIT_A):
 def test_the_others_give_the_whole_torque(actuator, name, out, pose, torque):
     """Of the columns of the others, G I is the share of what is wanted, and I the smallest that gives it."""
     G, wanted = torque_matrix(np.array(pose), actuator), 0.2 * np.array(torque)
-    made = without(out)
-    mask_disabled_groups(made, G)
-    current, share = allocated(name, made.G, wanted)
-    used = ~told(*out)
+    current, share = allocated(name, without(out, G).G, wanted)
+    used = ~at(*out)
     assert not current[~used].any()
     if share == 0.0:  # what is left has lost a direction
         sizes = np.linalg.svd(G[:, used], compute_uv=False)
@@ -71,9 +69,7 @@ def test_the_others_give_the_whole_torque(actuator, name, out, pose, torque):
 def test_with_too_few_left_there_is_no_torque_and_no_current(actuator, name):
     G = torque_matrix(np.array([0.2, -0.1, 0.3]), actuator)
     for left in (0, 1, 2):
-        made = without(range(left, COUNT))
-        mask_disabled_groups(made, G)
-        current, share = allocated(name, made.G, np.array([0.1, 0.2, 0.3]))
+        current, share = allocated(name, without(range(left, COUNT), G).G, np.array([0.1, 0.2, 0.3]))
         assert share == 0.0
         assert not current.any()
 
@@ -81,28 +77,18 @@ def test_with_too_few_left_there_is_no_torque_and_no_current(actuator, name):
 def test_reported_groups_are_enabled_again_and_detected_ones_are_not():
     made = groups(COUNT)
     made.out[5], made.out[6], made.some_out[0] = DETECTED_OPEN, DETECTED_SHORTED, True
-    mark_faulty_groups(made, told(2, 5), 1.0)
+    mark_faulty_groups(made, at(2, 5), 1.0)
     assert made.out[[2, 5, 6]].tolist() == [REPORTED, DETECTED_OPEN, DETECTED_SHORTED]
     assert made.out_s[2] == 1.0
-    mark_faulty_groups(made, told(2, 5), 2.0)
+    mark_faulty_groups(made, at(2, 5), 2.0)
     assert made.out_s[2] == 1.0  # since when, not until when
-    mark_faulty_groups(made, told(), 3.0)
+    mark_faulty_groups(made, at(), 3.0)
     assert made.out[[2, 5, 6]].tolist() == [IN_USE, DETECTED_OPEN, DETECTED_SHORTED]
     assert made.some_out[0]
 
 
 def test_with_all_in_use_no_bit_of_the_matrix_is_another(actuator):
-    G, made = torque_matrix(np.array([0.5, 0.3, -0.2]), actuator), groups(COUNT)
-    mask_disabled_groups(made, G)
+    G = torque_matrix(np.array([0.5, 0.3, -0.2]), actuator)
+    made = without((), G)
     assert made.G.tobytes() == np.ascontiguousarray(G).tobytes()
     assert not made.some_out[0]
-
-
-@given(st.lists(st.integers(0, 3), min_size=COUNT, max_size=COUNT), st.floats(0, 1e9))
-def test_the_state_is_complete(out, t_s):
-    made, other = groups(COUNT), groups(COUNT)
-    made.out[:], made.out_s[:], made.some_out[:] = out, t_s, any(out)
-    restore_state(other, save_state(made), "groups")
-    assert other.out.tolist() == out
-    assert other.out_s.tolist() == [t_s] * COUNT
-    assert other.some_out[0] == any(out)

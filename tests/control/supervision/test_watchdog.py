@@ -44,19 +44,13 @@ def test_a_jump_is_more_than_the_largest_rate_noise_and_resolution_allow(axis, m
     most = 60 * PERIOD_S * (missing + 1) + 6 * np.sqrt(2) * NOISE_RAD[axis] + QUANTUM_RAD[axis]
     for share, reason in ((1 - 1e-9, Reason.NONE), (1 + 1e-9, Reason.JUMP)):
         for sign in (-1, 1):
-            watcher = made()
-            assert looked(watcher, STILL) == Reason.NONE
+            watcher, first = made(), np.array([0.9, -0.9, 400.0])
+            assert looked(watcher, first) == Reason.NONE  # a first measurement is no jump
             watcher.fresh[axis] = 0.0
             for _ in range(missing):
-                looked(watcher, STILL)
+                looked(watcher, first)
             watcher.fresh[axis] = 1.0
-            angle = np.zeros(3)
-            angle[axis] = sign * share * most
-            assert looked(watcher, angle) == reason
-
-
-def test_a_first_measurement_is_no_jump():
-    assert looked(made(), [1.3, -1.3, 400.0]) == Reason.NONE
+            assert looked(watcher, first + sign * share * most * np.eye(3)[axis]) == reason
 
 
 @pytest.mark.parametrize("ticks", [1, 5, 8])
@@ -77,13 +71,11 @@ def test_stale_is_so_many_ticks_in_a_row(ticks):
 @pytest.mark.parametrize("axis", range(3))
 def test_speed_and_edge(axis):
     for rate, reason in ((60.0, Reason.NONE), (np.nextafter(60, 61), Reason.SPEED), (-61.0, Reason.SPEED)):
-        rates = np.zeros(3)
-        rates[axis] = rate
-        assert looked(made(), STILL, rates) == reason
+        assert looked(made(), STILL, rate * np.eye(3)[axis]) == reason
     for angle, reason in ((1.38, Reason.NONE), (1.3801, Reason.EDGE), (-1.3801, Reason.EDGE)):
-        angles = np.zeros(3)
-        angles[axis] = angle
-        assert looked(made(edge_margin_rad=0.02), angles) == (reason if axis < 2 else Reason.NONE)
+        assert looked(made(edge_margin_rad=0.02), angle * np.eye(3)[axis]) == (
+            reason if axis < 2 else Reason.NONE
+        )
     assert looked(made(edge_margin_rad=-0.1), [1.45, 0, 0]) == Reason.NONE  # outside, if that is wanted
 
 
@@ -98,15 +90,13 @@ def test_a_non_finite_measurement_is_replaced_and_trips(numbers):
     np.testing.assert_array_equal(measurement[0], np.where(lost, [0.2, 0.3, 0.4], 0.1))
     np.testing.assert_array_equal(measurement[1], np.where(lost, 0.0, 0.1))
     assert watcher.reason[0] == (Reason.MEASUREMENT if lost.any() else Reason.NONE)
-    off = watchdog(WatchdogSection(), WATCHED, np.ones(3), np.zeros(1, dtype=np.int64))
-    assert not replace_invalid(off, np.full((3, 3), np.nan))
-
-
-def test_a_non_finite_rate_trips_and_becomes_zero():
-    watcher, rates = made(), np.array([0.0, np.inf, np.nan])
+    rates = measurement[0] * np.array([1.0, np.inf, np.nan])
+    watcher = made()
     watch(watcher, np.zeros(3), rates)
     assert watcher.reason[0] == Reason.MEASUREMENT
-    assert not rates.any()
+    assert not rates[1:].any()
+    off = watchdog(WatchdogSection(), WATCHED, np.ones(3), np.zeros(1, dtype=np.int64))
+    assert not replace_invalid(off, np.full((3, 3), np.nan))
 
 
 @pytest.mark.parametrize("action", ["release", "short"])
