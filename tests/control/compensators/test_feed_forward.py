@@ -6,7 +6,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from spheretwin import scenario as scenarios
 from spheretwin.control.compensators.feed_forward import (
     FeedForwardSection,
     NominalRotor,
@@ -19,6 +18,7 @@ from spheretwin.models.telemetry.signals import ANGLES, Signal
 from spheretwin.plant.friction import friction, slow_down
 from spheretwin.session import Session
 from spheretwin.simulation import simulate
+from tests.control.compensators import cases
 
 COULOMB, VISCOUS = np.array([2e-3, 3e-3, 4e-3]), np.array([1e-4, 2e-4, 3e-4])
 INERTIA = np.array([2.0e-3, 2.3e-3, 2.6e-3])
@@ -85,12 +85,7 @@ class Turning:
 
 def alone(name="hold", **changes):
     """A run whose nominal model is true, without delay and lag."""
-    fields = {
-        "plant.engine": "lagrangian", "plant.modelling_error": 0.0, "plant.modelling_torque_Nm": [0, 0, 0],
-        "disturbance.load": 0.0, "disturbance.random_bound_Nm": 0.0, "drive.time_constant_s": 0.0,
-        "nominal.equals_truth": True,
-    }  # fmt: skip
-    return scenarios.load(name, fields | {key.replace("__", "."): value for key, value in changes.items()})
+    return cases.true_model(name, **{"drive__time_constant_s": 0.0} | changes)
 
 
 @pytest.mark.parametrize("share", [1.0, 0.0])

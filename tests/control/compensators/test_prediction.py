@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 from scipy.integrate import quad, solve_ivp
 
-from spheretwin import scenario as scenarios
 from spheretwin.control.applied_torque import applied_torque, estimate_applied_torque
 from spheretwin.control.compensators.prediction import DelayModel, PredictionSection, predict, prediction
 from spheretwin.control.law import Law
@@ -17,6 +16,7 @@ from spheretwin.models.magnetics import torque_matrix, torque_model
 from spheretwin.models.telemetry.signals import ANGLES, Signal
 from spheretwin.session import Session
 from spheretwin.simulation import simulate
+from tests.control.compensators import cases
 
 LAG_S = 7e-4
 Q, V = np.array([0.3, -0.2, 0.5]), np.array([1.0, -2.0, 4.0])
@@ -129,14 +129,8 @@ TELLING = Law("telling", telling, [2.0, 0.1], np.zeros(24), HANDED, asks_torque=
 
 def still_air(**changes):
     """A run whose nominal model is true."""
-    alone = {
-        "plant.engine": "lagrangian", "plant.modelling_error": 0.0, "plant.modelling_torque_Nm": [0, 0, 0],
-        "disturbance.load": 0.0, "disturbance.random_bound_Nm": 0.0, "duration": 0.5,
-        "controller.prediction.on": True, "plant.step_s": 1e-4, "nominal.equals_truth": True,
-    }  # fmt: skip
-    return scenarios.load(
-        "sinusoid", alone | {key.replace("__", "."): value for key, value in changes.items()}
-    )
+    fields = {"duration": 0.5, "controller__prediction__on": True, "plant__step_s": 1e-4}
+    return cases.true_model("sinusoid", **fields | changes)
 
 
 @pytest.mark.parametrize("periods", [1, 3])
