@@ -167,11 +167,12 @@ def test_the_rows_are_the_same_on_both_plants_within_the_bound(tmp_path):
     ],
 )
 def test_a_row_with_one_possible_plant_is_not_compared(tmp_path, chosen, monkeypatch):
-    base = 'name = "b"\nduration = 0.02\n[plant]\nengine = "mujoco"\n[trajectory]\nshape = "hold"\n'
+    base = 'name = "b"\nduration = 0.02\nplant.engine = "mujoco"\ntrajectory.shape = "hold"\n'
     (tmp_path / "base.toml").write_text(base)
     monkeypatch.setattr(agreement, "_rms", lambda *_: pytest.fail("a row was run for a comparison"))
-    result = run(chosen.model_copy(update={"folder": str(tmp_path)}), tmp_path / "out")
-    assert result.checked == 0 or "plant.integrator" in chosen.fields
+    chosen = chosen.model_copy(update={"folder": str(tmp_path)})
+    agreement.check(Rows(chosen), Grid(chosen)[0])
+    assert run(chosen, tmp_path / "out").checked == 0 or "plant.integrator" in chosen.fields
 
 
 def test_a_folder_that_cannot_be_had_is_refused(tmp_path):
