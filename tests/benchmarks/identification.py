@@ -79,6 +79,13 @@ def journal_of(path):
     return {draw["seed"]: draw for draw in map(json.loads, lines)}
 
 
+def add_to(path, draw):
+    """Add a draw to a journal, if there is one."""
+    if path:
+        with path.open("a") as file:
+            file.write(json.dumps(draw) + "\n")
+
+
 def figures_of(draws):
     """Figures of all draws."""
     names, chi2 = draws[0]["inside"], np.array([draw["chi2"] for draw in draws])
@@ -105,9 +112,7 @@ def main() -> int:
         if seed in draws:
             continue
         draws[seed] = identified(seed)
-        if options.journal:
-            with options.journal.open("a") as file:
-                file.write(json.dumps(draws[seed]) + "\n")
+        add_to(options.journal, draws[seed])
         print(f"draw {seed}: held-out mean square {draws[seed]['chi2']:.3f}", file=sys.stderr, flush=True)
     figures = figures_of(list(draws.values()))
     if options.json:

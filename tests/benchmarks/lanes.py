@@ -3,13 +3,11 @@
 One core, 64 plants, 50 steps a call; the vectors of the processor decide, so its widest are named.
 """
 
-import argparse
-import json
 import sys
 
 import llvmlite.binding
 import numpy as np
-from measuring import fastest, ratio, seconds_of, tell
+from measuring import fastest, options_of, ratio, report, seconds_of
 
 from spheretwin import plant
 from spheretwin.envs import TwinVectorEnv
@@ -34,12 +32,7 @@ def single(changes):
 def lockstep(changes):
     """Time of the same step of one of many plants, s."""
     plants = _plants(changes)
-
-    def work():
-        for _ in range(CALLS):
-            plants.step(np.zeros(18), np.zeros(3), dt, STEPS)
-
-    return lambda: seconds_of(work) / (PLANTS * STEPS * CALLS)
+    return _each(lambda: plants.step(np.zeros(18), np.zeros(3), dt, STEPS))
 
 
 def single_without_field():
@@ -62,10 +55,15 @@ def single_without_field():
 def lockstep_without_field():
     """Time of the same step of one of many plants, s."""
     plants = _plants(FRICTION)
+    return _each(lambda: plants.step_torque(np.zeros(3), dt, STEPS))
+
+
+def _each(call):
+    """Time of one step of one of the plants, in some calls of all of them, s."""
 
     def work():
         for _ in range(CALLS):
-            plants.step_torque(np.zeros(3), dt, STEPS)
+            call()
 
     return lambda: seconds_of(work) / (PLANTS * STEPS * CALLS)
 
@@ -121,37 +119,26 @@ def ratios():
         },
         rounds=9,
     )  # fmt: skip
+
+    def over_lockstep(of, kind, at_least):
+        sides = taken[f"single{kind}"], taken[f"lockstep{kind}"]
+        return ratio(f"one plant over one of 64, {of}", *sides, at_least=at_least)
+
     return [
-        ratio("one plant over one of 64, rotor and field", taken["single"], taken["lockstep"], at_least=2.0),
-        ratio(
-            "one plant over one of 64, rotor, field and friction",
-            taken["single, friction"],
-            taken["lockstep, friction"],
-            at_least=2.0,
-        ),
-        ratio(
-            "one plant over one of 64, rotor and friction",
-            taken["single, no field"],
-            taken["lockstep, no field"],
-            at_least=5.0,
-        ),
+        over_lockstep("rotor and field", "", 2.0),
+        over_lockstep("rotor, field and friction", ", friction", 2.0),
+        over_lockstep("rotor and friction", ", no field", 5.0),
         ratio("control periods of 64 plants per second, torques", 1.0, taken["torques"], at_least=3e6),
         ratio("control periods of 64 plants per second, currents", 1.0, taken["currents"], at_least=1e6),
     ]
 
 
 def main() -> int:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--json", action="store_true")
-    options = parser.parse_args()
+    options = options_of(__doc__)
     rows = ratios()
-    if options.json:
-        print(json.dumps({"processor": vectors(), "ratios": rows}))
-    else:
+    if not options.json:
         print(vectors())
-        for row in rows:
-            tell(row)
-    return 0 if all(row["ok"] for row in rows) else 1
+    return 0 if report(rows, options.json, processor=vectors()) else 1
 
 
 if __name__ == "__main__":

@@ -1,5 +1,7 @@
 """What benchmarks share: sides measured in turn, and rows that are told with their bounds."""
 
+import argparse
+import json
 import time
 from collections.abc import Callable
 from typing import Any
@@ -35,6 +37,23 @@ def ratio(
     ok = (at_most is None or value <= at_most) and (at_least is None or value >= at_least)
     sides = {"numerator_s": numerator_s, "denominator_s": denominator_s}
     return {"name": name, "value": value, "at_most": at_most, "at_least": at_least, "ok": ok, **sides}
+
+
+def options_of(document: str) -> argparse.Namespace:
+    """Return the options of a benchmark with its documentation: results as text or as JSON."""
+    parser = argparse.ArgumentParser(description=document.splitlines()[0])
+    parser.add_argument("--json", action="store_true")
+    return parser.parse_args()
+
+
+def report(rows: list[dict[str, Any]], as_json: bool, **others: object) -> bool:
+    """Print rows of ratios, in JSON with other results; return True if each keeps its bound."""
+    if as_json:
+        print(json.dumps({**others, "ratios": rows}))
+    else:
+        for row in rows:
+            tell(row)
+    return all(row["ok"] for row in rows)
 
 
 def tell(row: dict[str, Any]) -> None:

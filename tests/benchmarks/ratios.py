@@ -4,21 +4,20 @@ Machines differ and are shared, so only ratios have bounds. Both sides of a rati
 several times, and the fastest of each counts: whatever else the machine does only ever adds time.
 """
 
-import argparse
 import itertools
-import json
 import os
 import subprocess
 import sys
 import tempfile
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 from pathlib import Path
 
 import mujoco
 import numpy as np
 import plain
-from measuring import fastest, ratio, seconds_of, tell
+from measuring import fastest, options_of, ratio, report, seconds_of
 
 from spheretwin import plant
 from spheretwin import scenario as scenarios
@@ -45,28 +44,16 @@ SESSIONS = 8
 THINNED_Hz = 60.0
 
 
-def loop_seconds() -> float:
+def loop_seconds(engine: str = "mujoco") -> float:
     """Loop time of one physics step, s."""
-    run = simulate(scenarios.load(SCENARIO))
+    run = simulate(scenarios.load(SCENARIO, {"plant.engine": engine}))
     return run.wall_s / (len(run.telemetry) * run.scenario.substeps)
 
 
-def lagrangian_seconds() -> float:
-    """Loop time of one physics step on the Lagrangian, s."""
-    run = simulate(scenarios.load(SCENARIO, {"plant.engine": "lagrangian"}))
-    return run.wall_s / (len(run.telemetry) * run.scenario.substeps)
-
-
-def single_tick_seconds() -> float:
-    """Time of one tick in a session that is advanced tick by tick, s."""
+def tick_seconds(ticks: int) -> float:
+    """Time of one tick in a session that is advanced by some ticks at a time, s."""
     with Session(scenarios.load(SCENARIO)) as session:
-        return seconds_of(lambda: [session.advance(1) for _ in range(FEW_TICKS)]) / FEW_TICKS
-
-
-def tick_seconds() -> float:
-    """Time of one tick in a session that is advanced by as many at once, s."""
-    with Session(scenarios.load(SCENARIO)) as session:
-        return seconds_of(lambda: session.advance(FEW_TICKS)) / FEW_TICKS
+        return seconds_of(lambda: [session.advance(ticks) for _ in range(FEW_TICKS // ticks)]) / FEW_TICKS
 
 
 def set_up_seconds() -> float:
@@ -229,35 +216,28 @@ def _rotor() -> MujocoRotor:
 
 def ratios() -> list[dict[str, object]]:
     """Measure everything; rows with name, value, bound (None: reported only) and the two sides in s."""
-    command = [str(Path(sys.executable).with_name("spheretwin")), "simulate", SCENARIO]
+    simulated = [str(Path(sys.executable).with_name("spheretwin")), "simulate", SCENARIO]
     imports = [sys.executable, "-c", "import mujoco, numba, rerun"]
     with tempfile.TemporaryDirectory() as folder:
         brief, minute = scenarios.load(SCENARIO), scenarios.load("sinusoid", {"duration": 60.0})
         runs = fastest(
             {"recorded": run_seconds(brief, Path(folder)), "silent": run_seconds(brief, None)}, rounds=9
         )
-        minutes = fastest(
-            {
-                "recorded": run_seconds(minute, Path(folder)),
-                "thinned": run_seconds(minute, Path(folder), THINNED_Hz),
-                "silent": run_seconds(minute, None),
-            },
-            rounds=5,
-        )
-        processes = fastest(
-            {
-                "recorded": process_seconds(*command, "--record", f"{folder}/run.rrd"),
-                "silent": process_seconds(*command),
-                "imports": process_seconds(*imports),
-            },
-            rounds=5,
-        )
+        ways = {
+            "recorded": (Path(folder), None),
+            "thinned": (Path(folder), THINNED_Hz),
+            "silent": (None, None),
+        }
+        minutes = fastest({name: run_seconds(minute, *way) for name, way in ways.items()}, rounds=5)
+        commands = {"silent": simulated, "imports": imports}
+        commands["recorded"] = [*simulated, "--record", f"{folder}/run.rrd"]
+        processes = fastest({name: process_seconds(*each) for name, each in commands.items()}, rounds=5)
     inner = fastest(
         {
-            "loop": loop_seconds, "bare": bare_seconds, "lagrangian": lagrangian_seconds,
+            "loop": loop_seconds, "bare": bare_seconds, "lagrangian": partial(loop_seconds, "lagrangian"),
             "G_t": torque_matrix_seconds, "plant step": plant_step_seconds, "bounded": bounded_seconds,
-            "single": single_tick_seconds, "tick": tick_seconds, "set-up": set_up_seconds,
-            "brief run": brief_run_seconds, "brief loop": brief_loop_seconds,
+            "single": partial(tick_seconds, 1), "tick": partial(tick_seconds, FEW_TICKS),
+            "set-up": set_up_seconds, "brief run": brief_run_seconds, "brief loop": brief_loop_seconds,
             "electronics": hardware_seconds("electronics"), "ideal": hardware_seconds("ideal"),
             "prototype": hardware_seconds("prototype"),
         },
@@ -265,35 +245,25 @@ def ratios() -> list[dict[str, object]]:
     )  # fmt: skip
     threads = fastest({"one": threads_seconds(1), "two": threads_seconds(2)}, rounds=5)
     outer = fastest({"plain": plain_seconds, "loop": loop_seconds}, rounds=3)
-    bare, loop = inner["bare"], inner["loop"]
+    bare, loop, one_tick = inner["bare"], inner["loop"], inner["single"] - inner["tick"]
+    electronics, prototype, command = inner["electronics"], inner["prototype"], processes["silent"]
+    parts = electronics - inner["ideal"]
     return [
         ratio("closed loop over bare mj_step, a physics step", loop, bare, at_most=1.25),
         ratio("loop on the Lagrangian over that on MuJoCo", inner["lagrangian"], loop, at_most=0.2),
         ratio("plain Python loop over ours, a physics step", outer["plain"], outer["loop"], at_least=15),
         ratio("session ready, in bare mj_steps", inner["set-up"], bare, at_most=600),
-        ratio(
-            "advance(1) beyond its tick, in bare mj_steps", inner["single"] - inner["tick"], bare, at_most=3
-        ),
+        ratio("advance(1) beyond its tick, in bare mj_steps", one_tick, bare, at_most=3),
         ratio("a run of one second over its loop", inner["brief run"], inner["brief loop"], at_most=1.35),
         ratio("one thread over two, prepared sessions", threads["one"], threads["two"], at_least=1.7),
         ratio("run that records over one that does not", runs["recorded"], runs["silent"], at_most=1.3),
         ratio("a minute that records every row", minutes["recorded"], minutes["silent"], at_most=1.3),
         ratio("a minute that records 60 rows a second", minutes["thinned"], minutes["silent"], at_most=1.05),
-        ratio("warm command with --record over without", processes["recorded"], processes["silent"]),
+        ratio("warm command with --record over without", processes["recorded"], command),
+        ratio("warm command over importing its libraries", command, processes["imports"], at_most=2),
+        ratio("complete electronics over bare mj_step, a physics step", parts, bare, at_most=0.17),
         ratio(
-            "warm command over importing its libraries", processes["silent"], processes["imports"], at_most=2
-        ),
-        ratio(
-            "complete electronics over bare mj_step, a physics step",
-            inner["electronics"] - inner["ideal"],
-            bare,
-            at_most=0.17,
-        ),
-        ratio(
-            "loop of the complete prototype over that of its electronics",
-            inner["prototype"],
-            inner["electronics"],
-            at_most=1.6,
+            "loop of the complete prototype over that of its electronics", prototype, electronics, at_most=1.6
         ),
         ratio("public plant step over bare mj_step", inner["plant step"], bare, at_most=0.2),
         ratio("one torque matrix over bare mj_step", inner["G_t"], bare),
@@ -302,15 +272,8 @@ def ratios() -> list[dict[str, object]]:
 
 
 def main() -> int:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--json", action="store_true")
-    rows = ratios() if (options := parser.parse_args()) else []
-    if options.json:
-        print(json.dumps({"ratios": rows}))
-    else:
-        for row in rows:
-            tell(row)
-    return 0 if all(row["ok"] for row in rows) else 1
+    options = options_of(__doc__)
+    return 0 if report(ratios(), options.json) else 1
 
 
 if __name__ == "__main__":

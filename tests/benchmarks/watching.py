@@ -11,6 +11,7 @@ import sys
 from pathlib import Path
 
 import numpy as np
+from identification import add_to, journal_of
 
 from spheretwin import scenario as scenarios
 from spheretwin.machine import Log, Watch, identify
@@ -76,22 +77,16 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--draws", type=int, default=20, help="seeds below this number")
     parser.add_argument("--minutes", type=float, default=10.0, help="time without a change, of each machine")
-    parser.add_argument(
-        "--designed", action="store_true", help="the designed motion, not that of the scenario"
-    )
+    parser.add_argument("--designed", action="store_true", help="the designed motion")
     parser.add_argument("--journal", type=Path, help="file with a line a machine; these are not repeated")
     options = parser.parse_args()
-    lines = options.journal.read_text().splitlines() if options.journal and options.journal.exists() else []
-    machines = {machine["seed"]: machine for machine in map(json.loads, lines)}
+    machines = journal_of(options.journal)
     motion = motion_of(options.designed)
     for seed in range(options.draws):
         if seed not in machines:
             machines[seed] = watched(seed, motion, 60 * options.minutes)
-            line = json.dumps(machines[seed])
-            print(line, file=sys.stderr, flush=True)
-            if options.journal:
-                with options.journal.open("a") as file:
-                    file.write(line + "\n")
+            print(json.dumps(machines[seed]), file=sys.stderr, flush=True)
+            add_to(options.journal, machines[seed])
     false = sum(len(machine["healthy"]) for machine in machines.values())
     hours = len(machines) * options.minutes / 60
     print(f"{false} alarms in {hours:.2f} h without a change")
@@ -106,11 +101,8 @@ def main() -> int:
             f" (median), {min(after_s):.1f} to {max(after_s):.1f} s; size over the true one"
             f" {np.mean(sizes):.2f} ± {np.std(sizes):.2f}"
         )
-    return (
-        0
-        if not false and all(machine[name]["what"] for machine in machines.values() for name in names)
-        else 1
-    )
+    seen = all(machine[name]["what"] for machine in machines.values() for name in names)
+    return 0 if seen and not false else 1
 
 
 if __name__ == "__main__":
