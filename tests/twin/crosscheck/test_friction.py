@@ -5,7 +5,6 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from spheretwin.crosscheck import friction
-from spheretwin.crosscheck import hinge as moving
 from spheretwin.crosscheck import hinge as runs
 from spheretwin.crosscheck.hinge import Hinge, STEP_s, by_mujoco, by_stage
 from spheretwin.models import actuator as actuators
@@ -226,35 +225,25 @@ def test_options_of_a_file_change_nothing(tmp_path, actuator, report):
     assert [check.value for check in same] == [check.value for check in report.checks]
 
 
-OURS_SLIDES = {"stopping time, our stage", "stopping angle, our stage", "sliding"}
-WRONG_STAGES = {
-    "level 0.3 % lower": (0.997, 1, 1, 1, OURS_SLIDES | {"creep, our stage"}),
-    "level 5 % lower": (0.95, 1, 1, 1, OURS_SLIDES | {"creep, our stage", "breakaway, our stage"}),
-    "viscous 0.1 % higher": (1, 1.001, 1, 1, {"creep, our stage", "viscous alone, our stage"}),
-    "smoothed over half as much again": (
-        1,
-        1,
-        1.5,
-        1,
-        OURS_SLIDES | {"creep, our stage", "breakaway, our stage"},
-    ),
-    "of twice the step": (
-        1,
-        1,
-        1,
-        2,
-        OURS_SLIDES | {"creep, our stage", "breakaway, our stage", "viscous alone, our stage"},
-    ),
-}
+SLIDES = {"stopping time, our stage", "stopping angle, our stage", "sliding"}
+CREEP, BREAKAWAY, VISCOUS = "creep, our stage", "breakaway, our stage", "viscous alone, our stage"
 
 
 @pytest.mark.release("2 to 4 s; test_bounds_hold and test_breakaway of this file have the rows")
-@pytest.mark.parametrize("wrong", WRONG_STAGES)
-def test_a_wrong_stage_breaks_its_rows(monkeypatch, actuator, wrong):
-    level, viscous, smoothing, step, rows = WRONG_STAGES[wrong]
-    right = moving.friction
+@pytest.mark.parametrize(
+    ("level", "viscous", "smoothing", "step", "rows"),
+    [
+        (0.997, 1, 1, 1, SLIDES | {CREEP}),
+        (0.95, 1, 1, 1, SLIDES | {CREEP, BREAKAWAY}),
+        (1, 1.001, 1, 1, {CREEP, VISCOUS}),
+        (1, 1, 1.5, 1, SLIDES | {CREEP, BREAKAWAY}),
+        (1, 1, 1, 2, SLIDES | {CREEP, BREAKAWAY, VISCOUS}),
+    ],
+)
+def test_a_wrong_stage_breaks_its_rows(monkeypatch, actuator, level, viscous, smoothing, step, rows):
+    right = runs.friction
     monkeypatch.setattr(
-        moving, "friction", lambda C, c, s, J, h: right(level * C, viscous * c, smoothing * s, J, step * h)
+        runs, "friction", lambda C, c, s, J, h: right(level * C, viscous * c, smoothing * s, J, step * h)
     )
     assert broken(actuators.MJCF_PATH, actuator) == rows
 
@@ -272,14 +261,14 @@ MUJOCO_STOPS = {"stopping time, MuJoCo", "stopping angle, MuJoCo"}
     ],
 )
 def test_another_constraint_breaks_its_rows(monkeypatch, actuator, field, share, rows):
-    right = moving._with_bearing
+    right = runs._with_bearing
 
     def other(original, hinge):
         changed = right(original, hinge)
-        getattr(changed.bare, field)[moving.GAMMA] *= share
+        getattr(changed.bare, field)[runs.GAMMA] *= share
         return changed
 
-    monkeypatch.setattr(moving, "_with_bearing", other)
+    monkeypatch.setattr(runs, "_with_bearing", other)
     assert broken(actuators.MJCF_PATH, actuator) == rows
 
 

@@ -1,47 +1,10 @@
 """Static friction in the cross-check: the reference against closed forms, and what breaks which row."""
 
 import numpy as np
-import pytest
 
 from spheretwin.crosscheck import stiction
 from spheretwin.crosscheck.stiction import STICTION, COULOMB_Nm, Reference, SAMPLE_s, START_rad
-from spheretwin.models import actuator as actuators
 from spheretwin.plant.bristle_friction import StictionSection
-
-
-def broken(actuator):
-    checks = stiction.compare(actuators.MJCF_PATH, actuator).checks
-    assert [check.name for check in checks] == [
-        f"static friction: motion, {engine}" for engine in ("MuJoCo", "Lagrangian")
-    ]
-    return {check.name.removeprefix("static friction: ") for check in checks if not check.ok}
-
-
-def test_every_bound_is_met_with_a_margin(actuator):
-    for check in stiction.compare(actuators.MJCF_PATH, actuator).checks:
-        assert check.value < 0.1 * check.bound, check.name
-        assert check.unit == "rad/s"
-
-
-@pytest.mark.parametrize(
-    "changes",
-    [{"break_away": 1.4}, {"presliding_rad": 1.2e-3}, {"stribeck_rad_s": 0.1}, {"damping_ratio": 1.0}],
-    ids=lambda changes: next(iter(changes)),
-)
-def test_a_reference_with_another_coefficient_breaks_both_motions(actuator, changes, monkeypatch):
-    class Other(Reference):
-        def __init__(self, actuator, section, coulomb_Nm):
-            super().__init__(actuator, section.model_copy(update=changes), coulomb_Nm)
-
-    monkeypatch.setattr(stiction, "Reference", Other)
-    assert broken(actuator) == {"motion, MuJoCo", "motion, Lagrangian"}
-
-
-def test_smoothed_friction_in_the_plant_breaks_both_motions(actuator, monkeypatch):
-    reference = Reference(actuator, STICTION, COULOMB_Nm).integrate(START_rad, stiction.DURATION_s)
-    monkeypatch.setattr(Reference, "integrate", lambda *_: reference)
-    monkeypatch.setattr(stiction, "STICTION", STICTION.model_copy(update={"on": False}))
-    assert broken(actuator) == {"motion, MuJoCo", "motion, Lagrangian"}
 
 
 def test_the_reference_breaks_away_and_slides_as_its_equations_say(actuator, monkeypatch):
