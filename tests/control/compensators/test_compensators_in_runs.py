@@ -6,7 +6,6 @@ import numba
 import numpy as np
 import pytest
 
-from spheretwin import cli
 from spheretwin import scenario as scenarios
 from spheretwin.control.law import Law
 from spheretwin.models.base.errors import InputError
@@ -21,10 +20,6 @@ ON = {
     "controller.feed_forward.friction": 0.8,
     "controller.feed_forward.inertia": 1.0,
 }
-FLAGS = [
-    *("--controller.governor.acceleration-rad-s2", "5", "--controller.prediction.on", "true"),
-    *("--controller.feed-forward.friction", "0.8", "--controller.feed-forward.inertia", "1", "1", "0.5"),
-]
 COLUMNS = (*GOVERNED, "q_predicted_rad", "qdot_predicted_rad_s", "feed_forward_Nm")
 
 HANDED = tuple(Signal(name, "1", 3, name, ANGLES) for name in ("handed_rad", "handed_rad_s", "handed_rad_s2"))
@@ -47,17 +42,14 @@ LAWS = [
 
 
 def tilt(**changes):
-    fields = {
-        "hardware": "electronics", "plant.engine": "lagrangian", "duration": 0.3, "trajectory.phase_s": 0.1,
-        "controller.law": "pid",
-    }  # fmt: skip
+    fields = {"hardware": "electronics", "duration": 0.3, "trajectory.phase_s": 0.1, "controller.law": "pid"}
     return scenarios.load("tilt", fields | changes)
 
 
 @pytest.mark.parametrize("mine", LAWS)
 def test_every_part_works_around_it(mine):
     """What is fed forward is added, and what is governed is moved on by the delay, as what is measured is."""
-    table = simulate(tilt(**ON), law=mine).telemetry
+    table = simulate(tilt(**ON, duration=0.05), law=mine).telemetry
     angle, rate, push = (table[name] for name in GOVERNED)
     # A fused product rounds once less.
     np.testing.assert_allclose(table["handed_rad"], angle + 1e-3 * rate + 5e-7 * push, rtol=0, atol=1e-15)
@@ -118,15 +110,6 @@ def test_a_change_beside_it_moves_no_bit():
         assert changed.advance(67).values.tobytes() == unchanged.advance(100).rows(33, 100).values.tobytes()
 
 
-def test_a_file_replays_to_the_same_bytes(tmp_path, capsys):
-    first, again = tmp_path / "first.parquet", tmp_path / "again.parquet"
-    arguments = ["simulate", "tilt", "--hardware", "electronics", "--duration", "0.2", *FLAGS]
-    assert cli.main([*arguments, "--telemetry", str(first)]) == 0
-    assert cli.main(["simulate", "--replay", str(first), "--telemetry", str(again)]) == 0
-    assert first.read_bytes() == again.read_bytes()
-    assert capsys.readouterr().err == ""
-
-
 FILE = """
 from spheretwin.control.law import Law
 from spheretwin.control.law_components.parameters import LawParameters
@@ -145,7 +128,6 @@ def test_a_user_s_law_takes_none_of_their_names(tmp_path):
         scenarios.load("hold", {"controller.law": f"{path}:Mine"})
 
 
-@pytest.mark.parametrize("name", ["afsm", "pd"])
 @pytest.mark.parametrize(
     ("field", "value", "part"),
     [
@@ -153,9 +135,9 @@ def test_a_user_s_law_takes_none_of_their_names(tmp_path):
         ("feed_forward.friction", [1.0, -0.1, 0.0], "friction.1: expected a number greater than or equal"),
     ],
 )
-def test_a_value_out_of_range_is_refused_by_name(name, field, value, part):
+def test_a_value_out_of_range_is_refused_by_name(field, value, part):
     with pytest.raises(InputError, match=part):
-        scenarios.load("hold", {"controller.law": name, f"controller.{field}": value})
+        scenarios.load("hold", {f"controller.{field}": value})
 
 
 @pytest.mark.parametrize("mine", LAWS)
