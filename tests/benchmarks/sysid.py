@@ -66,14 +66,10 @@ class Peer:
         self.model = self.spec.compile()
         rollouts = [self._trajectory(number) for number in range(len(self.starts))]
         self.numbers = {id(rollout.control): number for number, rollout in enumerate(rollouts)}
-        sequences = sysid.ModelSequences(
-            "machine",
-            self.spec,
-            [f"{number}" for number in range(len(rollouts))],
-            [one.initial_state for one in rollouts],
-            [one.control for one in rollouts],
-            [one.sensordata for one in rollouts],
-        )
+        names = [f"{number}" for number in range(len(rollouts))]
+        columns = ("initial_state", "control", "sensordata")
+        of_each = [[getattr(one, column) for one in rollouts] for column in columns]
+        sequences = sysid.ModelSequences("machine", self.spec, names, *of_each)
         self.residual = sysid.build_residual_fn(
             models_sequences=[sequences],
             build_model=lambda _parameters, _spec: self.model,
@@ -190,17 +186,14 @@ def _figures(names, outcomes):
     values, intervals, true, times = (np.array(column) for column in zip(*outcomes, strict=True))
     errors, halves = values - true, np.ptp(intervals, axis=1) / 2
     inside = (intervals[:, 0] <= true) & (true <= intervals[:, 1])
-    return {
-        "draws": len(outcomes),
-        "coverage": float(np.mean(inside)),
-        "coverage_each": dict(zip(names, np.mean(inside, axis=0).tolist(), strict=True)),
-        "error_over_half_width_rms": dict(
-            zip(names, np.sqrt(np.mean((errors / halves) ** 2, axis=0)).tolist(), strict=True)
-        ),
-        "error_rms": dict(zip(names, np.sqrt(np.mean(errors**2, axis=0)).tolist(), strict=True)),
-        "half_width": dict(zip(names, np.mean(halves, axis=0).tolist(), strict=True)),
-        "cpu_s": float(np.median(times)),
+    each = {
+        "coverage_each": np.mean(inside, axis=0),
+        "error_over_half_width_rms": np.sqrt(np.mean((errors / halves) ** 2, axis=0)),
+        "error_rms": np.sqrt(np.mean(errors**2, axis=0)),
+        "half_width": np.mean(halves, axis=0),
     }
+    of_all = {"draws": len(outcomes), "coverage": float(np.mean(inside)), "cpu_s": float(np.median(times))}
+    return of_all | {figure: dict(zip(names, row.tolist(), strict=True)) for figure, row in each.items()}
 
 
 def without_payload():

@@ -19,6 +19,7 @@ from spheretwin.viz.figures import (
 from spheretwin.viz.figures.style import PAPER_WIDTHS_in, fit_width
 from tests.content.content import Cases, content_test
 from tests.content.figures import figure_text
+from tests.content.verdicts import capability
 from tests.viz.comparison.compared import RAMP, SIGNALS, SPIKE, VALUE, T_s, run_of
 from tests.viz.figures import drawn
 
@@ -54,16 +55,13 @@ def compared_over_time():
 def compared_spectra():
     frequency = np.geomspace(0.5, 500.0, 900)
     runs = slow_runs()[:2]
-    of_runs_ = [
-        [
-            Spectrum(
-                frequency, (1 + place) * DIGITS[hinge] / frequency, [(50.0, 0.1 * place), (7.0, 2.0 + hinge)]
-            )
-            for hinge in range(3)
-        ]
-        for place, _ in enumerate(runs)
-    ]
-    return comparison.spectra(runs, of_runs_, "Spectra")
+
+    def spectrum(place, hinge):
+        lines = [(50.0, 0.1 * place), (7.0, 2.0 + hinge)]
+        return Spectrum(frequency, (1 + place) * DIGITS[hinge] / frequency, lines)
+
+    of_runs = [[spectrum(place, hinge) for hinge in range(3)] for place in range(2)]
+    return comparison.spectra(runs, of_runs, "Spectra")
 
 
 def events():
@@ -98,12 +96,14 @@ def margins_of_laws():
 
 
 def ratios():
+    values = {
+        "one reading": ([0.5, 3.0, 2.0], [1.1, 1.2, 0.9]),
+        "another": ([0.25, 0.75], [4.0, 5.0, 6.0]),
+        "third": ([7.0], [8.0, 2.0]),
+    }
     rows = [
-        conditions.RatioRow(
-            "one reading", {"pd": np.array([0.5, 3.0, 2.0]), "afsm": np.array([1.1, 1.2, 0.9])}
-        ),
-        conditions.RatioRow("another", {"pd": np.array([0.25, 0.75]), "afsm": np.array([4.0, 5.0, 6.0])}),
-        conditions.RatioRow("third", {"pd": np.array([7.0]), "afsm": np.array([8.0, 2.0])}),
+        conditions.RatioRow(name, {"pd": np.array(pd), "afsm": np.array(afsm)})
+        for name, (pd, afsm) in values.items()
     ]
     return conditions.ratios(rows, {"pd": "PD", "afsm": "AFSM"}, "ours over printed", "Ratios")
 
@@ -223,42 +223,26 @@ def scatter_figures():
 def workspace_figures():
     tilt_rad, azimuth_rad = np.radians([0.0, 10.0, 20.0]), np.radians([0.0, 90.0])
     best = DIGITS.reshape(3, 2, 2)
-    reachable = np.ones((3, 2, 2), bool)
-    reachable[1, 1, 0] = reachable[2, 0] = False
-    space = SimpleNamespace(tilt_rad=tilt_rad, azimuth_rad=azimuth_rad, reachable=reachable)
     full = SimpleNamespace(tilt_rad=tilt_rad, azimuth_rad=azimuth_rad, reachable=np.ones((3, 2, 2), bool))
-    on_grid = SimpleNamespace(
-        best_Nm=best,
-        least_norm_Nm=best / 2,
-        singular_value_Nm_per_A=best / 100,
-        condition=10 * best,
-        copper_W_per_Nm2=3 * best,
+    space = SimpleNamespace(**{**vars(full), "reachable": full.reachable.copy()})
+    space.reachable[1, 1, 0] = space.reachable[2, 0] = False
+    on_grid, least = capability(best), best.min((1, 2))
+    copper = np.array([20.0, 40.0, 60.0])
+    worst = {"best_Nm": least - 0.5, "least_norm_Nm": least / 4, "copper_W_per_Nm2": copper}
+    of_grid, by_tilt = (
+        maps.capability_map(space, on_grid, 8.0),
+        maps.capability_by_tilt(full, on_grid, worst, 8.0),
     )
-    worst = {
-        "best_Nm": best.min((1, 2)) - 0.5,
-        "least_norm_Nm": best.min((1, 2)) / 4,
-        "copper_W_per_Nm2": np.array([20.0, 40.0, 60.0]),
-    }
-    return "\n".join(
-        figure_text(figure)
-        for figure in (
-            maps.capability_map(space, on_grid, 8.0),
-            maps.capability_by_tilt(full, on_grid, worst, 8.0),
-        )
-    )
+    return "\n".join(map(figure_text, (of_grid, by_tilt)))
 
 
 def error_bands():
-    seeds = (
-        np.array([0.1, 0.2, 0.4])[:, None, None] * np.arange(1.0, 31.0)[:, None] * np.array([1.0, 3.0, 5.0])
-    )
+    seeds = np.multiply.outer([0.1, 0.2, 0.4], np.outer(np.arange(1.0, 31.0), [1.0, 3.0, 5.0]))
     broken = seeds.copy()
     broken[1, 20:] = np.nan
+    errors = (seeds[:, :9], broken, 1e-3 * seeds, 1e-2 * seeds)
     by_label = {
-        label: over_time.ErrorBand(law, errors)
-        for (law, label), errors in zip(
-            LAWS.items(), (seeds[:, :9], broken, 1e-3 * seeds, 1e-2 * seeds), strict=True
-        )
+        label: over_time.ErrorBand(law, each) for (law, label), each in zip(LAWS.items(), errors, strict=True)
     }
     return over_time.errors(by_label, 0.5, HINGES, "Errors")
 
@@ -275,11 +259,8 @@ def angle_traces():
 
 def error_lines():
     line = over_time.ErrorLine("as printed", drawn.SIZES, 0.5 * drawn.SIZES)
-    lines = [
-        line,
-        line._replace(label="as acceleration", measured_deg=3 * drawn.SIZES),
-        line._replace(label="c"),
-    ]
+    other = line._replace(label="as acceleration", measured_deg=3 * drawn.SIZES)
+    lines = [line, other, line._replace(label="c")]
     groups = [
         over_time.ErrorGroup("afsm", "AFSM", lines, 0.12),
         over_time.ErrorGroup("pid", "PID", lines[::-1], None),

@@ -31,16 +31,13 @@ T_s = COUNT / 8
 def checks(*names: str) -> list[Check]:
     """Return checks that hold, one that is broken, one without a bound and one with two bounds."""
     made = [
-        Check(
-            name, f"{name} | ours against theirs", 10 * (1 + place), 1e-9 * (1 + place), 1e-6, f"why {name}"
-        )
-        for place, name in enumerate(names)
+        Check(name, f"{name} | ours against theirs", 10 * place, 1e-9 * place, 1e-6, f"why {name}")
+        for place, name in enumerate(names, 1)
     ]
     made[1] = dataclasses.replace(made[1], value=3e-6, unit="rad")
     if len(made) > 2:
-        made[2] = dataclasses.replace(
-            made[2], value=4.02, bound=4.2, at_least=3.8, detail={"a": 4.0, "b": 4.02}
-        )
+        bounds = {"bound": 4.2, "at_least": 3.8}
+        made[2] = dataclasses.replace(made[2], value=4.02, **bounds, detail={"a": 4.0, "b": 4.02})
         made[3:] = [dataclasses.replace(check, value=2.5, bound=None, unit="N·m") for check in made[3:]]
     return made
 
@@ -97,7 +94,8 @@ def field_verdict() -> FieldVerdict:
     return FieldVerdict(1.234, bands, Sources(1e-6, 2e-2, 3e-7), checks("torque", "force"), ["a small mesh"])
 
 
-def _capability(values: np.ndarray) -> SimpleNamespace:
+def capability(values: np.ndarray) -> SimpleNamespace:
+    """Return figures of a capability that are multiples of some values."""
     return SimpleNamespace(
         best_Nm=values,
         least_norm_Nm=values / 2,
@@ -113,9 +111,9 @@ def survey() -> TorqueSurvey:
     reachable = np.ones((3, 2, 2), bool)
     reachable[2, 0] = False
     space = SimpleNamespace(tilt_rad=tilt_rad, azimuth_rad=azimuth_rad, reachable=reachable)
-    on_grid = _capability(np.arange(1.0, 13.0).reshape(3, 2, 2))
+    on_grid = capability(np.arange(1.0, 13.0).reshape(3, 2, 2))
     worst = {
-        name: SimpleNamespace(capability=_capability(factor * np.array([0.5, 4.0, 9.0])))
+        name: SimpleNamespace(capability=capability(factor * np.array([0.5, 4.0, 9.0])))
         for name, factor in (("least_norm", 0.9), ("best", 0.8), ("singular_value", 0.7))
     }
     return TorqueSurvey(actuators.load(), 20.0, space, on_grid, worst, {})

@@ -8,6 +8,7 @@ the machine has it.
 """
 
 import argparse
+import itertools
 import subprocess
 import sys
 import tempfile
@@ -66,22 +67,16 @@ class Driven(NamedTuple):
 
 
 OPEN = "--fault.0.target coil.04 --fault.0.mode open --fault.0.start-s 3"
+BROKEN = {"open": f"tilt --hardware electronics {OPEN}"}
+LAWS = ("afsm", "adaptive_fuzzy", "pd")
 FAILING = "sinusoid --controller.law pd --disturbance.load 2"
 
 TABLE: dict[str, Recorded | Driven] = {
     "overview": Recorded({"nutation": "nutation"}, "overview", 3.4),
     "control": Recorded({"nutation": "nutation"}, "control", 3.4),
     "coils": Recorded({"loaded": "sinusoid --plant.payload-kg 0.1 --disturbance.load 2"}, "coils", 3.3),
-    "hardware": Recorded(
-        {"open": f"tilt --hardware electronics {OPEN}"},
-        "hardware",
-        4.4,
-    ),
-    "compare": Recorded(
-        {law: f"sinusoid --controller.law {law}" for law in ("afsm", "adaptive_fuzzy", "pd")},
-        "compare",
-        3.4,
-    ),
+    "hardware": Recorded(BROKEN, "hardware", 4.4),
+    "compare": Recorded({law: f"sinusoid --controller.law {law}" for law in LAWS}, "compare", 3.4),
     "desired": Recorded({"nutation": "nutation"}, "compare", 3.4),
     "failed": Recorded({"failing": FAILING}, "overview", 1.222),
     "bench": Driven("hold --plant.payload-kg 0.1", ((10.0, -20.0), (-20.0, -5.0), (5.0, 25.0))),
@@ -90,8 +85,8 @@ TABLE: dict[str, Recorded | Driven] = {
 
 MORE: dict[str, Recorded | Driven] = {
     "scenario": Recorded({"nutation": "nutation"}, "scenario", 3.4),
-    "open_overview": Recorded({"open": f"tilt --hardware electronics {OPEN}"}, "overview", 4.4),
-    "open_control": Recorded({"open": f"tilt --hardware electronics {OPEN}"}, "control", 4.4),
+    "open_overview": Recorded(BROKEN, "overview", 4.4),
+    "open_control": Recorded(BROKEN, "control", 4.4),
     "failed_control": Recorded({"failing": FAILING}, "control", 1.222),
     "compare_failed": Recorded({"afsm": "sinusoid --disturbance.load 2", "pd": FAILING}, "compare", 1.0),
     "live": Recorded({"nutation": "nutation"}, "overview", 3.4, live=True),
@@ -110,9 +105,8 @@ def main() -> None:
     parser.add_argument("names", nargs="*", metavar="NAME", help=f"of {', '.join(known)}")
     parser.add_argument("--out", type=Path, default=PICTURES, metavar="DIR")
     parser.add_argument("--size", default=f"{WIDTH}x{HEIGHT}", metavar="WIDTHxHEIGHT")
-    parser.add_argument(
-        "--inspect", type=Path, metavar="DIR", help="all sizes, both themes and a simulation of colours"
-    )
+    shown = "all sizes, both themes and a simulation of colours"
+    parser.add_argument("--inspect", type=Path, metavar="DIR", help=shown)
     options = parser.parse_args()
     for name in options.names:
         if name not in known:
@@ -141,18 +135,16 @@ def pictures_of(
 ) -> Iterator[tuple[Size, str, Image.Image]]:
     """Yield the pictures of a row, each with size and theme; none if this machine cannot take them."""
     with tempfile.TemporaryDirectory() as work:
-        if isinstance(row, Recorded):
-            recording = recorded(row, Path(work))
-            for size in sizes:
-                for theme in themes:
-                    yield size, theme, viewer_picture(name, recording, row.t_s, size, theme)
-        elif CHROMIUM:
-            for size in sizes:
-                for theme in themes:
-                    light = theme != DARK
-                    yield size, theme, screenshot(row.run.split(), row.poses_deg, size, Path(work), light)
-        else:
+        recording = recorded(row, Path(work)) if isinstance(row, Recorded) else None
+        if not recording and not CHROMIUM:
             print(NOT_TAKEN.format(name), file=sys.stderr)
+            return
+        for size, theme in itertools.product(sizes, themes):
+            if recording:
+                yield size, theme, viewer_picture(name, recording, row.t_s, size, theme)
+            else:
+                light = theme != DARK
+                yield size, theme, screenshot(row.run.split(), row.poses_deg, size, Path(work), light)
 
 
 def save_clip(name: str, row: Recorded | Driven, out: Path) -> None:
