@@ -145,7 +145,7 @@ def test_robust_bears_friction_and_inertia_that_the_nominal_model_does_not_have(
 
     def error_deg(preset, mismatch, seed):
         law = {"controller.law": "afsm_eso", "controller.preset": preset, "seed": seed}
-        fields = PROTOTYPE | {"nominal.coulomb_Nm": [2e-3] * 3}
+        fields = PROTOTYPE | {"plant.engine": "lagrangian", "nominal.coulomb_Nm": [2e-3] * 3}
         del fields["sensors.potentiometer.nonlinearity_rad"]
         run = simulate(scenarios.load("tilt", fields | MISMATCH[mismatch] | law))
         assert run.status == "completed"
