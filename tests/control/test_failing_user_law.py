@@ -30,11 +30,11 @@ def leaves(t, reference, measurement, parameters, state, torque):
         sys.exit(0)
 
 
-def closes(t, reference, measurement, parameters, state, torque):
+def closes(*_):
     raise GeneratorExit
 
 
-def strange(t, reference, measurement, parameters, state, torque):
+def strange(*_):
     raise Strange("so it is")
 
 
@@ -109,14 +109,6 @@ def outside_below(t, reference, measurement, parameters, state, torque):
 
 def metric_leaves(run):
     sys.exit(0)
-
-
-def metric_closes(run):
-    raise GeneratorExit
-
-
-def metric_strange(run):
-    raise Strange("so it is")
 """
 
 
@@ -273,10 +265,10 @@ def test_a_law_that_writes_outside_its_arrays_is_found_on_request(file, law, tmp
 
 @pytest.mark.parametrize(
     ("metric", "received"),
-    [("leaves", "SystemExit: 0"), ("closes", "GeneratorExit"), ("strange", "Strange: so it is")],
+    [("metric_leaves", "SystemExit: 0"), ("closes", "GeneratorExit"), ("strange", "Strange: so it is")],
 )
 def test_what_a_metric_raises_is_a_warning_and_exit_1(file, metric, received, capfd):
-    code, out, err = printed(capfd, "--metric", f"{file}:metric_{metric}", "--json")
+    code, out, err = printed(capfd, "--metric", f"{file}:{metric}", "--json")
     report = json.loads(out)
-    assert (code, err, report[f"metric_{metric}"]) == (1, "", None)
-    assert f"metric metric_{metric}: expected a figure, it raised {received}" in report["warnings"]
+    assert (code, err, report[metric]) == (1, "", None)
+    assert f"metric {metric}: expected a figure, it raised {received}" in report["warnings"]
