@@ -1,4 +1,4 @@
-"""ADRC: its equations, the poles of its observer and what the observer finds."""
+"""ADRC: its equations and the poles of its observer."""
 
 import numpy as np
 import pytest
@@ -44,34 +44,3 @@ def test_observer_has_the_documented_poles(bandwidth, period_s):
     # the size of the entries, 1/T² of them at most.
     coefficients = np.poly(np.linalg.eigvals(error - np.eye(3)))
     np.testing.assert_allclose(coefficients, np.poly([a - 1] * 3), rtol=1e-6, atol=1e-13)
-
-
-def observed(actuator, gains, load_Nm, ticks):
-    """Errors of the observer's angle, rate and acceleration of β, which a known torque and a load push."""
-    law, J = gains.build(known(actuator)), actuator.inertia[1]
-    state, torque = law.state.copy(), np.zeros(3)
-    angle, rate, missed = 0.1, 0.5, []
-    for tick in range(ticks):
-        measurement = np.zeros((3, 3))
-        measurement[:, 1] = angle, rate, torque[1]
-        law.step(0.0, np.zeros((3, 3)), measurement, law.parameters, state, torque)
-        missed.append([state[4] - angle, state[7] - rate, (state[1] + load_Nm) / J])
-        torque[1] = 0.01 * np.sin(0.1 * tick)  # whatever the coils give, as long as it is known
-        push = (torque[1] - load_Nm) / J
-        angle, rate = angle + PERIOD * rate + 0.5 * PERIOD**2 * push, rate + PERIOD * push
-    return np.array(missed)
-
-
-def test_the_observer_converges_at_the_rate_of_its_poles(actuator):
-    """From an unknown load its error is that of the matrix whose poles were checked, tick by tick, to 0."""
-    load_Nm, ticks = 0.05, 400
-    gains = ADRC(observer_bandwidth=100.0)
-    missed = observed(actuator, gains, load_Nm, ticks)
-    A = np.array([[1, PERIOD, PERIOD**2 / 2], [0, 1, PERIOD], [0, 0, 1]])
-    L = np.array([gain[0] for gain in observer_gains(np.array([100.0]), PERIOD)])
-    left = np.array([0.0, 0.0, load_Nm / actuator.inertia[1]])
-    for row in missed:
-        # 400 steps of numbers whose rounding is some 1e-13 of the acceleration's 23 rad/s².
-        np.testing.assert_allclose(row, left, atol=1e-9)
-        left = (A - np.outer(L, A[0])) @ left
-    assert np.abs(missed[-1]).max() < 1e-9  # e^(−40) 40² of 23 is 2e-13
