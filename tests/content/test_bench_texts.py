@@ -19,17 +19,12 @@ from spheretwin.models.base.errors import InputError
 from spheretwin.models.telemetry.table import read_parquet
 from spheretwin.session import Session
 from spheretwin.trajectories import SHAPES
-from tests.content import values
 from tests.content.content import content_test, scratch
-from tests.content.values import array, lines, tree
+from tests.content.values import array, lines, plain, tree
 from tests.twin.bench.cases import QUIET, bench
 
 VARIABLE = {"missed", "missed_share", "realtime_factor"}
 """Entries of a status that depend on the clock."""
-
-
-def plain(value):
-    return values.plain(value, lambda leaf: leaf if isinstance(leaf, float) else repr(leaf))
 
 
 def differences(before, after, prefix=""):
@@ -87,9 +82,8 @@ def a_script_of_commands():
                 made.advance(0)
             after = plain(made.state())
             lines.append(f"## {name} {arguments}: {ran} ticks, refused: {ticket.refused}")
-            lines += tree(
-                {key: value for key, value in differences(before, after).items() if key not in VARIABLE}
-            )
+            changed = differences(before, after)
+            lines += tree({key: changed[key] for key in changed if key not in VARIABLE})
             before = after
         lines += ["## bins", *tree({**plain(made.bins()), "run": 0})]
         lines += [made.scenario_toml(), made.command_line()]
@@ -186,10 +180,8 @@ def shapes_of_modes():
         for slow in (Limits(), Limits(rate_rad_s=0.2), Limits(acceleration_rad_s2=1.0)):
             for name, shape in shapes.items():
                 approach = approach_fields(shape, motion, 1.5, 0.25, slow, reach)
-                content[f"{slow}, {name}"] = {
-                    "shape": plain(shape.model_dump(mode="json")),
-                    "approach": plain(approach),
-                }
+                both = {"shape": shape.model_dump(mode="json"), "approach": approach}
+                content[f"{slow}, {name}"] = plain(both)
     return lines(content)
 
 
@@ -202,9 +194,8 @@ def arguments_of_commands():
 
 def row(setting):
     """Return the entries of a setting as a line."""
-    return " | ".join(
-        map(str, dataclasses.astuple(setting) if dataclasses.is_dataclass(setting) else setting)
-    )
+    entries = dataclasses.astuple(setting) if dataclasses.is_dataclass(setting) else setting
+    return " | ".join(map(str, entries))
 
 
 def choices():

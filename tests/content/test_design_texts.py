@@ -59,9 +59,8 @@ def direct_sums():
         content[f"{name}: cylinders"] = direct_summation.cylinders(subject.magnet, 4)
         content[f"{name}: reach"] = direct_summation._rim_reaches_winding(subject)
         content[f"{name}: matrix"] = direct_summation.direct_torque_matrix(q, subject, FEW)
-        content[f"{name}: displaced"] = direct_summation.direct_torque_matrix(
-            q, subject, FEW, displaced(subject)
-        )
+        moved = displaced(subject)
+        content[f"{name}: displaced"] = direct_summation.direct_torque_matrix(q, subject, FEW, moved)
     content["conductors"] = direct_summation.conductors(actuator.coil, Rule(2, 3, 4))
     compared = direct_summation.compare(actuator, np.array([0.0, 0.4]), 3, FEW)
     content["compared"] = compared
@@ -82,17 +81,12 @@ def curves():
     mesh, angles = pole_torque.Mesh(4, 16, 2, 4), np.radians([0.0, 5.0, 10.0, 20.0, 40.0, 90.0, 180.0])
     content = {"samples": pole_torque.sample_angles(), "mesh": pole_torque.Mesh(), "doubled": mesh.doubled()}
     flat = replace(actuator.magnet, front_radius_m=0.0)
-    for name, magnet, on_iron in (
-        ("ground", actuator.magnet, False),
-        ("flat", flat, False),
-        ("iron", actuator.magnet, True),
-    ):
-        content[name] = pole_torque.compute_curve(
-            magnet, actuator.coil, angles, mesh, on_iron=on_iron
-        ).torque_Nm_per_A
-    curve = pole_torque.compute_curve(
-        actuator.magnet, actuator.coil, np.radians(np.linspace(0, 180, 17)), mesh
-    )
+    parts = {"ground": (actuator.magnet, False), "flat": (flat, False), "iron": (actuator.magnet, True)}
+    for name, (magnet, on_iron) in parts.items():
+        curve = pole_torque.compute_curve(magnet, actuator.coil, angles, mesh, on_iron=on_iron)
+        content[name] = curve.torque_Nm_per_A
+    curve_angles = np.radians(np.linspace(0, 180, 17))
+    curve = pole_torque.compute_curve(actuator.magnet, actuator.coil, curve_angles, mesh)
     content["convergence"] = pole_torque.convergence(curve, actuator.magnet, actuator.coil, mesh)
     content["leave one out"] = curve_check.leave_one_out(actuator.torque_curve)
     content["lookup"] = curve_check.largest_lookup_error(actuator.torque_curve)
@@ -131,11 +125,8 @@ def geometry():
     }
     for name, change in changes.items():
         subject = replace(actuator, **change)
-        content[name] = [
-            geometry_check.air_gap_m(subject),
-            geometry_check.of_geometry(subject),
-            geometry_check.of_parts(subject),
-        ]
+        checks = (geometry_check.air_gap_m, geometry_check.of_geometry, geometry_check.of_parts)
+        content[name] = [each(subject) for each in checks]
     axes = np.array([[1.0, 0, 0], [0, 1.0, 0], [0.8, 0.6, 0]])
     content["clearance"] = geometry_check.clearance(axes, 0.01, 0.02, 0.05)
     return lines(content)

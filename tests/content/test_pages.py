@@ -48,17 +48,15 @@ def rows_of(axes: dict, count: int = 48, laws=("pd", "afsm"), lost=(3, 8, 13, 40
     return rows
 
 
+MANY_AXES = {
+    "disturbance.load": (5 * COUNT) % 47, "plant.modelling_error": (11 * COUNT) % 43,
+    "seed": (3 * COUNT) % 41,
+}  # fmt: skip
 STUDIES = {
     "one_axis": rows_of({"disturbance.load": COUNT % 4}),
     "one_axis_of_names": rows_of({"plant.engine": np.array(["mujoco", "lagrangian"] * 24, dtype=object)}),
     "two_axes": rows_of({"disturbance.load": COUNT % 4, "plant.modelling_error": (COUNT // 4) % 3 / 10}),
-    "many_axes": rows_of(
-        {
-            "disturbance.load": (5 * COUNT) % 47,
-            "plant.modelling_error": (11 * COUNT) % 43,
-            "seed": (3 * COUNT) % 41,
-        }
-    ),
+    "many_axes": rows_of(MANY_AXES),
     "few_rows": rows_of({"disturbance.load": COUNT % 4}, count=5, laws=("pd",), lost=(1,)),
     "seeds_only": rows_of({}, count=12, laws=("pd",), lost=()),
 }
@@ -136,10 +134,8 @@ def magnetics_pages() -> str:
 
     with (
         patch.object(field_check, "judge", lambda *_: field_verdict()),
-        patch.object(torque_map, "survey", lambda *_: survey()),
-        patch.object(torque_map, "judge", lambda *_: workspace_verdict()),
-        patch.object(curve_check, "judge", lambda *_: judged_curve()),
-        patch.object(curve_check, "compute", lambda *_: computed_curve()),
+        patch.multiple(torque_map, survey=lambda *_: survey(), judge=lambda *_: workspace_verdict()),
+        patch.multiple(curve_check, judge=lambda *_: judged_curve(), compute=lambda *_: computed_curve()),
     ):
         parts = [
             ("check",), ("check", "--json"), ("map", "--need", "2"), ("map", "--json"), ("curve", "--json"),

@@ -34,10 +34,8 @@ def decimated_electronics() -> str:
 
 def payload() -> str:
     """A run under another law with a payload, ended by the watchdog."""
-    changes = {
-        "hardware": "electronics", "watchdog.on": True, "controller.law": "pd", "plant.payload_kg": 0.4,
-    }  # fmt: skip
-    session = session_of("sinusoid", duration=0.4, **changes)
+    changes = {"watchdog.on": True, "controller.law": "pd", "plant.payload_kg": 0.4}
+    session = session_of("sinusoid", duration=0.4, hardware="electronics", **changes)
     return recording_text(recording(_file("payload"), session, 250, Status.FAILSAFE, shown="coils"))
 
 
@@ -69,11 +67,8 @@ def live_view() -> str:
 
 def merged() -> str:
     """Three runs of two laws and rates; one has left the workspace and has events."""
-    settings = (
-        ("afsm", 600, 1e-3, {}),
-        ("pd", 420, 1e-3, {"disturbance.load": 1.0}),
-        ("afsm", 350, 2e-3, {}),
-    )
+    loaded = {"disturbance.load": 1.0}
+    settings = (("afsm", 600, 1e-3, {}), ("pd", 420, 1e-3, loaded), ("afsm", 350, 2e-3, {}))
     runs, subjects = [], []
     for place, (law, ticks, period_s, changes) in enumerate(settings):
         session = session_of(

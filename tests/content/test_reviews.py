@@ -64,10 +64,8 @@ def review_json() -> str:
     import json
 
     out = []
-    for names, options in (
-        (("electronics.parquet",), ()),
-        (("first.parquet", "other.parquet"), ("--tolerance", "gate")),
-    ):
+    compared = ("first.parquet", "other.parquet"), ("--tolerance", "gate")
+    for names, options in ((("electronics.parquet",), ()), compared):
         text = review_of(*names, options=(*options, "--json"))
         report = json.loads(text.partition("stdout:\n")[2].partition("\n")[0])
         out += [text.partition("stdout:")[0], *tree(report)]
@@ -162,11 +160,8 @@ def terminal() -> str:
     }  # fmt: skip
 
     def all_tables() -> None:
-        for status, why in (
-            (Status.COMPLETED, None),
-            (Status.FAILSAFE, "a coil is too hot"),
-            (Status.INTERRUPTED, None),
-        ):
+        ends = {Status.COMPLETED: None, Status.FAILSAFE: "a coil is too hot", Status.INTERRUPTED: None}
+        for status, why in ends.items():
             summary = {**figures, "status": str(status)}
             runs.print_run("pd", 10.0, summary, band_rad=0.01, why=why, faults=["coil.07 open", "supply off"])
         runs.print_scenarios({"hold": "a [short] one", "nutation": "a longer one"})
@@ -178,12 +173,8 @@ def terminal() -> str:
         runs.print_rows("two words", ["a", "b", "c"], [["x", "some [text]", "1.5"], ["y", "z", "-2"]], 2)
         long = "a long text of many words that has no room in a cell of three lines of a narrow terminal " * 4
         runs.print_rows("a list", ["a", "b", "c"], [["x", long, "1"], ["y", "z", "2"]], 1)
-        print(
-            [
-                tables.three_digits(value)
-                for value in (0.0, 1e-4, -2e-4, 0.0123456, 1.005, 99.95, 123456.0, np.inf)
-            ]
-        )
+        values = (0.0, 1e-4, -2e-4, 0.0123456, 1.005, 99.95, 123456.0, np.inf)
+        print([tables.three_digits(value) for value in values])
         print([tables.percent(share) for share in (0.0, 1e-6, 0.1234, 1.0)], runs.angle(0.0301))
         results = [(None, "more " * 40), (True, "this " * 30), (False, "that")]
         verdicts = [Verdict(f"figure{number}", "A title", results[: number + 1]) for number in range(4)]

@@ -54,13 +54,8 @@ def run_text(name, overrides, columns_of=columns):
 
 
 def of_hardware():
-    return "\n".join(
-        [
-            run_text("nutation", {**SHORT, **LAGRANGIAN}),
-            run_text("nutation", {**SHORT, **ELECTRONICS}),
-            run_text("nutation", PROTOTYPE),
-        ]
-    )
+    hardware = ({**SHORT, **LAGRANGIAN}, {**SHORT, **ELECTRONICS}, PROTOTYPE)
+    return "\n".join(run_text("nutation", each) for each in hardware)
 
 
 def of_parts():
@@ -75,34 +70,25 @@ def of_parts():
     base = {**SHORT, **LAGRANGIAN}
     listed = [{"controller.law": law} for law in LAWS]
     listed += [{"estimator.kind": kind, **ELECTRONICS} for kind in families(Scenario)["estimator.kind"]]
-    listed += [
-        {"allocation": kind, "controller.law": "pd", "disturbance.load": 9.0}
-        for kind in ("least_norm", "bounded")
-    ]
+    limited = {"controller.law": "pd", "disturbance.load": 9.0}
+    listed += [{"allocation": kind, **limited} for kind in ("least_norm", "bounded")]
     listed += [
         {"trajectory": {"shape": shape, **({"file": f"{folder}/w.csv"} if shape == "waypoints" else {})}}
         for shape in SHAPES
     ]
-    listed += [
-        {
-            "trajectory.approach": {
-                "start_s": 0.01, "lasts_s": 0.02, "angle_rad": [0.01, 0.0, 0.02], "shape_s": 0.5,
-            }
-        }
-    ]  # fmt: skip
+    approach = {"start_s": 0.01, "lasts_s": 0.02, "angle_rad": [0.01, 0.0, 0.02], "shape_s": 0.5}
+    listed += [{"trajectory.approach": approach}]
+    sinusoid = {
+        "amplitude_Nm": [0.1, 0.2, 0.3],
+        "frequency_Hz": [10.0, 0.0, 90.0],
+        "phase_rad": [0.0, 1.0, 2.0],
+    }
     listed += [
         {"disturbance.terms": [{"kind": kind, **more}]}
         for kind, more in (
             ("constant", {"torque_Nm": [0.1, -0.2, 0.3]}),
             ("steps", {"times_s": [0.01, 0.02], "torques_Nm": [[0.1, 0, 0.2], [0, -0.3, 0]]}),
-            (
-                "sinusoidal",
-                {
-                    "amplitude_Nm": [0.1, 0.2, 0.3],
-                    "frequency_Hz": [10.0, 0.0, 90.0],
-                    "phase_rad": [0.0, 1.0, 2.0],
-                },
-            ),
+            ("sinusoidal", sinusoid),
             ("table", {"file": f"{folder}/t.csv"}),
             ("table", {"file": f"{folder}/t.csv", "between": "held"}),
             ("random", {"bound_Nm": [0.1, 0.0, 1e-3]}),
@@ -130,11 +116,8 @@ def of_faults():
     lines = []
     for target in TARGETS.values():
         for mode, what in target.modes.items():
-            value = (
-                {}
-                if what.value is None or what.value.default is not None
-                else {"value": max(what.value.least, min(what.value.largest, 0.01))}
-            )
+            given = what.value is not None and what.value.default is None
+            value = {"value": max(what.value.least, min(what.value.largest, 0.01))} if given else {}
             fault = {"target": target.names(18)[-1], "mode": mode, "start_s": 0.01, "end_s": 0.03, **value}
             with Session(scenarios.load("nutation", {**PROTOTYPE, "fault": [fault]})) as session:
                 table = session.advance(TICKS)
@@ -143,10 +126,8 @@ def of_faults():
     return "\n".join(lines)
 
 
-SECTIONS = (
-    "sensors.", "drive.", "plant.", "estimator.", "watchdog.", "detector.", "nominal.", "controller.",
-    "disturbance.",
-)  # fmt: skip
+PARTS = "sensors drive plant estimator watchdog detector nominal controller disturbance"
+SECTIONS = tuple(f"{part}." for part in PARTS.split())
 
 
 def varied(value):
@@ -173,7 +154,8 @@ COMPENSATED = {
 
 
 KINDS = ("plant.thermal.on", "plant.stiction.on", "plant.end_stops.on")
-"""Fields that select another kind of loop."""
+OMITTED = ("controller.period_s", "plant.step_s", *KINDS)
+"""Fields that are not changed: periods that do not fit then, and what selects another kind of loop."""
 
 
 def differs(name, values, usual):
@@ -208,27 +190,20 @@ def effect_of_each_field(base, sections, at_tick=0):
     usual, lines = run({}), []
     for name, value in fields.items():
         other = varied(value)
-        if not name.startswith(sections) or other is None or name not in known:
+        if not name.startswith(sections) or other is None or name not in known or name in OMITTED:
             continue
-        if name in ("controller.period_s", "plant.step_s") or name in KINDS:
-            continue  # periods that do not fit, and another compilation
         try:
             table = run({name: other})
         except SpheretwinError as error:
             lines.append(f"{name} = {other}: {error}")
             continue
+        names, usual_names = ([signal.name for signal in rows.signals] for rows in (table, usual))
         changed = [
-            signal.name
-            for signal in table.signals
-            if signal.name not in {each.name for each in usual.signals}
-            or differs(signal.name, table[signal.name], usual[signal.name])
+            each for each in names if each not in usual_names or differs(each, table[each], usual[each])
         ]
         last = [number(each) for each in table["q_rad"][-1]] if changed else []
-        sums = {
-            each: number(float(np.abs(table[each]).sum()))
-            for each in changed
-            if each in ("current_A", "q_measured_rad", "copper_loss_W")
-        }
+        summed = [each for each in changed if each in ("current_A", "q_measured_rad", "copper_loss_W")]
+        sums = {each: number(float(np.abs(table[each]).sum())) for each in summed}
         lines.append(f"{name} = {other}: {' '.join(changed) or 'no column'}; {' '.join(last)} {sums}")
     return "\n".join(lines)
 

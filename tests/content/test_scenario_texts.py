@@ -17,7 +17,7 @@ from spheretwin.study.axes import AnyAxis
 from spheretwin.study.grid import Grid
 from spheretwin.study.study import Study
 from tests.content.content import content_test, refusal
-from tests.content.values import lines
+from tests.content.values import lines, plain
 
 NAMES = [name for name, _ in every_field(Scenario)]
 
@@ -79,12 +79,11 @@ def _wrong(field_name, value):
 
 def messages_about_values():
     """Messages about a text, a number far out of range and a list for each field."""
-    content = [
+    return "\n".join(
         f"{name} = {json.dumps(value)}: {_wrong(name, value).removeprefix('scenario hold: ')}"
         for name in NAMES
         for value in ("x", -1e300, [1.0, 2.0])
-    ]
-    return "\n".join(content)
+    )
 
 
 COIL = {"target": "coil.03", "mode": "open"}
@@ -149,13 +148,11 @@ COMBINATIONS = {
 
 
 def messages_about_combinations():
-    content = []
-    for group, listed in COMBINATIONS.items():
-        content += [
-            f"{group}: {json.dumps(overrides)}: {refusal(scenarios.load, 'nutation', overrides)}"
-            for overrides in listed
-        ]
-    return "\n".join(content)
+    return "\n".join(
+        f"{group}: {json.dumps(overrides)}: {refusal(scenarios.load, 'nutation', overrides)}"
+        for group, listed in COMBINATIONS.items()
+        for overrides in listed
+    )
 
 
 def messages_about_changes():
@@ -219,14 +216,7 @@ def schedules():
         {"t_s": 0.02, "set": "fault", "value": {**COIL, "start_s": 0.5}},
     ]
     scenario = scenarios.load("hold", {"event": [event for event in events if event["set"] != "seed_"]})
-    return lines(
-        {
-            "changes": [
-                change._asdict() if hasattr(change, "_asdict") else vars(change)
-                for change in scheduled_changes(scenario)
-            ]
-        }
-    )
+    return lines({"changes": plain(scheduled_changes(scenario))})
 
 
 FLAGS = [
@@ -251,6 +241,7 @@ def flags():
 
 STUDY = {"name": "a", "scenario": "hold"}
 AXIS = {"field": "duration", "kind": "values", "values": [1.0, 2.0]}
+MANY = {"field": "duration", "kind": "linspace", "first": 1, "last": 2, "count": 100000}
 GAIN = {"field": "controller.stiffness", "low": 1.0, "high": 2.0}
 OBJECTIVE = {"metric": "rms_torque_Nm"}
 
@@ -268,12 +259,7 @@ STUDIES = (
         {"axis": [{"field": "duration", "kind": "linspace", "first": 0, "last": 1, "count": 0}]},
         {"axis": [{"field": "duration", "kind": "logspace", "first": 0, "last": 1, "count": 3}]},
         {"axis": [{"field": "duration", "kind": "linspace", "first": 1, "last": 2, "count": 1000000}] * 2},
-        {
-            "axis": [
-                {"field": name, "kind": "linspace", "first": 1, "last": 2, "count": 100000}
-                for name in ("duration", "disturbance.load")
-            ]
-        },
+        {"axis": [{**MANY, "field": name} for name in ("duration", "disturbance.load")]},
         {"axis": [{**AXIS, "field": "seed"}]},
         {"axis": [{**AXIS, "field": "controller.law", "values": ["pd", "pid"]}]},
         {"axis": [{**AXIS, "field": "name", "values": ["x", "y"]}]},
@@ -317,8 +303,7 @@ STUDIES = (
 
 
 def made_rows(fields):
-    chosen = studies.made({**STUDY, **fields}, "mine")
-    return Grid(chosen)
+    return Grid(studies.made({**STUDY, **fields}, "mine"))
 
 
 def messages_about_studies():
@@ -326,8 +311,7 @@ def messages_about_studies():
 
 
 def schemas():
-    kinds = [*(TypeAdapter(kind).json_schema() for kind in (Study, AnyAxis))]
-    return "\n".join(map(schema_text, kinds))
+    return "\n".join(schema_text(TypeAdapter(kind).json_schema()) for kind in (Study, AnyAxis))
 
 
 CASES = {

@@ -77,11 +77,8 @@ def rows_of_a_grid():
 def table_of_a_study():
     """Rows of 20 ticks, some refused, and journal and metadata of their table."""
     folder = scratch("study_table")
-    run(
-        study(LOADS[0], values("plant.payload_kg", 0.0, -1.0), seeds=2, law=[{"law": "pd"}, {"law": "afsm"}]),
-        folder,
-        threads=1,
-    )
+    axes, laws = (LOADS[0], values("plant.payload_kg", 0.0, -1.0)), [{"law": "pd"}, {"law": "afsm"}]
+    run(study(*axes, seeds=2, law=laws), folder, threads=1)
     table = parquet.read_table(folder / "table.parquet")
     metadata = {
         key.decode(): json.loads(value)
@@ -110,48 +107,29 @@ def trials_of_a_tuning():
     printed = tuning_page.summary(outcome, section.objective)
     del printed["wall_s"]
     table = parquet.read_table(outcome.table)
-    return "\n".join(
-        [
-            lines(printed),
-            lines(
-                {
-                    "columns": {field.name: str(field.type) for field in table.schema},
-                    "trials": table.to_pylist(),
-                }
-            ),
-            (folder / "out" / "tuning.md").read_text(encoding="utf-8"),
-            lines(json.loads((folder / "out" / "gains.json").read_text(encoding="utf-8"))),
-        ]
+    columns = {field.name: str(field.type) for field in table.schema}
+    page, gains = (
+        (folder / "out" / name).read_text(encoding="utf-8") for name in ("tuning.md", "gains.json")
     )
+    trials = lines({"columns": columns, "trials": table.to_pylist()})
+    return "\n".join([lines(printed), trials, page, lines(json.loads(gains))])
 
 
 def trials_of_each_sampler():
     """Trials of each method, one objective, with an optional gain, a factor and a power."""
     content = []
-    local = {"draws": 4, "perturbations": 2}
-    for sampler, more in (
-        ("tpe", {"trials": 12}),
-        ("nsga2", {"trials": 12}),
-        ("random", {"trials": 4, "prune": False}),
-        ("local", local),
-    ):
+    samplers = {
+        "tpe": {"trials": 12}, "nsga2": {"trials": 12}, "random": {"trials": 4, "prune": False},
+        "local": {"draws": 4, "perturbations": 2},
+    }  # fmt: skip
+    both = {
+        "name": "both", "low": 1.0, "high": 4.0, "optional": True,
+        "sets": [{"field": "controller.damping", "factor": 2.0, "power": 0.5}], "start": 2.0,
+    }  # fmt: skip
+    objectives, gains = ("miss", {"metric": "slowness", "over": "median"}), (tuning.gain(start=100.0), both)
+    for sampler, more in samplers.items():
         folder = scratch(f"trials_{sampler}")
-        gains = (
-            tuning.gain(start=100.0),
-            {
-                "name": "both", "low": 1.0, "high": 4.0, "optional": True,
-                "sets": [{"field": "controller.damping", "factor": 2.0, "power": 0.5}], "start": 2.0,
-            },
-        )  # fmt: skip
-        chosen = tuning.study(
-            folder,
-            ("miss", {"metric": "slowness", "over": "median"}),
-            gains,
-            seeds=2,
-            together=2,
-            sampler=sampler,
-            **more,
-        )
+        chosen = tuning.study(folder, objectives, gains, seeds=2, together=2, sampler=sampler, **more)
         outcome = tune(chosen, folder / "out", threads=1)
         table = parquet.read_table(outcome.table).to_pylist()
         content.append(f"{sampler}\n{lines(table)}")

@@ -44,14 +44,10 @@ def ranges() -> str:
         of = tracker.extents(ended_s)
         lines += [f"spans {array(of.t_s)} {of.ended_s}"]
         lines += [f"{name} {array(of._low[name])} {array(of._high[name])}" for name in ("a", "b")]
-        for channels in (
-            (PlotChannel("a"),),
-            (PlotChannel("a", 1), PlotChannel("b")),
-            (PlotChannel("b", 0),),
-        ):
-            limits = [
-                of.limit(*channels, least=least, above_zero=up) for least in (0.1, 30) for up in (False, True)
-            ]
+        several = (PlotChannel("a", 1), PlotChannel("b"))
+        for channels in ((PlotChannel("a"),), several, (PlotChannel("b", 0),)):
+            kinds = product((0.1, 30), (False, True))
+            limits = [of.limit(*channels, least=least, above_zero=up) for least, up in kinds]
             results = [*limits, *of.bounds(*channels), *of.band(*channels, least=0.5)]
             lines.append(f"{channels}: {array(np.array(results))} {of.largest(12.0, *channels)!r}")
     shown = [

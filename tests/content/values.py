@@ -83,7 +83,7 @@ def words(texts: list) -> str:
     return f"{len(texts)} texts, {len(distinct)} different: {distinct[:12]!r} … {distinct[-4:]!r}"
 
 
-def plain(value: object, leaf: Callable[[object], object] = repr) -> object:
+def plain(value: object, leaf: Callable[[object], object] | None = None) -> object:
     """Return a value as nested keys and values; `leaf` is what becomes of numbers and other objects."""
     if isinstance(value, np.ndarray):
         return array(value)
@@ -95,7 +95,9 @@ def plain(value: object, leaf: Callable[[object], object] = repr) -> object:
         return {str(name): plain(inside, leaf) for name, inside in value.items()}
     if isinstance(value, list | tuple):
         return [plain(inside, leaf) for inside in value]
-    return value if isinstance(value, str | bool | int | None) else leaf(value)
+    if isinstance(value, str | bool | int | None) or (isinstance(value, float) and not leaf):
+        return value
+    return (leaf or repr)(value)
 
 
 def lines(value: object) -> str:
