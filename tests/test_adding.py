@@ -25,14 +25,11 @@ import sys
 sys.meta_path[:] = [finder for finder in sys.meta_path if "editable" not in repr(finder)]
 """
 
-TESTS = (
-    ALONE
-    + """
+TESTS = f"""{ALONE}
 import pytest
 
 sys.exit(pytest.main(sys.argv[1:]))
 """
-)
 
 # What parts of the prototype draw and measure, none of which is new.
 DRAWN = """
@@ -201,14 +198,11 @@ def folder(tmp_path_factory):
     return folder
 
 
-REPRODUCE = (
-    ALONE
-    + """
+REPRODUCE = f"""{ALONE}
 from spheretwin import cli
 
 sys.exit(cli.main(["reproduce", "holding", "--out", sys.argv[1]]))
 """
-)
 
 
 def python(folder, script, *arguments, compiles=False):

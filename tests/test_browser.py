@@ -16,11 +16,12 @@ PAGE = """<p id=line hidden style="height: 30px; margin: 0">a line</p>
       button.addEventListener(kind, () => presses.push(button.innerText + " " + kind));
   addEventListener("mousemove", () => { line.hidden = false; }, {once: true});
 </script>"""
+ADDRESS = "data:text/html," + PAGE.replace("\n", " ").replace("#", "%23")
 
 
 def test_a_click_reaches_an_element_that_moves_away_and_no_other():
     with Browser() as browser:
-        page = browser.open("data:text/html," + PAGE.replace("\n", " ").replace("#", "%23"))
+        page = browser.open(ADDRESS)
         page.evaluate("cover.hidden = true")
         page.click("text=start")
         assert page.evaluate("presses") == ["start pointerdown", "start click"]
@@ -28,7 +29,7 @@ def test_a_click_reaches_an_element_that_moves_away_and_no_other():
 
 def test_an_element_is_clicked_once_nothing_covers_it():
     with Browser() as browser:
-        page = browser.open("data:text/html," + PAGE.replace("\n", " ").replace("#", "%23"))
+        page = browser.open(ADDRESS)
         page.evaluate("void (presses.length = 0, setTimeout(() => cover.remove(), 300))")
         page.click("#covered")
         assert page.evaluate("presses") == ["last pointerdown", "last click"]

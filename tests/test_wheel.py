@@ -17,18 +17,15 @@ def names(tmp_path_factory):
     folder = tmp_path_factory.mktemp("wheel")
     # Built from a copy: setuptools would leave its own folders in the tree.
     source = folder / "source"
-    files = subprocess.run(
-        ["git", "ls-files", "-z", "--cached", "--others", "--exclude-standard"],
-        cwd=ROOT, capture_output=True, text=True, check=True,
-    ).stdout  # fmt: skip
+    listing = ["git", "ls-files", "-z", "--cached", "--others", "--exclude-standard"]
+    captured = {"capture_output": True, "text": True, "check": True}
+    files = subprocess.run(listing, cwd=ROOT, **captured).stdout
     for name in filter(None, files.split("\0")):
         if (ROOT / name).is_file():
             (source / name).parent.mkdir(parents=True, exist_ok=True)
             (source / name).write_bytes((ROOT / name).read_bytes())
     code = "import setuptools.build_meta as b; print(b.build_wheel('..'))"
-    built = subprocess.run(
-        [sys.executable, "-c", code], cwd=source, capture_output=True, text=True, check=True
-    )
+    built = subprocess.run([sys.executable, "-c", code], cwd=source, **captured)
     with zipfile.ZipFile(folder / built.stdout.split()[-1]) as wheel:
         return wheel.namelist()
 
