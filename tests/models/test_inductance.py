@@ -104,15 +104,13 @@ def test_group_is_the_sum_over_its_coils_in_any_order():
 
 
 def test_inductance_grows_with_the_square_of_turns_and_with_size():
-    matrix = mutual_inductance(ACTUATOR)
-    double = replace(ACTUATOR, coil=replace(COIL, turns=2 * COIL.turns))
-    np.testing.assert_allclose(mutual_inductance(double), 4 * matrix, rtol=1e-12)
-    sizes = {
-        name: 3 * getattr(COIL, name)
-        for name in ("inner_radius_m", "outer_radius_m", "length_m", "distance_m")
-    }
-    large = replace(ACTUATOR, coil=replace(COIL, **sizes))
-    np.testing.assert_allclose(mutual_inductance(large), 3 * matrix, rtol=1e-12)
+    lengths = ("inner_radius_m", "outer_radius_m", "length_m", "distance_m")
+    large = replace(COIL, **{name: 3 * getattr(COIL, name) for name in lengths})
+    pair = coil_pair(COIL, np.radians(30))
+    assert coil_pair(replace(COIL, turns=2 * COIL.turns), np.radians(30)) == pytest.approx(
+        4 * pair, rel=1e-12
+    )
+    assert coil_pair(large, np.radians(30)) == pytest.approx(3 * pair, rel=1e-12)
 
 
 @pytest.mark.release("0.7 s; the other tests compare with exact inductances")
