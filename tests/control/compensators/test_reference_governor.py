@@ -28,14 +28,6 @@ def to_rest(angle, rate, ticks, **of_governor):
     return governed(np.zeros((ticks, 3, 3)), angle, rate, **of_governor)
 
 
-def fewest(distance):
-    """Periods from rest to rest over a distance in units of R h²: half of them pushed, half braked."""
-    periods = 0
-    while (periods // 2) * ((periods + 1) // 2) < distance:
-        periods += 1
-    return periods
-
-
 def could_stop_within(periods, z, v):
     """Whether ``z+ = z + v, v+ = v + u`` with ``|u| <= 1`` can be brought to rest at 0 in some periods.
 
@@ -48,15 +40,12 @@ def could_stop_within(periods, z, v):
 
 
 @pytest.mark.parametrize("distance", [1.0, 2.0, 6.0, 7.5, 12.0, 100.0, 381.7])
-def test_from_rest_to_rest_it_takes_at_most_a_period_more_than_any_can(distance):
-    """And passes its target by less than R h²/13, at and between the ticks."""
+def test_from_rest_to_rest_it_passes_its_target_by_a_thirteenth_of_a_period_s_move(distance):
+    """By less than R h²/13, at and between the ticks; the time is that of any motion, below."""
     unit = np.array(LARGEST) * PERIOD_S**2
-    periods = fewest(distance)
-    motion = to_rest(distance * unit, np.zeros(3), periods + 3)
+    motion = to_rest(distance * unit, np.zeros(3), 60)
     # Rest to rounding: a millionth of what a period moves.
-    assert np.abs(motion[periods + 1, 0]).max() < 1e-6 * unit.min()
-    assert np.abs(motion[periods + 1, 1]).max() < 1e-6 * unit.min() / PERIOD_S
-    assert np.abs(motion[periods - 1, 0] / unit).max() > 1e-6  # sooner it is not there
+    assert np.abs(motion[-1, :2] / [unit, unit / PERIOD_S]).max() < 1e-6
     angle, rate, push = motion[:, 0], motion[:, 1], motion[:, 2]
     turning = np.clip(-rate / np.where(push == 0, np.inf, push), 0, PERIOD_S)
     lowest = angle + rate * turning + push * turning**2 / 2
@@ -64,7 +53,7 @@ def test_from_rest_to_rest_it_takes_at_most_a_period_more_than_any_can(distance)
 
 
 @settings(max_examples=100)
-@given(st.floats(-200, 200), st.floats(-15, 15))
+@given(st.floats(-400, 400), st.floats(-15, 15))
 def test_from_any_motion_it_takes_at_most_a_period_more_than_any_can(z, v):
     """Exact for z, the lead less half a period's rate, on which the discrete feedback acts."""
     h, largest = PERIOD_S, LARGEST[0]
