@@ -8,9 +8,11 @@ import os
 import re
 import shutil
 import tempfile
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
+from contextlib import AbstractContextManager
 from importlib import import_module
 from pathlib import Path
+from unittest.mock import patch
 
 import pytest
 
@@ -101,16 +103,8 @@ def all_cases() -> dict[str, Cases]:
     }
 
 
-@contextlib.contextmanager
-def _columns(count: int) -> Iterator[None]:
-    before = os.environ.get("COLUMNS")
-    os.environ["COLUMNS"] = str(count)
-    try:
-        yield
-    finally:
-        os.environ.pop("COLUMNS")
-        if before is not None:
-            os.environ["COLUMNS"] = before
+def _columns(count: int) -> AbstractContextManager[object]:
+    return patch.dict(os.environ, COLUMNS=str(count))
 
 
 def refusal(call: Callable[..., object], *arguments: object, **named: object) -> str:

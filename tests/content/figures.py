@@ -2,6 +2,7 @@
 
 import contextlib
 from collections.abc import Iterator
+from unittest.mock import patch
 
 import numpy as np
 from matplotlib import collections, image, lines, patches, text
@@ -31,18 +32,14 @@ def figure_text(figure: Figure) -> str:
 def captured() -> Iterator[dict[str, str]]:
     """Yield the texts of the figures that are saved meanwhile, by the name of their file."""
     texts: dict[str, str] = {}
-    save = style.save
 
     def capture(figure: Figure, path, title: str = "") -> None:
         if path.name not in texts:
             texts[path.name] = f"title of the file: {title!r}\n{figure_text(figure)}"
         path.write_text("<svg></svg>", encoding="utf-8")
 
-    style.save = capture
-    try:
+    with patch.object(style, "save", capture):
         yield texts
-    finally:
-        style.save = save
 
 
 def _axes(axes: Axes) -> list[str]:
