@@ -38,6 +38,19 @@ def strange(*_):
     raise Strange("so it is")
 
 
+def returns(t, reference, measurement, parameters, state, torque):
+    return np.zeros(3)
+
+
+def rebinds(t, reference, measurement, parameters, state, torque):
+    torque = np.zeros(3)
+
+
+def late(t, reference, measurement, parameters, state, torque):
+    print("here")
+    torque[:] = 1 / 0 if t > 0.0205 else 0
+
+
 @numba.njit
 def raises(t, reference, measurement, parameters, state, torque):
     torque[:] = 0.0  # a torque that could be taken for one of a law that works
@@ -125,26 +138,36 @@ def printed(capfd, *arguments):
     return code, out, err
 
 
+INTO_THE_ARGUMENT = "write the torque into the last argument, torque[:] = …"
 RAISED = {
-    "leaves": "expected a torque at 0.006 s, received SystemExit: 0",
-    "closes": "expected a torque at 0 s, received GeneratorExit",
-    "strange": "expected a torque at 0 s, received Strange: so it is",
-    "raises": "expected a torque at 0.021 s, received ValueError: lost",
-    "asserts": "expected a torque at 0.021 s, received AssertionError",
+    law: f"expected a torque at {time_s} s, received {received}"
+    for law, time_s, received in (
+        ("leaves", 0.006, "SystemExit: 0"),
+        ("closes", 0, "GeneratorExit"),
+        ("strange", 0, "Strange: so it is"),
+        ("returns", 0, f"ValueError: a returned value, which is not used: {INTO_THE_ARGUMENT}"),
+        ("rebinds", 0, f"ValueError: no torque: {INTO_THE_ARGUMENT}"),
+        ("late", 0.021, "ZeroDivisionError: division by zero"),
+        ("raises", 0.021, "ValueError: lost"),
+        ("asserts", 0.021, "AssertionError"),
+    )
 }
 
 
 @pytest.mark.parametrize("law", RAISED)
 def test_what_a_law_raises_is_one_line_and_exit_1(file, law, capfd):
-    for more in ([], ["--json"]):
-        message = f"spheretwin: law {law}: {RAISED[law]}\n"
-        assert printed(capfd, "--controller.law", f"{file}:{law}", *more) == (1, "", message)
+    message = f"spheretwin: law {law}: {RAISED[law]}\n"
+    code, out, err = printed(capfd, "--controller.law", f"{file}:{law}")
+    assert (code, out.replace("here\n", ""), err) == (1, "", message)
+    code, out, err = printed(capfd, "--controller.law", f"{file}:{law}", "--json")
+    assert (code, out, err.replace("here\n", "")) == (1, "", message)  # what the law prints is no JSON
 
 
-def test_rows_before_a_compiled_law_raised_are_kept(file, tmp_path, capfd):
+@pytest.mark.parametrize(("law", "rows"), [("leaves", 6), ("late", 21), ("raises", 21)])
+def test_rows_before_an_exception_are_kept(file, law, rows, tmp_path, capfd):
     path = tmp_path / "run.parquet"
-    assert printed(capfd, "--controller.law", f"{file}:raises", "--telemetry", path)[0] == 1
-    assert len(read_parquet(path)[0]) == 21
+    assert printed(capfd, "--controller.law", f"{file}:{law}", "--telemetry", path)[0] == 1
+    assert len(read_parquet(path)[0]) == rows
 
 
 def test_under_a_watchdog_the_line_has_the_time_of_the_exception(file, capfd):
@@ -232,11 +255,12 @@ def failures_of_a_sweep(folder, capfd, fields):
     (source := folder / "study.toml").write_text(f'name = "failing"\nscenario = "hold"\n{fields}\n')
     assert cli.main(["sweep", str(source), "--out", str(folder / "out"), "--json"]) == 1
     out, err = capfd.readouterr()
+    err = err.replace("here\n", "")
     assert err.count("\n") == 1
     return json.loads(out), err
 
 
-@pytest.mark.parametrize("law", RAISED)
+@pytest.mark.parametrize("law", ["leaves", "strange", "late", "raises"])
 def test_a_row_whose_law_raises_has_failed(file, law, tmp_path, capfd):
     axis = '[[axis]]\nfield = "disturbance.load"\nkind = "values"\nvalues = [0.0, 1.0]'
     fields = f'fields = {{duration = 0.05}}\nlaw = [{{law = "{file}:{law}"}}]\n{axis}'

@@ -9,7 +9,6 @@ import pytest
 from spheretwin import cli
 from spheretwin import scenario as scenarios
 from spheretwin.control.law import Law
-from spheretwin.models.telemetry.table import read_parquet
 from spheretwin.session import Session
 from spheretwin.simulation import simulate
 from spheretwin.study import runner
@@ -115,59 +114,6 @@ def test_an_object_that_cannot_be_copied_is_shared():
     law = Law("locked", Locked(), [], [])
     with Session(scenarios.load("hold", SHORT), law) as session:
         assert session.law.step is law.step
-
-
-RETURNS = """
-import numpy as np
-from spheretwin import Law
-def returns(t, r, m, p, x, torque):
-    return np.zeros(3)
-def rebinds(t, r, m, p, x, torque):
-    torque = np.zeros(3)
-def late(t, r, m, p, x, torque):
-    torque[:] = 0.0
-    if t > 0.0205:
-        raise ValueError("lost")
-"""
-
-
-@pytest.mark.parametrize(
-    "hardware",
-    [
-        "ideal",
-        pytest.param(
-            "electronics",
-            marks=pytest.mark.release("compiles the stages for a loop in plain Python, 23 s; ideal is shown"),
-        ),
-    ],
-)
-@pytest.mark.parametrize(
-    ("name", "time_s", "received"),
-    [
-        ("returns", "0", "a returned value, which is not used: write the torque into the last argument"),
-        ("rebinds", "0", "no torque: write the torque into the last argument"),
-        ("late", "0.021", "ValueError: lost"),
-    ],
-)
-def test_an_exception_has_its_own_time_and_leaves_the_rows_before_it(
-    tmp_path, capfd, hardware, name, time_s, received
-):
-    (tmp_path / "law.py").write_text(RETURNS)
-    telemetry = tmp_path / "run.parquet"
-    arguments = [
-        "--controller.law",
-        f"{tmp_path}/law.py:{name}",
-        "--hardware",
-        hardware,
-        "--duration",
-        "0.05",
-    ]
-    assert cli.main(["simulate", "hold", *arguments, "--telemetry", str(telemetry)]) == 1
-    (line,) = capfd.readouterr().err.splitlines()
-    assert line.startswith(f"spheretwin: law {name}: expected a torque at {time_s} s, received ")
-    assert received in line
-    if name == "late":
-        assert len(read_parquet(telemetry)[0]) >= 21
 
 
 @needs_compiled_functions

@@ -207,20 +207,6 @@ def test_an_invalid_parameter_is_refused_by_name(file, tokens, message):
         load(f"{file}:ComputedTorque", *tokens.split())
 
 
-def test_what_a_plain_law_raises_is_told_in_one_line_and_keeps_the_json_alone(tmp_path, capsys):
-    (path := tmp_path / "plain.py").write_text(
-        "def fails(t, reference, measurement, parameters, state, torque):\n"
-        "    print('here')\n    torque[:] = 1 / 0 if t > 0.05 else 0\n"
-    )
-    assert cli.main(["simulate", "hold", "--controller.law", f"{path}:fails", "--json"]) == 1
-    out, err = capsys.readouterr()
-    assert out == ""
-    messages = [line for line in err.splitlines() if line != "here"]
-    assert messages == [
-        "spheretwin: law fails: expected a torque at 0.051 s, received ZeroDivisionError: division by zero"
-    ]
-
-
 def test_a_signal_of_an_odd_name_is_recorded_quietly(tmp_path, capfd):
     def step(t, reference, measurement, parameters, state, torque):
         torque[:] = 0.0
