@@ -56,6 +56,7 @@ def test_the_controller_knows_the_parts_of_a_stage_but_not_the_mass(stage, actua
     assert (nominal.angle_noise_rad, nominal.angle_resolution_rad) == accuracy(run.sensors)
 
 
+@OF_STAGES
 @pytest.mark.uncompiled
 def test_a_stage_is_run_for_each_seed_where_it_draws_and_only_there():
     def rows(stage, seed):
@@ -65,6 +66,7 @@ def test_a_stage_is_run_for_each_seed_where_it_draws_and_only_there():
     assert drawn == [stage.name for stage in STAGES if stage.is_random]
 
 
+@OF_STAGES
 @pytest.mark.uncompiled
 def test_what_a_drive_s_stage_needs_beside_is_no_error():
     """Amplifiers of ample voltage and bandwidth are currents at once, but for the offsets of the stage."""
