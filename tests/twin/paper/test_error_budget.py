@@ -14,6 +14,9 @@ from spheretwin.simulation import simulate
 from tests.twin.paper.cases import outcome
 
 BY_NAME = {stage.name: stage for stage in STAGES}
+OF_STAGES = pytest.mark.release(
+    "3 s of plain Python; fields of the stages are compared here, rows in content"
+)
 
 
 def scenario(stage, **more):
