@@ -14,9 +14,7 @@ from spheretwin.simulation import simulate
 from tests.twin.paper.cases import outcome
 
 BY_NAME = {stage.name: stage for stage in STAGES}
-OF_STAGES = pytest.mark.release(
-    "3 s of plain Python; fields of the stages are compared here, rows in content"
-)
+OF_STAGES = pytest.mark.release("3 s of plain Python; the fields of the stages are compared here")
 
 
 def scenario(stage, **more):
