@@ -139,19 +139,6 @@ def test_ideal_joint_has_the_closed_forms(actuator, shipped):
             np.testing.assert_allclose(bias, expected, rtol=0, atol=1e-14)
 
 
-def test_static_torque_of_an_offset_centre_is_m_g_r(actuator, shipped):
-    model = mujoco.MjModel.from_xml_path(str(actuators.MJCF_PATH))
-    model.body_sameframe[:] = 0
-    x, y, z = model.body_ipos[model.body("rotor").id] = 1e-3, -2e-3, 3e-3
-    chain, weight = read_chain(model), 1.6 * 9.81
-    # Upright: about x the arm is y, about y it is -x; gamma is vertical.
-    at_rest = of(chain, np.zeros(3), np.zeros(3))[1]
-    np.testing.assert_allclose(at_rest, [weight * y, -weight * x, 0], rtol=0, atol=1e-15)
-    # alpha at 90 degrees turns y up and z to -y: the axis of beta is z, that of gamma -y of the stator.
-    lying = of(chain, np.array([np.pi / 2, 0, 0]), np.zeros(3))[1]
-    np.testing.assert_allclose(lying, [-weight * z, 0, weight * x], rtol=0, atol=1e-15)
-
-
 def test_energy_of_the_free_chain_is_kept_to_the_order_of_the_step(actuator):
     machine = random_machine(3)
     chain, data = read_chain(machine), mujoco.MjData(machine)

@@ -31,16 +31,6 @@ def test_columns_are_views_by_name(table):
     np.testing.assert_array_equal(table.rows(2, 5)["q_rad"], table["q_rad"][2:5])
 
 
-def test_parquet_columns_are_what_pandas_and_polars_expect(table, tmp_path):
-    import pyarrow.parquet
-
-    table.write_parquet(path := tmp_path / "run.parquet", {})
-    schema = pyarrow.parquet.read_schema(path)
-    assert schema.names == [signal.name for signal in SIGNALS]
-    assert schema.field("current_A").type.list_size == 18
-    assert schema.field("current_A").metadata[b"unit"] == b"A"
-
-
 def test_another_reader_can_compare_the_checksums_of_pages(table, tmp_path):
     """They are Parquet's own. A flipped sign, stored without compression, is valid data without them."""
     import pyarrow.parquet

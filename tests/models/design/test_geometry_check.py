@@ -1,4 +1,4 @@
-"""Overlap of equal cylinders about a centre: the closed form against points inside both."""
+"""Geometry of an actuator: overlaps against points inside both cylinders, air gap, curve of another model."""
 
 from dataclasses import replace
 
@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from spheretwin.models.design.geometry_check import air_gap_m, clearance, overlaps
+from spheretwin.models import actuator as actuators
+from spheretwin.models.design.geometry_check import air_gap_m, clearance, of_model_file, overlaps
 
 RADIUS, LENGTH, DISTANCE = 0.011, 0.025, 0.063
 
@@ -77,3 +78,17 @@ def test_air_gap_is_that_of_the_farthest_point_of_a_pole(actuator, front_radius_
     farthest = np.hypot(rho, height).max()
     face = actuator.coil.distance_m - actuator.coil.length_m / 2
     assert air_gap_m(replace(actuator, magnet=magnet)) == pytest.approx(face - farthest, abs=1e-12)
+
+
+def test_a_model_file_is_held_against_a_curve_that_says_what_it_is_for(actuator, tmp_path):
+    text = actuators.MJCF_PATH.read_text(encoding="utf-8")
+    (path := tmp_path / "mine.xml").write_text(text.replace('_turns" data="320"', '_turns" data="640"'))
+    (line,) = of_model_file(path, actuator.torque_curve)
+    assert "coil turns 320" in line
+    # As one that has just been computed from the file itself.
+    assert of_model_file(path, replace(actuator.torque_curve, computed_for=None)) == []
+
+
+def test_a_model_file_without_a_rotor_is_not_warned_of(actuator, tmp_path):
+    (path := tmp_path / "mine.xml").write_text("<mujoco/>")
+    assert of_model_file(path, actuator.torque_curve) == []
