@@ -63,3 +63,40 @@ def test_approximation_and_adaptation_are_the_regressor_form(rate, angle, drive,
     output = fuzzy.approximate_and_adapt(rate, angle, drive, adapted)
     assert output == pytest.approx(theta @ regressor, rel=1e-12, abs=1e-12)
     np.testing.assert_allclose(adapted, theta + drive * regressor, rtol=1e-12, atol=1e-14)
+
+
+# The restrained approximator
+
+PERIOD = 1e-3
+FREE = fuzzy.AdaptationLimits(0.0, 0.0, 1e9)
+
+
+def learn(s, limits, ticks=1, theta=None, adaptation=10.0):
+    theta = np.zeros(75) if theta is None else theta.copy()
+    outputs = [
+        fuzzy.approximate_within_bounds(0.3, -0.2, s, adaptation, limits, PERIOD, theta) for _ in range(ticks)
+    ]
+    return theta, outputs
+
+
+def test_unrestrained_it_is_the_plain_one():
+    theta, outputs = learn(0.4, FREE, 50)
+    plain = np.zeros(75)
+    expected = [fuzzy.approximate_and_adapt(0.3, -0.2, -10.0 * 0.4 * PERIOD, plain) for _ in range(50)]
+    np.testing.assert_array_equal(outputs, expected)
+    np.testing.assert_array_equal(theta, plain)
+
+
+def test_nothing_is_learnt_within_the_dead_zone():
+    assert not learn(0.01, fuzzy.AdaptationLimits(0.01, 0.0, 1e9))[0].any()
+    assert learn(0.011, fuzzy.AdaptationLimits(0.01, 0.0, 1e9))[0].any()
+
+
+def test_what_was_learnt_leaks_away():
+    theta, _ = learn(0.0, fuzzy.AdaptationLimits(0.01, 2.0, 1e9), 500, np.ones(75))
+    np.testing.assert_allclose(theta, (1 - 2.0 * PERIOD) ** 500, rtol=1e-12)  # 500 roundings
+
+
+def test_the_norm_stays_at_its_bound():
+    theta, _ = learn(-5.0, fuzzy.AdaptationLimits(0.0, 0.0, 0.3), 200)
+    assert np.linalg.norm(theta) == pytest.approx(0.3, rel=1e-12)

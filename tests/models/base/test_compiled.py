@@ -264,15 +264,6 @@ def test_uncompiled_is_the_plain_function():
     assert compiled.uncompiled(double) is double
 
 
-def test_damaged_entry_is_no_entry(tmp_path, monkeypatch):
-    monkeypatch.setattr(cache, "_root", lambda: tmp_path)
-    cache.store_entry("name", b"machine code")
-    assert cache.load_entry("name") == b"machine code"
-    (path,) = tmp_path.rglob("name")
-    path.write_bytes(path.read_bytes().replace(b"code", b"cold"))
-    assert cache.load_entry("name") is None
-
-
 def test_cached_array_is_computed_once(tmp_path, monkeypatch):
     monkeypatch.setattr(cache, "_root", lambda: tmp_path)
     made = []
