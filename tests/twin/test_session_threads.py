@@ -10,6 +10,7 @@ from spheretwin.control.law import Law
 from spheretwin.models.base.errors import SpheretwinError
 from spheretwin.session import Session
 from tests.twin.session_cases import ENGINES, SHIPPED, rows, same_future, scenario, session
+from tests.waiting import wait_for
 
 
 def test_runs_on_threads_are_those_made_one_after_the_other():
@@ -43,7 +44,7 @@ def test_a_second_thread_is_refused_while_the_first_is_at_work():
     busy = session(blocking(entered, go), name="hold")
     with ThreadPoolExecutor(1) as pool:
         advancing = pool.submit(busy.advance, 20)
-        entered.wait()
+        wait_for(entered.is_set, while_alive=advancing)
         try:
             for call in (
                 lambda: busy.advance(1),

@@ -1,8 +1,8 @@
-"""Preparations of a busy machine: a loop may be compiled for longer than a person would wait."""
+"""A bench of a busy machine: to compile, or to wait for the interpreter, takes longer than a person waits."""
 
 import pytest
 
-from spheretwin.bench import preparation
+from spheretwin.bench import cycle, preparation
 from tests.twin.bench.cases import begun
 from tests.waiting import UNLIMITED_S
 
@@ -10,6 +10,8 @@ from tests.waiting import UNLIMITED_S
 @pytest.fixture(autouse=True)
 def _patience(monkeypatch):
     monkeypatch.setattr(preparation, "LIMIT_s", UNLIMITED_S)
+    for limit in ("COMMAND_s", "TICKS_s"):  # test_stall.py sets its own
+        monkeypatch.setattr(cycle, limit, UNLIMITED_S)
 
 
 @pytest.fixture

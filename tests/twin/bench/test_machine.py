@@ -21,6 +21,7 @@ from tests.twin.machine.link.lines import (
     heat,
     machine_channel,
 )
+from tests.waiting import UNLIMITED_S
 
 TICKS, STOPPED = 60, 20
 
@@ -40,7 +41,8 @@ def test_the_page_s_commands_drive_a_machine():
 
     thread = threading.Thread(target=serve, daemon=True)
     thread.start()
-    settings = LinkSettings(armed=True, ramp_s=0.0, lockstep=True, timeout_s=1000.0, connect_s=1000.0)
+    unlimited = {"timeout_s": UNLIMITED_S, "connect_s": UNLIMITED_S}
+    settings = LinkSettings(armed=True, ramp_s=0.0, lockstep=True, **unlimited)
     link = Link(controller_channel(line), "a test", settings, Limits(current_A=8.0), heat(), PERIOD_s)
     with Bench(scenario) as own, Bench(scenario, machine=link.session(scenario)) as bench:
         for one in (own, bench):

@@ -58,15 +58,15 @@ def test_stop_wakes_the_thread():
     """In slow motion, where a chunk is 20 ms of the clock's, and while nothing runs at all."""
     with paused() as made:
         made.begin()
-        made.command("speed", factor=0.1).wait()
+        made.command("speed", factor=0.1).wait(None)
         for running in (False, True):
             if running:
-                assert made.command("reset").wait() == "done"
-                assert made.command("start").wait() == "done"
-            assert made.command("stop").wait() == "done"
+                assert made.command("reset").wait(None) == "done"
+                assert made.command("start").wait(None) == "done"
+            assert made.command("stop").wait(None) == "done"
             assert made.state().stopped
             for _ in range(2):  # the second one comes after the chunk that follows the first one
-                assert made.command("limits").wait() == "done"
+                assert made.command("limits").wait(None) == "done"
             assert made.state().running == running
             assert not any(made.state().current_command_A)
 

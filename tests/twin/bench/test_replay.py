@@ -141,6 +141,6 @@ def test_a_twin_in_a_thread_runs_what_is_commanded_as_one_without(tmp_path):
             ("pause", {}),
             ("keep", {}),
         ]:
-            assert made.command(name, **arguments).wait(60) == "done"
+            assert made.command(name, **arguments).wait(None) == "done"
     assert len(kept_rows(path)) > 0
     assert same_when_replayed(path)

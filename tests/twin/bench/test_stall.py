@@ -6,25 +6,25 @@ from pathlib import Path
 
 import pytest
 
-from spheretwin.bench import supervisor
+from spheretwin.bench import cycle, supervisor
 from spheretwin.bench.supervisor import PERIOD_s, Supervisor, TICKS_s, processor_time_s
 from tests.twin.bench.cases import begun, done, kept_rows
-from tests.waiting import wait_for
+from tests.waiting import UNLIMITED_S, wait_for
 
 # It waits in its step until the test lets it go: a thread that never returns would stay in this process.
 LAW = """
 import threading
-GO, IN = threading.Event(), threading.Event()
+GO = threading.Event()
 
 def waits(t, reference, measurement, parameters, state, torque):
     torque[:] = 0.01
     if t > 0.05:
-        IN.set()
         GO.wait()
 """
 
 
-def test_a_law_that_does_not_return_stalls_the_loop(made, tmp_path):
+def test_a_law_that_does_not_return_stalls_the_loop(made, tmp_path, monkeypatch):
+    monkeypatch.setattr(cycle, "TICKS_s", TICKS_s)
     (file := tmp_path / "law.py").write_text(LAW)
     telemetry = tmp_path / "run.parquet"
     done(made, "set", name="controller.law", value=f"{file}:waits")
@@ -32,7 +32,6 @@ def test_a_law_that_does_not_return_stalls_the_loop(made, tmp_path):
     done(made, "record", telemetry=str(telemetry))
     made.begin()
     try:
-        assert law["IN"].wait()
         wait_for(lambda: made.state().mode == "fault")
         state = made.state()
         assert state.reason.startswith("LOOP STALLED: the law ")
@@ -42,12 +41,13 @@ def test_a_law_that_does_not_return_stalls_the_loop(made, tmp_path):
         # The files are completed while the law still waits.
         wait_for(lambda: made.state().completed_files == (str(telemetry),))
         assert len(kept_rows(telemetry)) > 0
-        assert made.command("stop").wait() == "done"  # it has happened
+        assert made.command("stop").wait(None) == "done"  # it has happened
         ticket = made.command("hold")
-        assert ticket.wait() == "refused"
+        assert ticket.wait(None) == "refused"
         assert "expected Ctrl-C, as the loop has stalled" in ticket.refused
     finally:
         law["GO"].set()
+    monkeypatch.setattr(cycle, "TICKS_s", UNLIMITED_S)
     wait_for(lambda: not made.stalled)
     ticket = made.command("hold")
     assert ticket.wait(None) == "refused"
@@ -55,17 +55,17 @@ def test_a_law_that_does_not_return_stalls_the_loop(made, tmp_path):
     assert made.command("set", name="controller.law", value="pd").wait(None) == "done"
     assert made.command("reset").wait(None) == "done"
     assert made.command("start").wait(None) == "done"
-    wait_for(lambda: made.state().t_s > 0.1)
-    assert made.state().mode != "fault"
+    made.until(lambda state: state.t_s > 0.1, UNLIMITED_S)  # it raises in a fault
 
 
-def test_a_bench_whose_loop_never_returns_can_be_closed(tmp_path):
+def test_a_bench_whose_loop_never_returns_can_be_closed(tmp_path, monkeypatch):
+    monkeypatch.setattr(cycle, "TICKS_s", TICKS_s)
     (file := tmp_path / "law.py").write_text(LAW)
     with begun() as bench:
         done(bench, "set", name="controller.law", value=f"{file}:waits")
         law = bench._bench_state.driver.session.law.step.__globals__
         bench.begin()
-        wait_for(lambda: bench.stalled)
+        wait_for(lambda: bench.state().mode == "fault")
     assert bench.state().reason.startswith("LOOP STALLED")
     assert not any(bench.state().current_command_A)
     law["GO"].set()

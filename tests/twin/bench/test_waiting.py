@@ -5,6 +5,7 @@ import pytest
 from spheretwin.bench.command_queue import Outcome, Ticket, settled_ticket
 from spheretwin.models.base.errors import InputError, SpheretwinError
 from tests.twin.bench.cases import paused
+from tests.waiting import UNLIMITED_S
 
 
 def test_outcomes_of_waiting_are_distinct():
@@ -19,16 +20,16 @@ def test_a_script_waits_for_commands_and_conditions(in_thread):
     with paused() as made:
         if in_thread:
             made.begin()
-        assert made.do("start").running
-        state = made.until(lambda state: state.t_s >= 0.1)
+        assert made.do("start", UNLIMITED_S).running
+        state = made.until(lambda state: state.t_s >= 0.1, UNLIMITED_S)
         assert state.t_s >= 0.1
         with pytest.raises(InputError, match="expected a group from 0 to 17, received 99"):
-            made.do("manual", group=99)
+            made.do("manual", UNLIMITED_S, group=99)
         with pytest.raises(InputError, match="expected one of start"):
             made.do("strat")
         with pytest.raises(SpheretwinError, match=r"received: it was not within 0\.05 s"):
             made.until(lambda state: state.mode == "replay", timeout_s=0.05)
-        assert made.do("hold").mode == "hold"
+        assert made.do("hold", UNLIMITED_S).mode == "hold"
 
 
 def test_until_ends_with_the_run_and_with_a_pause():

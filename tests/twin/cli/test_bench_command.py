@@ -154,7 +154,7 @@ class Scripted(bench.Bench):
             ("start", {}),
         ):
             ticket = self.command(name, **arguments)
-            if ticket.wait(600) != "done":  # in a thread an error would leave the bench running for ever
+            if ticket.wait(None) != "done":  # in a thread an error would leave the bench running for ever
                 print(name, "refused:", ticket.refused, flush=True)
                 return
         while not self.state().completed_files:

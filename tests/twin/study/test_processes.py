@@ -45,7 +45,7 @@ def command(tmp_path, whole):
 def begun(command, folder):
     """A process that has finished some rows, and not all."""
     process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-    wait_for(lambda: journal_lines(folder) > 4 or process.poll() is not None)
+    wait_for(lambda: journal_lines(folder) > 4, while_alive=process)
     assert process.poll() is None, process.communicate()
     return process
 

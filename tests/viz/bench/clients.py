@@ -56,7 +56,7 @@ def get(page, path="/", **headers):
 def socket_to(page, origin=None, protocol=PROTOCOL, path="", **headers):
     at = f"ws://127.0.0.1:{port(page)}{path}"
     headers = {"Cookie": cookie(page), **headers}
-    options = {"max_size": None, "max_queue": None, "proxy": None}
+    options = {"max_size": None, "max_queue": None, "proxy": None, "open_timeout": None, "ping_timeout": None}
     return connect(at, origin=origin, subprotocols=[protocol], additional_headers=headers, **options)
 
 

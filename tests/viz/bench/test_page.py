@@ -1,7 +1,5 @@
 """The page in a browser: controls send commands, the status is shown, no request leaves the machine."""
 
-import time
-
 import numpy as np
 import pytest
 from PIL import Image
@@ -153,7 +151,8 @@ def test_a_single_watching_page_does_not_operate(browser, monkeypatch):
         at_rest(page, tab, 2 * FRAMES_A_SETTING)
         bench.now.operator = None
         tab.wait_for("document.body.innerText.includes('Take over')")
-        time.sleep(1.5)  # longer than from one look at the pages to the next
+        looked = page._frame + FRAMES_A_SETTING  # one look at the pages, at least, is among so many frames
+        wait_for(lambda: page._frame > looked)
         assert bench.commands() == []
         tab.close()
 

@@ -5,7 +5,6 @@ import signal
 import socket
 import subprocess
 import sys
-import time
 import urllib.parse
 import urllib.request
 from pathlib import Path
@@ -158,9 +157,9 @@ def test_the_page_shows_the_run_and_asks_nothing_of_another_machine():
         follow(session, session.scenario.ticks, files.sinks)
         page = browser.open(files._live.address)
         page.wait_for("window._handle !== undefined")
-        time.sleep(3)  # what it asks for some time after it has started
+        wait_for(lambda: any(url.endswith(RECORDING) for url in page.requests))
+        page.draw(5)  # half a second: what it asks for some time after it has started
         assert page.outside == []
         assert page.errors == []
-        assert any(url.endswith(RECORDING) for url in page.requests)
         assert page.evaluate("window._handle.has_panicked()") is False
         assert files.close() == []

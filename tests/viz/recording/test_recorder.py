@@ -20,6 +20,7 @@ from spheretwin.viz.recording.reader import read
 from spheretwin.viz.recording.recorder import FEWEST_ROWS, Recorder
 from spheretwin.viz.recording.stream import PENDING_CHUNKS
 from tests.viz.recording.recordings import recorded, session_and_facts, static, telemetry_of, timed
+from tests.waiting import wait_for
 
 
 def test_every_signal_is_recorded_bit_for_bit(tmp_path):
@@ -112,8 +113,8 @@ def test_run_waits_for_a_recorder_that_is_behind(tmp_path):
         writer = threading.Thread(target=write_all)
         writer.start()
         try:
-            while len(written) < PENDING_CHUNKS - 2:  # room for the work at hand, and for one before it
-                time.sleep(0.001)
+            # Room for the work at hand, and for one before it.
+            wait_for(lambda: len(written) >= PENDING_CHUNKS - 2, while_alive=writer)
             time.sleep(0.05)  # time enough for hundreds more, were there no bound
             assert len(written) < PENDING_CHUNKS
         finally:

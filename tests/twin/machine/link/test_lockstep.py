@@ -17,6 +17,7 @@ from spheretwin.machine.link.machine_server import MachineServer
 from spheretwin.models.base.errors import InputError
 from spheretwin.session import Session
 from tests.twin.machine.link.lines import GROUPS, Line, PERIOD_s, heat
+from tests.waiting import UNLIMITED_S
 
 TICKS = 60
 
@@ -35,7 +36,8 @@ class Run:
         thread = threading.Thread(target=self.serve, args=(scenario, server, ticks), daemon=True)
         thread.start()
         limits = Limits(current_A=8.0)
-        settings = LinkSettings(armed=True, ramp_s=0.0, lockstep=True, timeout_s=1000.0, connect_s=1000.0)
+        unlimited = {"timeout_s": UNLIMITED_S, "connect_s": UNLIMITED_S}
+        settings = LinkSettings(armed=True, ramp_s=0.0, lockstep=True, **unlimited)
         channel = Channel(line, frames.command, frames.measurement, GROUPS)
         self.link = Link(channel, "a test", settings, limits, heat(), PERIOD_s, now=now or time.monotonic)
         with self.link.session(scenario) as session:

@@ -11,8 +11,7 @@ import pytest
 from spheretwin.machine.link.transports import Stream, Udp, open_transport
 from spheretwin.models.base.errors import InputError, SpheretwinError
 from tests.requirements import needs_pseudo_terminal
-
-SOON_s = 30.0  # a bound of a hang: everything is local
+from tests.waiting import UNLIMITED_S
 
 
 @pytest.fixture
@@ -34,16 +33,16 @@ def test_it_listens_at_the_loopback_unless_an_address_is_given(listener):
 def test_a_stranger_is_not_heard_after_the_peer(listener, sender):
     with contextlib.closing(open_transport(f"udp://:{listener.port}")) as stranger:
         stranger.send(b"a stranger whose frame was not valid")
-        assert listener.receive(SOON_s)
+        assert listener.receive(UNLIMITED_S)
         sender.send(b"the peer")
-        assert listener.receive(SOON_s) == b"the peer"
+        assert listener.receive(UNLIMITED_S) == b"the peer"
         listener.send(b"to nobody")
         listener.accept()
         stranger.send(b"currents")
-        assert listener.receive(SOON_s) == b""
+        assert listener.receive(UNLIMITED_S) == b""
         assert listener.foreign == 1
         listener.send(b"answer")
-        assert sender.receive(SOON_s) == b"answer"
+        assert sender.receive(UNLIMITED_S) == b"answer"
         assert sender.receive(0.0) == b""
         assert stranger.receive(0.0) == b""
 
@@ -67,7 +66,7 @@ def test_a_serial_line_carries_bytes_of_any_value():
         os.write(ours, everything)
         received = b""
         while len(received) < 256:
-            part = line.receive(SOON_s)
+            part = line.receive(UNLIMITED_S)
             assert part
             received += part
         assert received == everything
@@ -86,8 +85,8 @@ def test_the_end_of_a_pipe_is_noticed():
     stream = Stream(source, theirs)
     os.write(sink, b"last words")
     os.close(sink)
-    assert (stream.receive(SOON_s), stream.is_closed) == (b"last words", False)
-    assert (stream.receive(SOON_s), stream.is_closed) == (b"", True)
+    assert (stream.receive(UNLIMITED_S), stream.is_closed) == (b"last words", False)
+    assert (stream.receive(UNLIMITED_S), stream.is_closed) == (b"", True)
     for descriptor in (source, ours, theirs):
         os.close(descriptor)
 
@@ -107,7 +106,7 @@ def test_standard_output_is_for_frames_alone():
         "from spheretwin.machine.link.transports import open_transport\n"
         "line = open_transport('-')\n"
         "print('for people')\n"
-        "line.send(line.receive(30.0)[::-1])\n"
+        f"line.send(line.receive({UNLIMITED_S})[::-1])\n"
     )
     done = subprocess.run([sys.executable, "-c", code], input=b"emarf", capture_output=True, check=True)
     assert (done.stdout, done.stderr.strip()) == (b"frame", b"for people")

@@ -40,7 +40,7 @@ def started(source, folder, *options):
     command = [sys.executable, "-c", program, "sweep", str(source), "--out", str(folder), "--engine", "ray"]
     going = subprocess.Popen([*command, *options], stderr=subprocess.PIPE, text=True, start_new_session=True)
     path = folder / journal.NAME
-    wait_for(lambda: going.poll() is not None or (path.exists() and path.read_bytes().count(b"\n") > 10))
+    wait_for(lambda: path.exists() and path.read_bytes().count(b"\n") > 10, while_alive=going)
     return going
 
 

@@ -15,7 +15,7 @@ def test_loops_of_two_rows_run_at_the_same_time():
 
     def meeting(t, reference, measurement, parameters, state, torque):
         if t == 0:
-            both.wait()  # raises if the other loop does not run
+            both.wait()  # without end, unless the other loop runs too
         torque[:] = 0
 
     def work(number):
