@@ -136,6 +136,7 @@ def test_a_disk_that_fills_on_the_way_keeps_what_it_has_and_the_run_goes_on(sign
     assert read_parquet(path)[0].values.tobytes() == whole.values.tobytes()
 
 
+@pytest.mark.release("two processes, 1 s; test_files.py has two writers of one path")
 def test_two_processes_that_close_together_leave_one_of_the_two(tmp_path):
     path = tmp_path / "run.parquet"
     both = [streaming(path, 300, seed, pause=True) for seed in (1, 2)]
