@@ -152,6 +152,8 @@ def test_least_norm_torque_by_tilt(sampled, actuator):
     assert np.all(worst <= on_grid.least_norm_Nm.min(axis=(1, 2)))
     # Searched by another program: 0.8745 at 0, 0.4183 at 20, 0.3780 at 30.
     assert_allclose(worst[[0, 2, 3]], [0.8745, 0.4183, 0.3780], rtol=1e-3)
+    # Bounded currents give half as much again in the worst pose and direction, from 10 degrees on.
+    assert np.all(on_grid.best_Nm.min(axis=(1, 2))[1:4] >= 1.5 * worst[1:4])
     # Tilts are kept, and the shaft's azimuth at 0 degrees is free.
     assert_allclose(result.tilt_azimuth_spin_rad[:, 0], workspace.tilt_rad)
 
