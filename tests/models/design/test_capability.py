@@ -113,17 +113,6 @@ def test_pose_has_its_tilt_and_azimuth():
     assert_allclose(R_SR, turns[0] @ tilted @ turns[1], atol=1e-15)
 
 
-def test_a_turn_by_one_coil_pitch_changes_nothing(actuator):
-    generator = np.random.default_rng(5)
-    tilt, azimuth, spin = generator.uniform(0, 1, (3, 20))
-    pitch = np.radians(30)
-    here = capability(pose(tilt, azimuth, spin), actuator)
-    there = capability(pose(tilt, azimuth + pitch, spin + pitch), actuator)
-    # The MJCF's axes keep 1e-15; the look-up and its slope magnify rounding.
-    for name in ("least_norm_Nm", "best_Nm", "condition", "copper_W_per_Nm2"):
-        assert_allclose(getattr(here, name), getattr(there, name), rtol=1e-9)
-
-
 def test_grid_keeps_to_the_hinge_ranges(actuator):
     narrow = np.array([[-0.1, 0.1], [-0.2, 0.2], [-np.inf, np.inf]])
     workspace = grid(replace(actuator, hinge_range_rad=narrow), 20.0, 5.0, 8, 4)

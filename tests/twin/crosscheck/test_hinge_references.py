@@ -1,9 +1,14 @@
-"""Motion of both engines against end stops and static friction of another section: what breaks the rows."""
+"""End stops and static friction in the cross-check: their references, and what breaks which row."""
 
+import dataclasses
+
+import numpy as np
 import pytest
 
 from spheretwin.crosscheck import end_stops, stiction
 from spheretwin.models import actuator as actuators
+from spheretwin.models.lagrangian import inertia_matrix
+from spheretwin.plant.bristle_friction import StictionSection
 
 SECTIONS = {end_stops: "end stops", stiction: "static friction"}
 
@@ -54,3 +59,51 @@ def test_smoothed_friction_in_the_plant_breaks_both_motions(actuator, monkeypatc
     monkeypatch.setattr(stiction.Reference, "integrate", lambda *_: states)
     monkeypatch.setattr(stiction, "STICTION", stiction.STICTION.model_copy(update={"on": False}))
     assert not any(check.ok for check in checks_of(stiction, actuator))
+
+
+def test_the_reference_breaks_away_and_slides_as_its_equations_say(actuator, monkeypatch):
+    """Hinge γ alone, under three times its level: elastic swing, break-away, then uniform acceleration."""
+    J, load = actuator.inertia[2], 6e-3
+    monkeypatch.setattr(stiction, "torque_Nm", lambda t: np.array([0.0, 0.0, load]))
+    section = StictionSection(on=True, break_away=1.0, presliding_rad=1e-4, damping_ratio=0.0)
+    states, break_aways = stiction.Reference(actuator, section, stiction.COULOMB_Nm).integrate(
+        (0.0, 0.0, 0.0), 0.5
+    )
+    assert break_aways == 1
+    t_s, level = stiction.SAMPLE_s * np.arange(len(states)), stiction.COULOMB_Nm[2]
+    # Energy at any angle beyond the range: springs and sliders took k (y (q - y) + y²/2) each.
+    slip = np.array([0.5e-4, 1e-4])
+    spent = level / slip.sum() * np.sum(slip * (states[10:, [2]] - 0.5 * slip), axis=1)
+    np.testing.assert_allclose(0.5 * J * states[10:, 5] ** 2, load * states[10:, 2] - spent, rtol=1e-8)
+    np.testing.assert_allclose(np.diff(states[10:, 5]) / np.diff(t_s[10:]), (load - level) / J, rtol=1e-8)
+    assert not states[:, [0, 1, 3, 4]].any()
+
+
+def test_the_reference_starts_at_rest_in_its_pose(actuator):
+    states, break_aways = stiction.Reference(actuator, stiction.STICTION, stiction.COULOMB_Nm).integrate(
+        stiction.START_rad, 0.01
+    )
+    np.testing.assert_array_equal(states[0], [*stiction.START_rad, 0, 0, 0])
+    assert break_aways == 0
+
+
+def test_without_damping_the_reference_conserves_energy_and_bounces(actuator):
+    """At the samples without contact the energy is kinetic."""
+    reference = end_stops.Reference(actuator, end_stops.STOPS.model_copy(update={"damping_ratio": 0.0}))
+    states, contacts = reference.integrate()
+    assert contacts == 1
+    inside = np.all(
+        np.abs(states[:, :2]) < actuator.hinge_range_rad[:2, 1] - end_stops.STOPS.travel_rad, axis=1
+    )
+    energies = [0.5 * s[3:] @ inertia_matrix(s[:3], actuator.inertia) @ s[3:] for s in states[inside]]
+    np.testing.assert_allclose(energies, energies[0], rtol=1e-8)  # tolerances of DOP853 over 0.2 s
+
+
+def test_the_motion_starts_before_the_buffer_of_any_model(actuator):
+    """A contact that lasts from the start on is not counted, and the bound would be 0."""
+    narrow = np.radians([[-40.0, 40.0], [-40.0, 40.0], [-180.0, 180.0]])
+    for one in (actuator, dataclasses.replace(actuator, hinge_range_rad=narrow)):
+        low, high = (one.hinge_range_rad + end_stops.STOPS.travel_rad * np.array([1.0, -1.0])).T
+        start = np.array(end_stops.start_rad(one))
+        assert np.all((low < start) & (start < high))
+        assert end_stops.Reference(one, end_stops.STOPS).integrate()[1] > 0
