@@ -14,10 +14,6 @@ def compared():
     return compare(BANDWIDTHS)
 
 
-def test_every_estimator_with_a_bandwidth_is_there(compared):
-    assert list(compared) == ["difference", "kalman", "differentiator"]
-
-
 @pytest.mark.parametrize("kind", ["difference", "kalman"])
 def test_linear_estimators_are_as_derived(compared, kind):
     result = compared[kind]
@@ -29,6 +25,7 @@ def test_linear_estimators_are_as_derived(compared, kind):
 
 
 def test_noise_and_lag_order_the_estimators(compared):
+    assert list(compared) == ["difference", "kalman", "differentiator"]
     rms = {kind: result.rms_error_rad_s for kind, result in compared.items()}
     assert np.all(rms["kalman"][1:] < rms["difference"][1:])
     assert np.all(compared["difference"].lag_s < compared["kalman"].lag_s)
@@ -39,12 +36,6 @@ def test_differentiator_loses_a_motion_of_more_jerk_than_its_bound():
     # At 15 1/s its bound is 0.26 rad/s³; the sine has 6.2.
     result = compare([15.0])["differentiator"]
     assert result.rms_error_rad_s[0] > 0.5  # the rate itself has 0.44
-
-
-def test_same_seed_gives_the_same_figures():
-    motion = SampledSine(duration_s=6.0, seed=3)
-    for one, other in zip(compare([100.0], motion).values(), compare([100.0], motion).values(), strict=True):
-        np.testing.assert_array_equal(np.hstack(one), np.hstack(other))
 
 
 def test_record_of_no_two_periods_is_refused():

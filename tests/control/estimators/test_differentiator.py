@@ -47,12 +47,13 @@ class SlowDifferentiator:
         return self.z[1]
 
 
-def test_machine_code_is_the_slow_copy():
+@pytest.mark.parametrize("bandwidth", [15.0, 150.0, 1000.0])
+def test_machine_code_is_the_slow_copy(bandwidth):
     generator = np.random.default_rng(2)
     angle = 0.2 * np.sin(0.01 * np.arange(600)) + generator.normal(scale=NOISE, size=600)
     angle[300:] += 0.5
-    slow = SlowDifferentiator(150.0, PERIOD, NOISE)
-    result = estimates(built("differentiator", bandwidth_rad_s=150.0), on_all_axes(angle))[:, 0]
+    slow = SlowDifferentiator(bandwidth, PERIOD, NOISE)
+    result = estimates(built("differentiator", bandwidth_rad_s=bandwidth), on_all_axes(angle))[:, 0]
     # The eigenvalues are rounded, magnified by the slope's 1/T.
     np.testing.assert_allclose(result, [slow(sample) for sample in angle], rtol=1e-8, atol=1e-9)
 
@@ -114,19 +115,6 @@ def test_jump_of_the_rate_is_over_in_finite_time(jump, jerk):
     rate = estimates(built("differentiator", largest_jerk_rad_s3=jerk), on_all_axes(jump * time))[:, 0]
     wrong = np.flatnonzero(np.abs(rate - jump) > 1e-9 * jump)
     assert time[wrong[-1]] < 3.1 * math.sqrt(jump / jerk) + 3 * PERIOD
-
-
-@given(
-    jerk=st.floats(1.0, 1e4),
-    scale=st.sampled_from([0.25, 4.0, 64.0]),
-    seed=st.integers(0, 2**32 - 1),
-)
-def test_estimate_is_homogeneous_in_the_jerk(jerk, scale, seed):
-    # Angles and their bound scaled by a power of two: the same digits, scaled.
-    angle = np.random.default_rng(seed).normal(scale=1e-3, size=(40, 3))
-    one = estimates(built("differentiator", largest_jerk_rad_s3=jerk), angle)
-    other = estimates(built("differentiator", largest_jerk_rad_s3=scale * jerk), scale * angle)
-    np.testing.assert_array_equal(other, scale * one)
 
 
 @given(st.floats(0, 1e160))
