@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from spheretwin.control.law_components.extended_state_observer import ObserverState, observe, observer_gains
-from spheretwin.control.law_components.nominal_motion import RotorModel, RotorMotion, advance_motion
+from spheretwin.control.law_components.nominal_motion import RotorModel, RotorMotion
 
 PERIOD = 1e-3
 TUNINGS = [(800.0, 20.0), (800.0, 400.0), (700.0, 100.0), (180.0, 90.0)]
@@ -36,25 +36,6 @@ def test_poles_are_where_they_are_placed(bandwidths):
     # The double pole is known to the root of rounding, the polynomial is not.
     coefficients = np.poly(error_map(bandwidths))
     np.testing.assert_allclose(coefficients, np.poly(poles(bandwidths)), rtol=1e-10, atol=1e-10)
-
-
-def test_the_error_on_the_exact_model_decays_to_nothing(actuator):
-    """All axes coupled, large motion, random torques, under a constant load."""
-    nominal, load = RotorModel(tuple(actuator.inertia), True), np.array([0.05, -0.03, 0.04])
-    generator = np.random.default_rng(0)
-    true = RotorMotion((0.2, -0.3, 0.4), (1.0, -2.0, 3.0))
-    known, errors = ObserverState(RotorMotion(true.angle, REST), REST), []
-    for _ in range(600):
-        torque = 0.05 * generator.normal(size=3) - 0.2 * np.array(true.rate) * actuator.inertia - load
-        true = advance_motion(true, tuple(torque + load), nominal, PERIOD)
-        known = seen(known, true.angle, torque, (180.0, 90.0), nominal)
-        errors.append(np.abs(np.subtract(known.motion.rate, true.rate)).max())
-    # The slowest pole, 90 1/s, over 0.1 s. It is moved by some of the rotor's own rates, 4 rad/s in all: M
-    # turns while d̂ is learnt, and Coriolis terms are taken at rates that are not quite known.
-    assert errors[0] > 1.0
-    assert errors[200] < np.exp(-80.0 * 0.1) * errors[100]
-    assert errors[300] < np.exp(-80.0 * 0.1) * errors[200]
-    assert errors[-1] < 1e-11  # e^-48 of the start; the rounding of angles over a period of 1e-3 s
 
 
 @pytest.mark.parametrize("bandwidths", TUNINGS)

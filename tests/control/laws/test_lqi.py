@@ -32,17 +32,6 @@ def test_gains_have_the_least_cost(weights):
     assert np.abs(riccati / np.sqrt(np.outer(np.diag(P), np.diag(P)))).max() < 1e-9
 
 
-@pytest.mark.parametrize("weights", WEIGHTS)
-def test_poles_obey_the_return_difference(weights):
-    """|p(jω)|² of fast ticks is ω⁶ + w_r² ω⁴ + w_e² ω² + w_i²: the cost's own spectrum."""
-    period_s = 1e-7
-    stiffness, damping, integral = regulator(*weights, period_s)
-    results = [damping**2 - 2 * stiffness, stiffness**2 - 2 * integral * damping, integral**2]
-    # Sampling moves the gains by half a period times the fastest pole, up to 400 1/s.
-    size = max(weights[0] ** 0.5, weights[1], weights[2] ** (1 / 3)) ** np.array([2, 4, 6])
-    np.testing.assert_allclose(results / size, np.square(weights)[[1, 0, 2]] / size, atol=1e-3)
-
-
 def test_law_is_the_feedback_with_these_gains(actuator):
     gains = LQI(
         error_weight=[100.0, 2000.0, 0.0], rate_weight=[0.0, 5.0, 9.0], integral_weight=[1e4, 2e4, 3e4]
