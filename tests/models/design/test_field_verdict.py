@@ -12,7 +12,7 @@ from spheretwin.models.torque_curve import TorqueCurve
 from tests.models.design.quadrature import sum_coarsely
 
 pytestmark = pytest.mark.release(
-    "sums over all windings for 0.7 to 7.5 s; content of design_direct_sums has their values"
+    "sums over all windings for 0.7 to 7.5 s; the content design_direct_sums has their values"
 )
 
 

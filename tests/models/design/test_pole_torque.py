@@ -251,7 +251,7 @@ def test_shipped_curve_has_the_expected_peak(shipped):
     assert np.degrees(zero) == pytest.approx(34.2, abs=0.05)
 
 
-@pytest.mark.release("0.9 s; test_curve_origin.py has the provenance")
+@pytest.mark.release("0.9 s; the head is compared by test_shipped_head_is_what_the_curve_was_computed_for")
 def test_shipped_provenance_matches_the_geometry(magnet, coil, shipped):
     head = [line[2:] for line in TORQUE_CURVE_PATH.read_text().splitlines() if line.startswith("# ")]
     curve = replace(shipped, distance_sensitivity=distance_sensitivity(shipped, magnet, coil))

@@ -4,8 +4,7 @@ import json
 import zlib
 
 import numpy as np
-import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from spheretwin.models.telemetry.checksums import line_checksums, line_numbers, values_checksum
@@ -13,7 +12,7 @@ from spheretwin.models.telemetry.checksums import line_checksums, line_numbers, 
 LINES = st.lists(st.tuples(st.integers(0, 2**62), st.sampled_from(["INFO", "WARN"]), st.text(max_size=9)))
 
 
-@pytest.mark.release("1 s; the other damages of this file are found in less")
+@settings(max_examples=40)
 @given(LINES, st.integers(0, 2**31 - 100))
 def test_a_line_has_its_number_above_its_checksum(lines, first):
     sums = line_checksums(lines, first)

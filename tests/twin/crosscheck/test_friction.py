@@ -220,7 +220,7 @@ SLIDES = {"stopping time, our stage", "stopping angle, our stage", "sliding"}
 CREEP, BREAKAWAY, VISCOUS = "creep, our stage", "breakaway, our stage", "viscous alone, our stage"
 
 
-@pytest.mark.release("2 to 4 s; test_bounds_hold and test_breakaway of this file have the rows")
+@pytest.mark.release("2 to 4 s; the part keeps its bounds in test_crosscheck.py")
 @pytest.mark.parametrize(
     ("level", "viscous", "smoothing", "step", "rows"),
     [
@@ -242,7 +242,7 @@ def test_a_wrong_stage_breaks_its_rows(monkeypatch, actuator, level, viscous, sm
 MUJOCO_STOPS = {"stopping time, MuJoCo", "stopping angle, MuJoCo"}
 
 
-@pytest.mark.release("2 to 4 s; test_bounds_hold and test_breakaway of this file have the rows")
+@pytest.mark.release("2 to 4 s; the part keeps its bounds in test_crosscheck.py")
 @pytest.mark.parametrize(
     ("field", "share", "rows"),
     [
