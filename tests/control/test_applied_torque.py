@@ -87,12 +87,3 @@ def test_an_unused_applied_torque_is_nan_and_changes_no_bit():
     logging = Law("unasked", asking_step, np.array([0.5, 0.03]), np.zeros(3), BELIEVED)
     lost = simulate(scenario, law=logging)
     assert (lost.status, len(lost.telemetry)) == ("diverged", 0)  # it logs what is no number
-
-
-@pytest.mark.parametrize("nominal", [{"nominal.delay_s": 2.5e-3}, {"nominal.time_constant_s": 0.0}])
-def test_a_restored_session_continues_with_the_applied_torque(nominal):
-    scenario = scenarios.load("hold", nominal)
-    with Session(scenario, asking()) as session, Session(scenario, asking()) as other:
-        session.advance(37)
-        other.restore(session.snapshot())
-        assert other.advance(50).values.tobytes() == session.advance(50).values.tobytes()

@@ -4,6 +4,7 @@ import os
 import threading
 
 import numpy as np
+import pyarrow.parquet
 import pytest
 
 from spheretwin import cli
@@ -82,25 +83,18 @@ def test_runs_of_a_law_that_is_an_object_are_the_same(file, name):
 
 @pytest.mark.parametrize("threads", [1, 2])
 def test_rows_of_a_study_are_those_of_single_runs(file, tmp_path, threads):
+    loads = [0.0, 2.0, 4.0]
     (tmp_path / "s.toml").write_text(
         'name = "s"\nscenario = "hold"\nseeds = 1\n[fields]\nduration = 0.03\n[[law]]\n'
         'law = "law.py:METHOD"\n[[axis]]\nfield = "disturbance.load"\nkind = "values"\n'
-        "values = [0.0, 2.0, 4.0]\n"
+        f"values = {loads}\n"
     )
     runner.run(str(tmp_path / "s.toml"), tmp_path / "out", threads=threads)
-    rows, _ = read_parquet_rows(tmp_path / "out" / "table.parquet")
-    for load, row in zip((0.0, 2.0, 4.0), rows, strict=True):
+    rows = pyarrow.parquet.read_table(tmp_path / "out" / "table.parquet")["max_abs_error_rad"].to_pylist()
+    for load, row in zip(loads, rows, strict=True):
         changes = {**SHORT, "controller.law": f"{file}:METHOD", "disturbance.load": load}
-        assert row == pytest.approx(
-            simulate(scenarios.load("hold", changes)).figures["max_abs_error_rad"], rel=1e-12
-        )
-
-
-def read_parquet_rows(path):
-    import pyarrow.parquet as parquet
-
-    table = parquet.read_table(path)
-    return table["max_abs_error_rad"].to_pylist(), table
+        single = simulate(scenarios.load("hold", changes)).figures["max_abs_error_rad"]
+        assert row == pytest.approx(single, rel=1e-12)
 
 
 def test_an_object_that_cannot_be_copied_is_shared():
