@@ -13,19 +13,25 @@ FIRST_SUITE = (
 )  # fmt: skip
 """Pages with commands in the first suite: the main job, scenarios, replay, faults and changes of a run."""
 
-RELEASE = pytest.mark.release("commands of a page, 0.5 to 35 s; the tests of each verb have what it does")
+LONG = (
+    "twin/machine/__init__.py", "docs/tutorials/policy.md", "docs/reference/plant_step.md",
+    "docs/how-to/mujoco_plugin.md",
+)  # fmt: skip
+"""Pages and docstrings without commands that compile for 2 to 5 s."""
+
+RELEASE = pytest.mark.release("snippets of a page, 0.5 to 35 s; the tests of each part have what it does")
 
 
-def _is_named(page):
-    return str(page.relative_to(ROOT)) in FIRST_SUITE
-
-
-def _has_commands(page):
-    return any(example.document.text[example.start :].startswith("```sh") for example in examples(page))
+def _is_long(page):
+    name = str(page.relative_to(ROOT))
+    has_commands = any(
+        example.document.text[example.start :].startswith("```sh") for example in examples(page)
+    )
+    return name in LONG or (has_commands and name not in FIRST_SUITE)
 
 
 PAGES_WITH_SNIPPETS = [
-    pytest.param(page, marks=() if _is_named(page) or not _has_commands(page) else RELEASE)
+    pytest.param(page, marks=RELEASE if _is_long(page) else ())
     for page in (*PAGES, *MODULES)
     if examples(page)
 ]
