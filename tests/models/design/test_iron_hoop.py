@@ -37,7 +37,7 @@ def shell(permeability):
     return np.linalg.solve(matrix, right)[7] / SPHERE**2
 
 
-@pytest.mark.parametrize("permeability", [1.0, 10.0, 1000.0])
+@pytest.mark.parametrize("permeability", [1.0, 1000.0])
 def test_a_magnetised_sphere_around_a_shell_of_iron_is_exact(permeability):
     iron = Iron(np.pi, INNER, permeability)
     potential = harmonics(sphere(np.cos), iron, 1.0, 32)
