@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from spheretwin.models.kinematics import rate_jacobian, rotor_rate_jacobian, triple
+from spheretwin.models.kinematics import rotor_rate_jacobian, triple
 from spheretwin.models.lagrangian import InertiaEntries, coriolis_matrix, inertia_matrix, solve_inertia
 
 
@@ -36,26 +36,6 @@ def test_coriolis_matrix_has_the_christoffel_symbols_of_the_inertia_matrix(actua
         expected = christoffel @ qdot
         # Central differences of products of inertias near 2e-3: h² and rounding over h, times 50 rad/s.
         np.testing.assert_allclose(coriolis_matrix(q, qdot, actuator.inertia), expected, atol=1e-10)
-
-
-def test_equal_inertias_leave_only_the_gyroscopic_coupling(actuator):
-    J = 2.2e-3
-    for q, qdot in random_states(20):
-        a_rate, b_rate, c_rate = qdot
-        sb, cb = np.sin(q[1]), np.cos(q[1])
-        coupling = J * cb * np.array([b_rate * c_rate, -a_rate * c_rate, a_rate * b_rate])  # (3)-(5)
-        bias = coriolis_matrix(q, qdot, np.full(3, J)) @ qdot
-        np.testing.assert_allclose(bias, coupling, atol=1e-13)
-        M = inertia_matrix(q, np.full(3, J))
-        np.testing.assert_allclose(M, J * np.array([[1, 0, sb], [0, 1, 0], [sb, 0, 1]]), atol=1e-16)
-
-
-def test_rate_jacobian_and_inertia_lose_rank_together(actuator):
-    # det E = cos(beta) and det M = J1 J2 J3 cos²(beta): the joint locks at 90 degrees, nowhere else.
-    q = np.array([0.3, 1.2, -0.7])
-    assert np.linalg.det(rate_jacobian(q)) == pytest.approx(np.cos(q[1]), rel=1e-13)
-    determinant = np.linalg.det(inertia_matrix(q, actuator.inertia))
-    assert determinant == pytest.approx(np.prod(actuator.inertia) * np.cos(q[1]) ** 2, rel=1e-12)
 
 
 def test_solution_is_a_library_s_whatever_is_added_to_the_diagonal(actuator):

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from spheretwin import scenario as scenarios
-from spheretwin.control.laws.afsm_eso import PRESETS, AFSMWithObserver, boosted
+from spheretwin.control.laws.afsm_eso import PRESETS, AFSMWithObserver
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.lagrangian import coriolis_matrix, inertia_matrix
 from spheretwin.scenario.changes import with_change
@@ -116,15 +116,6 @@ def test_law_follows_its_equations(actuator, gains, delay_s):
         np.testing.assert_allclose(torque, slow.torque(reference, measurement), rtol=1e-9, atol=1e-10)
         np.testing.assert_allclose(state[3:6], slow.d, rtol=1e-9, atol=1e-10)
         np.testing.assert_array_equal(state[9:12] == law.parameters[24:27], slow.wd == law.parameters[24:27])
-
-
-def test_the_boost_is_zero_within_the_layer_and_opposes_s_beyond_it():
-    inside = np.linspace(-0.15, 0.15, 31)
-    assert not any(boosted(s, 70.0, 0.15, 100.0) for s in inside)
-    for s in (0.151, 0.3, 5.0):
-        assert 0 < boosted(s, 70.0, 0.15, 100.0) == -boosted(-s, 70.0, 0.15, 100.0) <= 100.0
-    assert boosted(5.0, 70.0, 0.15, 100.0) == 100.0
-    assert boosted(0.25, 70.0, 0.15, 100.0) == pytest.approx(7.0, rel=1e-12)
 
 
 @pytest.mark.parametrize("preset", PRESETS)
