@@ -12,6 +12,7 @@ from spheretwin import scenario as scenarios
 from spheretwin.models import actuator as actuators
 from spheretwin.models.base.errors import InputError
 from spheretwin.simulation import simulate
+from tests.models.model_files import edited
 
 TEXT = actuators.MJCF_PATH.read_text()
 GAMMA = '<joint name="gamma" axis="0 0 1"/>'
@@ -86,29 +87,22 @@ def test_arrays_are_frozen(actuator):
     ],
 )  # fmt: skip
 def test_an_invalid_actuator_is_refused(tmp_path, old, new, part):
-    assert old in TEXT
     with pytest.raises(InputError, match=re.escape(part)):
-        actuators.load(written(tmp_path, TEXT.replace(old, new)))
-
-
-def written(tmp_path, text):
-    meshes = f'meshdir="{actuators.FOLDER / "assets"}"'
-    (path := tmp_path / "mine.xml").write_text(text.replace('meshdir="assets"', meshes))
-    return path
+        actuators.load(edited(tmp_path, (old, new)))
 
 
 def test_groups_are_as_many_as_the_file_has_and_at_least_three(tmp_path):
-    text = TEXT.replace(RING + SITE, RING_OF_EIGHT + SITE)
-    assert actuators.load(written(tmp_path, text)).groups.shape == (16, 2)
-    tilted = re.compile(r"(?s)<replicate count=.12. euler=.0 0 30.>\s*<frame.*?</replicate>")
-    text = tilted.sub("", TEXT).replace(RING + SITE, '<replicate count="4" euler="0 0 90">' + SITE)
+    assert actuators.load(edited(tmp_path, (RING + SITE, RING_OF_EIGHT + SITE))).groups.shape == (16, 2)
+    tilted = re.findall(r"(?s)<replicate count=.12. euler=.0 0 30.>\s*<frame.*?</replicate>", TEXT)
+    few = [(layer, "") for layer in tilted]
+    path = edited(tmp_path, *few, (RING + SITE, '<replicate count="4" euler="0 0 90">' + SITE))
     with pytest.raises(InputError, match="at least 3 groups of coils, received 2"):
-        actuators.load(written(tmp_path, text))
+        actuators.load(path)
 
 
 @pytest.mark.parametrize("front", ["", FRONT.replace("0.05", "0")])
 def test_poles_are_flat_unless_the_model_says_how_they_are_ground(tmp_path, front):
-    magnet = actuators.load(written(tmp_path, TEXT.replace(FRONT, front))).magnet
+    magnet = actuators.load(edited(tmp_path, (FRONT, front))).magnet
     assert magnet.front_radius_m == 0.0
     assert magnet.sagitta_m == 0.0
     assert magnet.volume_m3 == pytest.approx(np.pi * 0.010**2 * 0.010, rel=1e-12)
@@ -153,7 +147,7 @@ def test_in_a_medium_a_ring_is_a_box_no_wider_than_it_is_drawn(ring):
 def test_mujoco_leaves_no_log_behind(tmp_path, monkeypatch, capfd):
     monkeypatch.chdir(tmp_path)
     with pytest.raises(InputError):
-        actuators.load(written(tmp_path, TEXT.replace('mass="1.6"', 'mass="nan"')))
+        actuators.load(edited(tmp_path, ('mass="1.6"', 'mass="nan"')))
     assert [entry.name for entry in tmp_path.iterdir()] == ["mine.xml"]
     assert capfd.readouterr().err == ""
 
@@ -161,8 +155,8 @@ def test_mujoco_leaves_no_log_behind(tmp_path, monkeypatch, capfd):
 @pytest.mark.parametrize("limit", ["1e-9", "1e9"])
 @pytest.mark.parametrize(("resistance", "inductance"), [("1e-9", "1e-6"), ("1e9", "1e-9"), ("1e6", "1e9")])
 def test_a_run_takes_every_drive_that_a_model_may_have(tmp_path, limit, resistance, inductance):
-    text = TEXT.replace('data="8"', f'data="{limit}"').replace('data="1.3"', f'data="{resistance}"')
-    path = written(tmp_path, text.replace('data="0.9e-3"', f'data="{inductance}"'))
+    drive = {"8": limit, "1.3": resistance, "0.9e-3": inductance}
+    path = edited(tmp_path, *((f'data="{old}"', f'data="{new}"') for old, new in drive.items()))
     scenario = scenarios.load("hold", {"plant.mjcf": str(path), "duration": 0.003})
     assert simulate(scenario).status == "completed"
 
@@ -174,7 +168,7 @@ def test_an_invalid_path_is_refused():
 
 
 def test_files_that_have_not_changed_are_one_actuator(tmp_path):
-    path = written(tmp_path, TEXT)
+    path = edited(tmp_path)
     (curve := tmp_path / "mine.csv").write_bytes(actuators.TORQUE_CURVE_PATH.read_bytes())
     first = actuators.load(path, curve)
     assert actuators.load(path, curve) is first

@@ -1,7 +1,5 @@
 """Shapes of poles and coils: the torque curve is of cylinders, every other shape is refused by name."""
 
-import re
-
 import numpy as np
 import pytest
 
@@ -11,6 +9,7 @@ from spheretwin.models.base.errors import InputError
 from spheretwin.models.kinematics import frame_of_axis
 from spheretwin.scenario import load
 from spheretwin.scenario.files import files_of
+from tests.models.model_files import edited
 
 SHAPES = {
     "box": 'type="box" size="0.009 0.009 0.005"',
@@ -23,11 +22,8 @@ POLE, COIL = 'type="cylinder" size="0.010 0.005"', 'type="cylinder" size="0.011 
 
 def model_file(folder, part, shape):
     """Write the shipped model with the sites of poles or of coils in another shape."""
-    text = actuators.MJCF_PATH.read_text().replace('meshdir="assets"', f'meshdir="{actuators.FOLDER}/assets"')
-    text = re.sub(r'.*name="pole_front_radius_m".*\n', "", text)
-    assert f"<site {part}" in text
-    (path := folder / "other.xml").write_text(text.replace(f"<site {part}", f"<site {SHAPES[shape]}"))
-    return path
+    flat = ('<numeric name="pole_front_radius_m" data="0.05"/>', "")
+    return edited(folder, flat, (f"<site {part}", f"<site {SHAPES[shape]}"))
 
 
 @pytest.mark.parametrize("shape", SHAPES)

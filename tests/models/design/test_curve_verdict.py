@@ -12,12 +12,11 @@ from spheretwin.models.base.errors import InputError
 from spheretwin.models.design import curve_check
 from spheretwin.models.torque_curve import TorqueCurve
 from tests.models.design.quadrature import sample_coarsely
+from tests.models.model_files import edited
 
 pytestmark = pytest.mark.release(
     "recomputes a torque curve for 1.4 to 1.9 s; test_pole_torque.py has its parts"
 )
-
-TEXT = actuators.MJCF_PATH.read_text(encoding="utf-8")
 
 
 @pytest.fixture
@@ -72,7 +71,7 @@ def test_a_table_that_misses_the_spline_breaks_its_bound_alone(monkeypatch):
 
 @pytest.mark.usefixtures("few_samples")
 def test_a_model_with_nothing_but_poles_and_coils_has_a_curve(tmp_path, computed):
-    (path := tmp_path / "mine.xml").write_text(TEXT.replace("group_resistance_ohm", "elsewhere"))
+    path = edited(tmp_path, ("group_resistance_ohm", "elsewhere"))
     with pytest.raises(InputError, match="group_resistance_ohm"):
         actuators.load(path)
     of_path = curve_check.compute(path)

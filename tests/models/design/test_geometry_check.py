@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from spheretwin.models import actuator as actuators
 from spheretwin.models.design.geometry_check import air_gap_m, clearance, of_model_file, overlaps
+from tests.models.model_files import edited
 
 RADIUS, LENGTH, DISTANCE = 0.011, 0.025, 0.063
 
@@ -81,8 +81,7 @@ def test_air_gap_is_that_of_the_farthest_point_of_a_pole(actuator, front_radius_
 
 
 def test_a_model_file_is_held_against_a_curve_that_says_what_it_is_for(actuator, tmp_path):
-    text = actuators.MJCF_PATH.read_text(encoding="utf-8")
-    (path := tmp_path / "mine.xml").write_text(text.replace('_turns" data="320"', '_turns" data="640"'))
+    path = edited(tmp_path, ('_turns" data="320"', '_turns" data="640"'))
     (line,) = of_model_file(path, actuator.torque_curve)
     assert "coil turns 320" in line
     # As one that has just been computed from the file itself.

@@ -19,6 +19,7 @@ from spheretwin.plant import lagrangian_rotor as plant
 from spheretwin.plant.lagrangian_rotor import LagrangianRotor
 from spheretwin.plant.mujoco_rotor import MujocoRotor
 from spheretwin.simulation import simulate
+from tests.models.model_files import edited
 
 FEW = 50
 assembly_of_the_plant = coil_driven.assembly.plant_of
@@ -311,11 +312,8 @@ def test_parts_are_announced_as_they_begin(monkeypatch):
 def test_a_model_the_lagrangian_does_not_have_exits_1_and_the_table_tells(tmp_path, monkeypatch):
     with_rings = ("dynamics", "identities", "closed loop")
     monkeypatch.setattr(suite, "PARTS", tuple(part for part in suite.PARTS if part.name in with_rings))
-    model = tmp_path / "heavy_rings.xml"
-    text = actuators.MJCF_PATH.read_text(encoding="utf-8")
     # Gimbal rings of a millionth of the rotor's inertia; the Lagrangian has none.
-    text = text.replace('meshdir="assets"', f'meshdir="{actuators.FOLDER / "assets"}"')
-    model.write_text(text.replace("1.1e-15", "1.1e-9"), encoding="utf-8")
+    model = edited(tmp_path, ("1.1e-15", "1.1e-9"))
     code, out, err = crosscheck("--mjcf", model, "--states", FEW)
     assert code == cli.FAILED
     assert "BROKEN" in out

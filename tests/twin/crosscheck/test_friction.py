@@ -9,6 +9,7 @@ from spheretwin.crosscheck import hinge as runs
 from spheretwin.crosscheck.hinge import Hinge, STEP_s, by_mujoco, by_stage
 from spheretwin.models import actuator as actuators
 from spheretwin.models.base.checks import Check
+from tests.models.model_files import edited
 
 J = 2.256e-3
 HINGE = Hinge(J, 2e-3, 1e-4, 0.01)
@@ -185,16 +186,6 @@ def test_below_its_level_our_stage_creeps_by_its_smoothing_and_mujoco_by_its_sof
     # (1 - d) T/(d b J), with viscous friction's 4e-5 of the rest.
     b = 2 / (0.95 * 0.02)
     np.testing.assert_allclose(theirs, 0.1 / 0.9 / b / J * np.array([1e-3, 2.5e-3]), rtol=5e-5)
-
-
-def edited(folder, *edits):
-    """The shipped model file with pieces of its text replaced."""
-    text = actuators.MJCF_PATH.read_text(encoding="utf-8")
-    for old, new in (('meshdir="assets"', f'meshdir="{actuators.FOLDER / "assets"}"'), *edits):
-        assert text.count(old) == 1
-        text = text.replace(old, new)
-    (path := folder / "model.xml").write_text(text, encoding="utf-8")
-    return path
 
 
 @pytest.mark.release("4 s; content of the cross-check's page has the rows of the shipped actuator")
