@@ -3,8 +3,6 @@
 import os
 
 import numpy as np
-import pyarrow as pa
-import pyarrow.parquet
 import pytest
 
 from spheretwin.models.base.errors import SpheretwinError
@@ -34,23 +32,6 @@ def test_the_file_is_the_table(rows, tmp_path):
     assert again.values.tobytes() == whole.values.tobytes()
     assert metadata == {"scenario": '{"a": 1}', "ticks": str(rows), "status": "completed"}
     assert os.listdir(tmp_path) == ["run.parquet"]
-
-
-def test_row_groups_are_of_some_batches(tmp_path):
-    group = telemetry_file.GROUP_BATCHES * PART_ROWS
-    streamed(path := tmp_path / "run.parquet", table(group + PART_ROWS + 13), 50).close({})
-    described = pyarrow.parquet.ParquetFile(path).metadata
-    groups = [described.row_group(i).num_rows for i in range(described.num_row_groups)]
-    assert groups == [group, PART_ROWS + 13]
-
-
-def test_parts_are_streams_that_any_arrow_reader_opens(tmp_path):
-    whole = table(200)
-    streamed(path := tmp_path / "run.parquet", whole, 50)
-    (part,) = parts_beside(path)
-    with pa.ipc.open_stream(part.read_bytes()) as stream:
-        result = stream.read_all()
-    assert result.equals(whole.rows(0, 192).arrow(FACTS), check_metadata=True)
 
 
 @pytest.mark.parametrize("rows", [PART_ROWS - 1, 333, 1000])
