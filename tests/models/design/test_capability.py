@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from scipy.optimize import linprog
 
 from spheretwin.control.allocation.least_norm import allocate
 from spheretwin.models.design import capability as capabilities
@@ -13,19 +12,7 @@ from spheretwin.models.design.capability import capability, torque_matrices
 from spheretwin.models.design.workspace import FIGURES, grid, local_minima, pose, worst_by_tilt
 from spheretwin.models.kinematics import rotation
 from spheretwin.models.magnetics import torque_matrix
-
-
-def most_torque(G, direction):
-    """Largest t with G I = t u and all |I_j| <= 1, by linear programming."""
-    columns = G.shape[1]
-    done = linprog(
-        c=[*np.zeros(columns), -1.0],
-        A_eq=np.column_stack([G, -direction]),
-        b_eq=np.zeros(3),
-        bounds=[(-1, 1)] * columns + [(0, None)],
-    )
-    assert done.success
-    return done.x[-1]
+from tests.control.allocation.cases import largest_by_programme
 
 
 def random_poses(count, seed=0):
@@ -57,10 +44,11 @@ def test_no_direction_has_less_and_the_facet_s_has_no_more(actuator):
     for q in random_poses(4):
         figures = capability(q[None], actuator)
         G = 8 * torque_matrix(q, actuator)
-        worst = most_torque(G, figures.best_direction[0])
+        worst = largest_by_programme(G, figures.best_direction[0], 1.0)
         assert_allclose(worst, figures.best_Nm[0], rtol=1e-7)  # the linear programme's tolerance
         for direction in generator.normal(size=(12, 3)):
-            assert most_torque(G, direction / np.linalg.norm(direction)) >= worst * (1 - 1e-7)
+            share = largest_by_programme(G, direction / np.linalg.norm(direction), 1.0)
+            assert share >= worst * (1 - 1e-7)
 
 
 # Least-norm currents
