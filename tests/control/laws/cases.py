@@ -56,6 +56,13 @@ def follows(law, slow):
         np.testing.assert_allclose(state[: len(logged)], logged, rtol=1e-11, atol=1e-11)
 
 
+def regressor(rate, angle):
+    """Return the regressor of the paper's approximator (34), (57): normalised products of Gaussians first."""
+    centres = np.array([-3, -1.5, 0, 1.5, 3])
+    products = np.outer(*(np.exp(-0.5 * ((x - centres) / 2) ** 2) for x in (rate, angle))).ravel()
+    return np.outer([1, rate, angle], products / products.sum()).ravel()
+
+
 class Asked:
     """Torques that were asked for, as old as the known delay, from all that there ever were."""
 

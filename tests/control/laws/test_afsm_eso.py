@@ -9,9 +9,8 @@ from spheretwin.models.base.errors import InputError
 from spheretwin.models.lagrangian import coriolis_matrix, inertia_matrix
 from spheretwin.scenario.changes import with_change
 from spheretwin.simulation import simulate
-from tests.control.laws.cases import PERIOD, known, machine_code
+from tests.control.laws.cases import PERIOD, known, machine_code, regressor
 
-CENTRES = np.array([-3, -1.5, 0, 1.5, 3])
 EVERYTHING = {
     "surface_slope_1_s": [40.0, 50.0, 60.0],
     "boost_layer_rad_s": [0.1, 0.2, 0.3],
@@ -54,13 +53,10 @@ class SlowLaw:
     def fuzzy(self, q, v, s):
         g, f = self.gains, np.zeros(3)
         for i in np.flatnonzero(g.fuzzy_adaptation):
-            gaussians = np.exp(-0.5 * ((np.array([v[i], q[i]])[:, None] - CENTRES) / 2) ** 2)
-            psi = np.outer(gaussians[0], gaussians[1]).ravel()
-            psi /= psi.sum()
-            regressor = np.concatenate([psi, psi * v[i], psi * q[i]])
-            f[i] = self.theta[i] @ regressor
+            basis = regressor(v[i], q[i])
+            f[i] = self.theta[i] @ basis
             learnt = s[i] if abs(s[i]) > g.fuzzy_dead_zone_rad_s else 0.0
-            self.theta[i] -= g.fuzzy_adaptation[i] * learnt * PERIOD * regressor
+            self.theta[i] -= g.fuzzy_adaptation[i] * learnt * PERIOD * basis
             self.theta[i] *= 1 - g.fuzzy_leakage_1_s * PERIOD
             norm = np.linalg.norm(self.theta[i])
             self.theta[i] *= min(1, g.fuzzy_bound / norm) if norm else 1

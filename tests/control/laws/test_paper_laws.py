@@ -6,9 +6,7 @@ import pytest
 from spheretwin.control.laws.adaptive_fuzzy import AdaptiveFuzzy
 from spheretwin.control.laws.afsm import AFSM
 from spheretwin.control.laws.pd import PD
-from tests.control.laws.cases import PERIOD, known, machine_code
-
-CENTRES = np.array([-3, -1.5, 0, 1.5, 3])
+from tests.control.laws.cases import PERIOD, known, machine_code, regressor
 
 
 def each_axis(kind):
@@ -37,12 +35,9 @@ class SlowLaw:
         v = np.empty(3)
         for i in range(3):
             rate, angle = measurement[1, i], measurement[0, i]
-            gaussians = np.exp(-0.5 * ((np.array([rate, angle])[:, None] - CENTRES) / 2) ** 2)
-            products = np.outer(gaussians[0], gaussians[1]).ravel()
-            psi = products / products.sum()
-            regressor = np.concatenate([psi, psi * rate, psi * angle])
-            v[i] = self.theta[i] @ regressor - g.reaching_gain[i] * s[i]
-            self.theta[i] -= g.fuzzy_rate[i] * s[i] * regressor * PERIOD
+            basis = regressor(rate, angle)
+            v[i] = self.theta[i] @ basis - g.reaching_gain[i] * s[i]
+            self.theta[i] -= g.fuzzy_rate[i] * s[i] * basis * PERIOD
         if g.law == "afsm":
             v -= np.sign(s) * (self.xi + self.zeta * bound)
             self.xi += np.array(g.switching_rate) * np.abs(s) * PERIOD
