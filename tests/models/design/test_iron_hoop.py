@@ -57,18 +57,19 @@ def test_the_error_falls_with_the_mesh():
     assert errors[1] > 4 * errors[2]
 
 
-@pytest.mark.parametrize("degree", [1, 3])
-def test_large_permeability_is_the_image_in_a_sphere(degree):
+def test_large_permeability_is_the_image_in_a_sphere():
     """The potential vanishes on the iron: of a charge of degree l at the front (1 - (r/a)^(2l+1)) is left."""
+    degree = 3
 
     def charge(psi):
         return np.polynomial.legendre.Legendre.basis(degree)(np.cos(psi))
 
-    ratio = [
-        harmonics(sphere(charge), Iron(np.pi, INNER, permeability), 1.0, 32)[degree]
+    with_iron, bare = (
+        harmonics(sphere(charge), Iron(np.pi, INNER, permeability), 1.0, 12)[degree]
         for permeability in (1e6, 1.0)
-    ]
-    assert ratio[0] / ratio[1] == pytest.approx(1 - (OUTER / FRONT) ** (2 * degree + 1), rel=1e-3)
+    )
+    # Measured: 1.4e-4; 5e-6 with 32 elements.
+    assert with_iron / bare == pytest.approx(1 - (OUTER / FRONT) ** (2 * degree + 1), rel=1e-3)
 
 
 def test_without_iron_the_pole_has_its_torque_curve(actuator):
