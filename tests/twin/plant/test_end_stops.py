@@ -149,7 +149,7 @@ FREE = {
 }
 
 
-@pytest.mark.release("compiles two loops for 20 s; crosscheck/test_end_stops.py has both engines")
+@pytest.mark.release("compiles two loops for 20 s; crosscheck/test_hinge_references.py has both engines")
 def test_a_thrown_rotor_stays_within_its_range_on_both_engines():
     """Without end stops the run ends at the end of the range."""
     on = FREE | {"plant.end_stops.on": True, "plant.viscous_Nm_s": [2e-3, 2e-3, 2e-3]}
