@@ -167,7 +167,7 @@ class Law:
         """
         try:
             step = _independent(self.step)
-        except Exception:  # objects of users may raise anything
+        except Exception:  # a copy runs code of the user, which may raise anything: the object is shared then
             return self
         return self if step is self.step else replace(self, step=step)
 

@@ -101,7 +101,8 @@ class _FromFile(LawParameters):
 
     def build(self, known: NominalModel) -> Law:
         """Return the law; one in plain Python is of a new module: no run has the memory of another."""
-        law: Any = super().build(known)  # type: ignore[safe-super]  # of the class that follows this one
+        # Abstract here only: the class of the user, the next base, has it.
+        law: Any = super().build(known)  # type: ignore[safe-super]
         if not isinstance(law, Law) or hasattr(law.step, "py_func"):
             return law
         fresh = _base_class(self.law, load_again(self.law))

@@ -21,7 +21,7 @@ from tests.content.content import Cases, content_test
 from tests.content.figures import figure_text
 from tests.content.verdicts import capability
 from tests.viz.comparison.compared import RAMP, SIGNALS, SPIKE, VALUE, T_s, run_of
-from tests.viz.figures import drawn
+from tests.viz.figures import figure_builders
 
 HINGES = ("α", "β", "γ")
 LAWS = {"pd": "PD", "pid": "PID", "adaptive_fuzzy": "adaptive fuzzy", "afsm": "AFSM"}
@@ -71,7 +71,9 @@ def events():
 
 
 def currents():
-    return comparison.currents([drawn.run_with_currents(), run_of(RAMP[:1500], "2 short")], "Currents")
+    return comparison.currents(
+        [figure_builders.run_with_currents(), run_of(RAMP[:1500], "2 short")], "Currents"
+    )
 
 
 def overview():
@@ -171,7 +173,7 @@ def map_lines_of_names():
 
 
 def narrow_map():
-    panel = maps.MapPanel(1 + 0.1 * drawn.VALUES / 20, drawn.LOST)
+    panel = maps.MapPanel(1 + 0.1 * figure_builders.VALUES / 20, figure_builders.LOST)
     return maps.maps({"pd": panel}, ("rows", "columns"), (["1", "2"], list("abc")), "q", "Narrow")
 
 
@@ -258,8 +260,8 @@ def angle_traces():
 
 
 def error_lines():
-    line = over_time.ErrorLine("as printed", drawn.SIZES, 0.5 * drawn.SIZES)
-    other = line._replace(label="as acceleration", measured_deg=3 * drawn.SIZES)
+    line = over_time.ErrorLine("as printed", figure_builders.SIZES, 0.5 * figure_builders.SIZES)
+    other = line._replace(label="as acceleration", measured_deg=3 * figure_builders.SIZES)
     lines = [line, other, line._replace(label="c")]
     groups = [
         over_time.ErrorGroup("afsm", "AFSM", lines, 0.12),
@@ -295,17 +297,17 @@ def clouds():
 
 def tuned():
     trials = {
-        "pid": drawn.TRIALS,
-        "afsm": drawn.TRIALS._replace(
+        "pid": figure_builders.TRIALS,
+        "afsm": figure_builders.TRIALS._replace(
             law="afsm",
-            values=drawn.TRIALS.values[::-1] * 1.5,
+            values=figure_builders.TRIALS.values[::-1] * 1.5,
             completed=np.array([True, True, True, False, False, True]),
             best=np.array([False, True, False, False, False, True]),
             signs=np.array([1.0, -1.0]),
             has_start=False,
         ),
     }
-    objectives = drawn.OBJECTIVES
+    objectives = figure_builders.OBJECTIVES
     figures = (fronts.progress(trials, objectives, "Trials"), fronts.front(trials, objectives, "Front"))
     return "\n".join(map(figure_text, figures))
 
@@ -339,18 +341,18 @@ def long_run():
 FIGURES = {
     "compared_over_time": compared_over_time, "compared_spectra": compared_spectra, "compared_events": events,
     "compared_currents": currents, "compared_long_run": long_run, "overview": overview,
-    "by_condition": drawn.by_condition, "by_condition_of_three_hinges": drawn.by_condition_of_three_hinges,
-    "margins_of_laws": margins_of_laws, "ratios": ratios, "estimators": drawn.estimators,
-    "crosscheck_margins": drawn.margins, "crosscheck_spreads": spreads, "crosscheck_motion": motion,
+    "by_condition": figure_builders.by_condition, "by_condition_of_three_hinges": figure_builders.by_condition_of_three_hinges,
+    "margins_of_laws": margins_of_laws, "ratios": ratios, "estimators": figure_builders.estimators,
+    "crosscheck_margins": figure_builders.margins, "crosscheck_spreads": spreads, "crosscheck_motion": motion,
     "crosscheck_convergence": convergence, "crosscheck_drifts": drifts,
-    "crosscheck_closed_loops": closed_loops, "crosscheck_friction": drawn.hinge_friction,
-    "map": drawn.study_map, "map_narrow": narrow_map, "map_large": large_map, "map_lines": map_lines,
-    "map_lines_of_names": map_lines_of_names, "heat": drawn.heat, "heat_of_many": heat_of_many,
+    "crosscheck_closed_loops": closed_loops, "crosscheck_friction": figure_builders.hinge_friction,
+    "map": figure_builders.study_map, "map_narrow": narrow_map, "map_large": large_map, "map_lines": map_lines,
+    "map_lines_of_names": map_lines_of_names, "heat": figure_builders.heat, "heat_of_many": heat_of_many,
     "workspace": workspace_figures, "distributions": spread_figures, "ranks": rank_figures,
-    "scatters": scatter_figures, "error_courses": drawn.courses, "error_lines": error_lines,
+    "scatters": scatter_figures, "error_courses": figure_builders.courses, "error_lines": error_lines,
     "error_bands": error_bands, "error_bands_one_column": one_column, "angle_traces": angle_traces,
-    "tip_paths": drawn.tip_paths, "fault_shares": drawn.shares, "fault_shares_of_many": many_shares,
-    "fault_remaining": remaining, "fault_triangles": drawn.triangles, "fault_clouds": clouds, "tuning": tuned,
+    "tip_paths": figure_builders.tip_paths, "fault_shares": figure_builders.shares, "fault_shares_of_many": many_shares,
+    "fault_remaining": remaining, "fault_triangles": figure_builders.triangles, "fault_clouds": clouds, "tuning": tuned,
     "condition_fronts": condition_fronts,
 }  # fmt: skip
 

@@ -80,7 +80,7 @@ def key(name):
     return int.from_bytes(blake2b(name.encode(), digest_size=8).digest(), "little")
 
 
-def drawn(name, channel):
+def error_generator(name, channel):
     """Generator of the errors of a channel."""
     return np.random.default_rng([SEED, key(name), channel])
 
@@ -103,11 +103,11 @@ class Copy:
     def __init__(self, faults, actuator):
         self.faults, self.actuator, self.tick_number = faults, actuator, 0
         self.residuals = [self.residual(channel) for channel in range(2)]
-        self.adc = [drawn("sensors.adc", channel).uniform(-1, 1, 2) for channel in range(2)]
-        dac = np.array([drawn("drive.dac", j).uniform(-1, 1, 5) for j in range(GROUPS)])
+        self.adc = [error_generator("sensors.adc", channel).uniform(-1, 1, 2) for channel in range(2)]
+        dac = np.array([error_generator("drive.dac", j).uniform(-1, 1, 5) for j in range(GROUPS)])
         self.dac_offset_V, self.dac_gain = 2e-3 * dac[:, 0], 1 + 1e-3 * dac[:, 1]
         self.inl = 4 * dac[:, 2:] / np.maximum(1, np.abs(dac[:, 2:]).sum(axis=1))[:, None]
-        offsets = [drawn("drive.amplifier", j).uniform(-1, 1) for j in range(GROUPS)]
+        offsets = [error_generator("drive.amplifier", j).uniform(-1, 1) for j in range(GROUPS)]
         self.amplifier_A = 8e-4 * np.array(offsets)
         self.wiper, self.converted, self.handed = np.zeros((3, 3))
         self.voltages, self.sent = [], [np.zeros(GROUPS)]
@@ -130,7 +130,7 @@ class Copy:
 
     @staticmethod
     def residual(channel):
-        shape = residual_of(drawn("sensors.potentiometer", channel).uniform(0, 2 * np.pi, 4))
+        shape = residual_of(error_generator("sensors.potentiometer", channel).uniform(0, 2 * np.pi, 4))
         return lambda angle: np.radians(0.02) * shape(angle * 2 * np.pi / np.radians(300))
 
     def acting(self, kind, place=None):
@@ -142,7 +142,7 @@ class Copy:
             if name == kind and place in (None, number) and first <= self.tick_number < last:
                 if mode == "intermittent":
                     stretch = self.tick_number // round(value / PERIOD_S)
-                    if drawn(f"{target} intermittent", stretch).random() < 0.5:
+                    if error_generator(f"{target} intermittent", stretch).random() < 0.5:
                         yield COMES_AND_GOES[name], None, target
                 else:
                     yield mode, value, target
@@ -298,7 +298,10 @@ class Copy:
             for end in ends if up > down else []:
                 begin, finish = v - end, voltage_at(along(left)) - end
                 if begin * finish < 0 and abs(begin) > 1e-9:
-                    beyond = lambda t, e=end, c=along: voltage_at(c(t)) - e  # noqa: E731
+
+                    def beyond(t, end=end, along=along):
+                        return voltage_at(along(t)) - end
+
                     root = brentq(beyond, 0, left, xtol=1e-19, rtol=1e-15)
                     if root < over:
                         over, after = root, "follow" if mode != "follow" else "up" if end == up else "down"

@@ -29,13 +29,13 @@ def path(tmp_path):
     return path
 
 
-def held(path):
+def contents_of(path):
     with Journal(path, "d", 6) as reader:
         return dict(reader.results()), reader.torn, reader.damaged
 
 
 def test_results_come_in_the_order_of_the_study(path):
-    results, torn, damaged = held(path)
+    results, torn, damaged = contents_of(path)
     assert (list(results), torn, damaged) == (list(range(6)), False, 0)
     assert results == {number: result(number) for number in range(6)}
     with Journal(path, "d", 6) as writer:
@@ -47,7 +47,7 @@ def test_a_journal_torn_anywhere_keeps_the_lines_before(path):
     ends = [place + 1 for place, byte in enumerate(whole) if byte == ord("\n")]
     for length in range(len(whole) + 1):
         path.write_bytes(whole[:length])
-        results, torn, damaged = held(path)
+        results, torn, damaged = contents_of(path)
         lines = sum(end <= length for end in ends)
         assert len(results) == max(lines - 1, 0)
         assert torn == (length > ends[0] and length not in ends)
@@ -64,7 +64,7 @@ def test_a_line_damaged_in_the_middle_loses_itself_alone(path):
         changed = bytearray(whole)
         changed[begin + place] ^= 1
         path.write_bytes(changed)
-        results, torn, damaged = held(path)
+        results, torn, damaged = contents_of(path)
         assert list(results) == [1, 2, 3, 4, 5]
         # A bit may turn a sign into the end of a line: two damaged ones.
         assert (torn, damaged) == (False, 1 + (changed[begin + place] == ord("\n")))
@@ -89,7 +89,7 @@ def test_a_file_that_is_no_journal_is_refused_and_left_as_it_is(tmp_path, text):
     path = tmp_path / journal.NAME
     path.write_bytes(text)
     with pytest.raises(InputError, match=r"expected a journal of a study, received .*journal\.jsonl"):
-        held(path)
+        contents_of(path)
     assert path.read_bytes() == text
 
 
