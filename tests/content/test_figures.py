@@ -21,7 +21,7 @@ from tests.content.content import Cases, content_test
 from tests.content.figures import figure_text
 from tests.content.verdicts import capability
 from tests.viz.comparison.compared import RAMP, SIGNALS, SPIKE, VALUE, T_s, run_of
-from tests.viz.figures import figure_builders
+from tests.viz.figures import figure_builders as built
 
 HINGES = ("α", "β", "γ")
 LAWS = {"pd": "PD", "pid": "PID", "adaptive_fuzzy": "adaptive fuzzy", "afsm": "AFSM"}
@@ -71,9 +71,7 @@ def events():
 
 
 def currents():
-    return comparison.currents(
-        [figure_builders.run_with_currents(), run_of(RAMP[:1500], "2 short")], "Currents"
-    )
+    return comparison.currents([built.run_with_currents(), run_of(RAMP[:1500], "2 short")], "Currents")
 
 
 def overview():
@@ -173,7 +171,7 @@ def map_lines_of_names():
 
 
 def narrow_map():
-    panel = maps.MapPanel(1 + 0.1 * figure_builders.VALUES / 20, figure_builders.LOST)
+    panel = maps.MapPanel(1 + 0.1 * built.VALUES / 20, built.LOST)
     return maps.maps({"pd": panel}, ("rows", "columns"), (["1", "2"], list("abc")), "q", "Narrow")
 
 
@@ -260,8 +258,8 @@ def angle_traces():
 
 
 def error_lines():
-    line = over_time.ErrorLine("as printed", figure_builders.SIZES, 0.5 * figure_builders.SIZES)
-    other = line._replace(label="as acceleration", measured_deg=3 * figure_builders.SIZES)
+    line = over_time.ErrorLine("as printed", built.SIZES, 0.5 * built.SIZES)
+    other = line._replace(label="as acceleration", measured_deg=3 * built.SIZES)
     lines = [line, other, line._replace(label="c")]
     groups = [
         over_time.ErrorGroup("afsm", "AFSM", lines, 0.12),
@@ -297,17 +295,17 @@ def clouds():
 
 def tuned():
     trials = {
-        "pid": figure_builders.TRIALS,
-        "afsm": figure_builders.TRIALS._replace(
+        "pid": built.TRIALS,
+        "afsm": built.TRIALS._replace(
             law="afsm",
-            values=figure_builders.TRIALS.values[::-1] * 1.5,
+            values=built.TRIALS.values[::-1] * 1.5,
             completed=np.array([True, True, True, False, False, True]),
             best=np.array([False, True, False, False, False, True]),
             signs=np.array([1.0, -1.0]),
             has_start=False,
         ),
     }
-    objectives = figure_builders.OBJECTIVES
+    objectives = built.OBJECTIVES
     figures = (fronts.progress(trials, objectives, "Trials"), fronts.front(trials, objectives, "Front"))
     return "\n".join(map(figure_text, figures))
 
@@ -341,18 +339,18 @@ def long_run():
 FIGURES = {
     "compared_over_time": compared_over_time, "compared_spectra": compared_spectra, "compared_events": events,
     "compared_currents": currents, "compared_long_run": long_run, "overview": overview,
-    "by_condition": figure_builders.by_condition, "by_condition_of_three_hinges": figure_builders.by_condition_of_three_hinges,
-    "margins_of_laws": margins_of_laws, "ratios": ratios, "estimators": figure_builders.estimators,
-    "crosscheck_margins": figure_builders.margins, "crosscheck_spreads": spreads, "crosscheck_motion": motion,
+    "by_condition": built.by_condition, "by_condition_of_three_hinges": built.by_condition_of_three_hinges,
+    "margins_of_laws": margins_of_laws, "ratios": ratios, "estimators": built.estimators,
+    "crosscheck_margins": built.margins, "crosscheck_spreads": spreads, "crosscheck_motion": motion,
     "crosscheck_convergence": convergence, "crosscheck_drifts": drifts,
-    "crosscheck_closed_loops": closed_loops, "crosscheck_friction": figure_builders.hinge_friction,
-    "map": figure_builders.study_map, "map_narrow": narrow_map, "map_large": large_map, "map_lines": map_lines,
-    "map_lines_of_names": map_lines_of_names, "heat": figure_builders.heat, "heat_of_many": heat_of_many,
+    "crosscheck_closed_loops": closed_loops, "crosscheck_friction": built.hinge_friction,
+    "map": built.study_map, "map_narrow": narrow_map, "map_large": large_map, "map_lines": map_lines,
+    "map_lines_of_names": map_lines_of_names, "heat": built.heat, "heat_of_many": heat_of_many,
     "workspace": workspace_figures, "distributions": spread_figures, "ranks": rank_figures,
-    "scatters": scatter_figures, "error_courses": figure_builders.courses, "error_lines": error_lines,
+    "scatters": scatter_figures, "error_courses": built.courses, "error_lines": error_lines,
     "error_bands": error_bands, "error_bands_one_column": one_column, "angle_traces": angle_traces,
-    "tip_paths": figure_builders.tip_paths, "fault_shares": figure_builders.shares, "fault_shares_of_many": many_shares,
-    "fault_remaining": remaining, "fault_triangles": figure_builders.triangles, "fault_clouds": clouds, "tuning": tuned,
+    "tip_paths": built.tip_paths, "fault_shares": built.shares, "fault_shares_of_many": many_shares,
+    "fault_remaining": remaining, "fault_triangles": built.triangles, "fault_clouds": clouds, "tuning": tuned,
     "condition_fronts": condition_fronts,
 }  # fmt: skip
 

@@ -6,7 +6,7 @@ import pytest
 from spheretwin.models.base.errors import InputError
 from spheretwin.viz.figures import comparison, faults, fronts, maps, over_time, style
 from tests.viz.comparison.compared import RAMP, VALUE, T_s, run_of
-from tests.viz.figures import figure_builders
+from tests.viz.figures import figure_builders as built
 from tests.viz.figures.figure_builders import OBJECTIVES, TRIALS
 
 LAWS = ("pd", "pid", "adaptive_fuzzy", "afsm", "new_one", "other_new_one")
@@ -38,11 +38,9 @@ def test_the_legend_is_below_the_panels():
 
 
 def test_error_bands_end_with_the_first_run():
-    ended = figure_builders.WINDOWS.copy()
+    ended = built.WINDOWS.copy()
     ended[1, 25:] = np.nan
-    (median,) = [
-        line for line in figure_builders.courses(ended).axes[0].get_lines() if line.get_label() == "AFSM"
-    ]
+    (median,) = [line for line in built.courses(ended).axes[0].get_lines() if line.get_label() == "AFSM"]
     assert len(median.get_xdata()) == 25
 
 
@@ -58,7 +56,7 @@ def test_panels_of_many_columns_are_one_below_the_other(columns, side_by_side):
 
 
 def test_the_scale_of_pairs_has_twice_the_bound_and_their_ticks_are_every_third_group():
-    (axes, _) = faults.triangles({"told": figure_builders.TRIANGLE / 8}, "group", "ratio", 2.0, "pairs").axes
+    (axes, _) = faults.triangles({"told": built.TRIANGLE / 8}, "group", "ratio", 2.0, "pairs").axes
     assert (axes.images[0].norm.vmin, axes.images[0].norm.vmax) == (1 / 8, 4.0)
     (axes, _) = faults.triangles({"told": np.ones((7, 7))}, "group", "ratio", 2.0, "pairs").axes
     assert list(axes.get_xticks()) == list(axes.get_yticks()) == [0, 3, 6]
@@ -121,7 +119,7 @@ def test_the_same_figure_gives_the_same_bytes(tmp_path, suffix):
     results = []
     for name in ("one", "other"):
         (tmp_path / name).mkdir()
-        style.save(figure_builders.tip_paths(), path := tmp_path / name / f"paths.{suffix}")
+        style.save(built.tip_paths(), path := tmp_path / name / f"paths.{suffix}")
         results.append(path.read_bytes())
     assert results[0] == results[1]
     assert (b"<svg" in results[0]) == (suffix == "svg")
@@ -129,4 +127,4 @@ def test_the_same_figure_gives_the_same_bytes(tmp_path, suffix):
 
 def test_a_figure_that_cannot_be_written_is_bad_input(tmp_path):
     with pytest.raises(InputError, match="writable path"):
-        style.save(figure_builders.margins(), tmp_path / "missing" / "figure.png")
+        style.save(built.margins(), tmp_path / "missing" / "figure.png")
