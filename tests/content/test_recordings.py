@@ -4,9 +4,12 @@ from pathlib import Path
 
 import numpy as np
 
+from spheretwin.machine.state_estimation import signals
+from spheretwin.models.telemetry.signals import width
 from spheretwin.models.telemetry.status import Level, Status
+from spheretwin.models.telemetry.table import Table
 from spheretwin.provenance import facts_of
-from spheretwin.viz.comparison import merged_recording, trajectories
+from spheretwin.viz.comparison import merged_recording, shadow_recording, trajectories
 from spheretwin.viz.comparison.runs import ComparedRun, EarlyEnd
 from spheretwin.viz.comparison.trajectories import LawTrajectory
 from spheretwin.viz.quantities import QuantityRows
@@ -104,6 +107,21 @@ def side_by_side() -> str:
     return recording_text(trajectories.write(path, laws, session_of().actuator, "both"))
 
 
+def shadow() -> str:
+    """A shadow of constructed rows; rows without a measurement, and a band that is wide at first."""
+    session = session_of(duration=0.4, hardware="electronics")
+    table = Table(signals(False), np.zeros((400, width(signals(False)))))
+    table.values[:] = rows_of(session, 400).values[:, : table.values.shape[1]]
+    table["t_s"][:] = PERIOD_s * np.arange(400)
+    table["q_measured_rad"][100:120, 1] = np.nan
+    for name in ("qdot_estimated_rad_s", "disturbance_estimated_Nm"):
+        table[f"{name}_std"][:] = np.where(np.arange(400) < 9, 1e9, 0.01)[:, None] * [1.0, 2.0, 3.0]
+    subject = RecordingSubject(session.actuator, session.signals, facts_of(session.scenario))
+    path, currents_A = _file("shadow"), rows_of(session, 400)["current_A"]
+    shadow_recording.write(path, table, currents_A, subject, "a **verdict**")
+    return recording_text(path)
+
+
 def _file(name: str) -> Path:
     path = scratch("recordings") / f"{name}.rrd"
     path.unlink(missing_ok=True)
@@ -113,7 +131,7 @@ def _file(name: str) -> Path:
 CASES: Cases = {
     "recording_every_row": every_row, "recording_decimated": decimated_electronics,
     "recording_payload": payload, "recording_recovered": recovered, "recording_live": live_view,
-    "recording_merged": merged, "recording_side_by_side": side_by_side,
+    "recording_merged": merged, "recording_side_by_side": side_by_side, "recording_shadow": shadow,
 }  # fmt: skip
 
 

@@ -4,13 +4,12 @@ import pytest
 from rerun.chunk import RrdReader
 
 from spheretwin import scenario as scenarios
-from spheretwin.models.telemetry.signals import COMMON_NAMES, common_signals
 from spheretwin.provenance import facts_of
 from spheretwin.session import Session
 from spheretwin.simulation import follow
 from spheretwin.viz.layout import layout as blueprints
 from spheretwin.viz.layout.layout import VIEWS
-from spheretwin.viz.layout.view import STYLES, VALUES, VIEW_NAMES, View, application
+from spheretwin.viz.layout.view import STYLES, VALUES, VIEW_NAMES, View
 from spheretwin.viz.recording import plots
 from spheretwin.viz.recording.recorder import Recorder
 from tests.viz.recording.panels import layouts, panels
@@ -170,20 +169,3 @@ def test_a_live_view_follows_the_run_and_a_recording_is_played_in_a_loop(live, p
     view = View(1.0, 8.0, 18, (), live=live)
     for shown in (blueprints.layout(view), blueprints.opening_layout(view)):
         assert (shown.time_panel.play_state, shown.time_panel.loop_mode) == played
-
-
-def test_layouts_differ_by_application():
-    own = tuple(signal for signal in common_signals(18) if signal.name not in COMMON_NAMES)
-    view = View(1.0, 8.0, 18, own, live=False)
-    others = [
-        view._replace(duration_s=2.0),
-        view._replace(current_limit_A=4.0),
-        view._replace(groups=12),
-        view._replace(own=common_signals(18)[:2]),
-        view._replace(live=True),
-        view._replace(shown="coils"),
-        view._replace(run="another"),
-        view._replace(decimated=True),
-    ]
-    assert len({application(each) for each in (view, *others)}) == 1 + len(others)
-    assert application(view) == application(view._replace())

@@ -6,13 +6,11 @@ import pytest
 from spheretwin.models.telemetry.signals import ANGLES, Signal, common_signals, width
 from spheretwin.models.telemetry.status import Status
 from spheretwin.models.telemetry.table import Table
-from spheretwin.viz import theme
-from spheretwin.viz.layout.view import CURRENT_MAP, CURRENT_VARIATION, TELEMETRY
+from spheretwin.viz.layout.view import TELEMETRY
 from spheretwin.viz.quantities import QuantityRows, quantities_of
-from spheretwin.viz.recording import currents, plots
-from spheretwin.viz.recording.reader import rewrite
+from spheretwin.viz.recording import plots
 from spheretwin.viz.recording.recorder import Recorder
-from tests.viz.recording.panels import columns, panels, rows
+from tests.viz.recording.panels import panels, rows
 from tests.viz.recording.recordings import session_and_facts
 
 TICK_s, TICKS, LIMIT_A = 1e-3, 3000, 8.0
@@ -49,22 +47,13 @@ def table():
     return table
 
 
-def write(recorder, table):
-    for first in range(0, TICKS, 97):
-        recorder.write(table.rows(first, min(first + 97, TICKS)))
-
-
-def new_recorder(path, table, rate_Hz):
+def record(path, table, rate_Hz):
     session, facts = session_and_facts(duration=3.0)
-    return Recorder(session.actuator, table.signals, facts, path=path, rate_Hz=rate_Hz), session.actuator
-
-
-def record(path, table, rate_Hz, status=Status.COMPLETED):
-    recorder, actuator = new_recorder(path, table, rate_Hz)
-    with recorder:
-        write(recorder, table)
-        recorder.finish(status)
-    return actuator
+    with Recorder(session.actuator, table.signals, facts, path=path, rate_Hz=rate_Hz) as recorder:
+        for first in range(0, TICKS, 97):
+            recorder.write(table.rows(first, min(first + 97, TICKS)))
+        recorder.finish(Status.COMPLETED)
+    return session.actuator
 
 
 @pytest.fixture(scope="module", params=[None, 60.0], ids=["every row", "60 Hz"])
@@ -121,55 +110,3 @@ def test_every_line_is_the_signal_at_each_tick_or_its_bounds_in_each_bin(recordi
         # Summed in another order, and in single precision at last.
         means = [whole[part].mean(axis=0) for part in parts]
         np.testing.assert_allclose(mean, means, rtol=1e-6, atol=1e-9)
-
-
-def packed(colours):
-    return [[int.from_bytes(bytes([*colour, 255]), "big") for colour in row] for row in colours.tolist()]
-
-
-def test_the_map_is_the_mean_of_each_cell_and_its_lane_the_deviation(recording, table):
-    path, _, _ = recording
-    bins = bins_of(currents.CURRENT_MAP_RATE_Hz)
-    cells = [*bins, bins[-1]]  # up to the end of the run
-    mean = np.array([table["current_A"][part].mean(axis=0) for part in cells])
-    deviation = np.array([np.sqrt(table["current_A"][part].var(axis=0).mean()) for part in cells])
-    for entity, expected in (
-        (CURRENT_MAP, theme.current_colours(mean, LIMIT_A)),
-        (CURRENT_VARIATION, theme.variation_colours(deviation[:, None], LIMIT_A)),
-    ):
-        values, times = columns(path)
-        key = f"/{entity}", "SeriesLines:colors"
-        order = np.argsort(np.concatenate(times[key]), kind="stable")
-        drawn = [row for column in values[key] for row in column.to_pylist()]
-        np.testing.assert_array_equal(
-            ticks(np.concatenate(times[key])[order]), [part[0] for part in bins] + [TICKS - 1]
-        )
-        # A mean that is summed in another order may round to the next colour.
-        difference = np.array([drawn[place] for place in order]) ^ np.array(packed(expected))
-        assert np.mean(difference != 0) < 0.01
-
-
-@pytest.mark.parametrize("rate_Hz", [None, 60.0], ids=["every row", "60 Hz"])
-def test_a_recording_that_was_not_closed_is_recovered_with_the_panels_of_a_closed_one(
-    table, tmp_path, rate_Hz
-):
-    closed, cut, recovered = (tmp_path / f"{name}.rrd" for name in ("closed", "cut", "recovered"))
-    record(closed, table, rate_Hz, Status.LEFT_WORKSPACE)
-    recorder, _ = new_recorder(cut, table, rate_Hz)
-    write(recorder, table)
-    cut.write_bytes(recorder.partial().path.read_bytes())
-    recorder.close()
-    assert cut.stat().st_size < closed.stat().st_size
-    recorded = rewrite(cut, recovered)
-    assert len(recorded.table) > (0.9 * TICKS if rate_Hz is None else 150)
-    by_title = {panel.title.partition(",")[0].partition(" ±")[0]: panel for panel in panels(recovered)}
-    for panel in panels(closed):
-        again = by_title[panel.title.partition(",")[0].partition(" ±")[0]]
-        assert again.shown == panel.shown
-        assert again.lines == panel.lines
-        assert set(again.entities) == set(panel.entities)
-        if panel.band:  # of rows that end a little earlier
-            np.testing.assert_allclose(again.band, panel.band, rtol=0.15, atol=1e-9)
-    _, times = columns(recovered)
-    ended = np.concatenate(times["/ended", "Scalars:scalars"])
-    assert abs(ended[0] * 1e-9 - recorded.table["t_s"][-1]) < 1e-6

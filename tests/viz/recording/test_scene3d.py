@@ -14,7 +14,7 @@ from spheretwin.models.telemetry.table import Table
 from spheretwin.viz.recording import stream
 from spheretwin.viz.recording.recorder import Recorder
 from spheretwin.viz.recording.scene3d import Ending, MovingActuator, Torques, Traces
-from spheretwin.viz.scene.entities import TRACES, TRAIL_S, METRES_PER_Nm, shaft_tip
+from spheretwin.viz.scene.entities import TRACES, METRES_PER_Nm, shaft_tip
 from spheretwin.viz.scene.meshes import FAILURE, FAILURE_TEXT, TORQUES
 from tests.viz.recording.recordings import recorded, session_and_facts, static, timed
 
@@ -43,16 +43,6 @@ def test_traces_follow_the_shaft_tip_without_gaps(loaded, actuator, trace):
     ends = np.array(strips)[:, 0]
     np.testing.assert_allclose(ends[:, 1], tips, atol=1e-8)  # single precision
     np.testing.assert_array_equal(ends[1:, 0], ends[:-1, 1])
-
-
-def test_the_ages_of_what_is_shown_of_the_way_meet():
-    way = [trace for trace in TRACES if trace.signal == "q_rad"]
-    assert [trace.newest_s for trace in way] == [0.0, *(trace.oldest_s for trace in way[:-1])]
-    assert way[-1].oldest_s == TRAIL_S
-    saturation = [max(trace.colour) - min(trace.colour) for trace in way]
-    widths = [trace.width for trace in way]
-    assert saturation == sorted(set(saturation), reverse=True)
-    assert widths == sorted(set(widths), reverse=True)
 
 
 def arrows(path):
@@ -114,15 +104,6 @@ def mark(path):
     positions = timed(path, FAILURE, "Points3D:positions")
     texts = timed(path, FAILURE_TEXT, "Points3D:labels")
     return [(t_ms, *at, *text) for (t_ms, at), (_, text) in zip(positions, texts, strict=True)]
-
-
-def test_a_run_that_is_complete_or_interrupted_has_no_mark(tmp_path, loaded):
-    assert mark(loaded[0]) == []
-    (session, facts), path = session_and_facts(), tmp_path / "run.rrd"
-    with Recorder(session.actuator, session.signals, facts, path=path) as recorder:
-        recorder.write(session.advance(5))
-        recorder.finish("interrupted")
-    assert mark(path) == []
 
 
 @pytest.mark.parametrize("lost", [np.nan, 1e7, 1e99, np.inf])

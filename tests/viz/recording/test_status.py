@@ -5,9 +5,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from spheretwin.models.base.errors import InputError
 from spheretwin.models.telemetry.signals import Signal, width
-from spheretwin.models.telemetry.table import Table, read_parquet
+from spheretwin.models.telemetry.table import Table
 from spheretwin.viz.recording.status import StateChanges
 
 SIGNALS = (
@@ -53,15 +52,3 @@ def test_each_change_is_logged_once_for_any_chunks(values, cuts):
                 expected.setdefault(entity, []).append(change)
                 before = row[column]
     assert lanes(whole, sorted(cuts)) == expected
-
-
-def test_names_of_states_are_kept_in_a_file(tmp_path):
-    table(np.zeros((2, 3))).write_parquet(tmp_path / "run.parquet", {})
-    read, _ = read_parquet(tmp_path / "run.parquet")
-    assert read.signals == SIGNALS
-
-
-@pytest.mark.parametrize("states", ["on", ("on", ""), ("a,b",), (1, 2)])
-def test_states_without_names_are_refused(states):
-    with pytest.raises(InputError, match="expected states as texts without commas"):
-        Signal("part", "1", 1, "how it is", states=states)
