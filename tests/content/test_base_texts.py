@@ -162,7 +162,8 @@ def columns():
         ("a", "rad", True, "m"), ("a", "rad", 1.0, "m"), ("a", "rad", 1, "m\x00"),
         ("a", "rad", 2, "m", ("x",)), ("a", "rad", 1, "m", ("x,y",)), ("a", "rad", 1, "m", ("",)),
         ("a", "rad", 1, "m", "x"), ("a", "1", 1, "m", (), ("on", "off")),
-        ("a", "1", 1, "m", (), ("on", "o,f")),
+        ("a", "1", 1, "m", (), ("on", "o,f")), ("a", "1", 1, "m", (), "on"),
+        ("a", "1", 1, "m", (), ("on", "")), ("a", "1", 1, "m", (), (1, 2)),
     ):  # fmt: skip
         lines += [f"{arguments}: {result(Signal, *arguments)}"]
     common = signals.common_signals(18)

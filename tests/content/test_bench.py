@@ -21,15 +21,20 @@ from tests.viz.bench import fake
 IDENTITY = re.compile(r"[0-9a-f]{8}-[0-9a-f]{4}-[0-9a-f]{4}-[0-9a-f]{4}-[0-9a-f]{12}")
 
 LATER = {
-    "mode": "point", "running": False, "stopped": True, "law": "pd & <b>", "t_s": 2.5, "speed": 0.5,
+    "mode": "point", "running": False, "stopped": True, "law": "pd & <b>c</b>", "t_s": 2.5, "speed": 0.5,
     "realtime_factor": 0.4567, "q_rad": (0.2, 0.1, -0.4), "q_ref_rad": (0.25, 0.15, -0.35),
     "error_mrad": 12.345, "error_deg": 0.7073, "current_A": tuple(3.5 - 0.5 * np.arange(fake.GROUPS)),
     "temperature_C": tuple(20.0 + 1.5 * np.arange(fake.GROUPS)), "torque_margin": 1.75, "saturated": True,
-    "status": "failsafe", "reason": "a coil is too hot", "faults": ("coil.07 open from 1 s", "supply off"),
+    "status": "failsafe", "reason": "a <p>coil</p> is too hot",
+    "faults": ("coil.07 open from 1 s", "supply off"), "active_faults": ("adc <u>noise</u>",),
     "pending": (("plant.engine", "mujoco"), ("seed", "3")), "snapshots": ("last", "before"),
-    "recording": ("bench.rrd",), "completed_files": ("a.parquet",), "note": "a note", "operator": None,
-    "watching": ("page 1", "page 2"), "asking": ("page 2",),
+    "recording": ("<s>bench</s>.rrd",), "completed_files": ("a.parquet",), "note": "<em>a</em> note",
+    "operator": None, "watching": ("page 1", "page 2"), "asking": ("page 2",),
 }  # fmt: skip
+
+
+REPLAY = {"replay_file": "/other/run.rrd", "replay_range_s": (1.0, 7.0), "t_s": 3.5}
+MANUAL_A = (0.0,) * 3 + (1.25,) + (0.0,) * (fake.GROUPS - 4)
 
 
 class _Names:
@@ -84,6 +89,13 @@ def page() -> str:
             ("first state", {}),
             ("later state", LATER),
             ("another run", {"t_s": 0.5, "mode": "off"}),
+            ("jog", {"mode": "jog", "jog_rates_rad_s": (0.0, 0.2, 0.0), "limits": (0.7, 9.0)}),
+            ("point of a script", {"mode": "point", "pose_rad": (0.2, -0.3, 0.5)}),
+            ("manual", {"mode": "manual", "pose_rad": None, "manual_currents_A": MANUAL_A}),
+            (
+                "replay",
+                {"mode": "replay", **REPLAY},
+            ),
         ):
             bench.now.__dict__.update(state)
             for step in range(FRAMES_A_SETTING):
@@ -99,7 +111,8 @@ def statuses() -> str:
     """Status of states that differ in one thing each."""
     changes = [{}, LATER, *({name: value} for name, value in LATER.items()), {"speed": float("inf")}]
     changes += [{"mode": mode} for mode in ("off", "fault", "replay", "manual")]
-    changes += [{"torque_margin": margin} for margin in (0.0, 0.3, 1.0, 1.2, 5.0, float("inf"))]
+    changes += [{"torque_margin": margin} for margin in (0.0, 0.04, 0.06, 0.29, 0.31, 1.0, 4.0, float("inf"))]
+    changes += [{"error_mrad": error} for error in (99_999.0, 5.82e7)]
     changes += [{"rank_lost": True}, {"operator": "page 1"}, {"status": "diverged"}]
     out: list[str] = []
     base: list[str] = []

@@ -5,15 +5,16 @@ from itertools import product
 
 import numpy as np
 
+from spheretwin.models.telemetry.signals import ANGLES, Signal, common_signals
 from spheretwin.viz import decimation, quantities, theme
-from spheretwin.viz.comparison import runs
+from spheretwin.viz.comparison import merged_recording, runs
 from spheretwin.viz.layout import extents, styles, view
 from spheretwin.viz.layout.extents import ExtentTracker, PlotChannel
 from spheretwin.viz.scene import entities, meshes, solids
 from tests.content.content import Cases, content_test
 from tests.content.runs import FAULTS, rows_of, session_of
 from tests.content.values import array, number
-from tests.viz.comparison.compared import RAMP, SPIKE, SQUARE, VALUE, run_of
+from tests.viz.comparison.compared import RAMP, SPIKE, SQUARE, VALUE, T_s, run_of
 
 COUNT = np.arange(3000.0)
 WAVE = COUNT % 37 - 18.0 + (COUNT > 2000) * 5.0
@@ -65,6 +66,22 @@ def ranges() -> str:
         lines += [
             f"{array(np.array(each[:2]))} {[outside.text() for outside in each.outside]}" for each in results
         ]
+    of_kinds = {
+        "transient": (0 * T_s, 0.01 * np.sin(40 * T_s) + np.where(T_s < 0.3, 2.0 - T_s, 0.0)),
+        "failed": (0.1 * np.sin(9 * T_s), -np.exp(np.minimum(8 * T_s[:2000], 12.0))),
+        "failed alone": (np.where(T_s < 3.9, np.sin(9 * T_s), -1e6),),
+        "gaps": (np.where(T_s > 3.99, np.nan, np.sin(9 * T_s)),),
+        "no number": (np.array([np.nan, np.inf]),),
+        "zeros": (np.zeros(2),),
+    }
+    for name, columns in of_kinds.items():
+        compared = [run_of(each) for each in columns]
+        compared[-1:] = [run_of(columns[-1], status="diverged")] if "failed" in name else compared[-1:]
+        low, high, outside = runs.settled_range(compared, columns, 1e-3)
+        lines.append(f"{name}: {array([low, high])} {[each.text() for each in outside]}")
+    late = [run_of(np.minimum(T_s, 1.0) + 1e-3), run_of(np.where(T_s < 0.1, 50.0, 1.0))]
+    ramp = VALUE._replace(desired=lambda rows: np.minimum(T_s, 1.0))
+    lines.append(f"reference: {runs.quantity_range(ramp, late, [0])}")
     lines.append(f"{runs.leaders([run.table for run in shown])}")
     return "\n".join(lines)
 
@@ -124,7 +141,12 @@ def every_quantity() -> str:
     lines.append(f"{[each.name for each in quantities.compared_quantities([table, other])]}")
     lines.append(f"{[each.name for each in quantities.compared_quantities([table])]}")
     lines.append(f"{extents.plotted_signals(table.signals)}")
-    lines += [f"{signal.name} {styles.signal_style(signal)}" for signal in table.signals]
+    others = [
+        Signal(name, "A", len(labels) or 1, "a signal", labels)
+        for name, labels in {"new_rad": ANGLES, "new_1": (), "new_A": tuple(map(str, range(18)))}.items()
+    ]
+    others.append(Signal("three_others", "A", 3, "a signal", ("a", "b", "c")))
+    lines += [f"{signal.name} {styles.signal_style(signal)}" for signal in (*table.signals, *others)]
     lines += [f"{each.name} {styles.quantity_style(each)}" for each in quantities.QUANTITIES]
     return "\n".join(lines)
 
@@ -141,7 +163,11 @@ def colours() -> str:
     lines.append(f"{theme.current_colours(at, 8.0).tolist()}")
     lines.append(f"{theme.variation_colours(np.linspace(0.0, 10.0, 21), 8.0).tolist()}")
     plain = view.View(1.0, 8.0, 18, (), False)
-    others = [plain, plain._replace(duration_s=2.0), plain._replace(live=True), plain._replace(shown="coils")]
+    changes = {
+        "duration_s": 2.0, "current_limit_A": 4.0, "groups": 12, "own": common_signals(18)[:2], "live": True,
+        "shown": "coils", "run": "another", "decimated": True,
+    }  # fmt: skip
+    others = [plain, *(plain._replace(**{name: value}) for name, value in changes.items())]
     lines.append(f"{[view.application(each) for each in others]}")
     lines.append(f"{[view.shown_until_s(*times) for times in ((10.0, 4.0), (4.2, 4.0))]}")
     return "\n".join(lines)
@@ -173,9 +199,37 @@ def shapes() -> str:
     return "\n".join(lines)
 
 
+class _Sent:
+    """Stream that lists what is sent."""
+
+    def __init__(self) -> None:
+        self.lines: list[str] = []
+
+    def log(self, entity: str, look, static: bool) -> None:
+        markers, colours = (each.as_arrow_array().to_pylist() for each in (look.markers, look.colors))
+        self.lines.append(f"{entity} {markers} {colours}")
+
+    def send_columns(self, entity: str, indexes: list, columns: list) -> None:
+        t_ns = np.asarray(indexes[0].as_arrow_array().cast("int64"))
+        values = np.asarray(columns[0].as_arrow_array().flatten())
+        self.lines.append(f"{entity} {t_ns.tolist()} {array(values)}")
+
+
+def marks() -> str:
+    """Markers of eight merged runs, of gaps, of no value and of one row, and their outlines in the legend."""
+    sent = _Sent()
+    series = [RAMP] * 8 + [np.where(T_s > 2.0, np.nan, RAMP), np.full(len(T_s), np.nan), RAMP[:1]]
+    for place, values in enumerate(series):
+        run = run_of(values, label=f"{place + 1} run")
+        merged_recording._send_marks(sent, f"run {place}", run, values, (1, 2, 3), (place % 8, 8))
+    outlines = [f"{name} {array(merged_recording._outline(place))}" for place, name in
+                enumerate([*map(str, merged_recording._OUTLINES), "other"])]  # fmt: skip
+    return "\n".join([*sent.lines, *outlines])
+
+
 CASES: Cases = {
-    "values_ranges": ranges, "values_decimated": decimated, "values_quantities": every_quantity,
-    "values_colours": colours, "values_shapes": shapes,
+    "values_marks": marks, "values_ranges": ranges, "values_decimated": decimated,
+    "values_quantities": every_quantity, "values_colours": colours, "values_shapes": shapes,
 }  # fmt: skip
 
 

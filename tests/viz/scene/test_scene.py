@@ -15,11 +15,9 @@ from spheretwin.models import actuator as actuators
 from spheretwin.models.kinematics import rotation
 from spheretwin.viz import theme
 from spheretwin.viz.scene.entities import (
-    ALONG,
     body_quaternions,
     coil_texture,
     current_scale,
-    current_scale_labels,
     shaft_tip,
     size_of,
 )
@@ -228,20 +226,6 @@ def test_meshes_without_names_have_those_of_their_files_and_move_with_what_carri
     for geom, points in zip(mine, drawn, strict=True):
         expected = world_positions(model, data, geom)
         np.testing.assert_allclose(spanned(points), spanned(expected), atol=1e-7)
-
-
-def test_the_scale_has_the_colours_that_coils_have_at_its_currents():
-    scale, labels = current_scale(1.0), current_scale_labels(6.0, 1.0)
-    colours = np.array(scale.vertex_colors.as_arrow_array().to_pylist())
-    shown = np.stack([colours >> 24, colours >> 16 & 255, colours >> 8 & 255], axis=1)
-    along = positions(scale) @ ALONG
-    share = 2 * (along - along.min()) / np.ptp(along) - 1
-    # Single precision moves a share by 1e-6, and near none the root of it by a step of eight bits.
-    np.testing.assert_allclose(shown, theme.current_colours(6.0 * share, 6.0), atol=1)
-    texts = labels.labels.as_arrow_array().to_pylist()
-    at = 2 * (positions(labels) @ ALONG - along.min()) / np.ptp(along) - 1
-    np.testing.assert_allclose([float(text.removesuffix("A")) for text in texts], 6.0 * at, atol=1e-5)
-    assert (texts[0], texts[-1]) == ("-6 A", "+6 A")
 
 
 def test_marks_grow_with_the_actuator_that_they_stand_beside(actuator):
