@@ -78,12 +78,16 @@ class Law:
         computed and holds NaN. It is 0 at the first tick under the law.
     period_s : float, optional
         Control period that the law is designed for, s; any other is refused. Without it, any period is valid.
+    current_limit_A : float
+        Largest group current that the controller commands under the law, A, if it is less than that of the
+        data sheet: the allocation scales the torque of law and feed-forward.
 
     Raises
     ------
     InputError
         The name is not a text or has control characters, the step is not a function, the numbers are not
-        real, finite and one-dimensional, the signals do not fit the state, or the period is invalid.
+        real, finite and one-dimensional, the signals do not fit the state, or the period or the limit is
+        invalid.
     """
 
     name: str
@@ -93,6 +97,7 @@ class Law:
     signals: tuple[Signal, ...] = ()
     asks_torque: bool = False
     period_s: float | None = None
+    current_limit_A: float = np.inf
 
     @classmethod
     def from_lti(
@@ -152,10 +157,14 @@ class Law:
         names = [*COMMON_NAMES, *(signal.name for signal in self.signals)]
         if twice := sorted({name for name in names if names.count(name) > 1}):
             raise InputError(f"law {self.name}: expected new names of signals, received {', '.join(twice)}")
-        period_s = self.period_s
+        period_s, limit_A = self.period_s, self.current_limit_A
         if period_s is not None and not (isinstance(period_s, int | float) and 0 < period_s < np.inf):
             raise InputError(
                 f"law {self.name}: expected period_s as a number above 0, received {shown(period_s)}"
+            )
+        if not (isinstance(limit_A, int | float) and limit_A > 0):
+            raise InputError(
+                f"law {self.name}: expected current_limit_A as a number above 0, received {shown(limit_A)}"
             )
 
     def for_a_run(self) -> Law:

@@ -164,7 +164,7 @@ def controller_of(
     return controller(
         law,
         magnetics,
-        nominal.current_limit_A,
+        min(nominal.current_limit_A, law.current_limit_A),
         width(law.signals),
         applied,
         compensators,

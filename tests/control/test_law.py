@@ -93,6 +93,10 @@ def test_other_numbers_are_refused_by_field(field, numbers, part):
             ({"period_s": period_s}, "law mine: expected period_s as a number above 0, received")
             for period_s in (0.0, -1e-3, np.nan, np.inf, "1e-3")
         ),
+        *(
+            ({"current_limit_A": limit_A}, "law mine: expected current_limit_A as a number above 0, received")
+            for limit_A in (0.0, -2.0, np.nan, "2", None)
+        ),
     ],
 )
 def test_an_invalid_law_is_refused(changes, part):

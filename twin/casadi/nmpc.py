@@ -13,8 +13,9 @@ control).
 
 *Rate.* A solve takes 10 ms, more than a control period. The law solves once in `ticks` periods and holds the
 planned torque; d̂ of the extended state observer is updated at every tick, and the change of d̂ since the solve
-is compensated at once. A run waits for each solve, so that it has no dead time of the solver; the horizon
-begins at the end of the nominal delay.
+is compensated at once. The allocation of each tick limits the currents of plan and correction to I_max. A run
+waits for each solve, so that it has no dead time of the solver; the horizon begins at the end of the nominal
+delay.
 
 `spheretwin.casadi.PredictiveControl().build(known)` is a `Law`; on a command line it is
 ``--controller.law FILE:PredictiveControl`` as `spheretwin.casadi.nmpc_file()` returns it.
@@ -90,7 +91,15 @@ class PredictiveControl(LawParameters):
         fraction, size = history_layout(known)
         problem = _Problem(self, known, fraction)
         state = np.zeros(PLAN + problem.size + size)
-        return Law(self.law, problem.step, np.zeros(0), state, SIGNALS, asks_torque=True)
+        return Law(
+            self.law,
+            problem.step,
+            np.zeros(0),
+            state,
+            SIGNALS,
+            asks_torque=True,
+            current_limit_A=self.current_limit_A,
+        )
 
 
 class _Solver(NamedTuple):

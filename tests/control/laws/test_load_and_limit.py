@@ -48,6 +48,7 @@ def test_the_current_limit_winds_up_no_integral(law):
     faster = {"controller.bandwidth": 80.0} if law == "adrc" else {}
     table = hold(**WEAK, controller__law=law, **faster).telemetry
     assert table["allocation_scale"].min() < 0.2
+    assert np.abs(table["current_command_A"]).max() == WEAK["nominal.current_limit_A"]
     start = table["error_rad"][0]
     assert np.max(-np.sign(start) * table["error_rad"] / np.abs(start)) < 0.5
     if law == "adrc":  # with no load and a true model, nothing but coupling is observed

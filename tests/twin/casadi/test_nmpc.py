@@ -10,6 +10,7 @@ from spheretwin.control.law import NominalModel
 from spheretwin.models import magnetics
 from spheretwin.models.kinematics import rate_jacobian
 from spheretwin.scenario import load
+from spheretwin.simulation import simulate
 
 PERIOD_s = 1e-3
 
@@ -66,6 +67,17 @@ def test_planned_currents_stay_within_their_limit(parameters, actuator):
     largest = np.abs(loop.currents).max()
     # The plan uses the allocation at the pose of the solve; until the next the rotor turns by 0.02 rad.
     assert 0.95 < largest < 1.05
+
+
+@pytest.mark.uncompiled
+@pytest.mark.parametrize("allocation", ["least_norm", "bounded"])
+def test_no_command_exceeds_the_limit_between_solves(allocation):
+    """With the limit in the plan alone, pose and correction need 2.70 A."""
+    fields = {"controller.law": nmpc_file(), "controller.current_limit_A": 2.0, "allocation": allocation}
+    run = simulate(load("hold", {**fields, "duration": 0.06}))
+    largest_A = np.abs(run.telemetry["current_command_A"]).max(axis=1)
+    assert largest_A.max() == 2.0
+    assert np.count_nonzero(largest_A > 1.99) > 40
 
 
 def test_between_solves_the_torque_follows_the_estimated_disturbance(parameters, actuator):
