@@ -13,7 +13,7 @@ from typing import Literal, NamedTuple
 from spheretwin.export.c_text import header, source
 from spheretwin.export.compiler import Platform, compile_library, cross_compiler, host_compiler, this_machine
 from spheretwin.export.model_description import InterfaceKind, build_description, model_description
-from spheretwin.export.plant_code import PlantCode
+from spheretwin.export.plant_code import SMALLEST, PlantCode, Variable
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.base.files import whole_file
 
@@ -37,6 +37,7 @@ def plant_files(model: PlantCode) -> dict[str, str]:
         **{name: source(name) for name in (*PLANT_SOURCES, *PLANT_HEADERS)},
         "st_plant_model.h": model.model_header(),
         "st_plant_tables.h": model.table_header(),
+        "st_plant_bounds.h": model.bounds_header(),
     }
 
 
@@ -65,7 +66,7 @@ def write_fmu(
         A compiler reported an error.
     """
     if kind == "model-exchange":
-        _check_derivatives(model)
+        model = _with_derivatives(model)
     compilers = _compilers(fmi, targets)
     identifier = "spheretwin_" + re.sub(r"[^A-Za-z0-9]", "_", model.name)
     files, names = plant_files(model), (f"fmi{fmi}.c", "st_fmu.c", *PLANT_SOURCES)
@@ -88,11 +89,20 @@ def write_fmu(
     return Fmu(path, identifier, [folder for folder, _, _ in compilers])
 
 
-def _check_derivatives(model: PlantCode) -> None:
-    for quantity in model.parameters:
-        if quantity.name in ("lag_s", "thermal_resistance_K_W") and quantity.values[0] <= 0:
-            field = {"lag_s": "drive.time_constant_s"}.get(quantity.name, f"drive.{quantity.name}")
+def _with_derivatives(model: PlantCode) -> PlantCode:
+    """Return a plant whose time constants stay above 0."""
+
+    def above_zero(one: Variable) -> Variable:
+        if one.name not in ("lag_s", "thermal_resistance_K_W"):
+            return one
+        if one.values[0] <= 0:
+            field = {"lag_s": "drive.time_constant_s"}.get(one.name, f"drive.{one.name}")
             raise InputError(f"export: expected {field} above 0 for model-exchange, received 0")
+        one = one._replace(least=SMALLEST)
+        one.check()
+        return one
+
+    return model._replace(parameters=[above_zero(one) for one in model.parameters])
 
 
 def _compilers(fmi: int, targets: Sequence[str]) -> list[tuple[str, Platform, list[str]]]:

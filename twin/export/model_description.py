@@ -49,7 +49,7 @@ class _Variable(NamedTuple):
     description: str
     start: float | None = None
     derivative_of: int | None = None
-    least: float | None = None
+    bounds: tuple[float, float] | None = None
 
     def attributes(self) -> dict[str, str]:
         """Attributes that both versions have in common, of any type."""
@@ -67,9 +67,9 @@ class _Variable(NamedTuple):
 
     def numbers(self) -> dict[str, str]:
         """Attributes of a real number."""
-        least = {} if self.least is None else {"min": repr(float(self.least))}
+        ends = zip(("min", "max"), self.bounds or (), strict=False)
         start = {} if self.start is None else {"start": repr(self.start)}
-        return {"unit": self.unit, **least, **start}
+        return {"unit": self.unit, **{name: repr(float(value)) for name, value in ends}, **start}
 
 
 def model_description(
@@ -143,8 +143,8 @@ def _variables(model: PlantCode) -> Iterator[_Variable]:
     reference = 1
     states = [(quantity, name, value) for quantity in model.states for name, value in _numbers(quantity)]
     for quantity, name, value in states:
-        text = quantity.description
-        yield _Variable(name, reference, "output", "continuous", quantity.unit, text, value)
+        text, bounds = quantity.description, (quantity.least, quantity.largest)
+        yield _Variable(name, reference, "output", "continuous", quantity.unit, text, value, None, bounds)
         reference += 1
     for place, (quantity, name, _) in enumerate(states, 1):
         text, unit = f"time derivative of {name}", _RATES[quantity.unit]
@@ -156,7 +156,7 @@ def _variables(model: PlantCode) -> Iterator[_Variable]:
             for name, value in _numbers(quantity):
                 yield _Variable(
                     name, reference, causality, variability, quantity.unit, quantity.description, value, None,
-                    quantity.least,
+                    (quantity.least, quantity.largest),
                 )  # fmt: skip
                 reference += 1
 

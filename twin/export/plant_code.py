@@ -23,6 +23,15 @@ from spheretwin.scenario.sections import ResolvedScenario
 Array = NDArray[np.float64]
 Inputs = Literal["currents", "voltages"]
 
+LARGEST = 1e15
+"""Bound of a number without a bound of its own: products of two are finite."""
+SMALLEST = 1e-9
+"""Least value of a number that another one is divided by, in its SI unit."""
+FASTEST = 1e6
+"""Bound of angles (rad), rates (rad/s), currents (A), voltages (V), torques (N m) and temperatures (degC)."""
+SHORTEST_STEP_S = 1e-6
+COLDEST_DEGC = -273.15
+
 
 class Variable(NamedTuple):
     """Parameter, state or input of the generated plant: one number or one for each of its parts."""
@@ -33,8 +42,9 @@ class Variable(NamedTuple):
     description: str
     parts: tuple[str, ...] = ()
     """Names of the numbers; empty for a single one."""
-    least: float | None = None
-    largest: float | None = None
+    least: float = -LARGEST
+    largest: float = LARGEST
+    """Bounds: the description of an FMU declares them, every entry of the code enforces them."""
     fixed: bool = False
     """True for a parameter that cannot change during a simulation."""
 
@@ -42,6 +52,21 @@ class Variable(NamedTuple):
     def names(self) -> list[str]:
         """Names of all numbers, such as ``q_rad.alpha`` and ``current_A[3]``."""
         return [self.name + part for part in self.parts] or [self.name]
+
+    def check(self) -> None:
+        """Refuse a number beyond the bounds.
+
+        Raises
+        ------
+        InputError
+            The message has name, bounds and number.
+        """
+        for name, value in zip(self.names, self.values, strict=True):
+            if not self.least <= value <= self.largest:
+                raise InputError(
+                    f"export: expected {name} from {self.least:g} to {self.largest:g} {self.unit},"
+                    f" received {value:g}"
+                )
 
 
 class PlantCode(NamedTuple):
@@ -72,6 +97,18 @@ class PlantCode(NamedTuple):
             "ST_THERMAL": self.thermal,
         }
         return header([*definitions(flags), "", "typedef struct {", *fields, "} st_parameters;"])
+
+    def bounds_header(self) -> str:
+        """Return the header of least and largest values."""
+        rows = {
+            "ST_PARAMETER_BOUNDS": self.parameters,
+            "ST_STATE_BOUNDS": self.states,
+            "ST_INPUT_BOUNDS": self.commands,
+        }
+        return header(
+            constant(name, [(one.least, one.largest) for one in ones for _ in one.values], "double")
+            for name, ones in rows.items()
+        )
 
     def table_header(self) -> str:
         """Return the header of tables and default values."""
@@ -114,6 +151,7 @@ def magnetic_tables(model: TorqueModel) -> list[str]:
     scatter = model.pair_gain.shape[1] > 0
     place = {
         "ST_LINES": lines,
+        "ST_ROWS": len(model.table),
         "ST_SCATTER": scatter,
         "ST_KNEE": f"ST_C({magnetics.KNEE!r})",
         "ST_CENTRE": f"ST_C({magnetics.CENTRE!r})",
@@ -149,8 +187,8 @@ def plant_code(
     Raises
     ------
     InputError
-        A field is invalid, or the plant has a state that the generated code does not have: static friction,
-        hysteresis of a cable; with voltages, mutual inductance.
+        A field is invalid or beyond the bounds of the generated code, or the plant has a state that the code
+        does not have: static friction, hysteresis of a cable; with voltages, mutual inductance.
     """
     loaded = scenarios.load(scenario, changes)
     step, config = parameters(loaded), initial_config(loaded, None, None)
@@ -161,7 +199,7 @@ def plant_code(
             f" received {resolved.drive.coil_coupling:g}"
         )
     groups = len(actuator.groups)
-    return PlantCode(
+    model = PlantCode(
         name=resolved.name,
         inputs=inputs,
         thermal=resolved.plant.thermal.on,
@@ -172,6 +210,9 @@ def plant_code(
         step=step,
         hinge_range_rad=actuator.hinge_range_rad,
     )
+    for one in (*model.parameters, *model.states):
+        one.check()
+    return model
 
 
 AXES = tuple(f".{angle}" for angle in HINGES)
@@ -185,17 +226,19 @@ def _parameters(scenario: ResolvedScenario, step: Parameters, inputs: Inputs, gr
     drive, thermal, plant = scenario.drive, scenario.plant.thermal, scenario.plant
     gain = step.torque_gain / remanence(thermal, drive.ambient_degC)
 
-    def each_hinge(name: str, values: Array, unit: str, text: str, least: float | None = None) -> Variable:
+    def each_hinge(name: str, values: Array, unit: str, text: str, least: float = -LARGEST) -> Variable:
         return Variable(name, _numbers(values), unit, text, AXES, least)
 
-    def single(name: str, value: float, unit: str, text: str, least: float = 1e-12, **more: Any) -> Variable:
+    def single(
+        name: str, value: float, unit: str, text: str, least: float = SMALLEST, **more: Any
+    ) -> Variable:
         return Variable(name, (float(value),), unit, text, (), least, **more)
 
     rows = []
     if step.joint is None:
         rows += [
             each_hinge(
-                "inertia_kg_m2", step.inertia_kg_m2, "kg.m2", "principal moments, with the payload", 1e-12
+                "inertia_kg_m2", step.inertia_kg_m2, "kg.m2", "principal moments, with the payload", SMALLEST
             ),
             single("weight_moment_Nm", step.weight_moment_Nm, "N.m", "weight of the payload times height", 0),
         ]
@@ -216,6 +259,8 @@ def _parameters(scenario: ResolvedScenario, step: Parameters, inputs: Inputs, gr
             "1",
             "torque of each group over nominal, at 20 degC",
             _per_group(groups),
+            -FASTEST,
+            FASTEST,
         ),
     ]
     if inputs == "currents":
@@ -237,7 +282,9 @@ def _parameters(scenario: ResolvedScenario, step: Parameters, inputs: Inputs, gr
     ]
     if thermal.on:
         rows += [
-            single("ambient_degC", drive.ambient_degC, "degC", "temperature of the surroundings", -273.15),
+            single(
+                "ambient_degC", drive.ambient_degC, "degC", "temperature of the surroundings", COLDEST_DEGC
+            ),
             Variable(
                 "remanence_per_K", (thermal.remanence_per_K,), "1/K", "relative change of the remanence"
             ),
@@ -251,12 +298,22 @@ def _parameters(scenario: ResolvedScenario, step: Parameters, inputs: Inputs, gr
         ]
     return [
         *rows,
-        single("step_s", plant.step_s, "s", "longest step of the fixed-step method", fixed=True),
+        single(
+            "step_s",
+            plant.step_s,
+            "s",
+            "longest step of the fixed-step method",
+            SHORTEST_STEP_S,
+            largest=1,
+            fixed=True,
+        ),
         single(
             "thermal_period_s",
             scenario.controller.period_s,
             "s",
             "time between updates of the temperatures by the fixed-step method",
+            SHORTEST_STEP_S,
+            largest=FASTEST,
             fixed=True,
         ),
     ]
@@ -266,13 +323,19 @@ def _states(scenario: ResolvedScenario, groups: int) -> list[Variable]:
     plant, ambient_degC = scenario.plant, scenario.drive.ambient_degC
     rotor_degC = initial_degC(plant.thermal, ambient_degC) if plant.thermal.on else ambient_degC
     each = _per_group(groups)
-    return [
+    motion = [
         Variable("q_rad", _numbers(plant.initial_rad), "rad", "angle of each hinge", AXES),
         Variable("qdot_rad_s", _numbers(plant.initial_rad_s), "rad/s", "rate of each hinge", AXES),
         Variable("current_A", (0.0,) * groups, "A", "current of each group", each),
+    ]
+    temperatures = [
         Variable("winding_degC", (ambient_degC,) * groups, "degC", "temperature of each winding", each),
         Variable("stator_degC", (ambient_degC,), "degC", "temperature of the stator"),
         Variable("rotor_degC", (rotor_degC,), "degC", "temperature of the rotor"),
+    ]
+    return [
+        *(one._replace(least=-FASTEST, largest=FASTEST) for one in motion),
+        *(one._replace(least=COLDEST_DEGC, largest=FASTEST) for one in temperatures),
     ]
 
 
@@ -283,7 +346,8 @@ def _inputs(scenario: ResolvedScenario, inputs: Inputs, groups: int) -> list[Var
         "voltages": Variable("voltage_V", zeros, "V", "voltage at each group", each),
     }
     disturbance = "generalised disturbance torque on each hinge, subtracted"
-    return [commands[inputs], Variable("disturbance_Nm", (0.0,) * 3, "N.m", disturbance, AXES)]
+    both = [commands[inputs], Variable("disturbance_Nm", (0.0,) * 3, "N.m", disturbance, AXES)]
+    return [one._replace(least=-FASTEST, largest=FASTEST) for one in both]
 
 
 def _numbers(values: Sequence[float] | Array | None) -> tuple[float, ...]:

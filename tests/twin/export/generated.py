@@ -28,6 +28,10 @@ def address(array):
     return array.ctypes.data_as(ctypes.c_void_p)
 
 
+UNTOUCHED = 12345.0
+"""Results before a call."""
+
+
 class CPlant:
     """Plant as a C library."""
 
@@ -43,6 +47,7 @@ class CPlant:
         self.names = [name for quantity in self.model.parameters for name in quantity.names]
         self.parameters, self.x_start = np.empty(len(self.names)), np.empty(8 + 2 * groups)
         self._plant = np.zeros(len(self.x_start) + 3 + groups + 1)
+        self.verdict = 0
         self.reset()
 
     def reset(self):
@@ -54,11 +59,16 @@ class CPlant:
     def x(self):
         return self._plant[: len(self.x_start)]
 
+    @property
+    def memory(self):
+        """Copy of all that a step changes."""
+        return self._plant.copy()
+
     def set(self, name, value):
         self.parameters[self.names.index(name)] = value
 
     def start(self, x):
-        self._c.st_plant_start(address(self._plant), address(x))
+        return self._c.st_plant_start(address(self._plant), address(x))
 
     def step(self, u, h):
         return self._c.st_plant_step(address(self.parameters), address(u), address(self._plant), h)
@@ -71,14 +81,15 @@ class CPlant:
         return verdict, reached[0]
 
     def derivatives(self, u, x):
-        result = np.empty(len(x))
-        self._c.st_plant_derivatives(address(self.parameters), address(u), address(x), address(result))
+        result = np.full(len(x), UNTOUCHED)
+        arrays = (self.parameters, u, x, result)
+        self.verdict = self._c.st_plant_derivatives(*map(address, arrays))
         return result
 
     def directional(self, u, x, du, dx):
-        result = np.empty(len(x))
+        result = np.full(len(x), UNTOUCHED)
         arrays = (self.parameters, u, x, du, dx, result)
-        self._c.st_plant_directional(*map(address, arrays))
+        self.verdict = self._c.st_plant_directional(*map(address, arrays))
         return result
 
 

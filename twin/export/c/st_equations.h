@@ -153,7 +153,8 @@ static inline void NAME(torque_matrix)(const T q[3], T G[3][ST_GROUPS])
                 beyond = cosine + ST_KNEE;
             }
             row = ST_CENTRE + ST_WIDE * cosine + (ST_NARROW - ST_WIDE) * beyond;
-            place = (int)RE(row); /* 0 also for a row that rounds below it */
+            /* 0 also for a row that rounds below it, and for one that is no number */
+            place = RE(row) >= 1 ? RE(row) < ST_ROWS ? (int)RE(row) : ST_ROWS - 1 : 0;
             t = row - (ST_NUMBER)place;
             cubic = ST_TABLE[place];
             h = cubic[0] + t * (cubic[1] + t * (cubic[2] + t * cubic[3]));

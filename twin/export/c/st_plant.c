@@ -6,7 +6,8 @@
 #include <math.h>
 
 #define ST_NUMBER double
-#include "st_plant_tables.h" /* generated */
+#include "st_plant_bounds.h" /* generated */
+#include "st_plant_tables.h"
 
 /* Real numbers. */
 #define T double
@@ -79,8 +80,8 @@ static st_complex st_arc_tangent(st_complex y, st_complex x)
 /* Imaginary parts are directions times this: their products vanish, and no direction underflows. */
 #define ST_TINY 1e-100
 
-/* No motion within the workspace is as fast. */
-#define ST_FASTEST 1e6
+/* Directions above it are scaled: products with their imaginary parts vanish then, too. */
+#define ST_LONG 1e15
 
 /* Below, series; above, differences lose only their last digits. */
 #define ST_SERIES_TO 0.25
@@ -91,27 +92,90 @@ typedef struct {
     double settled, mean, start_start, start_settled, settled_settled;
 } st_shares;
 
-void st_plant_derivatives(
-    const st_parameters *parameters, const double *input, const double *x, double *derivatives)
+/* ST_OK if all numbers are within their bounds, which none that is not finite is. */
+static int st_check(const double *values, const double (*bounds)[2], int count)
 {
-    st_rates(parameters, input, x, derivatives);
+    int i;
+    for (i = 0; i < count; i++) {
+        if (!(bounds[i][0] <= values[i] && values[i] <= bounds[i][1])) {
+            return ST_INVALID;
+        }
+    }
+    return ST_OK;
 }
 
-void st_plant_directional(const st_parameters *parameters, const double *input, const double *x,
+/* Largest magnitude; -1 if a number is not finite. */
+static double st_magnitude(const double *values, int count)
+{
+    double largest = 0;
+    int i;
+    for (i = 0; i < count; i++) {
+        if (!(fabs(values[i]) < HUGE_VAL)) {
+            return -1;
+        }
+        largest = fmax(largest, fabs(values[i]));
+    }
+    return largest;
+}
+
+static int st_check_motion(const st_parameters *p, const double *input, const double *x)
+{
+    return st_check((const double *)p, ST_PARAMETER_BOUNDS, (int)(sizeof *p / sizeof(double)))
+        || st_check(input, ST_INPUT_BOUNDS, ST_INPUTS) || st_check(x, ST_STATE_BOUNDS, ST_STATES) ? ST_INVALID : ST_OK;
+}
+
+int st_plant_check(const st_parameters *p, const double *input, const st_plant *plant)
+{
+    const double heat_s = plant->heat_s;
+    return st_check_motion(p, input, plant->x) || st_check(plant->last_qdot, ST_STATE_BOUNDS + ST_QDOT, 3)
+        || st_magnitude(plant->copper_J, ST_GROUPS) < 0 || !(heat_s >= 0 && heat_s < HUGE_VAL) ? ST_INVALID : ST_OK;
+}
+
+/* Copy a result if all its numbers are finite. */
+static int st_give(const double values[ST_STATES], double *result)
+{
+    int i;
+    if (st_magnitude(values, ST_STATES) < 0) {
+        return ST_DIVERGED;
+    }
+    for (i = 0; i < ST_STATES; i++) {
+        result[i] = values[i];
+    }
+    return ST_OK;
+}
+
+int st_plant_derivatives(const st_parameters *p, const double *input, const double *x, double *derivatives)
+{
+    double values[ST_STATES];
+    if (st_check_motion(p, input, x)) {
+        return ST_INVALID;
+    }
+    st_rates(p, input, x, values);
+    return st_give(values, derivatives);
+}
+
+int st_plant_directional(const st_parameters *p, const double *input, const double *x,
     const double *input_direction, const double *x_direction, double *result)
 {
     st_complex dual_input[ST_INPUTS], dual_x[ST_STATES], derivatives[ST_STATES];
+    const double of_input = st_magnitude(input_direction, ST_INPUTS), of_x = st_magnitude(x_direction, ST_STATES);
+    const double length = fmax(of_input, of_x), scale = length > ST_LONG ? length : 1;
+    double values[ST_STATES];
     int i;
+    if (st_check_motion(p, input, x) || of_input < 0 || of_x < 0) {
+        return ST_INVALID;
+    }
     for (i = 0; i < ST_INPUTS; i++) {
-        dual_input[i] = st_dual(input[i], ST_TINY * input_direction[i]);
+        dual_input[i] = st_dual(input[i], ST_TINY * (input_direction[i] / scale));
     }
     for (i = 0; i < ST_STATES; i++) {
-        dual_x[i] = st_dual(x[i], ST_TINY * x_direction[i]);
+        dual_x[i] = st_dual(x[i], ST_TINY * (x_direction[i] / scale));
     }
-    st_rates_complex(parameters, dual_input, dual_x, derivatives);
+    st_rates_complex(p, dual_input, dual_x, derivatives);
     for (i = 0; i < ST_STATES; i++) {
-        result[i] = cimag(derivatives[i]) / ST_TINY;
+        values[i] = cimag(derivatives[i]) / ST_TINY * scale;
     }
+    return st_give(values, result);
 }
 
 void st_plant_defaults(st_parameters *parameters, double *x)
@@ -123,7 +187,7 @@ void st_plant_defaults(st_parameters *parameters, double *x)
     }
 }
 
-void st_plant_start(st_plant *plant, const double *x)
+int st_plant_start(st_plant *plant, const double *x)
 {
     int i;
     for (i = 0; i < ST_STATES; i++) {
@@ -136,6 +200,7 @@ void st_plant_start(st_plant *plant, const double *x)
         plant->copper_J[i] = 0;
     }
     plant->heat_s = 0;
+    return st_check(x, ST_STATE_BOUNDS, ST_STATES);
 }
 
 /* Shares for a time of x time constants: 1 - exp(-x), its mean, and the means of the products of exp(-s) and
@@ -307,10 +372,8 @@ static void st_advance_heat(const st_parameters *p, st_plant *plant)
 int st_plant_verdict(const st_plant *plant)
 {
     int i;
-    for (i = 0; i < 3; i++) {
-        if (!(fabs(plant->x[ST_QDOT + i]) < ST_FASTEST)) { /* also if it is not a number */
-            return ST_DIVERGED;
-        }
+    if (st_check(plant->x, ST_STATE_BOUNDS, ST_STATES)) {
+        return ST_DIVERGED;
     }
     for (i = 0; i < 3; i++) {
         if (!(ST_HINGE_RANGE[i][0] <= plant->x[ST_Q + i] && plant->x[ST_Q + i] <= ST_HINGE_RANGE[i][1])) {
@@ -320,7 +383,8 @@ int st_plant_verdict(const st_plant *plant)
     return ST_OK;
 }
 
-int st_plant_step(const st_parameters *p, const double *input, st_plant *plant, double h)
+/* Step of checked numbers. */
+static int st_step(const st_parameters *p, const double *input, st_plant *plant, double h)
 {
     double *q = plant->x + ST_Q, *v = plant->x + ST_QDOT;
     double middle_q[3], middle_v[3], coil_q[3], coil_v[3], torque_S[3], torque[3];
@@ -331,9 +395,6 @@ int st_plant_step(const st_parameters *p, const double *input, st_plant *plant, 
         middle_v[i] = v[i] + (v[i] - plant->last_qdot[i]) / 2;
         plant->last_qdot[i] = v[i];
         slows |= p->coulomb_Nm[i] > 0 || p->viscous_Nm_s[i] > 0;
-        if (!(fabs(middle_q[i]) < ST_FASTEST) || !(fabs(v[i]) < ST_FASTEST)) {
-            return ST_DIVERGED;
-        }
     }
     if (slows) {
         st_slow_down(p, h / 2, q, v);
@@ -360,21 +421,45 @@ int st_plant_step(const st_parameters *p, const double *input, st_plant *plant, 
     return st_plant_verdict(plant);
 }
 
+int st_plant_step(const st_parameters *p, const double *input, st_plant *plant, double h)
+{
+    const st_plant before = *plant;
+    int verdict;
+    if (!(h >= ST_SHORTEST_S && h <= 1) || st_plant_check(p, input, plant)) {
+        return ST_INVALID;
+    }
+    verdict = st_step(p, input, plant, h);
+    if (verdict == ST_DIVERGED) {
+        *plant = before;
+    }
+    return verdict;
+}
+
 int st_plant_advance(
     const st_parameters *p, const double *input, st_plant *plant, double duration_s, double *reached_s)
 {
-    const double periods = duration_s / p->step_s;
-    const double steps = fmax(1, ceil(periods - 1e-6));
-    /* A whole multiple of the step is one to rounding only. */
-    const double h = fabs(periods - steps) < 1e-6 ? p->step_s : duration_s / steps;
-    double step;
+    const st_plant before = *plant;
+    double periods, steps, step, h;
     *reached_s = 0;
+    if (!(duration_s >= ST_SHORTEST_S && duration_s <= ST_MOST_STEPS_A_CALL * p->step_s)
+        || st_plant_check(p, input, plant)) {
+        return ST_INVALID;
+    }
+    periods = duration_s / p->step_s;
+    steps = fmax(1, ceil(periods - 1e-6));
+    /* A whole multiple of the step is one to rounding only. */
+    h = fabs(periods - steps) < 1e-6 ? p->step_s : duration_s / steps;
     for (step = 0; step < steps; step++) {
-        const int verdict = st_plant_step(p, input, plant, h);
-        if (verdict != ST_OK) {
+        const int verdict = st_step(p, input, plant, h);
+        if (verdict == ST_DIVERGED) {
+            *plant = before;
+            *reached_s = 0;
             return verdict;
         }
         *reached_s += h;
+        if (verdict != ST_OK) {
+            return verdict;
+        }
     }
     return ST_OK;
 }

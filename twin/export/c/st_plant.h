@@ -2,8 +2,11 @@
 /* Plant of a spherical actuator: rotor on three hinges, coil currents, temperatures.
  *
  * State, input and parameters are values of the caller: no memory is allocated and nothing is global.
- * All functions are reentrant. Needs a C99 compiler with complex numbers, and sin, cos, sqrt, exp, expm1,
- * floor (a general joint also atan2 and asin) of libm.
+ * All functions are reentrant. Needs a C99 compiler with complex numbers, and sin, cos, sqrt, expm1, fabs, fmax,
+ * ceil (a general joint also atan2 and asin) of libm.
+ *
+ * Every function checks its numbers: those beyond the bounds of st_plant_bounds.h, infinite ones and NaN give
+ * ST_INVALID. After ST_INVALID and ST_DIVERGED state and results are as they were before the call.
  */
 #ifndef ST_PLANT_H
 #define ST_PLANT_H
@@ -37,32 +40,39 @@ typedef struct {
     double heat_s;                /* time since that update */
 } st_plant;
 
-/* Result of a step: the hinges left their range, or the motion diverged or is not a number. */
-enum { ST_OK = 0, ST_LEFT_WORKSPACE = 1, ST_DIVERGED = 2 };
+/* Result: the hinges left their range; the result is beyond the bounds or no number; an argument is. */
+enum { ST_OK = 0, ST_LEFT_WORKSPACE = 1, ST_DIVERGED = 2, ST_INVALID = 3 };
+
+/* Shortest duration of a step or of an advance, in s, and most steps of an advance. */
+#define ST_SHORTEST_S 1e-12
+#define ST_MOST_STEPS_A_CALL 1e7
 
 /* Parameters and states x[ST_STATES] of the scenario at its start. */
 void st_plant_defaults(st_parameters *parameters, double *x);
 
-/* Start at states x[ST_STATES]. */
-void st_plant_start(st_plant *plant, const double *x);
+/* ST_OK if these numbers are within their bounds. */
+int st_plant_check(const st_parameters *parameters, const double *input, const st_plant *plant);
 
-/* Advance by one step of h seconds under a held input[ST_INPUTS]; the method is of second order. */
+/* Start at states x[ST_STATES]. After invalid ones every step gives ST_INVALID until the next start. */
+int st_plant_start(st_plant *plant, const double *x);
+
+/* Advance by one step of h seconds, at most 1, under a held input[ST_INPUTS]; the method is of second order. */
 int st_plant_step(const st_parameters *parameters, const double *input, st_plant *plant, double h);
 
 /* Verdict on the present motion. */
 int st_plant_verdict(const st_plant *plant);
 
-/* Advance by a duration, in equal steps of at most parameters->step_s; stops at the first step that fails.
- * `reached_s` is the time that was simulated. */
+/* Advance by a duration, in equal steps of at most parameters->step_s; stops at the step that leaves the range of
+ * the hinges. `reached_s` is the time that was simulated: 0 after ST_INVALID and ST_DIVERGED. */
 int st_plant_advance(
     const st_parameters *parameters, const double *input, st_plant *plant, double duration_s, double *reached_s);
 
 /* Time derivatives of the states. */
-void st_plant_derivatives(
+int st_plant_derivatives(
     const st_parameters *parameters, const double *input, const double *x, double *derivatives);
 
 /* Derivative of `st_plant_derivatives` along a direction of inputs and states, exact to rounding. */
-void st_plant_directional(const st_parameters *parameters, const double *input, const double *x,
+int st_plant_directional(const st_parameters *parameters, const double *input, const double *x,
     const double *input_direction, const double *x_direction, double *result);
 
 #ifdef __cplusplus
