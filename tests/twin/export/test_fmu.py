@@ -237,6 +237,68 @@ def test_leaving_the_range_requests_the_end(instance):
 
 
 @needs_c_compiler
+def test_declared_bounds_are_enforced_and_a_refused_set_changes_nothing(instance, files):
+    described = fmpy.read_model_description(str(files[instance.fmi, "co-simulation"]))
+    settable = [one for one in described.modelVariables if one.causality in ("input", "parameter")]
+    names = [one.name for one in settable]
+    before = instance.get(*names)
+    for one in settable:
+        least, largest = float(one.min), float(one.max)
+        assert least <= float(one.start) <= largest
+        for value in (np.nextafter(least, -np.inf), np.nextafter(largest, np.inf), np.nan, np.inf, -1e300):
+            both = [instance.references["disturbance_Nm.alpha"], one.valueReference]
+            with pytest.raises(fmpy.fmi1.FMICallException):
+                instance.call("setReal", "setFloat64", both, [0.5, value])
+    np.testing.assert_array_equal(instance.get(*names), before)
+    instance.step(0.0)
+
+
+@needs_c_compiler
+@pytest.mark.parametrize(
+    ("time", "duration"), [(0.0, v) for v in (0, -1, np.nan, np.inf, 1e18)] + [(np.nan, 1e-3)]
+)
+def test_steps_out_of_range_are_refused(instance, time, duration):
+    before = instance.get(*ANGLES, "time")
+    with pytest.raises(fmpy.fmi1.FMICallException):
+        instance.fmu.doStep(currentCommunicationPoint=time, communicationStepSize=duration)
+    np.testing.assert_array_equal(instance.get(*ANGLES, "time"), before)
+
+
+@needs_c_compiler
+@pytest.mark.parametrize("fmi", [2, 3])
+def test_invalid_states_do_not_reach_the_derivatives(fmi, opened):
+    instance = opened(fmi, "model-exchange")
+    n, rates = 44, [f"der({rate})" for rate in RATES]
+    before = instance.get(*ANGLES, *rates)
+    for value in (np.nan, np.inf, 1e300):
+        for place in (0, 3, 6, 43):
+            x = [20.0] * n
+            x[place] = value
+            with pytest.raises(fmpy.fmi1.FMICallException):
+                instance.fmu.setContinuousStates((ctypes.c_double * n)(*x), n)
+    np.testing.assert_array_equal(instance.get(*ANGLES, *rates), before)
+    with pytest.raises(fmpy.fmi1.FMICallException):
+        instance.set("lag_s", 0.0)
+
+
+@needs_c_compiler
+def test_damaged_states_are_refused(instance):
+    instance.step(0.0, 3)
+    saved = instance.call("getFMUstate", "getFMUState")
+    data = bytearray(instance.call("serializeFMUstate", "serializeFMUState", saved))
+    generator = np.random.default_rng(0)
+    damaged = [bytes(data[:-1]), b"", bytes(data) + b"0", bytes(len(data))]
+    for place in generator.integers(len(data), size=60):
+        flipped = data.copy()
+        flipped[place] ^= 1 << int(generator.integers(8))
+        damaged.append(bytes(flipped))
+    for content in damaged:
+        with pytest.raises(fmpy.fmi1.FMICallException):
+            instance.call("deSerializeFMUstate", "deserializeFMUState", content)
+    instance.call("freeFMUstate", "freeFMUState", saved)
+
+
+@needs_c_compiler
 @pytest.mark.parametrize("fmi", [2, 3])
 def test_directional_derivatives_are_those_of_the_derivatives(fmi, opened):
     instance = opened(fmi, "model-exchange")

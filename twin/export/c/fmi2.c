@@ -42,7 +42,7 @@ typedef struct {
 
 static st_fmu *fmu_of(fmi2Component c)
 {
-    return ((st_component *)c)->fmu;
+    return c ? ((st_component *)c)->fmu : NULL;
 }
 
 static void send(void *environment, const char *message)
@@ -52,9 +52,9 @@ static void send(void *environment, const char *message)
         "logStatusError", message); /* without conversions */
 }
 
-static fmi2Status status(int succeeded)
+static fmi2Status status(int result)
 {
-    return succeeded ? fmi2OK : fmi2Error;
+    return result == ST_FMU_OK ? fmi2OK : result == ST_FMU_DISCARD ? fmi2Discard : fmi2Error;
 }
 
 static fmi2Status none(size_t count)
@@ -123,8 +123,7 @@ ST_EXPORT fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean has_tolera
     fmi2Real start, fmi2Boolean has_stop, fmi2Real stop)
 {
     (void)has_tolerance, (void)tolerance, (void)has_stop, (void)stop;
-    fmu_of(c)->now.time_s = start;
-    return fmi2OK;
+    return status(st_fmu_set_time(fmu_of(c), start));
 }
 
 ST_EXPORT fmi2Status fmi2EnterInitializationMode(fmi2Component c)
@@ -135,8 +134,7 @@ ST_EXPORT fmi2Status fmi2EnterInitializationMode(fmi2Component c)
 
 ST_EXPORT fmi2Status fmi2ExitInitializationMode(fmi2Component c)
 {
-    st_fmu_start(fmu_of(c));
-    return fmi2OK;
+    return status(st_fmu_start(fmu_of(c)));
 }
 
 ST_EXPORT fmi2Status fmi2Terminate(fmi2Component c)
@@ -147,6 +145,9 @@ ST_EXPORT fmi2Status fmi2Terminate(fmi2Component c)
 
 ST_EXPORT fmi2Status fmi2Reset(fmi2Component c)
 {
+    if (!c) {
+        return fmi2Error;
+    }
     st_fmu_reset(fmu_of(c));
     return fmi2OK;
 }
@@ -193,9 +194,7 @@ ST_EXPORT fmi2Status fmi2SetFMUstate(fmi2Component c, fmi2FMUstate saved)
 ST_EXPORT fmi2Status fmi2FreeFMUstate(fmi2Component c, fmi2FMUstate *saved)
 {
     (void)c;
-    if (saved) {
-        st_fmu_release(saved);
-    }
+    st_fmu_release(saved);
     return fmi2OK;
 }
 
@@ -262,8 +261,7 @@ ST_EXPORT fmi2Status fmi2CompletedIntegratorStep(
 
 ST_EXPORT fmi2Status fmi2SetTime(fmi2Component c, fmi2Real time)
 {
-    fmu_of(c)->now.time_s = time;
-    return fmi2OK;
+    return status(st_fmu_set_time(fmu_of(c), time));
 }
 
 ST_EXPORT fmi2Status fmi2SetContinuousStates(fmi2Component c, const fmi2Real x[], size_t count)
@@ -273,10 +271,7 @@ ST_EXPORT fmi2Status fmi2SetContinuousStates(fmi2Component c, const fmi2Real x[]
 
 ST_EXPORT fmi2Status fmi2GetDerivatives(fmi2Component c, fmi2Real derivatives[], size_t count)
 {
-    if (count == ST_STATES) {
-        st_fmu_derivatives(fmu_of(c), derivatives);
-    }
-    return status(count == ST_STATES);
+    return status(st_fmu_derivatives(fmu_of(c), derivatives, count));
 }
 
 ST_EXPORT fmi2Status fmi2GetEventIndicators(fmi2Component c, fmi2Real indicators[], size_t count)
@@ -297,7 +292,7 @@ ST_EXPORT fmi2Status fmi2GetNominalsOfContinuousStates(fmi2Component c, fmi2Real
     for (i = 0; i < count; i++) {
         x[i] = 1;
     }
-    return status(count == ST_STATES);
+    return count == ST_STATES ? fmi2OK : fmi2Error;
 }
 
 /* Co-simulation. */
@@ -319,7 +314,7 @@ ST_EXPORT fmi2Status fmi2GetRealOutputDerivatives(
 ST_EXPORT fmi2Status fmi2DoStep(fmi2Component c, fmi2Real time, fmi2Real duration, fmi2Boolean no_set_state)
 {
     (void)no_set_state;
-    if (!st_fmu_advance(fmu_of(c), time, duration)) {
+    if (st_fmu_advance(fmu_of(c), time, duration) != ST_FMU_OK) {
         return fmi2Error;
     }
     return fmu_of(c)->now.terminated != 0 ? fmi2Discard : fmi2OK;
@@ -339,7 +334,7 @@ ST_EXPORT fmi2Status fmi2GetStatus(fmi2Component c, const fmi2StatusKind kind, f
 
 ST_EXPORT fmi2Status fmi2GetRealStatus(fmi2Component c, const fmi2StatusKind kind, fmi2Real *value)
 {
-    if (kind != fmi2LastSuccessfulTime) {
+    if (!c || kind != fmi2LastSuccessfulTime) {
         return fmi2Discard;
     }
     *value = fmu_of(c)->now.time_s;
@@ -354,7 +349,7 @@ ST_EXPORT fmi2Status fmi2GetIntegerStatus(fmi2Component c, const fmi2StatusKind 
 
 ST_EXPORT fmi2Status fmi2GetBooleanStatus(fmi2Component c, const fmi2StatusKind kind, fmi2Boolean *value)
 {
-    if (kind != fmi2Terminated) {
+    if (!c || kind != fmi2Terminated) {
         return fmi2Discard;
     }
     *value = fmu_of(c)->now.terminated != 0 ? fmi2True : fmi2False;

@@ -47,7 +47,7 @@ typedef struct {
 
 static st_fmu *fmu_of(fmi3Instance c)
 {
-    return ((st_component *)c)->fmu;
+    return c ? ((st_component *)c)->fmu : NULL;
 }
 
 static void send(void *environment, const char *message)
@@ -56,9 +56,9 @@ static void send(void *environment, const char *message)
     component->log(component->environment, fmi3Error, "logStatusError", message);
 }
 
-static fmi3Status status(int succeeded)
+static fmi3Status status(int result)
 {
-    return succeeded ? fmi3OK : fmi3Error;
+    return result == ST_FMU_OK ? fmi3OK : result == ST_FMU_DISCARD ? fmi3Discard : fmi3Error;
 }
 
 static fmi3Status none(size_t count)
@@ -141,18 +141,19 @@ ST_EXPORT fmi3Status fmi3EnterInitializationMode(fmi3Instance c, fmi3Boolean has
     fmi3Float64 start, fmi3Boolean has_stop, fmi3Float64 stop)
 {
     (void)has_tolerance, (void)tolerance, (void)has_stop, (void)stop;
-    fmu_of(c)->now.time_s = start;
-    return fmi3OK;
+    return status(st_fmu_set_time(fmu_of(c), start));
 }
 
 ST_EXPORT fmi3Status fmi3ExitInitializationMode(fmi3Instance c)
 {
-    st_fmu_start(fmu_of(c));
-    return fmi3OK;
+    return status(st_fmu_start(fmu_of(c)));
 }
 
 ST_EXPORT fmi3Status fmi3Reset(fmi3Instance c)
 {
+    if (!c) {
+        return fmi3Error;
+    }
     st_fmu_reset(fmu_of(c));
     return fmi3OK;
 }
@@ -175,13 +176,13 @@ ST_NO_EFFECT(fmi3ExitConfigurationMode, fmi3Error)
 ST_EXPORT fmi3Status fmi3GetFloat64(
     fmi3Instance c, const fmi3ValueReference vr[], size_t count, fmi3Float64 values[], size_t value_count)
 {
-    return status(count == value_count && st_fmu_get(fmu_of(c), vr, count, values));
+    return status(count == value_count ? st_fmu_get(fmu_of(c), vr, count, values) : ST_FMU_ERROR);
 }
 
 ST_EXPORT fmi3Status fmi3SetFloat64(
     fmi3Instance c, const fmi3ValueReference vr[], size_t count, const fmi3Float64 values[], size_t value_count)
 {
-    return status(count == value_count && st_fmu_set(fmu_of(c), vr, count, values));
+    return status(count == value_count ? st_fmu_set(fmu_of(c), vr, count, values) : ST_FMU_ERROR);
 }
 
 /* There are no values of other types. */
@@ -275,9 +276,7 @@ ST_EXPORT fmi3Status fmi3SetFMUState(fmi3Instance c, fmi3FMUState saved)
 ST_EXPORT fmi3Status fmi3FreeFMUState(fmi3Instance c, fmi3FMUState *saved)
 {
     (void)c;
-    if (saved) {
-        st_fmu_release(saved);
-    }
+    st_fmu_release(saved);
     return fmi3OK;
 }
 
@@ -305,8 +304,11 @@ ST_EXPORT fmi3Status fmi3GetDirectionalDerivative(fmi3Instance c, const fmi3Valu
     size_t unknown_count, const fmi3ValueReference knowns[], size_t known_count, const fmi3Float64 seed[],
     size_t seed_count, fmi3Float64 sensitivity[], size_t sensitivity_count)
 {
-    return status(seed_count == known_count && sensitivity_count == unknown_count
-        && st_fmu_directional(fmu_of(c), unknowns, unknown_count, knowns, known_count, seed, sensitivity));
+    if (seed_count != known_count || sensitivity_count != unknown_count) {
+        return fmi3Error;
+    }
+    return status(
+        st_fmu_directional(fmu_of(c), unknowns, unknown_count, knowns, known_count, seed, sensitivity));
 }
 
 ST_EXPORT fmi3Status fmi3GetAdjointDerivative(fmi3Instance c, const fmi3ValueReference unknowns[],
@@ -340,8 +342,7 @@ ST_EXPORT fmi3Status fmi3CompletedIntegratorStep(
 
 ST_EXPORT fmi3Status fmi3SetTime(fmi3Instance c, fmi3Float64 time)
 {
-    fmu_of(c)->now.time_s = time;
-    return fmi3OK;
+    return status(st_fmu_set_time(fmu_of(c), time));
 }
 
 ST_EXPORT fmi3Status fmi3SetContinuousStates(fmi3Instance c, const fmi3Float64 x[], size_t count)
@@ -356,10 +357,7 @@ ST_EXPORT fmi3Status fmi3GetContinuousStates(fmi3Instance c, fmi3Float64 x[], si
 
 ST_EXPORT fmi3Status fmi3GetContinuousStateDerivatives(fmi3Instance c, fmi3Float64 derivatives[], size_t count)
 {
-    if (count == ST_STATES) {
-        st_fmu_derivatives(fmu_of(c), derivatives);
-    }
-    return status(count == ST_STATES);
+    return status(st_fmu_derivatives(fmu_of(c), derivatives, count));
 }
 
 ST_EXPORT fmi3Status fmi3GetEventIndicators(fmi3Instance c, fmi3Float64 indicators[], size_t count)
@@ -375,7 +373,7 @@ ST_EXPORT fmi3Status fmi3GetNominalsOfContinuousStates(fmi3Instance c, fmi3Float
     for (i = 0; i < count; i++) {
         x[i] = 1;
     }
-    return status(count == ST_STATES);
+    return count == ST_STATES ? fmi3OK : fmi3Error;
 }
 
 ST_EXPORT fmi3Status fmi3GetNumberOfEventIndicators(fmi3Instance c, size_t *count)
@@ -405,12 +403,12 @@ ST_EXPORT fmi3Status fmi3DoStep(fmi3Instance c, fmi3Float64 time, fmi3Float64 du
     fmi3Boolean *event, fmi3Boolean *terminate, fmi3Boolean *early_return, fmi3Float64 *last_time)
 {
     st_fmu *fmu = fmu_of(c);
-    const int succeeded = st_fmu_advance(fmu, time, duration);
+    const int result = st_fmu_advance(fmu, time, duration);
     (void)no_set_state;
     *event = *early_return = false;
-    *terminate = fmu->now.terminated != 0;
-    *last_time = fmu->now.time_s;
-    return status(succeeded);
+    *terminate = fmu && fmu->now.terminated != 0;
+    *last_time = fmu ? fmu->now.time_s : time;
+    return status(result);
 }
 
 ST_EXPORT fmi3Status fmi3ActivateModelPartition(fmi3Instance c, fmi3ValueReference clock, fmi3Float64 time)

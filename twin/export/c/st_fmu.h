@@ -44,18 +44,22 @@ typedef struct {
     void (*log)(void *environment, const char *message); /* of an error; may be null */
 } st_fmu;
 
+/* Result: numbers beyond their bounds, or a motion without derivatives, are discarded. After a discard and after an
+ * error the instance is as it was before the call. */
+enum { ST_FMU_ERROR, ST_FMU_OK, ST_FMU_DISCARD };
+
 /* New instance with the values of the scenario; null without memory. */
 st_fmu *st_fmu_new(void);
 void st_fmu_reset(st_fmu *fmu);
 
-/* The other functions return 1 if they succeed. */
 int st_fmu_get(const st_fmu *fmu, const unsigned *references, size_t count, double *values);
 int st_fmu_set(st_fmu *fmu, const unsigned *references, size_t count, const double *values);
-void st_fmu_start(st_fmu *fmu);
+int st_fmu_set_time(st_fmu *fmu, double time_s);
+int st_fmu_start(st_fmu *fmu);
 
-/* 1 also if the hinges left their range: then `terminated` is set. */
+/* ST_FMU_OK also if the hinges left their range: then `terminated` is set. */
 int st_fmu_advance(st_fmu *fmu, double time_s, double duration_s);
-void st_fmu_derivatives(const st_fmu *fmu, double *derivatives);
+int st_fmu_derivatives(const st_fmu *fmu, double *derivatives, size_t count);
 int st_fmu_set_states(st_fmu *fmu, const double *x, size_t count);
 int st_fmu_get_states(const st_fmu *fmu, double *x, size_t count);
 
@@ -64,11 +68,11 @@ int st_fmu_outside(const st_fmu *fmu);
 int st_fmu_directional(const st_fmu *fmu, const unsigned *unknowns, size_t unknown_count, const unsigned *knowns,
     size_t known_count, const double *seed, double *sensitivity);
 
-/* Saved states. */
+/* Saved states. The bytes of one end in a check sum: damaged ones are refused. */
 int st_fmu_save(const st_fmu *fmu, void **saved);
 int st_fmu_restore(st_fmu *fmu, const void *saved);
 void st_fmu_release(void **saved);
-enum { ST_SERIAL_SIZE = sizeof(st_snapshot) + 1 };
+enum { ST_SUM_SIZE = 8, ST_SERIAL_SIZE = sizeof(st_snapshot) + 1 + ST_SUM_SIZE };
 int st_fmu_serialise(const void *saved, void *bytes, size_t size);
 int st_fmu_deserialise(const void *bytes, size_t size, void **saved);
 
