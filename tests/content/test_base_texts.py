@@ -92,6 +92,9 @@ def checks():
     return "\n".join([*lines, f"{broken(CHECKS)} {bound_shares(CHECKS)}"])
 
 
+KINDS = "from pathlib import Path\nimport numba\n@numba.njit\ndef step(): pass\n"
+
+
 def user_files():
     """References to user code, and what is refused of it and of outputs."""
     folder = scratch("user_files")
@@ -99,7 +102,8 @@ def user_files():
         "good": "from math import sin\ndef law(x):\n    return 2 * x\nVALUE = 3\ndef Other():\n    pass\n",
         "syntax": "x = 1\ndef law(:\n", "raises": "x = 1\n\n\n1 / 0\n",
         "deep": "def f():\n    raise ValueError('a\\nb')\nf()\n", "empty": "", "values": "A = 1\n",
-        "quits": "raise SystemExit(3)\n",
+        "quits": "raise SystemExit(3)\n", "paths": "from pathlib import Path\n",
+        "missing": "import no_module\n", "kinds": f"{KINDS}class Mine(Path): pass\n",
     }.items():  # fmt: skip
         (folder / f"{name}.py").write_text(text)
     (folder / "bytes.py").write_bytes(b"x = '\xff'\n")
@@ -107,7 +111,8 @@ def user_files():
     for reference in (
         "good.py:law", "good.py:lwa", "good.py:VALUE", "good.py:sin", "good.py:", ":law", "good",
         "syntax.py:law", "raises.py:law", "deep.py:f", "empty.py:law", "values.py:law", "none.py:law",
-        "a\0.py:law", "quits.py:law", "bytes.py:law",
+        "a\0.py:law", "quits.py:law", "bytes.py:law", "good.txt:law", "good.py:a b", "paths.py:f",
+        "missing.py:f", "kinds.py:x",
     ):  # fmt: skip
         path = f"{folder}/{reference}"
         lines.append(f"{reference}: {user_code.is_reference(path)}")
@@ -128,7 +133,10 @@ CSV = {
     "short": "t_s,a,b\n0,1\n", "word": "# x\nt_s,a,b\n0,1,x\n", "large": "t_s,a,b\n0,1,2e9\n",
     "nan": "t_s,a,b\n0,nan,2\n", "missing": "t_s,a\n0,1\n", "twice": "t_s,a,b,a\n0,1,2,3\n", "empty": "",
     "head": "t_s,a,b\n", "long": "t_s,a,b\n1e99,1,2\n", "quote": 't_s,"a",b\n0,"1",2\n',
-    "negative": "t_s,a,b\n-1,1,2\n0,1,2\n", "bom": "\ufefft_s,a,b\n0,1,2\n",
+    "negative": "t_s,a,b\n-1,1,2\n0,1,2\n", "bom": "\ufefft_s,a,b\n0,1,2\n", "nothing": "# nothing\n",
+    "semicolons": "t_s;a;b\n0;1;2\n",
+    "four": "t_s,a,b\n0,1,2\n3,4,5,6\n", "after a comment": "t_s,a,b\n0,1,2\n\n# so\n3,north,5\n",
+    "blank": "t_s,a,b\n3,,5\n", "infinite": "t_s,a,b\n3,4,-inf\n", "wide": "t_s,a,b\n0,1," + "9" * 200_000,
 }  # fmt: skip
 
 
@@ -145,9 +153,9 @@ def series():
         lines.append(f"{name}: {one.t_s.tolist()} {one.values.tolist()}")
         lines.append(f"  held {one.zero_order_hold(times, (9.0, 8.0)).tolist()}")
         lines.append(f"  between {one.interpolate(times).tolist()}")
-    lines.append(result(csv_series.read, "series", folder / "none.csv", ("a",), 1.0))
     (folder / "bytes.csv").write_bytes(b"\xff")
-    lines.append(result(csv_series.read, "series", folder / "bytes.csv", ("a",), 1.0))
+    names = ("none.csv", "bytes.csv", ".")
+    lines += [result(csv_series.read, "series", folder / name, ("a",), 1.0) for name in names]
     lines += [result(csv_series.check_rising, each) for each in ([0, 1], [1, 1], [0, 1, 0.5], [], [0, 1e-10])]
     lines.append(repr(csv_series.reached(np.array([-1.0, 0.0, 1.0, 1e6])).tolist()))
     return "\n".join(lines)

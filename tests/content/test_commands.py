@@ -2,7 +2,6 @@
 
 import functools
 import json
-import os
 import re
 
 import numpy as np
@@ -44,44 +43,8 @@ EXPLAIN = [
     "explain hardware prototype --json", "explain hardware electronics", "explain hardware x",
     "explain scenario nutation", "explain scenario tilt --all --json", "explain plant.coulomb_Nm",
     "explain drive --json", "explain plant.coulomb", "explain hardware ideal x", "explain trajectory",
-    "explain scenario x",
+    "explain scenario x", "simulate",
 ]  # fmt: skip
-
-REFUSED = [
-    "", "fly", "simulte", "simulate", "simulate x", "simulate hold x", "simulate hold --duration",
-    "simulate hold --duration 1 --duration 2", "simulate hold --record a.rrd --record b.rrd",
-    "simulate hold --record=", "simulate hold --recrod a.rrd", "simulate hold --metric x",
-    "simulate hold --metric nothing.py:f", "simulate hold --replay a.parquet",
-    "simulate --replay nothing.parquet", "simulate --replay a.rrd", "simulate --seed=2",
-    "simulate hold --view control", "simulate hold --json --json", "simulate hold --record nowhere/a.rrd",
-    "simulate hold --telemetry nowhere/a.parquet", "simulate hold --plant.mjcf nothing.xml",
-    "simulate hold --plant.torque_curve nothing.csv", "bench hold x", "bench nowhere", "bench --port 70000",
-    "bench --hold-after -1", "crosscheck x", "crosscheck --states 0", "crosscheck --mjcf nothing.xml",
-    "crosscheck --out a --figure-format gif", "reproduce", "reproduce figure99",
-    "reproduce figure6 --seeds 0", "reproduce figure6 figure6 --limit 0", "reproduce all --plant x", "sweep",
-    "sweep x", "sweep paper --limit 0", "sweep paper --row x", "sweep paper --row 0123456789abcdef",
-    "sweep paper --optimise", "sweep paper --trials 3", "sweep paper --row 1 --out a",
-    "sweep paper --optimise --row 1", "sweep paper --engine x", "sweep paper --address x",
-    "sweep nothing.toml", "sweep rivals_ideal --optimise --limit 3", "review", "review nothing.parquet",
-    "review a --tolerance gate", "review a b --tolerance gat", "review a --merge b.rrd",
-    "review a b --merge c.txt", "review a b --export c.csv", "review a --export d.txt", "review a.txt",
-    "recover", "recover a.rrd", "recover a.rrd --out b.parquet", "recover nothing.parquet --out b.parquet",
-    "recover a --out b", "magnetics", "magnetics x", "magnetics check --poses 0",
-    "magnetics curve --csv a.csv --out b.csv", "magnetics curve --csv nothing.csv", "magnetics map --need 0",
-    "magnetics map --largest-tilt 86", "magnetics check --mjcf nothing.xml", "log check", "log check a.txt",
-    "log check nothing.csv --accept gap", "explain", "explain x", "--x", "explain x --y",
-]  # fmt: skip
-
-
-def refusals():
-    """Messages and exit codes of calls that are refused, in an empty folder."""
-    here, folder = os.getcwd(), scratch("empty")
-    os.chdir(folder)
-    try:
-        text = several([*REFUSED, ["explain", "a\x1b[2J"], ["simulate", "hold", "--name", "a\nb"]])
-    finally:
-        os.chdir(here)
-    return "\n".join([text, f"files: {sorted(path.name for path in folder.iterdir())}"])
 
 
 FAULTS = '[{"target": "coil.07", "mode": "open", "start_s": 0.02, "detection": true}]'
@@ -202,7 +165,7 @@ def magnetics():
 
 CASES = {
     "command_help": lambda: several(HELP), "command_explain": lambda: several(EXPLAIN),
-    "command_refusals": refusals, "command_runs": runs, "command_reviews": reviews, "command_sweeps": sweeps,
+    "command_runs": runs, "command_reviews": reviews, "command_sweeps": sweeps,
     "command_logs": logs, "command_magnetics": magnetics,
 }  # fmt: skip
 

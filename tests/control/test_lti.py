@@ -180,51 +180,6 @@ def refusal(system, **given):
     return message
 
 
-def like(**changes):
-    """What has the attributes of a state space."""
-    matrices = {"A": [[0.5]], "B": [[1.0, 0, 0]], "C": [[1.0], [0], [0]], "D": np.eye(3), "dt": PERIOD_S}
-    return SimpleNamespace(**matrices | changes)
-
-
-@pytest.mark.parametrize(
-    ("system", "part"),
-    [
-        (signal.StateSpace([[-1.0]], [[1.0]], [[1.0]], [[0.0]]), "a discrete system with its dt in s"),
-        (signal.TransferFunction([1.0], [1.0, 1.0]), "received one with dt none; sample it first"),
-        (signal.dlti([1.0], [1.0, 0.5]), "received one with dt true"),
-        (like(dt=0), "received one with dt 0; sample it first, as system.to_discrete"),
-        (like(dt=np.nan), "received one with dt nan"),
-        (like(dt=-1e-3), "received one with dt -0.001"),
-        (
-            signal.TransferFunction([1.0, 2.0, 3.0], [1.0, 0.5], dt=PERIOD_S),
-            "a proper transfer function, or zeros, poles and gain, received a num",
-        ),
-        (signal.ZerosPolesGain([0.1, 0.2], [0.5], 1.0, dt=PERIOD_S), "a proper transfer function"),
-        (SimpleNamespace(num=[[[1.0]]], den=[[[0.0]]], dt=PERIOD_S), "a proper transfer function"),
-        (like(A=[[np.nan]]), "finite real numbers in A, received [[nan]]"),
-        (like(D=np.full((3, 3), np.inf)), "finite real numbers in D"),
-        (like(B=[[1j, 0, 0]]), "finite real numbers in B"),
-        (like(C=[["1"], ["0"], ["0"]]), "finite real numbers in C"),
-        (like(A=[[1.0], [1.0, 2.0]]), "A as an array"),
-        (like(B=[[1.0, 0]]), "B of shape (1, 3), received (1, 2)"),
-        (like(C=[[1.0, 0, 0]]), "C of shape (3, 1), received (1, 3)"),
-        (like(A=np.zeros((1, 2))), "A of shape (1, 1), received (1, 2)"),
-        (SimpleNamespace(num=[[[np.inf]]], den=[[[1.0]]], dt=PERIOD_S), "numbers in a transfer function"),
-        (gain(np.zeros((2, 3))), "1 output of 1 or 2 for every axis, received 2 of 3"),
-        (gain(np.zeros((3, 1))), "received 3 of 1"),
-        (gain(np.zeros((3, 9))), "received 3 of 9"),
-        (gain(np.zeros((1, 3))), "received 1 of 3"),
-        (np.eye(3), "received one with dt none"),
-        (
-            SimpleNamespace(dt=PERIOD_S),
-            "a state space, or a proper transfer function, or zeros, poles and gain, received",
-        ),
-    ],
-)
-def test_an_invalid_system_is_refused_in_one_line(system, part):
-    assert part in refusal(system)
-
-
 def test_numbers_given_with_the_system_are_checked():
     assert "inertia_kg_m2 as one number or three, received shape (2,)" in refusal(
         LEAD, inertia_kg_m2=[1.0, 2.0]

@@ -1,7 +1,5 @@
 """The linear model against differences of the equations of motion that both engines step, and identities."""
 
-import re
-
 import numpy as np
 import pytest
 from scipy.signal import cont2discrete
@@ -210,26 +208,6 @@ def test_states_inputs_and_outputs_are_named_and_the_first_pose_is_where_it_rest
     assert len(model.states) == len(model.system.A) == 24
     assert len(model.inputs) == model.system.B.shape[1] == len(model.input_at_rest) == 18
     assert model.outputs == ("alpha_rad", "beta_rad", "gamma_rad")
-
-
-@pytest.mark.parametrize(
-    ("changes", "given", "part"),
-    [
-        ({}, {"pose_rad": [1.5, 0.0, 0.0]}, "a pose with alpha from -1.39626 to 1.39626 rad, received 1.5"),
-        ({}, {"pose_rad": [0.0, np.pi / 2, 0.0]}, "a pose with beta from -1.39626 to 1.39626 rad"),  # locked
-        ({}, {"pose_rad": [0.0, 0.0]}, "a pose of three finite angles, received [0.0, 0.0]"),
-        ({}, {"pose_rad": [0.0, np.nan, 0.0]}, "a pose of three finite angles"),
-        ({}, {"pose_rad": "upright"}, "a pose of three finite angles, received 'upright'"),
-        ({}, {"inputs": "voltages"}, "inputs as one of torque, currents, received 'voltages'"),
-        ({}, {"kind": "matlab"}, "kind as one of scipy, control, received 'matlab'"),
-        ({"plant.payload_kg": 60.0}, {"pose_rad": TILTED}, "a pose that the coils hold within 8 A"),
-        ({"plant.group_gain": [0.0] * 18}, {}, "coils that give torque"),
-    ],
-)
-def test_what_has_no_linear_model_is_refused_in_one_line(changes, given, part):
-    with pytest.raises(InputError, match=f"^linear model: expected .*{re.escape(part)}") as caught:
-        linearise(scenario(changes), **given)
-    assert str(caught.value).isprintable()
 
 
 def test_a_model_that_the_lagrangian_does_not_know_is_refused(tmp_path):

@@ -1,11 +1,8 @@
 """Series of the user's: read as spreadsheets write them, held or joined by lines, refused by line."""
 
-import re
-
 import numpy as np
 import pytest
 
-from spheretwin.models.base.errors import InputError
 from spheretwin.models.telemetry.csv_series import read
 
 GOOD = "t_s,a,b\n0,1,-2\n0.5,3,4\n2,5,6e-1\n"
@@ -34,27 +31,3 @@ def test_it_is_read_as_it_is_written(tmp_path, content):
     assert hash(series) == hash(reading(tmp_path, GOOD))
     assert series != reading(tmp_path, GOOD.replace("3", "3.5"))
     assert series != GOOD
-
-
-@pytest.mark.parametrize(
-    ("content", "complaint"),
-    [
-        ("# nothing\n", "received none"),
-        ("t_s;a;b\n0;1;2\n", "received t_s;a;b"),
-        (GOOD + "3,4,5,6\n", "expected 3 numbers in line 5, received 4"),
-        (GOOD + "\n# so\n3,north,5\n", "line 7: expected a number from -100 to 100 as a, received 'north'"),
-        (GOOD + "3,,5\n", "line 5: expected a number from -100 to 100 as a, received ''"),
-        (GOOD + "3,4,-inf\n", "as b, received '-inf'"),
-        ("t_s,a,b\n0,1," + "9" * 200_000 + "\n", "expected values between commas, field larger than"),
-    ],
-)
-def test_an_invalid_series_is_refused_by_line(tmp_path, content, complaint):
-    with pytest.raises(InputError, match=re.escape(complaint)) as refusal:
-        reading(tmp_path, content)
-    assert str(refusal.value).startswith(f"bench {tmp_path / 'some.csv'}: ")
-
-
-@pytest.mark.parametrize("name", ["absent.csv", ".", "a\0b"])
-def test_an_unreadable_file_is_refused(tmp_path, name):
-    with pytest.raises(InputError, match="expected a readable CSV file"):
-        read("bench", tmp_path / name, ("a", "b"), 1.0)

@@ -89,34 +89,6 @@ def test_a_map_is_read_from_toml(tmp_path):
     assert column_map.currents.names(["current_0", "current_1", "current_3"]) == ["current_0", "current_1"]
 
 
-@pytest.mark.parametrize(
-    ("angles", "currents", "said"),
-    [
-        ({"columns": ["a", "b"]}, CURRENTS, "expected columns of three angles, received 2"),
-        ({**ANGLES, "unit": "grad"}, CURRENTS, "received 'grad'; did you mean rad?"),
-        ({**ANGLES, "sign": [1, 0, 1]}, CURRENTS, "received 0"),
-        ({**ANGLES, "sign": [1, 1]}, CURRENTS, "expected sign once or for 3 columns, received 2"),
-        ({**ANGLES, "scale": [0.0]}, CURRENTS, "expected a scale other than 0"),
-        ({**ANGLES, "wrap": [-1.0]}, CURRENTS, "expected a wrap of at least 0"),
-        ({**ANGLES, "factor": [1.0]}, CURRENTS, "factor"),
-        (ANGLES, {"columns": []}, "currents.columns"),
-        (ANGLES, {**CURRENTS, "kind": "voltage"}, "expected"),
-        (ANGLES, {**CURRENTS, "scale": [1.0, 2.0, 3.0]}, "currents.scale once or for 2 columns, received 3"),
-        (
-            {"columns": ["a", "b", "d"]},
-            CURRENTS,
-            "expected a column d of numbers, received t_s, a, b, c, i0, i1",
-        ),
-        (ANGLES, {"columns": ["j*"]}, "expected a column j0"),
-    ],
-)
-def test_what_does_not_fit_is_refused(angles, currents, said):
-    file = dict.fromkeys(["t_s", "a", "b", "c", "i0", "i1"], np.zeros(3))
-    with pytest.raises(InputError) as error:
-        columns.of_fields({"angles": angles, "currents": currents}).log(file, "bad")
-    assert said in str(error.value)
-
-
 def test_a_file_that_is_no_toml_is_refused(tmp_path):
     (tmp_path / "map.toml").write_text("[angles")
     for name in ("map.toml", "other.toml"):

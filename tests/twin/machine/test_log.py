@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from spheretwin.machine import Log
-from spheretwin.models.base.errors import InputError
 
 TIMES = np.arange(5) * 1e-3
 CURRENTS = np.arange(90.0).reshape(5, 18)
@@ -40,20 +39,3 @@ def test_rows_are_a_log_with_the_same_conditions():
         {"plant.payload_kg": 0.1},
         ("gaps",),
     )
-
-
-@pytest.mark.parametrize(
-    ("arguments", "said"),
-    [
-        ((TIMES[:1], CURRENTS[:1], ANGLES[:1]), "expected at least two rows, received t_s of shape (1,)"),
-        ((0.0, CURRENTS, ANGLES), "expected at least two rows, received t_s of shape ()"),
-        ((TIMES, CURRENTS[:4], ANGLES), "received (4, 18) and (5, 3)"),
-        ((TIMES, CURRENTS, ANGLES[:, :2]), "received (5, 18) and (5, 2)"),
-        ((TIMES, CURRENTS, ANGLES, "voltages"), "expected currents commanded or measured"),
-    ],
-)
-def test_what_does_not_fit_is_refused(arguments, said):
-    with pytest.raises(InputError) as error:
-        Log(*arguments, name="bad")
-    assert said in str(error.value)
-    assert str(error.value).startswith("log bad:")

@@ -120,28 +120,3 @@ def test_a_link_is_not_armed_with_a_limit_above_that_of_the_model_file(changes, 
             Link.open("udp://127.0.0.1:9", scenario, armed, limits)
     else:
         Link.open("udp://127.0.0.1:9", scenario, armed, limits).channel.transport.close()
-
-
-@pytest.mark.parametrize(
-    ("option", "words"),
-    [
-        (
-            'integrator="Euler" timestep="0.002"',
-            ["timestep of 0.002 s is not used: plant.step_s is 0.0005", "integrator Euler"],
-        ),
-        ('integrator="RK4" timestep="0.0005"', []),
-        ('integrator="RK4"', []),
-        ('integrator="RK4" timestep="0.0005"><!-- <option timestep="1"> --', []),
-    ],
-)
-def test_step_and_integrator_that_a_model_file_states_are_named_if_they_are_not_used(tmp_path, option, words):
-    text = actuators.MJCF_PATH.read_text().replace('meshdir="assets"', f'meshdir="{actuators.FOLDER}/assets"')
-    (path := tmp_path / "m.xml").write_text(re.sub(r"<option[^>/]*", f"<option {option}", text, count=1))
-    scenario = scenarios.load("hold", {"plant.mjcf": str(path)})
-    lines = [
-        line
-        for line in warnings_of(scenario, initial_config(scenario, None, None).files)
-        if "not used" in line
-    ]
-    assert len(lines) == len(words)
-    assert all(word in line for word, line in zip(words, lines, strict=True))

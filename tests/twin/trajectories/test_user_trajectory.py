@@ -63,35 +63,6 @@ def test_what_it_does_with_its_arrays_later_changes_nothing():
     np.testing.assert_array_equal(t, [1.0, 2.0])
 
 
-def failing(t):
-    raise ZeroDivisionError("division\nby zero")
-
-
-@pytest.mark.parametrize(
-    ("own", "complaint"),
-    [
-        (None, "an object with sample(t), received none"),
-        (Own, "an object with sample(t), received <class"),
-        (Own(1.0), "an object with sample(t)"),
-        (Own(failing), "samples from 0 to 0 s, received ZeroDivisionError: division by zero"),
-        (Own(lambda t: np.zeros((len(t), 3))), "acceleration by axis), received float64 of shape (1, 3)"),
-        (Own(lambda t: np.zeros((3, 3, 3))), "received float64 of shape (3, 3, 3)"),
-        (Own(lambda t: np.zeros((len(t), 3, 3), np.float32)), "received float32 of shape (1, 3, 3)"),
-        (Own(lambda t: [[[0.0] * 3] * 3]), "received list of shape (1, 3, 3)"),
-        (Own(lambda t: [[0.0], [0.0, 1.0]]), "received list of shape none"),
-        (Own(lambda t: np.full((len(t), 3, 3), np.nan)), "finite numbers at 0 s, received [[nan, nan, nan]"),
-        (Own(lambda t: np.full((len(t), 3, 3), np.inf)), "finite numbers at 0 s"),
-    ],
-)
-def test_what_is_none_is_refused_on_one_line(own, complaint):
-    with pytest.raises(InputError) as refusal:
-        checked(own)
-    message = str(refusal.value)
-    assert message.startswith("trajectory: expected ")
-    assert complaint in message
-    assert "\n" not in message
-
-
 def test_later_samples_are_checked_too():
     own = checked(Own(lambda t: np.zeros((1, 3, 3))))
     with pytest.raises(InputError, match=r"float64 of shape \(5, 3, 3\)"):

@@ -143,22 +143,3 @@ def test_an_edit_of_the_file_changes_no_path_that_is_made(tmp_path, file):
     assert Waypoints(file=file) != made
     (tmp_path / "poses.csv").unlink()
     assert made.sample(t).tobytes() == before
-
-
-@pytest.mark.parametrize(
-    ("text", "complaint"),
-    [
-        (f"{HEADER}\n0,0,0,0\n", "at least two poses, received one"),
-        (f"{HEADER}\n0,0,0,0\n1,0,nan,0\n", "line 3: expected a number from -10000 to 10000 as beta_rad"),
-        (f"# bench\n{HEADER}\n\n0,0,0,0\n0,1,0,0\n", "line 5: expected a t_s that rises, received 0 then 0"),
-        ("t_s,alpha,beta,gamma\n0,0,0,0\n1,0,0,0\n", "columns t_s, alpha_rad, beta_rad, gamma_rad"),
-    ],
-)
-def test_bad_files_are_refused_on_one_line(tmp_path, text, complaint):
-    path = tmp_path / "bad.csv"
-    path.write_text(text)
-    with pytest.raises(InputError) as refusal:
-        Waypoints(file=str(path))
-    assert complaint in str(refusal.value)
-    assert str(refusal.value).startswith(f"waypoints {path}: ")
-    assert "\n" not in str(refusal.value)

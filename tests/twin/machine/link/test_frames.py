@@ -108,29 +108,6 @@ def test_hostile_lines_are_counted(line):
     assert (decoder.counts.accepted, decoder.counts.corrupt) == (1, 1)
 
 
-@pytest.mark.parametrize(
-    ("lines", "message"),
-    [
-        ('field = [{name = "angel"}]', "measurement.field.0.name: expected"),
-        ('field = [{name = "angle", unit = "turn"}]',
-         "expected the unit of angle as one of rad, mrad, deg, received turn"),
-        ('field = [{name = "angle"}, {name = "angle"}]', "expected each field once, received angle twice"),
-        ('field = [{name = "sequence", type = "float32"}]', "expected sequence as an integer"),
-        ('field = [{name = "time"}]', "expected a measurement with the field angle"),
-        ('field = [{name = "angle", scale = 0.0}]', "expected another scale of angle than 0"),
-        ('start = [300]\nfield = [{name = "angle"}]', "received 300"),
-        ('encoding = "json"\nend = [10]\nfield = [{name = "angle"}]', "expected JSON without start and end"),
-        ('checksum = "md5"\nfield = [{name = "angle"}]', "expected 'none' or 'crc16', received 'md5'"),
-    ],
-)  # fmt: skip
-def test_a_wrong_description_is_refused_by_its_field(lines, message, tmp_path):
-    (path := tmp_path / "mine.toml").write_text(f"[measurement]\n{lines}\n")
-    with pytest.raises(InputError) as error:
-        frame_format.load(str(path))
-    assert message in str(error.value)
-    assert "mine.toml" in str(error.value)
-
-
 def test_an_unknown_description_is_refused_with_the_valid_names():
     with pytest.raises(InputError, match=r"spheretwin_json.*did you mean spheretwin\?"):
         frame_format.load("spheretwim")
