@@ -6,6 +6,9 @@ alone: an edited callee in another file would still give the old result.
 
 Each entry begins with a digest of its content: a truncated or damaged entry is computed again. Without a
 writable folder nothing is cached.
+
+An entry may be a pickle, which runs code when it is read. Folders are therefore created for their owner
+alone, and a folder or an entry that another account can change is not used.
 """
 
 import hashlib
@@ -13,39 +16,68 @@ import importlib.metadata
 import importlib.util
 import io
 import os
+import stat
 import sys
 import tempfile
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from functools import cache
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from spheretwin.models.base.errors import SpheretwinError
-from spheretwin.models.base.files import whole_file
+from spheretwin.models.base.errors import HIDDEN, one_line
 
 WITHOUT_COMPILED_CODE = ("analysis", "bench", "cli", "machine", "study", "viz")
 """Folders of the package whose sources no compiled function depends on."""
 
 
-def cache_folder() -> Path | None:
-    """Return the folder for these sources and versions; None if there is no writable one.
+class CacheFolder(NamedTuple):
+    """Folder of the cache."""
 
-    `SPHERETWIN_CACHE_DIR` moves it elsewhere.
+    path: Path | None
+    """None if there is no usable one."""
+    refusal: str = ""
+    """Reason for which the folder of the user is not used; empty if there is none."""
+
+
+def cache_folder() -> Path | None:
+    """Return the folder for these sources and versions; None if there is no usable one.
+
+    `SPHERETWIN_CACHE_DIR` moves it elsewhere. The first call of a process reports a refused folder on stderr.
     """
-    root = _root()
-    return root and root / sources_digest()
+    return checked_folder().path
+
+
+@cache
+def checked_folder() -> CacheFolder:
+    """Return the folder for these sources and versions, or the reason for which there is none."""
+    for root in _candidates():
+        try:
+            folder = (root / sources_digest()).resolve()
+            if refusal := _made_or_refused(folder):
+                refusal = (
+                    f"cache: expected a folder that no other account can change, received {root}: {refusal}"
+                )
+                print(f"spheretwin: {one_line(refusal)}; nothing is cached on disk", file=sys.stderr)
+                return CacheFolder(None, refusal)
+            with tempfile.TemporaryFile(dir=folder):
+                return CacheFolder(folder)
+        except (OSError, RuntimeError):  # the latter: a link in a circle, until Python 3.13
+            continue
+    return CacheFolder(None)
 
 
 def load_entry(name: str) -> bytes | None:
-    """Return the content of an entry; None if there is none, or if it is damaged."""
+    """Return the content of an entry; None if there is none, if it is damaged, or if others can change it."""
     folder = cache_folder()
     if folder is None:
         return None
     try:
-        entry = (folder / name).read_bytes()
+        with (folder / name).open("rb") as file:
+            entry = b"" if _danger(os.fstat(file.fileno())) else file.read()
     except OSError:
         return None
     digest, content = entry[:_DIGEST_BYTES], entry[_DIGEST_BYTES:]
@@ -53,12 +85,17 @@ def load_entry(name: str) -> bytes | None:
 
 
 def store_entry(name: str, content: bytes) -> None:
-    """Store the content of an entry; a folder that cannot be written is ignored."""
-    if folder := cache_folder():
-        with suppress(OSError, SpheretwinError):
-            folder.mkdir(parents=True, exist_ok=True)
-            with whole_file(folder / name) as temporary:
-                temporary.write_bytes(hashlib.sha256(content).digest() + content)
+    """Store the content of an entry, for this account alone; a folder that cannot be written is ignored."""
+    with suppress(OSError):
+        # The folder is made again: someone may have cleared the cache meanwhile.
+        if (folder := cache_folder()) and not _made_or_refused(folder):
+            descriptor, temporary = tempfile.mkstemp(dir=folder, prefix=f".{name[:100]}.", suffix=HIDDEN)
+            try:
+                with open(descriptor, "wb") as file:
+                    file.write(hashlib.sha256(content).digest() + content)
+                os.replace(temporary, folder / name)
+            finally:
+                Path(temporary).unlink(missing_ok=True)
 
 
 def cached_array(key: bytes, compute: Callable[[], NDArray[np.float64]]) -> NDArray[np.float64]:
@@ -84,16 +121,35 @@ def cached_array(key: bytes, compute: Callable[[], NDArray[np.float64]]) -> NDAr
 _DIGEST_BYTES = hashlib.sha256().digest_size
 
 
-@cache
-def _root() -> Path | None:
-    for folder in _candidates():
-        try:
-            folder.mkdir(parents=True, exist_ok=True)
-            with tempfile.TemporaryFile(dir=folder):
-                return folder
-        except OSError:
-            continue
-    return None
+def _made_or_refused(folder: Path) -> str:
+    """Create a folder and its parents; return a reason, if another account can change one of them."""
+    for path in (*reversed(folder.parents), folder):
+        with suppress(FileExistsError):
+            if not path.exists():
+                path.mkdir(mode=0o700)
+        if danger := _danger(path.stat(), may_be_sticky=path != folder):
+            return f"{path} {danger}"
+    return ""
+
+
+def _danger(status: os.stat_result, may_be_sticky: bool = False) -> str:
+    """Return in which way another account than root can change a file or a folder, as ssh checks its keys.
+
+    Parameters
+    ----------
+    status : os.stat_result
+    may_be_sticky : bool
+        Accept a folder of all accounts in which each one can rename its own entries only, such as /tmp.
+    """
+    if not hasattr(os, "geteuid"):  # Windows, where the rights of a folder are not in its mode
+        return ""
+    if status.st_uid not in (0, os.geteuid()):
+        return f"belongs to another account (number {status.st_uid})"
+    if status.st_mode & (stat.S_IWGRP | stat.S_IWOTH) and not (
+        may_be_sticky and status.st_mode & stat.S_ISVTX
+    ):
+        return f"can be written by {'everyone' if status.st_mode & stat.S_IWOTH else 'its group'}"
+    return ""
 
 
 def _candidates() -> Iterator[Path]:

@@ -87,10 +87,10 @@ def versions() -> Iterator[Finding]:
 
 def compile_cache() -> Finding:
     """Return folder, entries and size of the compiled code for these sources."""
-    folder = cache.cache_folder()
+    folder, refusal = cache.checked_folder()
     if folder is None:
-        advice = "set SPHERETWIN_CACHE_DIR to a writable folder; else every process compiles again"
-        return Finding("compile cache", "no writable folder", ok=True, advice=advice)
+        advice = "set SPHERETWIN_CACHE_DIR to a folder of your own; else every process compiles again"
+        return Finding("compile cache", refusal or "no writable folder", ok=True, advice=advice)
     sizes = [entry.stat().st_size for entry in folder.iterdir()] if folder.is_dir() else []
     if not sizes:
         return Finding(

@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-import pickle
 import shlex
-import time
 import zlib
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import closing
@@ -20,11 +18,11 @@ from numpy.typing import NDArray
 from spheretwin import scenario as scenarios
 from spheretwin.models import mjcf
 from spheretwin.models.actuator import MJCF_PATH, TORQUE_CURVE_PATH
-from spheretwin.models.base.cache import load_entry, store_entry
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.telemetry.run_record import versions
 from spheretwin.models.telemetry.status import Status
 from spheretwin.paper.experiment import Case, Experiment, Outcome, Outcomes
+from spheretwin.paper.outcome_cache import OutcomeCache
 from spheretwin.provenance import digest
 from spheretwin.run import Run, figures_of
 from spheretwin.scenario.changes import complete_fields
@@ -45,9 +43,6 @@ PLANT = "plant.engine"
 
 EVERY = 100
 """In addition to the first run of each law, one run in this many runs on MuJoCo too."""
-
-SAVE_INTERVAL_s = 30.0
-"""Time whose results a killed process loses at most."""
 
 
 class Job(NamedTuple):
@@ -194,44 +189,6 @@ def key_of(scenario: Scenario) -> str:
 def _shipped() -> tuple[str | None, ...]:
     """Digests of the shipped model and torque curve."""
     return mjcf.contents_digest(MJCF_PATH), digest("plant.torque_curve", str(TORQUE_CURVE_PATH))
-
-
-class OutcomeCache:
-    """Outcomes of earlier runs of an experiment; only one thread adds.
-
-    Parameters
-    ----------
-    plan : Plan
-    summaries : mapping
-        `summarise` of the plan.
-    """
-
-    def __init__(self, plan: Plan, summaries: Mapping[str, CaseSummary]) -> None:
-        self._summaries, self._entry = summaries, f"reproduce_{plan.experiment.name}.pickle"
-        content = load_entry(self._entry)
-        # The folder is trusted: it contains machine code too.
-        self._outcomes: dict[str, Outcome] = pickle.loads(content) if content else {}
-        self._saved_s, self._changed = time.monotonic(), False
-
-    def find(self, job: Job) -> Outcome | None:
-        """Outcome of an earlier run; None if there is none."""
-        return self._outcomes.get(self._key(job))
-
-    def add(self, job: Job, outcome: Outcome) -> None:
-        """Add an outcome; save all of them at intervals."""
-        self._outcomes[self._key(job)] = outcome
-        self._changed = True
-        if time.monotonic() - self._saved_s > SAVE_INTERVAL_s:
-            self.save()
-
-    def save(self) -> None:
-        """Save new outcomes if the cache can be written."""
-        if self._changed:
-            store_entry(self._entry, pickle.dumps(self._outcomes))
-            self._saved_s, self._changed = time.monotonic(), False
-
-    def _key(self, job: Job) -> str:
-        return f"{self._summaries[job.case.name].key} {job.plant} {job.seed}"
 
 
 class PlanResult(NamedTuple):

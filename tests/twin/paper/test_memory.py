@@ -5,18 +5,27 @@ from unittest.mock import Mock
 import numpy as np
 import pytest
 
-from spheretwin.paper import runner
+from spheretwin.control.supervision.watchdog import Reason
+from spheretwin.models.telemetry.status import Status
+from spheretwin.paper import fault_outcomes, nutation, outcome_cache, runner, stability, step_size, tilt
+from spheretwin.paper.experiment import Outcome
+from spheretwin.paper.outcome_cache import OutcomeCache
 from spheretwin.paper.page import rows
-from spheretwin.paper.runner import OutcomeCache, key_of, make_plan, run_plan, scenario_of, summarise
+from spheretwin.paper.runner import key_of, make_plan, run_plan, scenario_of, summarise
 from tests.twin.paper.cases import IDEAL, NOISY, SHORT, experiment
 
 
 @pytest.fixture
-def ran(monkeypatch):
+def entries():
+    return {}
+
+
+@pytest.fixture
+def ran(monkeypatch, entries):
     """Scenarios that were really run, with a cache of their own, in memory."""
-    real, results, entries = runner.run_session, [], {}
-    monkeypatch.setattr(runner, "load_entry", entries.get)
-    monkeypatch.setattr(runner, "store_entry", entries.__setitem__)
+    real, results = runner.run_session, []
+    monkeypatch.setattr(outcome_cache, "load_entry", entries.get)
+    monkeypatch.setattr(outcome_cache, "store_entry", entries.__setitem__)
 
     def run_session(session):
         results.append(session.initial_scenario)
@@ -26,12 +35,16 @@ def ran(monkeypatch):
     return results
 
 
+def errors(run) -> nutation.Array:
+    return run.telemetry["error_rad"].copy()
+
+
 def run_cached(plan, **options):
     return run_plan(plan, cache=OutcomeCache(plan, summarise(plan)), **options)
 
 
 def test_rows_that_were_run_are_not_run_again_and_are_the_same(ran):
-    made = experiment(NOISY, IDEAL, reduce=lambda run: run.telemetry["error_rad"].copy())
+    made = experiment(NOISY, IDEAL, reduce=errors)
     plan = make_plan(made, seeds=3)
     first = run_cached(plan)
     assert len(ran) == 4
@@ -42,6 +55,50 @@ def test_rows_that_were_run_are_not_run_again_and_are_the_same(ran):
         np.testing.assert_array_equal(*([run.data for run in runs[name]] for runs in (first, again)))
     run_cached(make_plan(made, seeds=5))
     assert sorted(scenario.seed for scenario in ran[4:]) == [3, 4]  # threads begin in any order
+
+
+SPAN = stability.Span(1e-3, 0.1, 2 / 3, float("nan"))
+FAULT = fault_outcomes.FaultData(
+    0.0, 1e-300, 0.1 + 0.2, 1.0, True, Reason.CURRENT, float("nan"), False, True,
+    fault_outcomes.RemainingTorque(1.0, 0.5, 0.25, 1 / 3, 3), (None, 0.02), (5, 0), 0,
+)  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("reduce", "data"),
+    [
+        (fault_outcomes.reduce, FAULT),
+        (fault_outcomes.reduce, FAULT._replace(remaining=None, latencies_s=(), driven_ticks=())),
+        (stability.reduce, stability.StabilityMeasures(0.5, SPAN, None, (1.0, 2.0), None)),
+        (
+            stability.reduce,
+            stability.StabilityMeasures(None, None, None, None, None, np.array([1 + 2j, -0.0 + 1j / 3])),
+        ),
+        (nutation.reduce, nutation.NutationData(np.zeros((0, 3)), None)),
+        (
+            nutation.reduce,
+            nutation.NutationData(
+                np.array([[0.1, np.nan, np.inf]]),
+                nutation.Trajectory(np.arange(2.0), np.eye(3)[:2], np.ones((2, 3)) / 3, np.zeros(2)),
+            ),
+        ),
+        (step_size.reduce, step_size.Trace(np.ones((2, 3)), 1.0)),
+        (tilt.reduce, np.ones((4, 2)) / 7),
+    ],
+)
+def test_an_outcome_is_the_same_from_the_cache_and_its_file_is_plain_text(ran, entries, reduce, data):
+    plan = make_plan(experiment(IDEAL, reduce=reduce), seeds=1)
+    outcome = Outcome(
+        Status.LEFT_WORKSPACE, {"rms_error_rad": [1 / 3] * 3}, np.array([0.1, np.nan, 1.0]), data
+    )
+    written = OutcomeCache(plan, summarise(plan))
+    written.add(plan.jobs[0], outcome)
+    written.save()
+    (content,) = entries.values()
+    assert content.decode("ascii").count("\n") == 1
+    again = OutcomeCache(plan, summarise(plan)).find(plan.jobs[0])
+    assert repr(again) == repr(outcome)  # also the types, and each digit
+    assert again.status is outcome.status
 
 
 def test_what_was_run_before_an_interruption_is_kept(ran):
