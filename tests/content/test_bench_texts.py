@@ -1,6 +1,7 @@
 """Content of the bench: its status after each command, its journal, settings and history, and its clients."""
 
 import dataclasses
+import math
 
 from spheretwin import scenario as scenarios
 from spheretwin.bench.commands import COMMANDS
@@ -60,8 +61,30 @@ SCRIPT = [
     ("trajectory", {"fields": {"shape": "hold", "approach": {"x": 1}}}, 0), ("grant", {"to": "nobody"}, 0),
     ("keep", {}, 0), ("record", {"telemetry": "FOLDER/r.parquet"}, 15), ("keep", {}, 5),
     ("save", {"file": "FOLDER/saved.toml"}, 0), ("replay", {"file": "FOLDER/r.parquet"}, 5), ("hold", {}, 5),
+]  # fmt: skip
+
+END = [
     ("set", {"name": "disturbance.load", "value": 1000.0}, 1500), ("hold", {}, 3),
     ("snapshot", {"name": "t"}, 0), ("reset", {}, 0),
+]  # fmt: skip
+
+REFUSED = [
+    ("step", {}), ("steer", {}), ("stpo", {}), (3, {}), ("speed", {"factor": 0.01}), ("speed", {}),
+    ("speed", {"factor": 1.0, "colour": "red"}), ("speed", {"factor": "2"}), ("off", {"now": True}),
+    ("off", {"now": {1}}), ("point", {"pose_rad": [0, 1]}), ("point", {"pose_rad": [0.0, 1.39, 0.0]}),
+    ("jog", {"rates_rad_s": [math.inf, 0, 0]}), ("manual", {"group": 18}), ("manual", {}),
+    ("manual", {"currents_A": [1.0] * 17}), ("set", {"name": "disturbance.load", "value": math.nan}),
+    ("set", {"name": "trajectory.approach.start_s", "value": 1.0}), ("clear_faults", {"place": 0}),
+    ("record", {}), ("record", {"telemetry": "/no/such/run.parquet"}), ("save", {"file": "/no/such/s.toml"}),
+    ("replay", {"file": "/no/such/run.parquet"}), ("load", {"source": "nowhere"}),
+    *(("set", {"name": name, "value": value}) for name, value in (
+        ("controller.law", "magic"), ("plant.payload_kg", -1.0), ("nothing", 1.0),
+        ("fault", [{"target": "coil.99", "mode": "open"}]), ("trajectory.shape", "spiral"),
+    )),
+    *(("capture", given) for given in (
+        {"on": "level", "signal": "eror_rad"}, {"on": "level", "signal": "error_rad", "entry": 3},
+        {"on": "fault", "before_s": 2.0, "length_s": 2.0}, {"on": "fault", "length_s": 1e3},
+    )),
 ]  # fmt: skip
 
 
@@ -70,7 +93,7 @@ def a_script_of_commands():
     folder, lines = scratch("bench"), []
     with bench(plant__end_stops__on=False) as made:
         before = {}
-        for name, arguments, ticks in SCRIPT:
+        for name, arguments, ticks in [*SCRIPT, *((*each, 0) for each in REFUSED), *END]:
             given = {
                 key: value.replace("FOLDER", str(folder)) if isinstance(value, str) else value
                 for key, value in arguments.items()

@@ -1,6 +1,5 @@
 """Commands of a bench: their effects, their refusals, and that no command ends the bench."""
 
-import math
 import re
 import threading
 
@@ -12,8 +11,7 @@ from spheretwin import scenario as scenarios
 from spheretwin.bench import Bench
 from spheretwin.bench.command_queue import MOST_WAITING, Queue, QueuedCommand
 from spheretwin.bench.commands import COMMANDS
-from spheretwin.models.base.errors import InputError, SpheretwinError
-from spheretwin.session import Session
+from spheretwin.models.base.errors import SpheretwinError
 from tests.twin.bench.cases import MODES, begun, done, paused, said
 
 
@@ -21,65 +19,6 @@ from tests.twin.bench.cases import MODES, begun, done, paused, said
 def common():
     with begun() as made:
         yield made
-
-
-@pytest.mark.parametrize(
-    ("name", "value"),
-    [
-        ("controller.law", "magic"),
-        ("plant.payload_kg", -1.0),
-        ("nothing", 1.0),
-        ("fault", [{"target": "coil.99", "mode": "open"}]),
-        ("trajectory.shape", "spiral"),
-    ],
-)
-def test_a_value_is_refused_in_the_words_of_the_command_line(common, name, value):
-    with pytest.raises(InputError) as refusal:
-        Session(scenarios.load("sinusoid", {name: value}))
-    before = common.state()
-    assert said(common, "set", name=name, value=value) == str(refusal.value)
-    assert (common.state().journal, common.state().pending) == (before.journal, before.pending)
-    assert common.state().refused == str(refusal.value)
-
-
-@pytest.mark.parametrize(
-    ("name", "arguments", "message"),
-    [
-        ("step", {}, "while paused"),
-        ("steer", {}, "bench: expected one of start, "),
-        ("stpo", {}, "did you mean stop?"),
-        (3, {}, "received 3"),
-        ("speed", {"factor": 0.01}, "bench: speed: factor: expected"),
-        ("speed", {}, "factor: expected a value, received none"),
-        ("speed", {"factor": 1.0, "colour": "red"}, "bench: speed: expected factor, received colour"),
-        ("speed", {"factor": "2"}, "bench: speed: factor: expected a number, received '2'"),
-        ("off", {"now": True}, "expected no arguments, received now"),
-        ("off", {"now": {1, 2}}, "received now"),
-        ("point", {"pose_rad": [0, 1]}, "pose_rad"),
-        ("point", {"pose_rad": [0.0, 1.39, 0.0]}, "expected β from -1.34626 to 1.34626 rad, received 1.39"),
-        ("jog", {"rates_rad_s": [math.inf, 0, 0]}, "rates_rad_s"),
-        ("manual", {"group": 18}, "expected a group from 0 to 17"),
-        ("manual", {}, "either currents_A or group"),
-        ("manual", {"currents_A": [1.0] * 17}, "manual.currents_A for 18 groups, received 17"),
-        ("set", {"name": "disturbance.load", "value": math.nan}, "load: expected a finite number"),
-        ("set", {"name": "trajectory.approach.start_s", "value": 1.0}, "expected a mode instead"),
-        ("clear_faults", {"place": 0}, "expected the place of a fault below 0"),
-        ("record", {}, "expected a file to record into"),
-        ("record", {"telemetry": "/no/such/folder/run.parquet"}, "expected a writable path"),
-        ("replay", {"file": "/no/such/run.parquet"}, "/no/such/run.parquet"),
-        ("load", {"source": "nowhere"}, "expected bench, hold, nutation"),
-        ("save", {"file": "/no/such/folder/s.toml"}, "expected a writable path"),
-    ],
-)
-def test_a_command_that_cannot_be_done_is_refused_in_one_line(common, name, arguments, message):
-    before = common.state()
-    ticket = common.command(name, **arguments)
-    common.advance(0)
-    assert message in ticket.refused
-    assert "\n" not in ticket.refused
-    after = common.state()
-    assert (after.mode, after.journal, after.tick) == (before.mode, before.journal, before.tick)
-    assert after.refused == ticket.refused
 
 
 @pytest.mark.parametrize("command", COMMANDS.values(), ids=COMMANDS)

@@ -7,7 +7,6 @@ import pytest
 
 from spheretwin.bench import modes
 from spheretwin.bench.modes import Limits
-from spheretwin.trajectories.shapes import Hold
 from tests.twin.bench.cases import MODES, begun, done, kept_rows
 
 BY_HAND = ("off", "manual")
@@ -98,19 +97,3 @@ def test_a_changed_field_of_the_trajectory_keeps_its_phase(made):
     made.advance(2000)
     t = made.state().t_s
     np.testing.assert_allclose(made.state().q_ref_rad, 0.1 * np.sin(np.pi * t), atol=1e-12)
-
-
-def test_the_time_that_a_way_takes_keeps_rates_and_accelerations():
-    difference = np.zeros((3, 3))
-    difference[0] = [1.0, -0.5, 0.2]
-    limits = Limits(0.7, 3.0)
-    lasts_s = modes.approach_duration_s(difference, limits)
-    # Minimum jerk: 15/8 of the mean rate, 10/√3 of the distance over the time squared.
-    least_s = max(15 / 8 / 0.7, np.sqrt(10 / np.sqrt(3) / 3))
-    assert least_s * (1 - 1e-3) < lasts_s < 1.05 * least_s  # to the 33 places looked at, and steps of 4 %
-    way = modes.approach_fields(Hold(), difference, 0.0, 0.0, limits, np.array([[-2.0, 2.0]] * 3))
-    assert way["lasts_s"] == lasts_s
-    # Where it would leave the range, it is made shorter.
-    difference[1] = [4.0, 0.0, 0.0]
-    tight = modes.approach_fields(Hold(), difference, 0.0, 0.0, limits, np.array([[-1.1, 1.1]] * 3))
-    assert tight["lasts_s"] < modes.approach_duration_s(difference, limits)

@@ -4,7 +4,7 @@ import pytest
 
 from spheretwin import scenario as scenarios
 from spheretwin.bench import Bench
-from spheretwin.bench.operators import GONE_s, Operators, SILENCE_s
+from spheretwin.bench.operators import GONE_s, Operators
 from tests.twin.bench.cases import FREE, done
 
 
@@ -97,20 +97,3 @@ def test_the_twin_holds_some_time_after_its_operator_has_left_unless_somebody_ta
         clock.now += 0.5 * GONE_s
         say(shared, "beat", "c")
     assert (shared.state().operator, shared.state().mode) == ("c", "jog")
-
-
-@pytest.mark.parametrize(
-    ("present", "gone", "left"),
-    [("c", True, (None, ("c",), ())), ("a", False, ("a", (), ()))],
-)
-def test_a_silent_client_neither_becomes_the_operator_nor_is_waited_for(clock, present, gone, left):
-    operators = Operators(clock=clock)
-    for client in ("a", "b", *present):
-        operators.register(client)
-    operators.ask("b")
-    clock.now = 0.9 * SILENCE_s
-    operators.register(present)
-    assert not operators.check_silence()
-    clock.now = 1.1 * SILENCE_s
-    assert operators.check_silence() == gone
-    assert (operators.operator, operators.watching, operators.asking) == left

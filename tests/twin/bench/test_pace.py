@@ -3,9 +3,7 @@
 import numpy as np
 import pytest
 
-from spheretwin.bench.pace import MOST_TICKS, CHUNK_s, LATE_s, Pace
 from tests.twin.bench.cases import MODES, begun, done, kept_rows, paused, said
-from tests.twin.bench.test_operators import Clock
 
 
 @pytest.mark.parametrize("mode", MODES)
@@ -69,46 +67,3 @@ def test_stop_wakes_the_thread():
                 assert made.command("limits").wait(None) == "done"
             assert made.state().running == running
             assert not any(made.state().current_command_A)
-
-
-@pytest.fixture
-def clock():
-    return Clock()
-
-
-def run(pace, clock, chunks, took_s=0.001, period_s=1e-3):
-    """Chunks one after the other; returns the times at which they began, and simulated time."""
-    begins, t_s = [], 0.0
-    for _ in range(chunks):
-        clock.now += pace.wait_s()
-        begins.append(clock.now)
-        ticks = pace.ticks(period_s)
-        t_s += ticks * period_s
-        clock.now += took_s
-        pace.record_chunk(ticks, period_s, t_s, took_s)
-    return begins, t_s
-
-
-def test_late_chunks_are_counted_and_made_up_within_a_bound(clock):
-    pace = Pace(clock)
-    run(pace, clock, 11)
-    clock.now += 2.5 * CHUNK_s
-    begins, _ = run(pace, clock, 4)
-    assert pace.missed == 1
-    # Back on the old beat.
-    assert begins[-1] == pytest.approx(14 * CHUNK_s, abs=1e-9)
-    clock.now += 60.0
-    begins, _ = run(pace, clock, 50)
-    made_up_for = int(np.sum(np.diff(begins) < CHUNK_s / 2))
-    assert 0 < made_up_for <= LATE_s / CHUNK_s + 1
-    assert begins[made_up_for + 1] - begins[0] < 0.15  # 0.1 s and a chunk are made up
-
-
-def test_as_fast_as_possible_waits_for_nothing_and_has_no_deadlines(clock):
-    pace = Pace(clock)
-    pace.speed = 1e6
-    _, t_s = run(pace, clock, 100, took_s=1e-4)
-    assert pace.ticks(1e-3) == MOST_TICKS
-    assert pace.chunks == 0
-    assert clock.now == pytest.approx(0.01)
-    assert pace.realtime_factor() == pytest.approx(t_s / 0.01, rel=0.05)
