@@ -38,6 +38,7 @@ from spheretwin.control.estimators.estimator import (
     EstimatorParameters,
     Sampling,
     bandwidth_field,
+    jumped,
     named,
     usable,
 )
@@ -77,5 +78,9 @@ def step(angle: Array, parameters: Array, state: Array, rate: Array) -> None:
         if state[STARTED + axis] == 0.0:
             state[STARTED + axis], state[ANGLE + axis], state[RATE + axis] = 1.0, measured, 0.0
         change = measured - state[ANGLE + axis]
-        rate[axis] = parameters[DECAY + axis] * state[RATE + axis] + parameters[GAIN + axis] * change
+        decay, gain = parameters[DECAY + axis], parameters[GAIN + axis]
+        if jumped(change, (1.0 - decay) / gain):
+            rate[axis] = state[RATE + axis]
+        else:
+            rate[axis] = decay * state[RATE + axis] + gain * change
         state[ANGLE + axis], state[RATE + axis] = measured, rate[axis]

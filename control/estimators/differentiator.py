@@ -66,6 +66,7 @@ from spheretwin.control.estimators.estimator import (
     EstimatorParameters,
     Sampling,
     bandwidth_field,
+    jumped,
     named,
     usable,
     within_range,
@@ -78,7 +79,7 @@ Array = NDArray[np.float64]
 OUTER, MIDDLE, INNER = 2.0, 2.12, 1.1  # Levant's coefficients, from z0 to z2
 END_SLOPE = 1.5  # weight of the innermost term in z1: slope of a parabola at its end
 PERIOD, FILTERS, JERK = 0, 1, 2  # layout of the parameters
-STARTED, ANGLE, RATE, ACCELERATION = 0, 3, 6, 9  # layout of the memory
+STARTED, ANGLE, RATE, ACCELERATION, LAST = 0, 3, 6, 9, 12  # layout of the memory
 
 UNKNOWN_NOISE_rad = math.radians(0.02)  # the prototype's potentiometers, if no noise is given
 LEAST_JERK_rad_s3, LARGEST_JERK_rad_s3 = 1e-30, 1e30  # beyond these its products with periods underflow
@@ -118,7 +119,7 @@ class Differentiator(EstimatorParameters):
             That jerk is too small or too large to compute with.
         """
         numbers = [sampling.period_s, float(self.filters_angle), *self.jerk(sampling)]
-        return Estimator(self.kind, step, np.array(numbers), np.zeros(12))
+        return Estimator(self.kind, step, np.array(numbers), np.zeros(15))
 
     def derived(self, sampling: Sampling) -> Derived:
         """Return the approximate noise gain if noise dominates the error, and no lag."""
@@ -164,8 +165,12 @@ def step(angle: Array, parameters: Array, state: Array, rate: Array) -> None:
             state[STARTED + axis], rate[axis] = 0.0, np.nan
             continue
         if state[STARTED + axis] == 0.0:
-            state[STARTED + axis], state[ANGLE + axis] = 1.0, measured
+            state[STARTED + axis], state[ANGLE + axis], state[LAST + axis] = 1.0, measured, measured
             state[RATE + axis] = state[ACCELERATION + axis] = 0.0
+        change, state[LAST + axis] = measured - state[LAST + axis], measured
+        if jumped(change, T):
+            state[ANGLE + axis], state[ACCELERATION + axis], rate[axis] = measured, 0.0, state[RATE + axis]
+            continue
         unit = parameters[JERK + axis] * T  # of acceleration; times T of rate, times T² of angle
         predicted_rate = state[RATE + axis] + T * state[ACCELERATION + axis]
         ahead = state[ANGLE + axis] + 0.5 * T * (state[RATE + axis] + predicted_rate) - measured

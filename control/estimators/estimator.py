@@ -42,6 +42,10 @@ SIGNATURE = types.void(_vector, _vector, _vector, _vector)
 LARGEST_ANGLE_rad = 1e100
 """Limit to which an angle is clipped: differences of larger ones would overflow."""
 
+LEAST_JUMP_rad, FASTEST_ROTOR_rad_s = 0.2, 200.0
+"""Between two samples no rotor turns further than both. A single wrong sample would otherwise give a rate
+of thousands of rad/s."""
+
 SLOWEST_rad_s, FASTEST_rad_s = 1e-3, 1e6  # a bandwidth beyond these is a mistake
 
 Bandwidth = Annotated[float, Field(ge=SLOWEST_rad_s, le=FASTEST_rad_s)]
@@ -58,7 +62,8 @@ class Estimator(NamedTuple):
     step: Callable[..., Any]
     """``step(angle, parameters, state, rate)``, called once a control tick with the measured angles, writes
     the estimated rates, rad/s. The first call starts at the first angle, with rate 0. An angle that is not
-    finite gives a rate of NaN on that axis only, which then starts again."""
+    finite gives a rate of NaN on that axis only, which then starts again; one that `jumped`
+    leaves the rate as it was."""
     parameters: NDArray[np.float64]
     """(n,) passed to every call."""
     state: NDArray[np.float64]
@@ -136,6 +141,12 @@ def usable(angle: float) -> float:
     if not abs(angle) < np.inf:
         return np.nan
     return min(max(angle, -LARGEST_ANGLE_rad), LARGEST_ANGLE_rad)
+
+
+@allocation_free
+def jumped(change: float, period_s: float) -> bool:
+    """Return True if an angle changed further in a period than a rotor turns."""
+    return abs(change) > max(LEAST_JUMP_rad, FASTEST_ROTOR_rad_s * period_s)
 
 
 def estimates(estimator: Estimator, angle_rad: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -53,6 +53,7 @@ from spheretwin.control.estimators.estimator import (
     Sampling,
     SLOWEST_rad_s,
     bandwidth_field,
+    jumped,
     named,
     usable,
     within_range,
@@ -62,7 +63,7 @@ from spheretwin.control.law import NonNegativeEach, each
 Array = NDArray[np.float64]
 
 OF_ANGLE, OF_RATE, PERIOD, FILTERS = 0, 3, 6, 7  # layout of the parameters: alpha, beta / T
-STARTED, ANGLE, RATE = 0, 3, 6  # layout of the memory
+STARTED, ANGLE, RATE, LAST = 0, 3, 6, 9  # layout of the memory
 
 
 class Kalman(EstimatorParameters):
@@ -92,7 +93,7 @@ class Kalman(EstimatorParameters):
         share = self._bandwidth(sampling) * sampling.period_s
         of_angle, of_rate = _cached_gains(*share.tolist())
         numbers = [*of_angle, *(of_rate / sampling.period_s), sampling.period_s, float(self.filters_angle)]
-        return Estimator(self.kind, step, np.array(numbers), np.zeros(9))
+        return Estimator(self.kind, step, np.array(numbers), np.zeros(12))
 
     def derived(self, sampling: Sampling) -> Derived:
         """Return noise gain and lag, exact."""
@@ -158,6 +159,11 @@ def step(angle: Array, parameters: Array, state: Array, rate: Array) -> None:
             continue
         if state[STARTED + axis] == 0.0:
             state[STARTED + axis], state[ANGLE + axis], state[RATE + axis] = 1.0, measured, 0.0
+            state[LAST + axis] = measured
+        change, state[LAST + axis] = measured - state[LAST + axis], measured
+        if jumped(change, period):
+            state[ANGLE + axis], rate[axis] = measured, state[RATE + axis]
+            continue
         predicted = state[ANGLE + axis] + period * state[RATE + axis]
         innovation = measured - predicted
         state[ANGLE + axis] = predicted + parameters[OF_ANGLE + axis] * innovation

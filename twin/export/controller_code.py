@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from spheretwin import assembly
 from spheretwin import scenario as scenarios
@@ -20,7 +21,6 @@ from spheretwin.control.laws import afsm, afsm_eso, pd
 from spheretwin.export.c_text import constant, definitions, header, source
 from spheretwin.export.plant_code import NUMBERS, magnetic_tables
 from spheretwin.models.base.errors import InputError
-from spheretwin.models.telemetry.signals import width
 from spheretwin.scenario.sections import ResolvedScenario
 from spheretwin.shared_buffers import shared_buffers, supervision_of
 
@@ -46,6 +46,14 @@ _ALLOCATIONS = {
     "least_norm": ("st_allocation_least_norm.h", "st_least_norm.h"),
     "bounded": ("st_allocation_bounded.h", "st_least_norm.h", "st_simplex.h"),
 }
+
+
+MARGIN_rad = 0.1
+"""Distance beyond the range of a hinge at which an angle is still accepted: errors of the sensors."""
+LARGEST_ANGLE_rad = 1e5
+"""Bound of an angle whose hinge has no end; a float still resolves 0.01 rad there."""
+LARGEST_ERROR_rad = 2 * np.pi
+LARGEST_ACCELERATION_rad_s2 = 1e4
 
 
 class ControllerCode(NamedTuple):
@@ -94,7 +102,9 @@ def controller_code(scenario: str, changes: Mapping[str, Any] | None = None) -> 
         files={
             **{name: source(name) for name in names},
             "st_controller_model.h": _model_header(resolved, law, controller, groups),
-            "st_controller_tables.h": _table_header(resolved, controller, law_files[0], estimator_file),
+            "st_controller_tables.h": _table_header(
+                resolved, controller, config.files.nominal.hinge_range_rad, law_files[0], estimator_file
+            ),
         },
         groups=groups,
         period_s=resolved.controller.period_s,
@@ -134,7 +144,6 @@ def _model_header(scenario: ResolvedScenario, law: Law, controller: Controller, 
                 "ST_GROUPS": groups,
                 "ST_PERIOD_S": f"((st_real){scenario.controller.period_s!r})",
                 "ST_LAW_STATE": len(controller.memory),
-                "ST_LAW_SIGNALS": width(law.signals),
                 "ST_ESTIMATOR_STATE": len(controller.estimator_state.memory),
                 "ST_APPLIED_TORQUE": applied.on,
                 "ST_COMMANDS": len(applied.commands),
@@ -146,10 +155,23 @@ def _model_header(scenario: ResolvedScenario, law: Law, controller: Controller, 
     )
 
 
-def _table_header(scenario: ResolvedScenario, controller: Controller, law: str, estimator: str) -> str:
-    """Return the header of parts, parameters and tables."""
+def _table_header(
+    scenario: ResolvedScenario,
+    controller: Controller,
+    hinge_range_rad: NDArray[np.float64],
+    law: str,
+    estimator: str,
+) -> str:
+    """Return the header of parts, bounds, parameters and tables."""
     applied = controller.applied_torque
-    numbers: dict[str, Any] = {"ST_CURRENT_LIMIT_A": controller.current_limit_A}
+    angles = hinge_range_rad + MARGIN_rad * np.array([-1.0, 1.0])
+    numbers: dict[str, Any] = {
+        "ST_CURRENT_LIMIT_A": controller.current_limit_A,
+        "ST_ANGLE_BOUNDS": np.clip(angles, -LARGEST_ANGLE_rad, LARGEST_ANGLE_rad),
+        "ST_LARGEST_ERROR": LARGEST_ERROR_rad,
+        "ST_LARGEST_RATE": scenario.watchdog.largest_rate_rad_s,
+        "ST_LARGEST_ACCELERATION": LARGEST_ACCELERATION_rad_s2,
+    }
     if applied.on:
         numbers |= {
             "ST_FRACTION": applied.fraction,

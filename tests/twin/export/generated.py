@@ -108,6 +108,11 @@ class CController:
         self._memory = np.zeros(20_000)  # more than any controller has
         self.start()
 
+    @property
+    def memory(self):
+        """Copy of all that a tick changes."""
+        return self._memory.copy()
+
     def start(self):
         self._c.st_controller_start(address(self._memory))
 

@@ -69,19 +69,6 @@ def test_single_precision_is_within_its_bound(case, tmp_path):
 
 
 @needs_c_compiler
-def test_invalid_angles_give_no_commands_and_no_lasting_harm(tmp_path):
-    controller = CController(tmp_path, "nutation", RUN | CASES["robust"])
-    reference = np.zeros((3, 3))
-    for bad in (np.nan, np.inf):
-        share, command = controller.tick(reference, [0.0, bad, 0.0], np.zeros(3))
-        assert share == -1
-        np.testing.assert_array_equal(command, 0)
-    share, command = controller.tick(reference, [0.01, 0.0, 0.0], np.zeros(3))
-    assert 0 < share <= 1
-    assert 0.1 < np.abs(command).max() <= 1
-
-
-@needs_c_compiler
 def test_a_start_erases_the_memory(tmp_path):
     controller = CController(tmp_path, "nutation", RUN | CASES["afsm"])
     generator = np.random.default_rng(0)

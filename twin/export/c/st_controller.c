@@ -15,6 +15,12 @@
 #define COSINE st_cos
 #include "st_equations.h"
 
+/* 1 if an angle changed further in a period than a rotor turns: an estimator then keeps its rate. */
+static inline int st_jumped(st_real change, st_real period)
+{
+    return st_fabs(change) > st_greatest((st_real)0.2, 200 * period);
+}
+
 #include ST_ESTIMATOR
 #include ST_LAW
 #include ST_ALLOCATION
@@ -104,44 +110,84 @@ static void st_estimate_torque(
 }
 #endif
 
-/* Torque of the law with its compensators; returns 1 if it is finite. */
-static int st_call_law(st_controller *controller, st_real reference[3][3], st_real measurement[3][3],
+/* Torque of the law with its compensators. */
+static void st_call_law(st_controller *controller, st_real reference[3][3], st_real measurement[3][3],
     st_real torque[3])
 {
 #if ST_FEED_FORWARD
     st_real fed[3];
-#endif
     int i;
+#endif
 #if ST_GOVERNOR
-    if (!st_govern(controller, measurement, reference)) {
-        return 0;
-    }
+    st_govern(controller, measurement, reference);
 #endif
 #if ST_FEED_FORWARD
     st_feed_forward(controller, reference, measurement[2], fed);
 #endif
     st_law((const st_real(*)[3])reference, (const st_real(*)[3])measurement, controller->law, torque);
-    for (i = 0; i < 3; i++) {
 #if ST_FEED_FORWARD
+    for (i = 0; i < 3; i++) {
         torque[i] += fed[i];
+    }
 #endif
-        if (!(st_fabs(torque[i]) < ST_LARGEST)) {
+}
+
+/* 1 if all inputs are within their bounds, which none that is not finite is. */
+static int st_acceptable(const st_real reference[3][3], const st_real angle[3], const st_real rate[3])
+{
+    int i;
+    (void)rate;
+    for (i = 0; i < 3; i++) {
+        const st_real *bounds = ST_ANGLE_BOUNDS[i], desired = reference[0][i];
+        if (!(bounds[0] <= angle[i] && angle[i] <= bounds[1] && bounds[0] <= desired && desired <= bounds[1]
+                && st_fabs(angle[i] - desired) <= ST_LARGEST_ERROR && st_fabs(reference[1][i]) <= ST_LARGEST_RATE
+                && st_fabs(reference[2][i]) <= ST_LARGEST_ACCELERATION)) {
             return 0;
         }
+#if !ST_ESTIMATOR_STATE
+        if (!(st_fabs(rate[i]) <= ST_LARGEST_RATE)) {
+            return 0;
+        }
+#endif
     }
-    for (i = 0; i < ST_LAW_SIGNALS; i++) {
-        if (!st_finite(controller->law[i])) {
+    return 1;
+}
+
+static int st_all_finite(const st_real *values, int count)
+{
+    int i;
+    for (i = 0; i < count; i++) {
+        if (!st_finite(values[i])) {
             return 0;
         }
     }
     return 1;
 }
 
-st_real st_controller_tick(st_controller *controller, const st_real reference[3][3], const st_real angle[3],
-    const st_real rate[3], st_real command[ST_GROUPS])
+/* 1 if state, torque and commands are finite. */
+static int st_sound(const st_controller *controller, const st_real torque[3], const st_real command[ST_GROUPS])
 {
-    st_real desired[3][3], measurement[3][3], pose[3], torque[3], torque_S[3], G[3][ST_GROUPS], share = -1;
-    int i, j, succeeded = 1;
+    int sound = st_all_finite(controller->law, ST_LAW_STATE) && st_all_finite(torque, 3)
+        && st_all_finite(controller->estimator, ST_ESTIMATOR_STATE) && st_all_finite(command, ST_GROUPS)
+        && st_all_finite(controller->applied_torque, 3);
+#if ST_APPLIED_TORQUE
+    sound = sound && st_all_finite(controller->current, ST_GROUPS);
+#endif
+#if ST_GOVERNOR
+    sound = sound && st_all_finite(controller->governed[0], 9);
+#endif
+#if ST_FEED_FORWARD
+    sound = sound && st_all_finite(controller->fed_forward[0], 3);
+#endif
+    return sound;
+}
+
+/* Tick of accepted inputs; returns the share of the torque. */
+static st_real st_run(st_controller *controller, const st_real reference[3][3], const st_real angle[3],
+    const st_real rate[3], st_real torque[3], st_real command[ST_GROUPS])
+{
+    st_real desired[3][3], measurement[3][3], pose[3], torque_S[3], G[3][ST_GROUPS], share;
+    int i, j;
     for (i = 0; i < 3; i++) {
         measurement[0][i] = angle[i];
         for (j = 0; j < 3; j++) {
@@ -152,21 +198,32 @@ st_real st_controller_tick(st_controller *controller, const st_real reference[3]
     for (i = 0; i < 3; i++) {
         pose[i] = measurement[0][i];
         measurement[2][i] = controller->applied_torque[i];
-        succeeded = succeeded && st_fabs(pose[i]) < ST_LARGEST;
-    }
-    for (j = 0; j < ST_GROUPS; j++) {
-        command[j] = 0;
-    }
-    if (!succeeded) {
-        return share;
     }
     st_torque_matrix(pose, G);
-    if (st_call_law(controller, desired, measurement, torque)) {
-        st_cartesian_torque(pose, torque, torque_S);
-        share = st_allocate(G, torque_S, ST_CURRENT_LIMIT_A, command);
-    }
+    st_call_law(controller, desired, measurement, torque);
+    st_cartesian_torque(pose, torque, torque_S);
+    share = st_allocate(G, torque_S, ST_CURRENT_LIMIT_A, command);
 #if ST_APPLIED_TORQUE
     st_estimate_torque(controller, pose, G, command);
 #endif
     return share;
+}
+
+st_real st_controller_tick(st_controller *controller, const st_real reference[3][3], const st_real angle[3],
+    const st_real rate[3], st_real command[ST_GROUPS])
+{
+    const st_controller before = *controller;
+    st_real torque[3];
+    int j;
+    if (st_acceptable(reference, angle, rate)) {
+        const st_real share = st_run(controller, reference, angle, rate, torque, command);
+        if (st_sound(controller, torque, command)) {
+            return share;
+        }
+        *controller = before;
+    }
+    for (j = 0; j < ST_GROUPS; j++) {
+        command[j] = 0;
+    }
+    return -1;
 }

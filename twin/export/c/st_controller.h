@@ -47,8 +47,10 @@ void st_controller_start(st_controller *controller);
  * reference: desired angles (rad), rates (rad/s) and accelerations (rad/s^2) of the hinges as rows.
  * angle, rate: measured. With an estimator `rate` is not read.
  * command: result, current of each group in A.
- * Returns the share of the law's torque that the commands give; -1, with commands of 0, if the law gave no
- * finite torque. */
+ * Returns the share of the law's torque that the commands give. Returns -1, with commands of 0 and the state as it
+ * was, if an input is beyond its bounds in st_controller_tables.h or not finite, or if a result would not be
+ * finite. The bounds are those of angles, rates, accelerations, and of the distance of an angle from the desired
+ * one. A refused tick has no effect on later ones. */
 st_real st_controller_tick(st_controller *controller, const st_real reference[3][3], const st_real angle[3],
     const st_real rate[3], st_real command[ST_GROUPS]);
 

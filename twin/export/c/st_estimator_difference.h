@@ -6,19 +6,20 @@ static void st_estimate_rates(st_real angle[3], const st_real measured[3], st_re
     int axis;
     (void)measured;
     for (axis = 0; axis < 3; axis++) {
-        const st_real now = st_within(angle[axis], ST_LARGEST);
-        if (!st_finite(angle[axis])) {
-            state[STARTED + axis] = 0;
-            rate[axis] = (st_real)NAN;
-            continue;
-        }
+        const st_real decay = ST_ESTIMATOR_PARAMETERS[DECAY + axis], gain = ST_ESTIMATOR_PARAMETERS[GAIN + axis];
+        const st_real now = angle[axis];
+        st_real change;
         if (!(state[STARTED + axis] != 0)) {
             state[STARTED + axis] = 1;
             state[ANGLE + axis] = now;
             state[RATE + axis] = 0;
         }
-        rate[axis] = ST_ESTIMATOR_PARAMETERS[DECAY + axis] * state[RATE + axis]
-            + ST_ESTIMATOR_PARAMETERS[GAIN + axis] * (now - state[ANGLE + axis]);
+        change = now - state[ANGLE + axis];
+        if (st_jumped(change, (1 - decay) / gain)) {
+            rate[axis] = state[RATE + axis];
+        } else {
+            rate[axis] = decay * state[RATE + axis] + gain * change;
+        }
         state[ANGLE + axis] = now;
         state[RATE + axis] = rate[axis];
     }

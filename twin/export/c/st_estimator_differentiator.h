@@ -19,23 +19,26 @@ static st_real st_root(st_real rest)
 
 static void st_estimate_rates(st_real angle[3], const st_real measured[3], st_real *state, st_real rate[3])
 {
-    enum { PERIOD = 0, FILTERS = 1, JERK = 2, STARTED = 0, ANGLE = 3, RATE = 6, ACCELERATION = 9 };
+    enum { PERIOD = 0, FILTERS = 1, JERK = 2, STARTED = 0, ANGLE = 3, RATE = 6, ACCELERATION = 9, LAST = 12 };
     const st_real *parameters = ST_ESTIMATOR_PARAMETERS;
     const st_real period = parameters[PERIOD], inner = (st_real)1.1;
     int axis;
     (void)measured;
     for (axis = 0; axis < 3; axis++) {
-        const st_real now = st_within(angle[axis], ST_LARGEST), unit = parameters[JERK + axis] * period;
-        st_real predicted, ahead, error, clipped, u, sign;
-        if (!st_finite(angle[axis])) {
-            state[STARTED + axis] = 0;
-            rate[axis] = (st_real)NAN;
-            continue;
-        }
+        const st_real now = angle[axis], unit = parameters[JERK + axis] * period;
+        st_real change, predicted, ahead, error, clipped, u, sign;
         if (!(state[STARTED + axis] != 0)) {
             state[STARTED + axis] = 1;
-            state[ANGLE + axis] = now;
+            state[ANGLE + axis] = state[LAST + axis] = now;
             state[RATE + axis] = state[ACCELERATION + axis] = 0;
+        }
+        change = now - state[LAST + axis];
+        state[LAST + axis] = now;
+        if (st_jumped(change, period)) {
+            state[ANGLE + axis] = now;
+            state[ACCELERATION + axis] = 0;
+            rate[axis] = state[RATE + axis];
+            continue;
         }
         predicted = state[RATE + axis] + period * state[ACCELERATION + axis];
         ahead = state[ANGLE + axis] + period / 2 * (state[RATE + axis] + predicted) - now;

@@ -13,12 +13,12 @@ static st_real st_fhan(st_real x, st_real v, st_real largest, st_real h)
     return -largest * st_within(switching / reach, 1);
 }
 
-/* Replace the reference by the governed one; returns 1 if it is finite, otherwise the governor restarts. */
-static int st_govern(st_controller *controller, st_real measurement[3][3], st_real reference[3][3])
+/* Replace the reference by the governed one. */
+static void st_govern(st_controller *controller, st_real measurement[3][3], st_real reference[3][3])
 {
     st_real(*motion)[3] = controller->governed;
     const st_real h = ST_PERIOD_S;
-    int finite = 1, axis, row;
+    int axis, row;
     for (axis = 0; axis < 3; axis++) {
         const st_real largest = ST_GOVERNOR_LARGEST[axis];
         st_real acceleration = reference[2][axis], spare, angle_error, rate_error;
@@ -35,13 +35,8 @@ static int st_govern(st_controller *controller, st_real measurement[3][3], st_re
         acceleration += st_fhan(angle_error - h * rate_error / 2, rate_error, spare, h);
         motion[2][axis] = st_within(acceleration, largest);
         for (row = 0; row < 3; row++) {
-            finite = finite && st_finite(motion[row][axis]);
             reference[row][axis] = motion[row][axis];
         }
     }
-    controller->governed_started = finite;
-    for (axis = 0; axis < 3 && !finite; axis++) {
-        motion[0][axis] = motion[1][axis] = motion[2][axis] = 0;
-    }
-    return finite;
+    controller->governed_started = 1;
 }

@@ -13,7 +13,6 @@
 #define st_pow powf
 #define st_fabs fabsf
 #define st_copysign copysignf
-#define ST_LARGEST 1e30f     /* of a torque or an angle: products of larger ones overflow */
 #define ST_SINGULAR 1e-9f    /* share of the determinant of a matrix that has lost rank */
 #define ST_ROUNDING 1e-6f    /* share of a distance or a rate that is rounding */
 #define ST_FLAT 1e-5f        /* share of a vector's length that counts as none */
@@ -30,7 +29,6 @@
 #define st_fabs fabs
 #define st_copysign copysign
 #endif
-#define ST_LARGEST 1e100
 #define ST_SINGULAR 1e-12
 #define ST_ROUNDING 1e-12
 #define ST_FLAT 1e-10
