@@ -1,5 +1,6 @@
 """A new member of every family: its class, its row, and where they belong."""
 
+from pathlib import Path
 from typing import NamedTuple
 
 
@@ -15,34 +16,20 @@ class Addition(NamedTuple):
     imported: str = ""
 
 
+def copy_of(file: str, names: dict[str, str]) -> str:
+    """Return the text of a member below its docstring, with other names."""
+    text = (Path(__file__).parents[1] / file).read_text(encoding="utf-8").split('"""', 2)[2]
+    for old, new in names.items():
+        text = text.replace(old, new)
+    return text
+
+
+UNCOUPLED = {"Lagrangian": "Uncoupled", "LAGRANGIAN": "UNCOUPLED", '"lagrangian"': '"uncoupled"'}
+
 ADDITIONS = {
     "law": Addition(
         "control/laws/lazy.py",
-        '''
-from typing import Literal
-
-import numpy as np
-from pydantic import Field
-
-from spheretwin.control.law import NominalModel, Law
-from spheretwin.control.law_components.parameters import LawParameters, PositiveEach, each, named
-
-
-class Lazy(LawParameters):
-    """Proportional, and slow."""
-
-    law: Literal["lazy"] = named("lazy")
-    slackness: PositiveEach = Field(each(2.0), description="torque a unit of error, N·m")
-
-    def build(self, known: NominalModel) -> Law:
-        return Law(self.law, step, np.array(self.slackness), np.zeros(0))
-
-
-def step(t, reference, measurement, parameters, state, torque):
-    for axis in range(3):
-        torque[axis] = -parameters[axis] * (measurement[0, axis] - reference[0, axis])
-        torque[axis] -= 0.05 * (measurement[1, axis] - reference[1, axis])
-''',
+        copy_of("control/laws/pd.py", {"PD(": "Lazy(", '"pd"': '"lazy"', "stiffness": "slackness"}),
         "control/laws/__init__.py",
         ("    | AFSMWithObserver,\n", "    | AFSMWithObserver\n    | Lazy,\n"),
         "from spheretwin.control.laws.lazy import Lazy\n",
@@ -98,52 +85,7 @@ LARGEST = Channel(lambda groups: LARGEST_SIGNALS, lambda scenario: True, write_l
     ),
     "physics engine": Addition(
         "twin/plant/stiff.py",
-        """
-from typing import NamedTuple
-
-import numpy as np
-
-from spheretwin.models.base.compiled import allocation_free
-from spheretwin.plant.rotor import EngineKind
-
-
-class Integrators(NamedTuple):
-    step_s: float
-    inertia: np.ndarray
-    q: np.ndarray
-    qdot: np.ndarray
-    torque_q: np.ndarray
-    warnings: np.ndarray
-
-
-class Uncoupled:
-    def __init__(self, setting):
-        self.setting = setting
-
-    def start(self, q, qdot):
-        self.q, self.qdot = np.array(q, float), np.array(qdot, float)
-        inertia = self.setting.actuator.inertia
-        none = np.zeros(1, np.int32)
-        return Integrators(
-            self.setting.step_s, inertia, self.q, self.qdot, np.zeros(3), none
-        )
-
-    def state(self):
-        return np.concatenate([self.q, self.qdot])
-
-    def restore(self, state):
-        self.q[:], self.qdot[:] = state[:3], state[3:]
-
-
-@allocation_free
-def step(rotor):
-    for i in range(3):
-        rotor.qdot[i] += rotor.step_s * rotor.torque_q[i] / rotor.inertia[i]
-        rotor.q[i] += rotor.step_s * rotor.qdot[i]
-
-
-UNCOUPLED = EngineKind("uncoupled", Uncoupled, Integrators, step)
-""",
+        copy_of("twin/plant/lagrangian_rotor.py", UNCOUPLED),
         "twin/plant/plant_tick.py",
         (
             "        lagrangian_rotor.LAGRANGIAN,\n",
@@ -254,32 +196,7 @@ EXPERIMENT = Experiment("holding", "Holding on", "Laws that hold on.", cases, te
     ),
     "estimator": Addition(
         "control/estimators/rough.py",
-        '''
-from typing import Literal
-
-import numpy as np
-
-from spheretwin.control.estimators.estimator import Derived, Estimator, EstimatorParameters, Sampling, named
-
-
-class Rough(EstimatorParameters):
-    """The backward difference as it is."""
-
-    kind: Literal["rough"] = named("rough")
-
-    def build(self, sampling: Sampling) -> Estimator:
-        return Estimator(self.kind, step, np.array([sampling.period_s]), np.full(3, np.nan))
-
-    def derived(self, sampling: Sampling) -> Derived:
-        T = sampling.period_s
-        return Derived(np.full(3, np.sqrt(2) / T), np.full(3, T / 2))
-
-
-def step(angle, parameters, state, rate):
-    for axis in range(3):
-        rate[axis] = (angle[axis] - state[axis]) / parameters[0] if state[axis] == state[axis] else 0.0
-        state[axis] = angle[axis]
-''',
+        copy_of("control/estimators/difference.py", {"Difference(": "Rough(", '"difference"': '"rough"'}),
         "control/estimators/__init__.py",
         ("    | Differentiator,\n", "    | Differentiator\n    | Rough,\n"),
         "from spheretwin.control.estimators.rough import Rough\n",

@@ -97,7 +97,9 @@ allocation = "halved"
 shape = "ramp"
 [controller]
 law = "lazy"
+level = "torque"
 slackness = [1.0, 2.0, 3.0]
+damping = [0.05, 0.05, 0.05]
 [estimator]
 kind = "rough"
 [plant]
@@ -238,7 +240,7 @@ def test_the_members_compile_and_act_as_in_plain_python(folder, grown):
 def test_a_law(grown):
     assert (grown["code"], grown["summary"]["status"]) == (0, "completed")
     assert grown["summary"]["scenario"]["controller"]["slackness"] == [1.0, 2.0, 3.0]
-    assert grown["helped"]["--controller.slackness"] == "torque a unit of error, N·m"
+    assert grown["helped"]["--controller.slackness"] == "torque or acceleration per unit of error, 1/s²"
     assert "adaptive_fuzzy, afsm, afsm_eso, lazy" in grown["refused"]["controller.law"]
 
 

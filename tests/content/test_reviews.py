@@ -1,15 +1,18 @@
 """Approved content of reviews, recoveries and exports of constructed runs, of short runs and of tables."""
 
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
 import numpy as np
 
 from spheretwin import scenario as scenarios
+from spheretwin.analysis import review
+from spheretwin.analysis.comparison import labels
 from spheretwin.models.telemetry.fault_log import FaultLog
 from spheretwin.models.telemetry.status import Status
 from spheretwin.models.telemetry.table import read_parquet
-from spheretwin.provenance import facts_of
+from spheretwin.provenance import facts_of, record_of
 from spheretwin.viz.recording.recorder import Recorder
 from spheretwin.viz.terminal import reviews as reviews_printed
 from spheretwin.viz.terminal import runs, tables, texts
@@ -17,8 +20,9 @@ from spheretwin.viz.terminal.texts import Verdict
 from tests.content.content import Cases, command, content_test, printed, scratch
 from tests.content.pages import folder_text
 from tests.content.recordings import recording_text
-from tests.content.runs import FAULTS, made_run
+from tests.content.runs import FAULTS, made_run, session_of
 from tests.content.values import array, tree
+from tests.twin.analysis.runs import made_of, named
 from tests.viz.terminal.test_reviews import RUN
 from tests.viz.terminal.test_runs import SUMMARY
 
@@ -214,11 +218,70 @@ def fault_texts() -> str:
     return "\n".join(f"{fault.text()} | {fault!r}" for fault in log.faults)
 
 
+BASE = {
+    "name": "tilt", "hardware": "ideal", "plant": {"modelling_error": 0.2, "payload_kg": 0.05},
+    "disturbance": {"load": 0.0}, "controller": {"law": "pd", "stiffness": [1.0, 2.0]},
+    "sensors": {"adc": {"bits": 16}},
+}  # fmt: skip
+FAULT_PAIR = [{"target": "coil.07", "mode": "open", "start_s": 1.0}, {"target": "group.3", "mode": "stuck"}]
+OWN = {"name": "x", "description": "a", "duration": 1.0, "trajectory": {"shape": "hold"}}
+ANOTHER = {"name": "x", "description": "b", "duration": 2.0, "trajectory": {"shape": "sine"}}
+
+
+def but(**sections: object) -> dict:
+    """Return the base with other entries of some sections."""
+    changed = {name: {**BASE[name], **inside} if isinstance(inside, dict) else inside
+               for name, inside in sections.items()}  # fmt: skip
+    return {**BASE, **changed}
+
+
+PAIRS = [
+    (BASE, BASE), (BASE, but(plant={"modelling_error": 0.0, "payload_kg": 0.1}, disturbance={"load": 2.0})),
+    (BASE, but(controller={"stiffness": [3.0, 2.0]})), (BASE, but(controller={"law": "pid", "kp": 1.0})),
+    (BASE, but(hardware="electronics", sensors={"adc": {"bits": 12}})), (BASE, {**BASE, "watch": 1}),
+    ({"fault": FAULT_PAIR}, {"fault": []}), (OWN, {**ANOTHER, "name": "y"}), (OWN, ANOTHER),
+    tuple({"plant": {"modelling_error": m, "modelling_torque_Nm": m}} for m in (0.0, 0.2)),
+    (BASE, but(disturbance={"load": 2.0}, hardware="electronics")), ({"name": "a"}, {"name": "b"}),
+    *(({"x": value}, {"x": "other"}) for value in (0.100000001, 1e-7, 3.0, True, None, "pd", [], [1, 2])),
+]  # fmt: skip
+FIGURES_OF_RUNS = [
+    {"path": "a", "x": 1.5, "each": [1.0, None, 3.0], "law": "pd", "seed": 1, "whole": True, "y": None},
+    {"path": "b", "x": 4.0, "each": [0.5, 2.0, 3.0], "law": "pid", "seed": 2, "whole": False, "y": 2},
+]  # fmt: skip
+LISTS = [{"path": "a", "e": None}, {"path": "b", "e": [1.0]}]
+NOMINAL = [
+    {"plant.modelling_error": 0.2},
+    {"plant.modelling_error": 0.2, "drive.delay_s": 0.001, "nominal.equals_truth": True},
+    {"plant.modelling_error": 0.0, "plant.coulomb_Nm": (0.002, 0.002, 0.003), "nominal.torque_scale": 1.1,
+     "drive.delay_s": 0.001},
+]  # fmt: skip
+
+
+def differences() -> str:
+    """Fields and figures in which runs differ, conditions on which they agree, labels and nominal errors."""
+    lines = [f"{review.scenario_differences(pair)} | {review.common_conditions(pair)}" for pair in PAIRS]
+    lines += [
+        str(review.common_conditions([BASE])),
+        f"{review.differences(FIGURES_OF_RUNS)} {review.differences(LISTS)}",
+    ]
+    runs_of_laws = []
+    for name, law in {"pd": "pd", "first": "./laws/mine.py:Mine", "second": "/a/new/mine.py:Mine"}.items():
+        run = named(made_of([[0.0, 0.0]]), f"/b/{name}.parquet")
+        record = replace(run.record, scenario=but(controller={"law": law}))
+        runs_of_laws.append(replace(run, record=record))
+    lines += [f"{labels(runs_of_laws)} {labels(runs_of_laws[:2])}"]
+    for changes in NOMINAL:
+        with session_of("sinusoid", **changes) as session:
+            run = replace(made_of([[0.0, 0.0]]), record=record_of(session))
+        lines += [str(review.nominal_errors(run))]
+    return "\n".join(lines)
+
+
 CASES: Cases = {
-    "review_terminal": reviews, "review_json": review_json, "review_page": review_page,
-    "review_merge": review_merge, "review_recover": recoveries, "review_exported": exported,
-    "review_faults": fault_texts, "review_simulate": simulations, "terminal_tables": terminal,
-    "terminal_many_events": many_events,
+    "review_differences": differences, "review_terminal": reviews, "review_json": review_json,
+    "review_page": review_page, "review_merge": review_merge, "review_recover": recoveries,
+    "review_exported": exported, "review_faults": fault_texts, "review_simulate": simulations,
+    "terminal_tables": terminal, "terminal_many_events": many_events,
 }  # fmt: skip
 
 

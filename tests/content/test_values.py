@@ -99,6 +99,7 @@ def decimated() -> str:
     for lines_per_octave in (1, 3, 12):
         result = decimation.octave_maxima(0.5 + COUNT, WAVE, lines_per_octave)
         lines.append(f"octaves {lines_per_octave} {array(result[0])} {array(result[1])}")
+    lines.append(f"no octaves {decimation.octave_maxima(COUNT[:0], WAVE[:0], 10)}")
     for immediate, rate_Hz in product((False, True), (10.0, 60.0)):
         bins = decimation.TimeBins(rate_Hz, immediate=immediate)
         sent = [bins.add(1e-3 * COUNT[k : k + 130], WAVE[k : k + 130, None]) for k in range(0, 3000, 130)]
