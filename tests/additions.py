@@ -345,9 +345,9 @@ from spheretwin.control.allocation.least_norm import allocate
 
 
 def halved(G, torque_S, limit, current, scratch):
-    """Least-norm currents up to half of the limit."""
+    """Least-norm currents up to half of the limit if they are enough."""
     share = allocate(G, torque_S, 0.5 * limit, current)
-    return share
+    return share if share == 1.0 else allocate(G, torque_S, limit, current)
 ''',
         "control/allocation/__init__.py",
         ('    "bounded": bounded,\n', '    "bounded": bounded,\n    "halved": halved,\n'),

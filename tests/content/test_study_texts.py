@@ -13,9 +13,9 @@ from spheretwin.study.tuning import report as tuning_page
 from spheretwin.study.tuning.gains import section_of
 from spheretwin.study.tuning.sampler import warnings_only
 from spheretwin.study.tuning.tuning import tune
-from tests.content.content import content_test, scratch
+from tests.content.content import content_test, refusal, scratch
 from tests.content.values import lines
-from tests.twin.study.cases import LOADS, study, values
+from tests.twin.study.cases import LOADS, SHORT, study, values
 from tests.twin.study.tuning import cases as tuning
 
 
@@ -136,7 +136,85 @@ def trials_of_each_sampler():
     return "\n".join(content)
 
 
+LOAD, PD = "disturbance.load", [{"law": "pd"}]
+
+
+def of_load(kind, **fields):
+    return [{"field": LOAD, "kind": kind, **fields}]
+
+
+REFUSED_AXES = [
+    of_load("gauss"), of_load("linspace", first=0, last=1, count=10**9), [values(LOAD, 1.0, 1)],
+    of_load("linspace", first=1, last=1, count=2), [values(LOAD, 1.0, zip="a")], [values(LOAD, "1.0", "2")],
+    [values(LOAD, 1.0, 2.0, zip="a"), values("plant.modelling_error", 0.1, zip="a")],
+    [values("disturbance.laod", 1.0)], [values("plant.modelling_error.3", 1.0)],
+    [values("plant.payload_kg", -1.0, -2.0)],
+]  # fmt: skip
+REFUSED_STUDIES = [
+    {"axis": of_load("normal", mean=0, deviation=0), "samples": 3},
+    {"axis": of_load("uniform", low=0, high=1, zip="a"), "samples": 3},
+    {"axis": [LOADS[0]], "fields": {LOAD: 1.0}}, {"fields": {"seed": 1}}, {"fields": {"": 1}},
+    {"law": PD, "fields": {"controller.stiffness": [1.0]}}, {"law": [{"law": "pdd"}]},
+    {"law": [{"law": "pd", "wobble": 1.0}]}, {"law": [*PD, {"law": "afsm", "wobble": 1.0}]},
+    {"law": [{"law": "nothing.py:step"}]}, {"metrics": ["rms_error_rad"] * 2},
+    {"metrics": ["a.py:one", "b.py:one"]}, {"metrics": ["nothing.py:one"]}, {"metrics": ["mine.py:key"]},
+    {"telemetry": [1]}, {"scenario": "sinsoid"},
+]  # fmt: skip
+STUDY_FILES = [
+    "name = ", "", 'name = "a"\nscenario = "sinusoid"\naxis = 3\n',
+    'name = "a"\nscenario = "nothing.toml"\n', "a" * 10 + "[" * 2000,
+]  # fmt: skip
+STIFFNESS, DAMPING = "controller.stiffness", "controller.damping"
+REFUSED_TUNINGS = [
+    {"gains": (tuning.gain(step=1.0),)}, {"gains": (tuning.gain(low=float("nan")),)}, {"draws": 20},
+    {"objectives": [{"metric": "exact", "direction": "down"}]}, {"objectives": ["exact", "exact"]},
+    {"sampler": "local", "trials": 20},
+]  # fmt: skip
+CHANGED_TUNINGS = [
+    {"optimise": None}, {"fields": {"controller.law": "pd", STIFFNESS: 5.0}},
+    {"axis": [values(DAMPING, 1.0, 2.0)]}, {"fields": {}, "law": [{"law": "pd", "damping": 9.0}]},
+    *({"optimise": {"gain": gains}} for gains in (
+        [tuning.gain("stifness")], [tuning.gain(), tuning.gain("damping", law="pdd")],
+        [tuning.gain(law="afsm")],
+        [tuning.gain(), tuning.gain()], [tuning.gain(start=50.0), tuning.gain("damping")],
+        [tuning.gain(low=1e12, high=1e13)],
+    )),
+    {"optimise": {"objective": [{"metric": "rms_error"}]}},
+]  # fmt: skip
+
+
+def messages_before_the_first_row():
+    """Messages about studies and tunings that cannot be run; no file is written."""
+    folder = scratch("refused_studies")
+    (folder / "mine.py").write_text("def key(run): return 1\n")
+    base = tuning.study(folder, **tuning.TWO)
+    dumped, section = base.model_dump(mode="json"), base.optimise.model_dump(mode="json")
+
+    def change(fields):
+        own = fields.get("optimise", {})
+        return {**dumped, **fields, "optimise": own if own is None else {**section, **own}}
+
+    def swept(fields):
+        given = {"name": "a", "scenario": "sinusoid", "fields": SHORT, "folder": str(folder)}
+        run(studies.made({**given, **fields}, "a"), folder / "swept")
+
+    def swept_file(text):
+        (path := folder / "study.toml").write_text(text)
+        run(str(path), folder / "swept")
+
+    calls = {
+        swept: [*({"axis": axes} for axes in REFUSED_AXES), *REFUSED_STUDIES], swept_file: STUDY_FILES,
+        lambda given: tune(tuning.study(folder, **given), folder / "tuned"): REFUSED_TUNINGS,
+        lambda given: tune(studies.made(change(given), "known"), folder / "tuned"): CHANGED_TUNINGS,
+    }  # fmt: skip
+    lines = [
+        f"{str(given)[:300]}: {refusal(call, given)}" for call, inputs in calls.items() for given in inputs
+    ]
+    return "\n".join([*lines, f"files: {sorted(path.name for path in folder.rglob('*'))}"])
+
+
 CASES = {
+    "study_refusals": messages_before_the_first_row,
     "study_tuning": trials_of_a_tuning,
     "study_samplers": trials_of_each_sampler,
     "study_shipped_rows": rows_of_shipped_studies,

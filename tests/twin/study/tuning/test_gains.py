@@ -4,14 +4,11 @@ import pytest
 
 from spheretwin.control.law_components.feedback import triple_pole
 from spheretwin.control.laws import LAWS
-from spheretwin.models.base.errors import InputError
 from spheretwin.study.optimise import Gain
 from spheretwin.study.row import Rows
-from spheretwin.study.study import load, made
+from spheretwin.study.study import load
 from spheretwin.study.tuning.gains import gains_of, middle, numbers, values
-from spheretwin.study.tuning.tuning import tune
-from tests.twin.study.cases import values as axis
-from tests.twin.study.tuning.cases import TWO, gain, study
+from tests.twin.study.tuning.cases import gain, study
 
 SHIPPED = load("tuning")
 PID_GAINS = next(gains_of(SHIPPED, law, Rows(SHIPPED)) for law in SHIPPED.law if law["law"] == "pid")
@@ -52,51 +49,3 @@ def test_an_optional_gain_that_is_off_leaves_its_fields_alone():
     chosen = {STIFFNESS: 300.0, DAMPING: 20.0}
     assert values(gains, {**chosen, gains[0].switch: 0.5}) == values(gains, dict(chosen)) == chosen
     assert values(gains, {**chosen, gains[0].switch: 0.49}) == {DAMPING: 20.0}
-
-
-def with_optimise(folder, **fields):
-    """The study of two objectives with other fields of its section."""
-    return changed(folder, optimise={**study(folder, **TWO).optimise.model_dump(mode="json"), **fields})
-
-
-def changed(folder, **fields):
-    """The study of two objectives with other fields."""
-    whole = study(folder, **TWO)
-    dumped = {**whole.model_dump(mode="json"), "optimise": whole.optimise.model_dump(mode="json")}
-    return made({**dumped, **fields}, "known")
-
-
-REFUSED = {
-    study: {
-        "step": {"gains": (gain(step=1.0),)},
-        "low": {"gains": (gain(low=float("nan")),)},
-        "direction": {"objectives": [{"metric": "exact", "direction": "down"}]},
-        "expected different objectives": {"objectives": ["exact", "exact"]},
-        "expected draws with the sampler local alone, received tpe": {"draws": 20},
-        "perturbations of the sampler local, received trials": {"sampler": "local", "trials": 20},
-    },
-    changed: {
-        "expected [optimise] in a study": {"optimise": None},
-        "expected controller.stiffness as a gain alone": {"fields": {"controller.law": "pd", STIFFNESS: 5.0}},
-        "expected controller.damping as a gain alone": {"axis": [axis(DAMPING, 1.0, 2.0)]},
-        "in [[law]] or as a gain, received both": {"fields": {}, "law": [{"law": "pd", "damping": 9.0}]},
-    },
-    with_optimise: {
-        "stifness; did you mean stiffness?": {"gain": [gain("stifness")]},
-        "received pdd; did you mean pd?": {"gain": [gain(), gain("damping", law="pdd")]},
-        "expected gains of pd, received none": {"gain": [gain(law="afsm")]},
-        "different names": {"gain": [gain(), gain()]},
-        "received none of controller.damping": {"gain": [gain(start=50.0), gain("damping")]},
-        "received 'rms_error'; did you mean rms_error_rad?": {"objective": [{"metric": "rms_error"}]},
-        "controller.stiffness.0: expected": {"gain": [gain(low=1e12, high=1e13)]},
-    },
-}
-
-
-@pytest.mark.parametrize(("make", "message"), [(make, each) for make in REFUSED for each in REFUSED[make]])
-def test_what_cannot_be_tuned_is_refused_in_a_line_before_a_trial(tmp_path, make, message):
-    with pytest.raises(InputError) as refusal:
-        tune(make(tmp_path, **REFUSED[make][message]), tmp_path / "out")
-    assert message in str(refusal.value)
-    assert "\n" not in str(refusal.value)
-    assert not (tmp_path / "out").exists()
