@@ -129,13 +129,6 @@ def test_a_change_during_the_run_keeps_the_connection():
     assert len(controller.times) == 10
 
 
-@pytest.mark.release("1 s of plain Python; compiled external parts are tested in less")
-@pytest.mark.uncompiled
-def test_both_parts_in_plain_python():
-    test_the_currents_of_a_controller_are_those_of_manual_currents()
-    test_a_plant_receives_the_commands_and_its_measurements_are_the_telemetry()
-
-
 def test_the_journal_names_the_part_and_a_replay_is_refused(tmp_path):
     twin = session(Controller(constant))
     rows = twin.advance(5)

@@ -5,16 +5,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from spheretwin import scenario as scenarios
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.telemetry.signals import Signal, width
 from spheretwin.models.telemetry.status import QUIET_S
 from spheretwin.models.telemetry.table import Table
-from spheretwin.outputs import Outputs, check_rate
-from spheretwin.session import Session
-from spheretwin.simulation import follow
+from spheretwin.outputs import check_rate
 from spheretwin.viz.decimation import WINDOW_S, FirstAndExtremeRows, FirstRows
-from spheretwin.viz.recording.reader import read
 
 SIGNALS = (
     Signal("t_s", "s", 1, "time"),
@@ -106,36 +102,6 @@ def test_firsts_are_one_of_each_bin_and_every_row_at_the_rate_of_the_rows(long, 
     np.testing.assert_array_equal(bins, np.arange(int(np.floor(25.299 * rate_Hz + 1e-6)) + 1))
     # The first of its bin: the row before it, 1 ms earlier, is of the bin before.
     assert (np.floor((t_s[1:] - 1e-3) * rate_Hz + 1e-6) < bins[1:]).all()
-
-
-def recorded(path, rate_Hz=None):
-    """A run with faults, saturation, a change of law, and the events of all of these."""
-    changes = {
-        "plant.engine": "lagrangian",
-        "duration": 12.3,
-        "fault": [{"target": "coil.07", "mode": "open", "start_s": 0.3, "detection": True}],
-        "event": [{"t_s": 4.5, "set": "controller.law", "value": "pd"}],
-    }
-    with Session(scenarios.load("hold", changes)) as session:
-        files = Outputs(session, path, None, live=False, record_rate_Hz=rate_Hz)
-        follow(session, session.scenario.ticks, files.sinks)
-        assert files.close() == []
-    return read(path)
-
-
-@pytest.mark.release("1.5 s; content of values_decimated has the rows")
-def test_a_decimated_recording_has_complete_rows_all_extremes_and_all_events(tmp_path):
-    every, some = recorded(tmp_path / "all.rrd"), recorded(tmp_path / "some.rrd", RATE_Hz)
-    assert (every.facts["record_rate_Hz"], some.facts["record_rate_Hz"]) == (None, RATE_Hz)
-    assert some.events == every.events
-    assert any("current limit" in text for _, _, text in some.events)
-    assert some.table.signals == every.table.signals
-    places = np.searchsorted(every.table["t_s"], some.table["t_s"])
-    assert some.table.values.tobytes() == every.table.values[places].tobytes()
-    assert len(some.table) < 0.2 * len(every.table)
-    for reduce in (np.nanmax, np.nanmin):
-        np.testing.assert_array_equal(reduce(some.table.values, axis=0), reduce(every.table.values, axis=0))
-    np.testing.assert_array_equal(some.table.values[-1], every.table.values[-1])
 
 
 def test_a_rate_that_no_run_has_the_rows_for_is_refused(tmp_path):

@@ -16,7 +16,6 @@ import pytest
 from numba import types
 
 from spheretwin.models.base import cache, compiled
-from spheretwin.simulation import simulate
 
 SOURCE = Path(compiled.__file__).parent
 
@@ -199,34 +198,10 @@ def test_entry_that_cannot_be_used_is_made_again(tmp_path, monkeypatch, damage):
     assert [hits(), hits()] == [0, 1]
 
 
-@pytest.mark.release("a process of 0.7 s; test_no_folder_at_all_is_done_without has the same refusal")
-def test_full_disk_is_done_without(package):
-    # Python itself keeps bytecode that the limit has cut.
-    environment = {**environment_of(package), "PYTHONDONTWRITEBYTECODE": "1"}
-    full = "import resource; resource.setrlimit(resource.RLIMIT_FSIZE, (100, 100))\n"
-    assert python(full + RUN, **environment).split() == ["41", "0", "0"]
-    assert entries(package) == []
-
-
 def test_no_folder_at_all_is_done_without(package):
     nowhere = {"SPHERETWIN_CACHE_DIR": "/proc", "XDG_CACHE_HOME": "/proc", "HOME": "/proc"}
     environment = {**os.environ, **nowhere, "PYTHONPATH": str(package)}
     assert python(RUN, **environment).split() == ["41", "0", "0"]
-
-
-@pytest.mark.release("a process of 0.8 s; tests marked uncompiled run without a compiler")
-def test_run_without_compilation():
-    """Everything a run calls works as plain Python, and to rounding says the same."""
-    code = (
-        "from spheretwin.simulation import simulate\n"
-        "run = simulate('hold', {'duration': 0.02})\n"
-        "print(*run.telemetry['q_rad'][-1], run.status)"
-    )
-    *plain_q, plain_status = python(code, **{**os.environ, "NUMBA_DISABLE_JIT": "1"}).split()
-    run = simulate("hold", {"duration": 0.02})
-    assert plain_status == run.status == "completed"
-    # Products and sums are not fused in Python; each of 20 ticks may differ by some ulp, hardly amplified.
-    np.testing.assert_allclose(np.array(plain_q, float), run.telemetry["q_rad"][-1], rtol=1e-9, atol=0)
 
 
 SIGNATURE = types.float64(types.float64)

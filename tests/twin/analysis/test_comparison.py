@@ -2,9 +2,7 @@
 
 import base64
 import json
-import os
 import re
-import xml.etree.ElementTree as ElementTree
 from dataclasses import replace
 from html.parser import HTMLParser
 
@@ -103,21 +101,6 @@ def test_text_of_a_user_is_never_markup(page):
     assert any("&lt;b&gt;&amp;&lt;i&gt;" in title for title in titles)
     assert "<" not in page.own.split("const config")[0]
     assert any(text.startswith("2 <b>&<i>: afsm, L 2, ") for text in page.texts["button"])
-
-
-@pytest.mark.release("figures of a whole review for 7 s; content of reviews has them")
-def test_every_figure_has_a_second_format_and_the_same_bytes_each_time(files, tmp_path):
-    for name in ("one", "other"):
-        folder = str(tmp_path / name)
-        assert cli.main(["review", *map(str, files), "--figures", folder, "--figure-format", "pdf"]) == 0
-    kinds = [f"{name}.{kind}" for name in NAMES for kind in ("pdf", "svg")]
-    assert sorted(os.listdir(tmp_path / "one")) == sorted([comparison.PAGE, *kinds])
-    for name in os.listdir(tmp_path / "one"):
-        content = (tmp_path / "one" / name).read_bytes()
-        assert content == (tmp_path / "other" / name).read_bytes(), name
-        assert content.startswith(b"%PDF") == name.endswith("pdf")
-        if name.endswith("svg"):
-            assert ElementTree.fromstring(content).tag.endswith("svg")
 
 
 def review(run, folder, *options):

@@ -185,18 +185,6 @@ def test_wherever_a_recording_is_cut_its_whole_ticks_are_read(files, tmp_path):
     assert rows[-1] == len(whole)
 
 
-@OF_CUTS
-def test_half_of_the_last_rows_are_no_rows(files, tmp_path):
-    """Cut anywhere in the rows that were recorded last; behind them stands the layout."""
-    content, sizes = files[1].read_bytes(), set()
-    for part in np.linspace(0.6, 0.95, 20):
-        (path := tmp_path / "run.rrd").write_bytes(content[: int(part * len(content))])
-        table = read(path).table
-        sizes.add(len(table))
-        assert not np.isnan(table["current_A"]).any()
-    assert len(sizes) > 1
-
-
 def cut(path):
     path.write_bytes(path.read_bytes()[:5000])
 

@@ -144,20 +144,6 @@ def pages(monkeypatch):
 
 
 @pytest.mark.release("1 s and a viewer's server; tests/twin/machine has the figures")
-def test_a_live_shadow_shows_the_log_and_has_the_figures_of_the_others(log, tmp_path, pages):
-    words, received = ["shadow", log, *MACHINE, "--json"], tmp_path / "live.rrd"
-    result = call(*words, "--live")
-    assert result.err.startswith("watch: http://127.0.0.1:")
-    plain, live = call(*words).json, result.json
-    assert {**live, "cpu_s_per_s": 0} == {**plain, "cpu_s_per_s": 0}
-    received.write_bytes(b"".join(*pages))
-    values, times = columns(received)
-    assert sum(map(len, times["/plots/angle", "Scalars:scalars"])) == 120  # 2 s of 60 Hz
-    (text,) = values["/verdict", "TextDocument:text"][-1].to_pylist()[0]
-    assert f"| alpha | {plain['chi2']['alpha']:.3f} |" in text
-
-
-@pytest.mark.release("1 s and a viewer's server; tests/twin/machine has the figures")
 def test_a_live_watch_shows_windows_and_alarms(tmp_path, pages):
     path, received = log_with_offset(tmp_path / "log.parquet", 2.6), tmp_path / "live.rrd"
     result = call("watch", path, *MACHINE, "--live")

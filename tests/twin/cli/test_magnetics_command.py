@@ -18,8 +18,7 @@ from tests.content.verdicts import (
     survey,
     workspace_verdict,
 )
-from tests.models.design.quadrature import sample_coarsely, sum_coarsely
-from tests.twin.cli.calls import call, refusal, succeeded
+from tests.twin.cli.calls import call, refusal
 
 
 @pytest.fixture
@@ -133,26 +132,6 @@ def test_a_curve_of_another_geometry_is_named(monkeypatch):
     far = verdict._replace(sources=sources, checks=verdict.checks[::-1])
     monkeypatch.setattr(field_check, "judge", lambda *_: far)
     assert "2.9 % of its peak away" in broken("check").err
-
-
-@pytest.mark.release("recomputes a curve for 2 s; test_curve_verdict.py has its bounds")
-def test_computed_curves_are_judged(monkeypatch, user_csv, tmp_path):
-    sample_coarsely(monkeypatch)
-    assert call("magnetics", "curve", "--csv", user_csv(0.93), "--json").json["rows"] == 61
-    result = call("magnetics", "curve", "--out", tmp_path / "curve.csv")
-    assert result.code == cli.DONE
-    assert "2 of 2 checks hold" in result.out
-    assert len(torque_curve.read(tmp_path / "curve.csv").phi_rad) == 37
-
-
-@pytest.mark.release("direct sums for 4 s; test_field_verdict.py has wrong curves and fields")
-def test_direct_sums_pass_and_find_a_wrong_curve(monkeypatch, user_csv):
-    sum_coarsely(monkeypatch)
-    assert "8 of 8 checks hold" in succeeded("magnetics", "check", "--poses", 2, "--seed", 5)
-    result = broken("check", "--poses", 1, "--csv", user_csv(1.03), "--json")
-    assert not result.json["checks"][0]["ok"]
-    assert "2.9 % of its peak away" in result.err
-    assert "broken: torque" in result.err
 
 
 def test_missing_packages_are_named_before_the_work(monkeypatch, tmp_path):

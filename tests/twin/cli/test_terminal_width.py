@@ -11,7 +11,6 @@ from spheretwin.paper import EXPERIMENTS
 from spheretwin.study.grid import Grid
 from spheretwin.study.study import load
 from spheretwin.viz.terminal import tables
-from tests.models.design.quadrature import sum_coarsely
 from tests.twin.cli.tables import WIDTH
 from tests.twin.cli.tables import checker as checker  # a fixture
 
@@ -66,15 +65,6 @@ def test_reproduce(checker, monkeypatch, name):
     code = cli.main(["reproduce", name, "--seeds", "1", "--limit", "1", "--verbose"])
     assert code in (cli.DONE, cli.FAILED)
     assert checker.tables >= 1
-
-
-@pytest.mark.release("direct sums for 3 s; the other verbs have the width in less")
-def test_magnetics(checker, monkeypatch):
-    sum_coarsely(monkeypatch)
-    assert cli.main(["magnetics", "check", "--poses", "1"]) == cli.DONE
-    assert checker.tables == 2
-    cli.main(["magnetics", "map", "--largest-tilt", "6"])
-    assert checker.tables >= 3
 
 
 def test_a_text_that_fits_no_cell_is_printed_as_a_list(checker, capsys):

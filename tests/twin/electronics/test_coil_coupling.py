@@ -81,24 +81,6 @@ def orders(errors):
     return np.log2(np.array(errors[:-1]) / np.array(errors[1:]))
 
 
-@pytest.mark.release("2.6 s; the convergence to a solver without steps is the stricter comparison")
-def test_without_mutual_inductance_groups_are_uncoupled():
-    generator = np.random.default_rng(0)
-    coupled = Steps(chain_of(np.zeros((GROUPS, GROUPS)), 5e-4, current_limit_A=8.0), np.zeros(GROUPS))
-    plain = Steps(chain_of(None, 5e-4, current_limit_A=8.0, coil_coupling=0.0), np.zeros(GROUPS))
-    for tick in range(200):
-        if tick == 100:
-            for steps in (coupled, plain):
-                steps.chain.coil.contact[3:5] = OPEN, SHORTED
-        command, emf = generator.normal(size=(2, GROUPS)) * 5
-        first, second = coupled.take(command, emf), plain.take(command, emf)
-        # A step of two parts: rounding of currents up to 15 A, voltages of 90 V and times of 0.5 ms.
-        np.testing.assert_allclose(coupled.current, plain.current, rtol=0, atol=1e-12)
-        np.testing.assert_allclose(first, second, rtol=1e-11, atol=1e-15)
-        np.testing.assert_allclose(coupled.chain.flow[3:], plain.chain.flow[3:], rtol=1e-12, atol=1e-15)
-        np.testing.assert_allclose(coupled.chain.period, plain.chain.period, rtol=1e-12)
-
-
 def test_all_groups_at_limits_are_the_matrix_exponential():
     generator = np.random.default_rng(3)
     volts = generator.choice([UP, DOWN], GROUPS)

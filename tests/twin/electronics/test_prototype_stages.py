@@ -7,7 +7,6 @@ from spheretwin import assembly
 from spheretwin import scenario as scenarios
 from spheretwin.control.estimators import ESTIMATORS
 from spheretwin.control.estimators.estimator import estimates
-from spheretwin.control.law import Law
 from spheretwin.electronics.random_streams import noise_table
 from spheretwin.electronics.sensor_chain import noise_streams, sense, sensor_chain
 from spheretwin.models.lagrangian import inertia_matrix
@@ -106,14 +105,3 @@ def test_neutral_stages_move_no_bit():
         simulate(scenarios.load("hold", {"duration": 0.1, **changes})).telemetry for changes in ({}, neutral)
     )
     assert named.values.tobytes() == plain.values.tobytes()
-
-
-@pytest.mark.release("1.3 s of plain Python; laws in plain Python run with ideal hardware in less")
-@pytest.mark.uncompiled
-def test_a_law_in_plain_python_runs_with_the_electronics():
-    def step(t, reference, measurement, parameters, state, torque):
-        torque[:] = -0.5 * (measurement[0] - reference[0]) - 0.03 * measurement[1]
-
-    run = simulate(prototype("tilt", duration=0.05), law=Law("plain", step, [], []))
-    assert run.status == "completed"
-    assert np.isfinite(run.telemetry.values).all()

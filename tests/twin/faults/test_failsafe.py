@@ -100,23 +100,6 @@ def test_a_law_that_gives_no_number(bad):
     assert len(plain.telemetry) == 50
 
 
-@pytest.mark.release("compiles a loop of its own for 10 s; test_fuzz.py has measurements that are no numbers")
-def test_a_measurement_that_overflows():
-    """Of so many turns there are more counts than a number holds; no scenario can bring the rotor there."""
-    for watching, status in ((True, "failsafe"), (False, "diverged")):
-        changes = {"sensors.encoder.counts": 2**31, "plant.engine": "lagrangian", "watchdog.on": watching}
-        with Session(scenario("hold", **changes)) as session:
-            session.advance(50)
-            session._runtime._rotor.data.q[2] = 1e300
-            table = session.advance(200)
-            assert session.status == status
-            assert np.isfinite(table.values).all()
-            assert len(table) == (1 + RUNDOWN if watching else 0)
-            if watching:
-                assert session.reason == Reason.MEASUREMENT
-                assert set(table["failsafe_reason"].tolist()) == {float(Reason.MEASUREMENT)}
-
-
 OWN_LOOP = pytest.mark.release("compiles a loop of its own for 10 s; the other value has the same")
 
 

@@ -184,18 +184,6 @@ def test_too_little_torque_or_the_watchdog_is_the_reason(study):
     assert alone["status"] == "left_workspace"
 
 
-@pytest.mark.release("compiles a loop for 12 s; the cross-check compares the engines")
-def test_the_other_engine_agrees():
-    _, outcomes = run_cases(
-        [make((0,), REPORTED) for make in (of_groups, fault_cases.on_other_engine)], seeds=2
-    )
-    ((one, other),) = fault_study.engine_pairs(outcomes, REPORTED)
-    assert fault_study.agree(one, other)
-    assert fault_study.difference_rad(one, other) < 1e-12  # 10,000 steps that round otherwise
-    apart = other._replace(data=other.data._replace(after_rad=other.data.after_rad + 2e-9))
-    assert not fault_study.agree(one, apart)
-
-
 def test_map_of_pairs_has_pairs_below_and_single_groups_on_the_diagonal(study):
     ratios = fault_sections.ratios(study[1], fault_cases.UNREPORTED)
     assert np.argwhere(np.isfinite(ratios)).tolist() == [[0, 0], [1, 0]]

@@ -1,8 +1,5 @@
 """The Lagrangian as a plant: its payload from energies, its steps of order four, one loop for both plants."""
 
-import subprocess
-import sys
-
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
@@ -145,27 +142,3 @@ def test_start_does_not_hold_on_to_its_arguments(actuator):
 def test_only_runge_kutta_is_known(actuator):
     with pytest.raises(InputError, match="expected the integrator RK4, received Euler"):
         LagrangianRotor(actuator, STEP_S, "Euler")
-
-
-SECOND_PROCESS = """
-import numpy as np
-from spheretwin import channels, load, loop, simulate
-from spheretwin.control.law import Law
-
-def plain(t, reference, measurement, parameters, state, torque):
-    torque[:] = 0.0
-
-for engine in ("mujoco", "lagrangian"):
-    for law in (None, Law("mine", plain, np.zeros(0), np.zeros(0))):
-        simulate(load("hold", {"duration": 0.01, "plant.engine": engine}), law=law)
-for function in (loop.loop, channels.write_channels):
-    print(sum(function.stats.cache_hits.values()), sum(function.stats.cache_misses.values()))
-"""
-
-
-@pytest.mark.release("processes of 2 s; test_compiled.py has the cache")
-def test_compiled_and_plain_loops_are_kept_between_processes():
-    """A law in plain Python runs in the plain loop, which calls compiled functions."""
-    command = [sys.executable, "-c", SECOND_PROCESS]
-    _, second = (subprocess.run(command, capture_output=True, text=True, check=True) for _ in range(2))
-    assert second.stdout.split() == ["2", "0", "2", "0"]

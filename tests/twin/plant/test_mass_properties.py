@@ -266,19 +266,6 @@ def test_a_payload_off_the_axis_is_computed_by_the_equations_of_motion(tmp_path)
     assert_same_steps(*rotors, ([0.4, -0.3, 0.2], [1.0, 2.0, -3.0]))
 
 
-@pytest.mark.release("1 s of plain Python; test_session_settings.py has changes of the plant")
-@pytest.mark.uncompiled
-def test_a_change_during_the_run_acts_and_a_snapshot_restores_it():
-    with Session(scenarios.load("hold", {"plant.engine": "lagrangian"})) as session:
-        session.advance(2)
-        session.set("plant.mass.centre_m", [2e-3, 0.0, 0.0])
-        snapshot = session.snapshot()
-        first = session.advance(10).values.copy()
-        session.restore(snapshot)
-        np.testing.assert_array_equal(session.advance(10).values, first)
-        assert np.abs(first).max() > 0
-
-
 def test_a_linear_model_needs_an_ideal_joint():
     with pytest.raises(InputError, match=r"expected an ideal joint, received plant\.mass"):
         linearise(scenarios.load("hold", {"plant.mass.centre_m": [1e-3, 0.0, 0.0]}))

@@ -9,7 +9,6 @@ from spheretwin import scenario as scenarios
 from spheretwin.analysis import tolerances
 from spheretwin.models.base.errors import InputError, shown
 from spheretwin.scenario import reading
-from spheretwin.scenario.changes import with_change
 from spheretwin.scenario.fields import every_field
 from spheretwin.scenario.sections import Scenario
 from spheretwin.study import study as studies
@@ -54,33 +53,12 @@ def check(messages, least):
         assert not line.isspace()
 
 
-# The law decides only what is in its own section.
-OF_A_LAW = [name for name in NAMES if name.startswith("controller")]
-
-
-@pytest.mark.release("5 s; test_flags has the same messages of fewer fields")
-@pytest.mark.parametrize(("law", "names"), [("pd", NAMES), ("afsm_eso", OF_A_LAW)], ids=["pd", "afsm_eso"])
-def test_overrides(law, names):
-    messages = {
-        message(scenarios.load, "hold", {"controller.law": law, name: value})
-        for name in names
-        for value in VALUES
-    }
-    check(messages, 3 * len(names))  # most values do not fit most fields
-
-
 @pytest.mark.parametrize("value", ["null", "true", "x", "[]", '{"a": 1}', "1.5", "nan", "9" * 5000, "-1e300"])
 def test_flags(value):
     def load(name):
         return scenarios.load("hold", reading.overrides([f"--{name}", value]))
 
     check({message(load, name) for name in NAMES}, 0)
-
-
-@pytest.mark.release("3 s; test_session_settings.py has the refused changes")
-def test_changes_of_a_run():
-    scenario = scenarios.load("hold")
-    check({message(with_change, scenario, name, value) for name in NAMES for value in VALUES}, 500)
 
 
 def test_studies():

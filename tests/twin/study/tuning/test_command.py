@@ -1,7 +1,6 @@
 """``spheretwin sweep STUDY --optimise``: its two streams, its exit codes, its files."""
 
 import json
-import shlex
 import signal
 
 import pyarrow.parquet as parquet
@@ -143,19 +142,6 @@ def test_objectives_are_words_with_their_unit(words):
     trial |= {"values": {made.called: 2.0}, "fresh": None, "fresh_reason": None}
     head, _ = report.chosen({"start": None, "best": [trial]})
     assert head == ["trial", "controller damping", words]
-
-
-@pytest.mark.release("0.8 s; content of study_tuning has the command")
-def test_the_command_that_is_reported_runs_the_gains(optimise, tmp_path, capsys):
-    assert optimise("--json") == cli.DONE
-    best = json.loads(capsys.readouterr().out)["laws"]["pd"]["best"][0]
-    words = shlex.split(best["command"])
-    assert words[:3] == ["spheretwin", "simulate", "hold"]
-    reference = str(tmp_path / "figures.py:miss")
-    more = [] if reference in words else ["--metric", reference]
-    assert cli.main([*words[1:], *more, "--json"]) == cli.DONE
-    miss = json.loads(capsys.readouterr().out)["miss"]
-    assert miss == trials_in(tmp_path)[best["trial"]]["worst miss, each row"][0]
 
 
 def test_people_get_the_start_the_front_and_the_path_of_the_trials(optimise, capsys, monkeypatch):
