@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from spheretwin.models.base.errors import shown
 from spheretwin.scenario.fields import quantity_text
+from spheretwin.study import conditions
 from spheretwin.study.statistics import Array, Rows, ranked, strongest
 from spheretwin.viz.pages import markdown as pieces
 from spheretwin.viz.pages.markdown import Drawing, write_page
@@ -251,7 +252,7 @@ def write(
     table = pieces.table(head, body, [False, *(True for _ in summary)])
     sections = ["## Metrics of the rows", "", *table, ""]
     sections += ["## Figures", "", *map(pieces.figure, figures)] if figures else []
-    sections += [*_worst(rows, command), *_failures(rows)]
+    sections += [*conditions.section(rows), *_worst(rows, command), *_failures(rows)]
     sections += ["## Varied fields", "", *_axes(study, rows), ""]
     limit = f" --limit {requested[0]}" if requested[0] < requested[1] else ""
     lead = [study["description"], "", _ends(rows, *requested)]
@@ -268,7 +269,7 @@ def _ends(rows: Rows, of: int, total: int) -> str:
 
 
 def medians(summary: Mapping[str, Any]) -> tuple[list[str], list[list[str]]]:
-    """Headings and rows of a table: median and 95 % range of each figure, then the statuses, by law."""
+    """Headings and rows of a table: of each figure median, its 95 % interval and range, then the statuses."""
     figures = [name for name in next(iter(summary.values()), {}) if name != "statuses"]
     statuses = sorted({status for of_law in summary.values() for status in of_law["statuses"]})
     body = [
@@ -278,14 +279,15 @@ def medians(summary: Mapping[str, Any]) -> tuple[list[str], list[list[str]]]:
         [f"number of rows: {name}", *(str(of_law["statuses"].get(name, 0)) for of_law in summary.values())]
         for name in statuses
     ]
-    return ["median (95 % range) of the completed rows", *summary], body
+    return ["median [its 95 % interval] (95 % range) of the completed rows", *summary], body
 
 
 def _spread(figure: Mapping[str, Any]) -> str:
     if figure["median"] is None:
         return "–"
     low, high = figure["range_95"]
-    return f"{figure['median']:.4g} ({low:.4g} to {high:.4g})"
+    ends = ("–" if end is None else f"{end:.4g}" for end in figure["median_95"])
+    return f"{figure['median']:.4g} [{', '.join(ends)}] ({low:.4g} to {high:.4g})"
 
 
 def _worst(rows: Rows, command: str) -> list[str]:

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import json
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from math import ceil, floor
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from spheretwin.metrics import METRICS
 from spheretwin.models.telemetry import checksums
@@ -44,6 +45,8 @@ class Rows(NamedTuple):
         Numbers, or text.
     figures : mapping of name to (n,) array
         Of a figure of each hinge, the largest of the three; NaN without a value.
+    hinges_rad : (n, 3) array, optional
+        Largest error of each hinge; None if no row has it.
     """
 
     study: dict[str, Any]
@@ -54,6 +57,7 @@ class Rows(NamedTuple):
     complaints: Texts
     axes: Mapping[str, NDArray[Any]]
     figures: Mapping[str, Array]
+    hinges_rad: Array | None = None
 
     @property
     def completed(self) -> NDArray[np.bool_]:
@@ -122,6 +126,7 @@ def _rows(file: pyarrow.parquet.ParquetFile) -> Rows:
         ),
         {field: _values(column(field)) for field in axes},
         {name: largest(column(name)) for name in sorted(figures, key=_place)},
+        _hinges(column(MAIN)) if MAIN in figures else None,
     )
 
 
@@ -146,6 +151,16 @@ def largest(column: pa.ChunkedArray) -> Array:
         flat = lists.flatten().to_numpy(zero_copy_only=False).astype(np.float64)
         starts = np.cumsum(lengths) - lengths
         numbers[lengths > 0] = np.maximum.reduceat(flat, starts[lengths > 0])
+    return numbers
+
+
+def _hinges(column: pa.ChunkedArray) -> Array:
+    """Numbers of each hinge, (n, 3); NaN in rows without."""
+    lists = column.combine_chunks()
+    numbers = np.full((len(lists), 3), np.nan)
+    is_complete = np.nan_to_num(lists.value_lengths().to_numpy(zero_copy_only=False)) == 3
+    flat = lists.filter(is_complete).flatten().to_numpy(zero_copy_only=False)
+    numbers[is_complete] = flat.astype(np.float64).reshape(-1, 3)
     return numbers
 
 
@@ -235,6 +250,74 @@ def _ranks(values: NDArray[np.float64]) -> NDArray[np.float64]:
 
 LEVELS = (2.5, 50.0, 97.5)
 
+TAIL = 0.025
+"""Probability beyond each end of an interval of 95 %."""
+
+
+def interval(values: ArrayLike, share: float = 0.5, draws: int | None = None) -> tuple[float, float]:
+    """Return the 95 % interval of a quantile: the bootstrap interval of infinitely many resamples.
+
+    Of a resample, the value of rank r is the one of rank k or below with the probability that a number of the
+    distribution Beta(r, n + 1 - r) is at most k/n. So nothing is drawn, and the interval is the same at each
+    call. An end is infinite if the draws are too few for it: none may be beyond the quantile.
+
+    Parameters
+    ----------
+    values : (n,) array
+        Infinity is a value; NaN leaves no interval.
+    share : float
+        Of the quantile; the median unless given.
+    draws : int, optional
+        Number of independent draws, if several values belong to each.
+    """
+    from scipy.special import betaincinv  # slow to import
+
+    ordered = np.sort(np.asarray(values, dtype=np.float64))
+    count, draws = len(ordered), draws or len(ordered)
+    if not count or np.isnan(ordered[-1]):
+        return np.nan, np.nan
+    rank, low, high = round(share * draws, 9), -np.inf, np.inf
+    if (1 - share) ** draws <= TAIL:
+        low = ordered[max(ceil(count * betaincinv(ceil(rank), draws + 1 - ceil(rank), TAIL)), 1) - 1]
+    if share**draws <= TAIL:
+        above = floor(rank) + 1
+        high = ordered[ceil(count * betaincinv(above, draws + 1 - above, 1 - TAIL)) - 1]
+    return float(low), float(high)
+
+
+def quantile_text(
+    values: ArrayLike, text: Callable[[float], str], share: float = 0.5, draws: int | None = None
+) -> str:
+    """Quantile, and its 95 % interval in brackets, a dash for an end for which the draws are too few.
+
+    Parameters
+    ----------
+    values : (n,) array
+        Infinity is a value; a dash is the text of NaN, and of no values.
+    text : callable
+        Text of a value.
+    share, draws
+        As of `interval`.
+    """
+    numbers = np.asarray(values, dtype=np.float64)
+    if not len(numbers) or np.any(np.isnan(numbers)):
+        return "–"
+    median = share == 0.5
+    quantile = np.median(numbers) if median else np.quantile(numbers, share, method="inverted_cdf")
+    ends = (
+        text(end) if np.isfinite(end) or end in numbers else "–" for end in interval(numbers, share, draws)
+    )
+    return f"{text(float(quantile))} [{', '.join(ends)}]"
+
+
+def share_interval(cases: float, draws: int) -> tuple[float, float]:
+    """Return the 95 % interval of Clopper and Pearson (1934) of a probability that gave some cases."""
+    from scipy.special import betaincinv  # slow to import
+
+    low = betaincinv(cases, draws - cases + 1, TAIL) if cases else 0.0
+    high = betaincinv(cases + 1, draws - cases, 1 - TAIL) if cases < draws else 1.0
+    return float(low), float(high)
+
 
 def summary(rows: Rows) -> dict[str, Any]:
     """Summary of a study.
@@ -242,8 +325,9 @@ def summary(rows: Rows) -> dict[str, Any]:
     Returns
     -------
     dict
-        By law: ``statuses`` with their counts, and for each figure of the completed rows ``median`` and
-        ``range_95``; of a figure of each hinge, the largest of the three is taken.
+        By law: ``statuses`` with their counts, and for each figure of the completed rows ``median``, the
+        interval ``median_95`` of this median (None for an end for which the rows are too few), and
+        ``range_95`` of the rows; of a figure of each hinge, the largest of the three is taken.
     """
     by_law: dict[str, Any] = {}
     for law in rows.law_names:
@@ -259,6 +343,7 @@ def _spread(values: NDArray[np.float64]) -> dict[str, Any]:
     """Median and range of the finite values; None without one."""
     numbers = values[np.isfinite(values)]
     if not len(numbers):
-        return {"median": None, "range_95": None}
+        return {"median": None, "median_95": None, "range_95": None}
     low, median, high = np.percentile(numbers, LEVELS).tolist()
-    return {"median": median, "range_95": [low, high]}
+    ends = [end if np.isfinite(end) else None for end in interval(numbers)]
+    return {"median": median, "median_95": ends, "range_95": [low, high]}

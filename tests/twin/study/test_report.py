@@ -11,8 +11,18 @@ from spheretwin.metrics import METRICS
 from spheretwin.models.base.errors import InputError
 from spheretwin.scenario.fields import every_field, quantity_text, unit_of
 from spheretwin.scenario.sections import Scenario
-from spheretwin.study import report
-from spheretwin.study.statistics import Rows, largest, ranked, read, strongest, summary
+from spheretwin.study import conditions, report
+from spheretwin.study.statistics import (
+    Rows,
+    interval,
+    largest,
+    quantile_text,
+    ranked,
+    read,
+    share_interval,
+    strongest,
+    summary,
+)
 from tests.twin.study.cases import loads, run_rows, study
 
 LISTS = st.none() | st.lists(st.none() | st.floats(-9, 9), min_size=1, max_size=3)
@@ -45,9 +55,68 @@ def test_the_summary_is_numpy_s_over_the_completed_rows_of_each_law():
     assert summaries["pd"]["statuses"] == {"left_workspace": 2, "completed": 18}
     of_pd = [values_[place] for place in range(4, 40, 2) if place != 6]
     low, median, high = np.percentile(of_pd, [2.5, 50, 97.5])
-    assert summaries["pd"]["max_abs_error_rad"] == {"median": median, "range_95": [low, high]}
+    # Of 17 values: P(5 to 12 of 17 tosses are heads) = 0.951.
+    inner = sorted(of_pd)[4], sorted(of_pd)[12]
+    assert summaries["pd"]["max_abs_error_rad"] == {
+        "median": median,
+        "median_95": list(inner),
+        "range_95": [low, high],
+    }
     lost = made(2, {"max_abs_error_rad": np.ones(2)}, {}, lost=(0, 1))
-    assert summary(lost)["pd"]["max_abs_error_rad"] == {"median": None, "range_95": None}
+    assert summary(lost)["pd"]["max_abs_error_rad"] == {
+        "median": None,
+        "median_95": None,
+        "range_95": None,
+    }
+
+
+def test_an_interval_is_that_of_many_resamples():
+    values = np.random.default_rng(3).exponential(size=400)
+    resamples = np.random.default_rng(4).choice(values, (20_000, 400))
+    for share in (0.5, 0.9):
+        quantiles = np.quantile(resamples, share, axis=1, method="inverted_cdf")
+        # Both ends are values of the sample: those of the resamples are at most a rank away.
+        ends = np.searchsorted(
+            np.sort(values), [interval(values, share), np.quantile(quantiles, [0.025, 0.975])]
+        )
+        assert np.abs(np.diff(ends, axis=0)).max() <= 1
+
+
+@pytest.mark.parametrize(("count", "share"), [(20, 0.5), (100, 0.5), (100, 0.9), (400, 0.95)])
+def test_an_interval_covers_the_quantile_in_95_of_100_samples(count, share):
+    samples = np.random.default_rng(5).uniform(size=(1000, count))
+    covered = np.mean([low <= share <= high for low, high in (interval(sample, share) for sample in samples)])
+    # Ranks are coarse; three standard deviations of 1,000 samples are 0.02.
+    assert 0.91 < covered < 0.98
+
+
+def test_the_interval_of_a_share_is_scipy_s():
+    for cases, draws in ((3, 100), (0, 20), (20, 20)):
+        expected = stats.binomtest(cases, draws).proportion_ci()
+        np.testing.assert_allclose(share_interval(cases, draws), (expected.low, expected.high), atol=1e-9)
+
+
+def test_an_interval_has_its_special_cases():
+    assert interval([2.0]) == interval([1.0] * 5) == (-np.inf, np.inf)  # each may be above the median: 3 %
+    assert interval([1.0, 2.0, 3.0, 4.0, 5.0, 6.0]) == (1.0, 6.0)
+    assert (
+        interval(np.arange(100.0), 0.99)[1] == np.inf
+    )  # 100 draws are below the quantile in 37 % of samples
+    assert interval([1.0] * 80 + [np.inf] * 20, 0.95) == (np.inf, np.inf)
+    assert interval([1.0] * 90 + [np.inf] * 10, 0.9) == (1.0, np.inf)
+    assert np.isnan(interval([])).all()
+    assert np.isnan(interval([1.0, np.nan])).all()
+    values = np.arange(400.0)
+    assert interval(values) == (179.0, 220.0)  # P(180 to 220 of 400 tosses are heads) = 0.960
+    low, high = interval(values, draws=100)  # four values a draw: twice as wide
+    assert 2 * 41 - 4 <= high - low <= 2 * 41 + 4
+
+
+def test_the_text_of_a_quantile_has_no_end_that_the_draws_do_not_give():
+    assert quantile_text([1.0, 2.0], "{:.1f}".format) == "1.5 [–, –]"
+    assert quantile_text(np.arange(100.0), "{:g}".format, 0.99) == "98 [94, –]"
+    assert quantile_text([1.0] * 50 + [np.inf] * 50, "{:g}".format, 0.9) == "inf [inf, inf]"
+    assert quantile_text([], str) == quantile_text([1.0, np.nan], str) == "–"
 
 
 def test_rank_correlations_are_scipy_s_where_rows_are_few():
@@ -141,3 +210,23 @@ def test_words_of_all_fields_and_metrics_are_different_and_end_in_their_units():
     assert len(set(words.values())) == len(names)
     assert not any("_" in text or "." in text for text in words.values())
     assert all(text.endswith(f", {unit_of(name)}") for name, text in words.items() if unit_of(name))
+
+
+def test_medians_by_condition_are_those_of_each_hinge(tmp_path):
+    """The encoder of γ may have the largest error of all rows."""
+    errors_deg = np.random.default_rng(6).uniform(1, 2, (40, 3)) * [1.0, 1.0, 9.0]
+    delays = np.repeat([1e-3, 2e-3], 20)
+    rows = made(
+        40, {"max_abs_error_rad": np.radians(errors_deg).max(axis=1)}, {"drive.delay_s": delays}, lost=[3]
+    )
+    rows = rows._replace(hinges_rad=np.radians(errors_deg))
+    lines = conditions.section(rows)
+    first, second = (line.split("|")[1:-1] for line in lines if "of 20" in line)
+    assert [cell.strip() for cell in first[:3]] == ["0.001", "pd", "19 of 20"]
+    worse = np.delete(errors_deg[:20, :2].max(axis=1), 3)
+    assert first[6].strip() == quantile_text(worse, "{:.4g}".format)
+    assert float(first[6].split()[0]) == pytest.approx(np.median(worse), rel=1e-3)
+    assert second[4].strip() == quantile_text(errors_deg[20:, 1], "{:.4g}".format)
+    assert (
+        conditions.section(made(2, {"max_abs_error_rad": np.ones(2)}, {"drive.delay_s": delays[19:21]})) == []
+    )
