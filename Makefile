@@ -47,7 +47,7 @@ benchmark: setup ## print the speed ratios and the bars of studies, hold the all
 peers: .venv-peers/installed ## compare JAX, MJX, Drake and plain NumPy with ours, and print the times of all
 	PYTHONPATH=tests/benchmarks .venv-peers/bin/python tests/benchmarks/peers/compare.py
 
-reproduce: setup ## run all that the paper shows, over 20 seeds, and leave a page in reproduced/
+reproduce: setup ## run all that the paper shows, over 20 seeds or more, and leave a page in reproduced/
 	$(BIN)/spheretwin reproduce all --out reproduced
 	@echo "here:      reproduced/reproduce.html"
 

@@ -12,6 +12,7 @@ from spheretwin.models.base.errors import InputError, did_you_mean, shown
 from spheretwin.models.base.mujoco_library import timers_stopped
 from spheretwin.models.telemetry.run_record import versions
 from spheretwin.paper import EXPERIMENTS, page
+from spheretwin.paper.experiment import SEEDS
 from spheretwin.paper.page import Chapter, chapter_of, rows
 from spheretwin.paper.runner import make_plan, run_with_cache, summarise, unexpected_ends
 from spheretwin.plant.plant_tick import ENGINES
@@ -21,7 +22,7 @@ from spheretwin.viz.terminal.progress import runs, tracked
 from spheretwin.viz.terminal.tables import print_checks
 from spheretwin.viz.terminal.texts import Verdict, print_verdicts
 
-SEEDS, MOST = 20, 1000
+MOST = 1000
 ALL = "all"
 TWIN = "twin"
 
@@ -44,7 +45,7 @@ def declare(parser: Parser) -> None:
         "--seeds",
         type=whole(MOST),
         metavar="N",
-        help=f"runs of each case, {SEEDS} unless given",
+        help=f"runs of each case; unless given {SEEDS}, and more where small differences or rare cases count",
     )
     parser.add_argument(
         "--limit", type=whole(MOST), metavar="N", help="only the first N cases of each experiment"
@@ -62,7 +63,6 @@ def run(options: argparse.Namespace) -> bool:
     """Run the verb; return True if every run ended as expected."""
     if TWIN in options.names:
         return _twin(options)
-    options.seeds = options.seeds or SEEDS
     plans = [
         make_plan(EXPERIMENTS[name], options.seeds, options.limit, options.plant)
         for name in _named(options.names)
@@ -148,9 +148,10 @@ def _named(names: Sequence[str]) -> list[str]:
 
 def _command(options: argparse.Namespace) -> str:
     """Return the command that creates the same page again."""
+    seeds = f" --seeds {options.seeds}" if options.seeds else ""
     limit = f" --limit {options.limit}" if options.limit else ""
     plant = f" --plant {options.plant}" if options.plant else ""
-    return f"spheretwin reproduce {' '.join(_named(options.names))} --seeds {options.seeds}{limit}{plant}"
+    return f"spheretwin reproduce {' '.join(_named(options.names))}{seeds}{limit}{plant}"
 
 
 def _verdict(chapter: Chapter) -> Verdict:

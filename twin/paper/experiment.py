@@ -18,6 +18,10 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 
+SEEDS = 20
+"""Runs of a case, unless it has more or the command states their number."""
+
+
 class Case(NamedTuple):
     """One condition: a scenario with some of its fields changed, run once for each seed."""
 
@@ -37,6 +41,8 @@ class Case(NamedTuple):
     comparable: bool = True
     """Whether it may be in the sample that runs on both plants: a loop beyond its margin amplifies rounding,
     and differs between any two plants."""
+    seeds: int = SEEDS
+    """Runs unless the command states their number; more where a small difference or a rare case counts."""
     seeded_fields: Callable[[int], Mapping[str, Any]] = lambda seed: {}
     """Fields that depend on the seed, a function of the seed alone."""
 

@@ -127,6 +127,12 @@ OF_GROUPS = (UNREPORTED, REPORTED, DETECTING, BOUNDED)
 """For open groups: they are not reported, reported to the allocation, or detected. The last way reports
 them to the allocation that uses all that the current limit allows."""
 
+LATENCY_LAWS = ("afsm", "afsm_eso")
+"""Laws of the distribution of the detection latency: it depends on what the law commands to each group."""
+
+SEEDS = 200
+"""Starts of each group for this distribution, whose tail is rare."""
+
 ALONE = Way("no watchdog", fields={"watchdog.on": False})
 RELEASE = Way("release", fields={"watchdog.on": True, "watchdog.action": "release"})
 BRAKE = Way("short", fields={"watchdog.on": True, "watchdog.action": "short"})
@@ -163,6 +169,7 @@ def cases() -> list[Case]:
         [[of_groups(groups, way) for way in OF_GROUPS] for groups in random_groups()],
         [[of_part(failure, way) for way in OF_PARTS] for failure in failures()],
         [[shorted(groups, DETECTING)] for groups in singles()],
+        [[of_latency(groups, law) for law in LATENCY_LAWS] for groups in singles()],
         [[on_other_engine(groups, way) for way in OF_GROUPS] for groups in sample()],
     ]
     return [HEALTHY, HEALTHY_ELECTRONICS, *_in_turn(kinds)]
@@ -177,6 +184,17 @@ def of_groups(groups: Groups, way: Way) -> Case:
 def shorted(groups: Groups, way: Way) -> Case:
     """Case of groups with shorted ends in one way."""
     return _of_coils(groups, way, "short", "short")
+
+
+def of_latency(groups: Groups, law: str) -> Case:
+    """Case of open groups under a law, with many starts."""
+    case = of_groups(groups, DETECTING)
+    return case._replace(
+        name=f"{case.name}, {law}, latency",
+        fields={**case.fields, "controller.law": law},
+        details={**case.details, "kind": "latency"},
+        seeds=SEEDS,
+    )
 
 
 def on_other_engine(groups: Groups, way: Way) -> Case:

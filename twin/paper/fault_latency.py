@@ -14,6 +14,8 @@ from spheretwin.paper import fault_sections
 from spheretwin.paper.experiment import Outcome, Outcomes, ResultTable, Section
 from spheretwin.paper.fault_outcomes import tracks
 from spheretwin.paper.fault_sections import percent, runs_by_set
+from spheretwin.paper.laws import BY_LAW
+from spheretwin.study.statistics import quantile_text, share_interval
 
 METHOD = (
     "*Latency* is the time from the start of a fault to the first tick at which the allocation excludes the"
@@ -22,6 +24,9 @@ METHOD = (
     " is above the threshold of the detector. At all other ticks the group is idle: an open group within the"
     " threshold cannot be distinguished from a healthy one. The latency is therefore the time until enough"
     " driven ticks have passed.\n\n"
+    "Quantiles have their 95 % interval in brackets. The latency depends on the law, which commands the"
+    " currents: every group opens at many starts under each of two. Faults of several groups, which share"
+    " their start, count as one draw.\n\n"
     "The *cost* of the delay is the error after the fault (as above) minus that of the run with a reported"
     " fault of the same groups, seed and start."
 )
@@ -30,7 +35,7 @@ HEAD = (
     "driven ticks: median", "longest", "not detected: most",
 )  # fmt: skip
 COST = (
-    "slowest latency, ms", "runs", "cost, mrad: median", "95 %", "99 %", "largest",
+    "slowest latency, ms", "runs", "cost, mrad: median", "95 %", "99 %", "largest of these",
     "healthy error, mrad: median", "track",
 )  # fmt: skip
 QUANTILES = (0.5, 0.9, 0.95, 0.99)
@@ -41,6 +46,9 @@ EDGES_ms = (0.0, 6.5, 20.5, 100.5, inf)
 
 class Detection(NamedTuple):
     """Detection of one failed group."""
+
+    run: int
+    """Number of its run: groups of a run share the start."""
 
     latency_s: float
     """Infinite if it is not detected."""
@@ -66,26 +74,28 @@ def section(outcomes: Outcomes) -> Section:
 
 def _detections(outcomes: Outcomes) -> dict[str, list[Detection]]:
     """Detections by the kind of fault."""
+    singles, label = cases.singles(), {law: BY_LAW[law].label for law in cases.LATENCY_LAWS}
     kinds = {
-        "one open": (cases.singles(), cases.of_groups),
-        "two open": (cases.pairs(), cases.of_groups),
-        "three to nine open": (cases.random_groups(), cases.of_groups),
-        "one shorted": (cases.singles(), cases.shorted),
+        f"one open, {label[law]}": [cases.of_latency(groups, law) for groups in singles] for law in label
     }
+    several = {"two open": cases.pairs(), "three to nine open": cases.random_groups()}
+    kinds |= {
+        kind: [cases.of_groups(groups, cases.DETECTING) for groups in sets] for kind, sets in several.items()
+    }
+    kinds["one shorted"] = [cases.shorted(groups, cases.DETECTING) for groups in singles]
     return {
         kind: [
             detection
-            for groups in sets
-            for run in outcomes.runs(case(groups, cases.DETECTING))
-            for detection in _of_run(run)
+            for number, run in enumerate(run for case in of_kind for run in outcomes.runs(case))
+            for detection in _of_run(run, number)
         ]
-        for kind, (sets, case) in kinds.items()
+        for kind, of_kind in kinds.items()
     }
 
 
-def _of_run(run: Outcome) -> list[Detection]:
+def _of_run(run: Outcome, number: int = 0) -> list[Detection]:
     return [
-        Detection(inf if latency_s is None else latency_s, ticks)
+        Detection(number, inf if latency_s is None else latency_s, ticks)
         for latency_s, ticks in zip(run.data.latencies_s, run.data.driven_ticks, strict=True)
     ]
 
@@ -100,22 +110,24 @@ def _row(kind: str, detections: Sequence[Detection]) -> tuple[str, ...]:
         ticks[:2] = f"{np.median(driven):.0f}", str(max(driven))
     if "open" in kind and missed:
         ticks[2] = str(max(one.driven_ticks for one in missed))
+    runs = len({one.run for one in detections})
     return (
-        kind, str(len(detections)), *(_ms(value) for value in _quantiles(latencies_ms)),
+        kind, str(len(detections)), *(quantile_text(latencies_ms, _ms, share, runs) for share in QUANTILES),
         _ms(1e3 * max((one.latency_s for one in detected), default=inf)),
-        f"{len(missed)} ({percent([one.latency_s == inf for one in detections])})", *ticks,
+        _share(len(missed), len(detections), runs), *ticks,
     )  # fmt: skip
+
+
+def _share(cases: int, count: int, draws: int) -> str:
+    """Cases and their share in percent, with its interval."""
+    low, high = share_interval(cases * draws / count, draws)
+    return f"{cases} ({100 * cases / count:.1f} % [{100 * low:.1f}, {100 * high:.1f}])"
 
 
 def _split(detections: Sequence[Detection]) -> tuple[list[Detection], list[Detection]]:
     """Detected and missed faults."""
     detected = [one for one in detections if one.latency_s < inf]
     return detected, [one for one in detections if one.latency_s == inf]
-
-
-def _quantiles(values: Sequence[float]) -> list[float]:
-    """Return the smallest values that the stated shares do not exceed; infinity is a value."""
-    return [float(value) for value in np.quantile(values, QUANTILES, method="inverted_cdf")]
 
 
 def _ms(value: float) -> str:
@@ -163,10 +175,12 @@ def _cost_row(pairs: Sequence[tuple[Outcome, Outcome]], first: float, end: float
     chosen = [pair for pair in pairs if _within(1e3 * _slowest_s(pair[0]), first, end)]
     if not chosen:
         return None
-    costs = np.quantile([1e3 * cost_rad(*pair) for pair in chosen], [0.5, 0.95, 0.99, 1.0])
+    costs = [1e3 * cost_rad(*pair) for pair in chosen]
     healthy = np.median([1e3 * detecting.data.healthy_rad for detecting, _ in chosen])
     return (
-        _named(first, end), str(len(chosen)), *(f"{cost:.3f}" for cost in costs), f"{healthy:.1f}",
+        _named(first, end), str(len(chosen)),
+        *(quantile_text(costs, "{:.3f}".format, share) for share in (0.5, 0.95, 0.99)),
+        f"{max(costs):.3f}", f"{healthy:.1f}",
         percent([tracks(detecting) for detecting, _ in chosen]),
     )  # fmt: skip
 

@@ -13,6 +13,7 @@ from spheretwin.paper import fault_cases as cases
 from spheretwin.paper.experiment import Outcome, Outcomes, ResultTable, Section
 from spheretwin.paper.fault_outcomes import TWICE, tracks
 from spheretwin.paper.page import statuses_text
+from spheretwin.study.statistics import quantile_text
 from spheretwin.viz.pages.markdown import Drawing
 
 PARTS_METHOD = (
@@ -160,7 +161,8 @@ GROUPS_METHOD = (
     "The fault starts at a random control tick of the run, which depends on the seed; all ways of a set"
     " share it. The *error ratio* is the largest error of any hinge from the start of the fault to the end of"
     " the run, divided by the same error of the healthy run with the same seed, allocation and window. A run"
-    f" *tracks* if it completes and its error ratio is at most {TWICE:g}.\n\n"
+    f" *tracks* if it completes and its error ratio is at most {TWICE:g}. Quantiles have their 95 % interval"
+    " in brackets; a largest value is that of the stated number of runs.\n\n"
     f"Every group and every pair runs with every seed; {cases.RANDOM_SETS} larger random sets run with"
     " one seed each."
 )
@@ -238,9 +240,10 @@ def _started(outcomes: Outcomes, interval_s: tuple[float, float], way: cases.Way
 
 
 def _tracking(runs: Sequence[Outcome]) -> tuple[str, ...]:
-    """Return the share that tracks, and quantiles of the error ratio."""
-    ratios = np.quantile([run.data.ratio for run in runs], [0.5, 0.95, 0.99, 1.0])
-    return percent([tracks(run) for run in runs]), *(f"{ratio:.2f}" for ratio in ratios)
+    """Return the share that tracks, and quantiles of the error ratio with their intervals."""
+    ratios = [run.data.ratio for run in runs]
+    quantiles = (quantile_text(ratios, "{:.2f}".format, share) for share in (0.5, 0.95, 0.99))
+    return percent([tracks(run) for run in runs]), *quantiles, f"{np.max(ratios):.2f}"
 
 
 def few(outcomes: Outcomes, way: cases.Way) -> list[Outcome]:

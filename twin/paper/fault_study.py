@@ -257,7 +257,7 @@ EXPERIMENT = Experiment(
     name="faults",
     title="Parts that fail during the run",
     summary="The nutation (59) under AFSM with m = 0.2 and L = 1. At a random time coil groups open, or a"
-    " sensor, the supply or the controller fails.",
+    " sensor, the supply or the controller fails. The detection latency is measured under AFSM-ESO too.",
     cases=cases.cases,
     sections=sections,
     reduce=reduce,

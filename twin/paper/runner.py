@@ -64,7 +64,8 @@ class Plan(NamedTuple):
 
     experiment: Experiment
     cases: list[Case]
-    seeds: int
+    seeds: int | None = None
+    """Runs of each case; those of `Case.seeds` unless given."""
     plant: str | None = None
     """Plant of the cases that do not name one; the fast one if the model allows it, unless given."""
 
@@ -99,10 +100,12 @@ class Plan(NamedTuple):
         return Outcomes({case.name: list(islice(remaining, len(self._seeds(case)))) for case in self.cases})
 
     def _seeds(self, case: Case) -> range:
-        return range(self.seeds if case.is_random and not case.single_run else 1)
+        return range((self.seeds or case.seeds) if case.is_random and not case.single_run else 1)
 
 
-def make_plan(experiment: Experiment, seeds: int, limit: int | None = None, plant: str | None = None) -> Plan:
+def make_plan(
+    experiment: Experiment, seeds: int | None = None, limit: int | None = None, plant: str | None = None
+) -> Plan:
     """Plan of an experiment: all of its cases, or the first `limit` of them."""
     return Plan(experiment, experiment.cases()[:limit], seeds, plant)
 

@@ -8,8 +8,9 @@ import pytest
 
 from spheretwin import scenario as scenarios
 from spheretwin.faults.targets import TARGETS
-from spheretwin.paper import fault_cases
+from spheretwin.paper import fault_cases, fault_study
 from spheretwin.paper.fault_cases import DETECTING, OF_GROUPS, OF_PARTS, failures, of_groups, of_part
+from spheretwin.paper.runner import Plan
 
 ALL = fault_cases.cases()
 
@@ -43,6 +44,7 @@ def test_every_set_has_its_ways_and_a_sample_runs_on_the_other_engine():
         "drawn": 2000 * ways,
         "part": len(failures()) * len(OF_PARTS),
         "short": 18,
+        "latency": 2 * 18,
         "MuJoCo": len(fault_cases.sample()) * ways,
     }
     assert len(fault_cases.sample()) == -(-2171 // fault_cases.SAMPLE)
@@ -82,7 +84,7 @@ def test_every_mode_of_every_shared_part_is_there_with_a_value_where_it_needs_on
 @pytest.mark.parametrize("limit", [25, 60])
 def test_a_limit_leaves_some_of_each_kind(limit):
     kinds = Counter(case.details["kind"] for case in ALL[:limit])
-    assert set(kinds) == {"healthy", "single", "pair", "drawn", "part", "short", "MuJoCo"}
+    assert set(kinds) == {"healthy", "single", "pair", "drawn", "part", "short", "latency", "MuJoCo"}
     named = {case.name for case in ALL[:limit]}
     assert named & {name.removesuffix(", MuJoCo") for name in named if name.endswith(", MuJoCo")}
 
@@ -114,6 +116,19 @@ def test_all_ways_and_engines_of_a_set_share_the_start_of_a_seed_and_other_seeds
         assert len(set.union(*(starts(of_part(failure, way), 0) for way in OF_PARTS))) == 1
     (alone,) = starts(fault_cases.shorted((3,), DETECTING), 1)
     assert alone == fault_cases.start_s("group 3", 1)
+
+
+def test_the_latency_is_that_of_two_laws_over_many_starts():
+    of_latency = [case for case in ALL if case.details["kind"] == "latency"]
+    laws = Counter(scenarios.load("nutation", case.fields).controller.law for case in of_latency)
+    assert laws == {"afsm": 18, "afsm_eso": 18}
+    assert {case.seeds for case in of_latency} == {fault_cases.SEEDS}
+    jobs = Plan(fault_study.EXPERIMENT, of_latency).jobs
+    assert len(jobs) == 36 * fault_cases.SEEDS >= 2 * 3600
+    assert len(Plan(fault_study.EXPERIMENT, of_latency, 2).jobs) == 72
+    # Starts and seeds of AFSM are those of the other tables.
+    (other,) = (case for case in ALL if case.name == of_groups((0,), DETECTING).name)
+    assert of_latency[0].fields_of(3) == {**other.fields_of(3), "controller.law": "afsm"}
 
 
 def test_only_what_is_drawn_or_a_sample_runs_once():
