@@ -23,13 +23,8 @@ test: compiled ## run the tests of the first suite in parallel, in six minutes
 test-all: compiled ## run all tests, also those marked release
 	$(PYTEST)
 
-# Tests that run in parallel load these loops; without them each process would compile its own. A loop has ideal
-# sensors or a chain of them, and a lag of the currents or a chain as its drive.
-HARDWARE = "" "--hardware electronics" "--sensors.encoder.counts 4096" "--drive.supply-V 24"
-HOLD = for hardware in $(HARDWARE) $(2); do \
-	$(BIN)/spheretwin simulate hold --duration 0.1 --json --plant.engine $(1) $$hardware || exit 1; done > /dev/null
-compiled: setup ## compile the loops of the first suite, a process for each engine
-	$(call HOLD,mujoco) & ( $(call HOLD,lagrangian,"--hardware prototype") ) && wait $$!
+compiled: setup ## compile the loop and the stages of the first suite, which tests that run in parallel load
+	$(BIN)/python tests/compiled_loops.py
 
 check: .venv-wheel/installed ## format, lint, types, import layers
 	$(WHEEL)/ruff format --check .

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
+from numba import types
 from numpy.typing import NDArray
 
 from spheretwin.control import allocation as allocations
@@ -31,6 +32,7 @@ NO_TORQUE = -1.0
 _COMMAND = int(Reason.COMMAND)
 
 law_at = function_at(laws.SIGNATURE)
+python_law_at = function_at(types.void(types.float64))
 allocation_at = function_at(allocations.SIGNATURE)
 
 
@@ -71,6 +73,7 @@ class Controller(NamedTuple):
     supervision: Supervision
     manual: Manual
     authority: NDArray[np.float64]  # (1,) share of the commands that is sent: 1, or less in a soft start
+    python_law: int = 0  # address of a function of the time that calls a law in plain Python; 0: none
 
 
 def controller(
@@ -221,7 +224,10 @@ def _call_law(
         compensators, controller.applied_torque, controller.magnetics, measurement, reference
     ):
         return False
-    law_at(law)(t, reference, measurement, controller.parameters, controller.memory, torque_q)
+    if controller.python_law != 0:
+        python_law_at(controller.python_law)(t)
+    else:
+        law_at(law)(t, reference, measurement, controller.parameters, controller.memory, torque_q)
     if compensators.feed_forward.on:
         for i in range(3):
             torque_q[i] += compensators.feed_forward.torque_q[i]

@@ -71,7 +71,7 @@ class Kick(DisturbanceTerm):
         "",
         """
 @part_of_its_caller
-def write_largest(row, controller, sensors, plant):
+def write_largest(row, plant):
     row[0] = 0.0
     for j in range(plant.current.shape[0]):
         row[0] = max(row[0], abs(plant.current[j]))

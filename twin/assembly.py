@@ -22,7 +22,6 @@ from spheretwin.electronics.drive import DriveModel
 from spheretwin.electronics.drive_chain import DriveChain
 from spheretwin.electronics.transducers import CurrentSensors
 from spheretwin.faults.schedule import part_names
-from spheretwin.loop import ColumnOffsets
 from spheretwin.models.actuator import Actuator
 from spheretwin.models.base.errors import InputError, SpheretwinError, exception_text, shown
 from spheretwin.models.base.reuse import reused
@@ -30,7 +29,7 @@ from spheretwin.models.joint_chain import JointChain
 from spheretwin.models.lagrangian import loaded_inertia
 from spheretwin.models.magnetics import TorqueModel, scaled, scratch_of, torque_model
 from spheretwin.models.scatter import scattered_model
-from spheretwin.models.telemetry.signals import Signal, common_signals, offsets, width
+from spheretwin.models.telemetry.signals import Signal, common_signals, width
 from spheretwin.plant.bristle_friction import bristle_friction
 from spheretwin.plant.end_stops import end_stops
 from spheretwin.plant.friction import Friction, friction
@@ -114,13 +113,6 @@ def signals_of(scenario: ResolvedScenario, actuator: Actuator, law: Law) -> tupl
         if channel.logged(scenario):
             signals += channel.signals(groups)
     return signals + law.signals
-
-
-def column_offsets(signals: tuple[Signal, ...], law: Law) -> ColumnOffsets:
-    """Return the first columns of the signals that only some runs log."""
-    first = offsets(signals)
-    channels = tuple(first.get(channel.signals(1)[0].name, -1) for channel in CHANNELS)
-    return ColumnOffsets(channels, width(signals) - width(law.signals))
 
 
 def nominal_magnetics(scenario: ResolvedScenario, files: Files) -> TorqueModel:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import cache
+from inspect import signature
 from typing import Any, NamedTuple
 
 from numpy.typing import NDArray
@@ -14,7 +15,7 @@ from spheretwin.electronics.drive import write_telemetry as write_drive_telemetr
 from spheretwin.electronics.sensors import write_telemetry as write_sensor_telemetry
 from spheretwin.faults.fault import MODES
 from spheretwin.faults.schedule import part_names
-from spheretwin.models.base.compiled import part_of_its_caller
+from spheretwin.models.base.compiled import part_of_its_caller, uncompiled
 from spheretwin.models.telemetry.signals import ANGLES, Signal
 from spheretwin.plant.bristle_friction import log_cable, log_end_stops, log_presliding
 from spheretwin.plant.cable import acts
@@ -30,8 +31,14 @@ class Channel(NamedTuple):
     logged: Callable[[Scenario], bool]
     """True if a run of a resolved scenario has the channel."""
     write: Any
-    """``write(row, controller, sensors, plant)`` writes the columns into the beginning of `row`, once in each
-    tick, after the plant has advanced. `part_of_its_caller` includes it in the machine code of the loop."""
+    """``write(row, plant)`` writes the columns into the beginning of `row`, once in each tick, after the
+    plant has advanced. Its other arguments name the parts that it reads: one or two of `controller`,
+    `sensors` and `plant`."""
+
+    @property
+    def parts(self) -> list[str]:
+        """Names of the parts that it reads."""
+        return list(signature(uncompiled(self.write)).parameters)[1:]
 
 
 @cache
@@ -42,7 +49,7 @@ def current_signals(groups: int) -> tuple[Signal, ...]:
 
 
 @part_of_its_caller
-def write_currents(row: NDArray, controller: Any, sensors: Any, plant: Any) -> None:
+def write_currents(row: NDArray, plant: Any) -> None:
     """Write the columns of one tick."""
     measured_A = plant.current_sensors.measured_A
     for j in range(measured_A.shape[0]):
@@ -67,7 +74,7 @@ def drive_signals(groups: int) -> tuple[Signal, ...]:
 
 
 @part_of_its_caller
-def write_drive(row: NDArray, controller: Any, sensors: Any, plant: Any) -> None:
+def write_drive(row: NDArray, plant: Any) -> None:
     """Write the columns of one tick."""
     write_drive_telemetry(plant.drive, row)
 
@@ -97,7 +104,7 @@ def fault_signals(groups: int) -> tuple[Signal, ...]:
 
 
 @part_of_its_caller
-def write_faults(row: NDArray, controller: Any, sensors: Any, plant: Any) -> None:
+def write_faults(row: NDArray, controller: Any, plant: Any) -> None:
     """Write the columns of one tick."""
     groups, parts = controller.supervision.groups, plant.fault_modes.shape[0]
     count = groups.out.shape[0]
@@ -125,7 +132,7 @@ FEED_FORWARD_SIGNALS = (
 
 
 @part_of_its_caller
-def write_feed_forward(row: NDArray, controller: Any, sensors: Any, plant: Any) -> None:
+def write_feed_forward(row: NDArray, controller: Any) -> None:
     """Write the columns of one tick."""
     for i in range(3):
         row[i] = controller.compensators.feed_forward.torque_q[i]
@@ -144,7 +151,7 @@ FRICTION_SIGNALS = (
 
 
 @part_of_its_caller
-def write_friction(row: NDArray, controller: Any, sensors: Any, plant: Any) -> None:
+def write_friction(row: NDArray, plant: Any) -> None:
     """Write the columns of one tick."""
     for i in range(3):
         row[i] = plant.first_friction_q[i]
@@ -163,7 +170,7 @@ PRESLIDING_SIGNALS = (
 
 
 @part_of_its_caller
-def write_presliding(row: NDArray, controller: Any, sensors: Any, plant: Any) -> None:
+def write_presliding(row: NDArray, plant: Any) -> None:
     """Write the columns of one tick."""
     log_presliding(plant.bristles, row)
 
@@ -179,7 +186,7 @@ CABLE_SIGNALS = (
 
 
 @part_of_its_caller
-def write_cable(row: NDArray, controller: Any, sensors: Any, plant: Any) -> None:
+def write_cable(row: NDArray, plant: Any) -> None:
     """Write the columns of one tick."""
     log_cable(plant.bristles, row)
 
@@ -195,7 +202,7 @@ END_STOP_SIGNALS = (
 
 
 @part_of_its_caller
-def write_end_stops(row: NDArray, controller: Any, sensors: Any, plant: Any) -> None:
+def write_end_stops(row: NDArray, plant: Any) -> None:
     """Write the columns of one tick."""
     log_end_stops(plant.bristles, row)
 
@@ -212,7 +219,7 @@ HEAT_SIGNALS = (
 
 
 @part_of_its_caller
-def write_heat(row: NDArray, controller: Any, sensors: Any, plant: Any) -> None:
+def write_heat(row: NDArray, plant: Any) -> None:
     """Write the columns of one tick."""
     log_heat(plant.heat, row)
 
@@ -230,7 +237,7 @@ REFERENCE_GOVERNOR_SIGNALS = (
 
 
 @part_of_its_caller
-def write_reference_governor(row: NDArray, controller: Any, sensors: Any, plant: Any) -> None:
+def write_reference_governor(row: NDArray, controller: Any) -> None:
     """Write the columns of one tick."""
     motion = controller.compensators.governor.motion
     for part in range(3):
@@ -254,7 +261,7 @@ SENSOR_SIGNALS = (
 
 
 @part_of_its_caller
-def write_sensors(row: NDArray, controller: Any, sensors: Any, plant: Any) -> None:
+def write_sensors(row: NDArray, controller: Any) -> None:
     """Write the columns of one tick."""
     for i in range(3):
         row[i], row[3 + i] = controller.pose[i], controller.rates[i]
@@ -279,7 +286,7 @@ SENSOR_STATE_SIGNALS = (
 
 
 @part_of_its_caller
-def write_sensor_states(row: NDArray, controller: Any, sensors: Any, plant: Any) -> None:
+def write_sensor_states(row: NDArray, sensors: Any) -> None:
     """Write the columns of one tick."""
     write_sensor_telemetry(sensors, row)
 
@@ -299,7 +306,7 @@ PREDICTION_SIGNALS = (
 
 
 @part_of_its_caller
-def write_prediction(row: NDArray, controller: Any, sensors: Any, plant: Any) -> None:
+def write_prediction(row: NDArray, controller: Any) -> None:
     """Write the columns of one tick."""
     prediction = controller.compensators.prediction
     for i in range(3):
@@ -325,7 +332,7 @@ WATCHDOG_SIGNALS = (
 
 
 @part_of_its_caller
-def write_watchdog(row: NDArray, controller: Any, sensors: Any, plant: Any) -> None:
+def write_watchdog(row: NDArray, controller: Any) -> None:
     """Write the columns of one tick."""
     row[0] = controller.supervision.watchdog.reason[0]
 
@@ -349,33 +356,3 @@ CHANNELS: tuple[Channel, ...] = (
     FAULTS,
     WATCHDOG,
 )
-
-
-def _chain(channels: tuple[Channel, ...], place: int = 0) -> Any:
-    """Return one compiled function that writes the columns of all channels, without a loop over functions."""
-    if len(channels) == 1:
-        return _if_logged(channels[0].write, place)
-    half = len(channels) // 2  # halves: each level of the chain is copied into the one above
-    write, write_others = _chain(channels[:half], place), _chain(channels[half:], place + half)
-
-    @part_of_its_caller
-    def write_all(row: Any, offsets: Any, controller: Any, sensors: Any, plant: Any) -> None:
-        write(row, offsets, controller, sensors, plant)
-        write_others(row, offsets, controller, sensors, plant)
-
-    return write_all
-
-
-def _if_logged(write: Any, place: int) -> Any:
-    """Return a compiled function that writes the columns of one channel, if a run has them."""
-
-    @part_of_its_caller
-    def write_if_logged(row: Any, offsets: Any, controller: Any, sensors: Any, plant: Any) -> None:
-        if offsets[place] >= 0:
-            write(row[offsets[place] :], controller, sensors, plant)
-
-    return write_if_logged
-
-
-write_channels = _chain(CHANNELS)
-"""``write_channels(row, offsets, controller, sensors, plant)``; a negative offset means no column."""

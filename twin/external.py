@@ -14,7 +14,7 @@ from spheretwin.control.manual_currents import Manual
 from spheretwin.control.supervision.watchdog import Reason, trip
 from spheretwin.electronics.drive_chain import DriveChain
 from spheretwin.loop import INTERRUPTED, NO_EXTERNAL, External, Scratch
-from spheretwin.models.base.compiled import uncompiled
+from spheretwin.models.base.compiled import COMPILES, uncompiled
 from spheretwin.plant.plant_tick import GOING, Plant
 
 Array = NDArray[np.float64]
@@ -81,8 +81,6 @@ class Connection:
     plant : Plant
     scratch : Scratch
         Buffers of the loop.
-    compiled : bool
-        True if the loop is compiled: it calls the part by its address.
 
     Attributes
     ----------
@@ -90,9 +88,7 @@ class Connection:
         Argument of the loop. It has only addresses: this object keeps the functions alive.
     """
 
-    def __init__(
-        self, part: Any, controller: Controller, plant: Plant, scratch: Scratch, compiled: bool
-    ) -> None:
+    def __init__(self, part: Any, controller: Controller, plant: Plant, scratch: Scratch) -> None:
         self._part, self._controller, self._plant = part, controller, plant
         self._measured = scratch.measurement
         self._error: BaseException | None = None
@@ -102,7 +98,7 @@ class Connection:
         is_plant = hasattr(part, "advance")
         function = self._guarded(self._advance if is_plant else self._command)
         self._callback = _CALLBACK(function)
-        entry = ctypes.cast(self._callback, ctypes.c_void_p).value if compiled else function
+        entry = ctypes.cast(self._callback, ctypes.c_void_p).value if COMPILES else function
         groups = len(plant.current)
         self.external = External(
             0 if is_plant else entry, entry if is_plant else 0, np.zeros(groups), np.zeros(3)

@@ -12,14 +12,12 @@ import numpy as np
 from numba import types
 from numpy.typing import NDArray
 
-from spheretwin.channels import write_channels
 from spheretwin.control import allocation as allocations
 from spheretwin.control import law as laws
 from spheretwin.control.controller import NO_TORQUE, Controller, control_tick
 from spheretwin.control.estimators import estimator as estimators
 from spheretwin.control.law import Law
 from spheretwin.control.supervision.watchdog import GO, Reason, count_rundown, replace_invalid, trip
-from spheretwin.electronics.sensors import Sensors, sense
 from spheretwin.electronics.transducers import sense_currents
 from spheretwin.models.base.compiled import (
     COMPILES,
@@ -42,10 +40,8 @@ from spheretwin.plant.plant_tick import (
     FAILSAFE,
     GOING,
     LEFT_WORKSPACE,
-    Plant,
-    PlantOutput,
-    plant_tick,
 )
+from spheretwin.stages import Stages, advance_at, sense_at, write_at
 
 Array = NDArray[np.float64]
 
@@ -66,13 +62,6 @@ class Inputs(NamedTuple):
     disturbance: NDArray[np.float64]  # (n, 3) N·m, generalised, subtracted in (1)
     noise: NDArray[np.float64]  # (n, k) standard normal numbers of the sensors
     fault_noise: NDArray[np.float64]  # (n, m) of faults, and of the sensors of currents
-
-
-class ColumnOffsets(NamedTuple):
-    """First columns of the signals that only some runs log."""
-
-    channels: tuple[int, ...]  # in the order of `channels.CHANNELS`; -1 if they are not logged
-    law_signals: int
 
 
 EXTERNAL_SIGNATURE = types.int64(types.float64)
@@ -110,9 +99,8 @@ def loop(
     allocate: Any,
     estimate: Any,
     controller: Controller,
-    sensors: Sensors,
-    plant: Plant,
-    column_offsets: ColumnOffsets,
+    stages: Stages,
+    law_signals: int,
     scratch: Scratch,
     external: External,
     log: Array,
@@ -128,9 +116,10 @@ def loop(
         `control.estimators.estimator.SIGNATURE`.
     controller : Controller
         Changed in place, like the plant; neither accesses the other.
-    sensors : Sensors
-    plant : Plant
-    column_offsets : ColumnOffsets
+    stages : Stages
+        Sensors, plant and channels.
+    law_signals : int
+        First column of the law's signals.
     scratch : Scratch
         The content is irrelevant.
     external : External
@@ -145,22 +134,24 @@ def loop(
     """
     reference, measurement = scratch.reference, scratch.measurement
     watchdog, detector = controller.supervision.watchdog, controller.supervision.detector
-    groups = plant.current.shape[0]
+    groups = stages.current.shape[0]
     first_current, scale = CURRENT_COMMAND + groups, CURRENT_COMMAND + 3 * groups
     first_mean = first_current + groups
     for tick in range(log.shape[0]):
         row, t, disturbance = log[tick], inputs.t[tick], inputs.disturbance[tick]
-        copy_into(plant.draws, 0, inputs.fault_noise[tick], plant.draws.shape[0])
-        is_finite = sense(sensors, plant.rotor.q, plant.rotor.qdot, inputs.noise[tick], measurement)
+        copy_into(stages.draws, 0, inputs.fault_noise[tick], stages.draws.shape[0])
+        is_finite = sense_at(stages.sense)(
+            stages.sensors, stages.q, stages.qdot, inputs.noise[tick], measurement
+        )
         copy_rows(inputs.reference[tick], reference)
         # Logged before the law is called, because the law may overwrite its arguments.
-        write_motion(row, t, reference, plant.rotor.q, plant.rotor.qdot, disturbance)
+        write_motion(row, t, reference, stages.q, stages.qdot, disturbance)
         if not (is_finite or replace_invalid(watchdog, measurement)):
             return tick, DIVERGED
-        if plant.current_sensors.on:
-            sense_currents(plant.current_sensors, plant.current, plant.draws)
+        if stages.current_sensors.on:
+            sense_currents(stages.current_sensors, stages.current, stages.draws)
             if detector.on:
-                copy_into(detector.measured_A, 0, plant.current_sensors.measured_A, groups)
+                copy_into(detector.measured_A, 0, stages.current_sensors.measured_A, groups)
         if external.controller != 0:
             code = external_at(external.controller)(t)
             if code != GOING:
@@ -171,21 +162,23 @@ def loop(
             return tick, DIVERGED
         row[scale] = share
         copy_into(row, TORQUE_COMMAND, controller.torque_q, 3)
-        copy_into(row, column_offsets.law_signals, controller.memory, controller.logged)
-        delivered = PlantOutput(
-            row[first_current:first_mean], row[first_mean:scale], row[TORQUE : TORQUE + 3]
-        )
+        copy_into(row, law_signals, controller.memory, controller.logged)
+        current, mean_current = row[first_current:first_mean], row[first_mean:scale]
+        torque_S = row[TORQUE : TORQUE + 3]
         if external.plant == 0:
-            status = plant_tick(plant, command, disturbance, delivered)
+            status = advance_at(stages.advance)(
+                stages.plant, command, disturbance, current, mean_current, torque_S
+            )
         else:
             copy_into(external.command, 0, command, groups)
             status = external_at(external.plant)(t)
-            copy_into(delivered.current, 0, command, groups)
-            copy_into(delivered.mean_current, 0, command, groups)
-            copy_into(delivered.torque_S, 0, external.torque_S, 3)
+            copy_into(current, 0, command, groups)
+            copy_into(mean_current, 0, command, groups)
+            copy_into(torque_S, 0, external.torque_S, 3)
         if status == FAILSAFE and watchdog.reason[0] == 0:
             trip(watchdog, _TEMPERATURE)
-        write_channels(row, column_offsets.channels, controller, sensors, plant)
+        for channel in range(stages.columns.shape[0]):
+            write_at(stages.writers[channel])(stages.parts[channel], row[stages.columns[channel] :])
         if not all_finite(row):  # the state cannot be continued either
             return tick, DIVERGED
         if status == FAILSAFE and watchdog.on:
@@ -222,10 +215,10 @@ def write_motion(row: Array, t: float, reference: Array, q: Array, qdot: Array, 
 
 
 class Functions(NamedTuple):
-    """The loop and its callback functions in the form that the loop accepts."""
+    """Callback functions of the loop: addresses in compiled code, otherwise functions."""
 
-    loop: Callable[..., tuple[int, int]]
     law: Any
+    """0 if it is in plain Python and the loop is compiled."""
     allocate: Any
     estimate: Any
     """0 if no rates are estimated."""
@@ -240,7 +233,7 @@ def dispatch(
     *,
     check_bounds: bool = False,
 ) -> Functions:
-    """Return the loop and the callbacks for a law, an allocation and an estimator of rates.
+    """Return the callbacks for a law, an allocation and an estimator of rates.
 
     Parameters
     ----------
@@ -254,28 +247,31 @@ def dispatch(
     InputError
         numba cannot compile the law.
     """
-    is_user = is_user_law(law)
-    if not COMPILES or (is_user and not isinstance(law.step, Dispatcher)):
-        step = _step_that_writes(law) if is_user else uncompiled(law.step)
-        return Functions(uncompiled(loop), step, allocate, estimate and uncompiled(estimate), ())
+    if not COMPILES:
+        step = step_that_writes(law) if is_user_law(law) else law.step
+        return Functions(step, allocate, estimate or 0, ())
+    callbacks = [
+        None if is_python_law(law) else _law_callback(law, check_bounds),
+        compiled_callback(allocations.SIGNATURE, allocate),
+        compiled_callback(estimators.SIGNATURE, estimate) if estimate else None,
+    ]
+    return Functions(*(callback.address if callback else 0 for callback in callbacks), tuple(callbacks))
+
+
+def _law_callback(law: Law, check_bounds: bool) -> Any:
     try:
-        law_callback = compiled_callback(laws.SIGNATURE, law.step, check_bounds=check_bounds)
+        return compiled_callback(laws.SIGNATURE, law.step, check_bounds=check_bounds)
     except Exception as error:  # numba also raises errors of other kinds, such as AttributeError
-        if not is_user:
+        if not is_user_law(law):
             raise
         raise InputError(
             f"law {law.name}: expected a function of (t, reference, measurement, parameters, state,"
             f" torque) that numba compiles, received {compile_error(error, law.step)}"
         ) from error
-    callbacks = [law_callback, compiled_callback(allocations.SIGNATURE, allocate)]
-    if estimate:
-        callbacks.append(compiled_callback(estimators.SIGNATURE, estimate))
-    addresses = [callback.address for callback in callbacks]
-    return Functions(loop, addresses[0], addresses[1], addresses[2] if estimate else 0, tuple(callbacks))
 
 
-def _step_that_writes(law: Law) -> Callable[..., None]:
-    """Return the step of a user law in plain Python, whose exceptions end the run as those of compiled code.
+def step_that_writes(law: Law) -> Callable[..., None]:
+    """Return the step of a law in plain Python, whose exceptions end the run as those of compiled code.
 
     A returned value, or no torque, is an exception.
     """
@@ -289,8 +285,6 @@ def _step_that_writes(law: Law) -> Callable[..., None]:
             if returned is not None or np.all(np.isnan(torque)):
                 received = "no torque" if returned is None else "a returned value, which is not used"
                 raise ValueError(f"{received}: write the torque into the last argument, torque[:] = …")
-        except KeyboardInterrupt:
-            raise
         except BaseException as error:  # the user's code may raise anything
             if not report_error(error):
                 raise
@@ -301,3 +295,8 @@ def _step_that_writes(law: Law) -> Callable[..., None]:
 def is_user_law(law: Law) -> bool:
     """True if a law is a user law, not one of this package."""
     return not is_of_package(law.step)
+
+
+def is_python_law(law: Law) -> bool:
+    """True if a law is a user law in plain Python."""
+    return is_user_law(law) and not isinstance(law.step, Dispatcher)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ctypes
 from collections.abc import Callable
 from functools import cached_property
 from typing import Any, NamedTuple
@@ -17,11 +18,10 @@ from spheretwin.control.supervision.watchdog import REASONS, Reason, transfer_tr
 from spheretwin.electronics.drive import transfer_drive
 from spheretwin.electronics.sensors import measure_again
 from spheretwin.external import Connection, ExternalController, ExternalPlant, external_currents
-from spheretwin.loop import dispatch, is_user_law
-from spheretwin.models.base.compiled import for_types_of
+from spheretwin.loop import dispatch, is_python_law, is_user_law, step_that_writes
+from spheretwin.models.base.compiled import COMPILES, for_types_of
 from spheretwin.models.base.errors import LawError
 from spheretwin.models.base.numba_internals.callbacks import callback_errors
-from spheretwin.models.base.numba_internals.functions import Dispatcher
 from spheretwin.models.base.state import check_length, restore_state, save_state, transfer_state
 from spheretwin.models.base.turns import outside_turn
 from spheretwin.models.telemetry.signals import width
@@ -30,6 +30,7 @@ from spheretwin.scenario.changes import StateChange
 from spheretwin.scenario.files import Files
 from spheretwin.scenario.sections import ResolvedScenario
 from spheretwin.shared_buffers import faults_of, sensors_of, shared_buffers, supervision_of
+from spheretwin.stages import compiled_stages
 
 # Only for the types.
 NO_INPUTS = loops.Inputs(
@@ -40,6 +41,9 @@ NO_INPUTS = loops.Inputs(
 LAW_PARAMETERS, LAW_MEMORY = "the law's parameters", "the law's memory"
 COMPENSATORS = "the governor, the prediction and the feed-forward"
 ESTIMATOR_MEMORY = "the estimator's memory"
+
+
+_PYTHON_LAW = ctypes.CFUNCTYPE(None, ctypes.c_double)
 
 
 class LastTick(NamedTuple):
@@ -132,22 +136,24 @@ class Runtime:
             check_bounds=scenario.controller.check_bounds,
         )
         self._may_raise = is_user_law(law) or scenario.controller.check_bounds
-        scratch = loops.Scratch(
+        self._scratch = loops.Scratch(
             np.empty((3, 3)), np.empty((6 if scenario.controller.prediction.on else 3, 3))
         )
-        is_compiled = isinstance(self._functions.loop, Dispatcher)
-        self._connection = Connection(external, self._controller, self._plant, scratch, is_compiled)
-        self._parts = (
-            self._functions.law,
-            self._functions.allocate,
-            self._functions.estimate,
-            self._controller,
-            self._sensors,
-            self._plant,
-            assembly.column_offsets(self.signals, self.law),
-            scratch,
-            self._connection.external,
-        )
+        if COMPILES and is_python_law(law):
+            self._python_law = _PYTHON_LAW(self._call_law(step_that_writes(law)))
+            address = ctypes.cast(self._python_law, ctypes.c_void_p).value
+            self._controller = self._controller._replace(python_law=address)
+        self._connection = Connection(external, self._controller, self._plant, self._scratch)
+
+    def _call_law(self, step: Callable[..., None]) -> Callable[[float], None]:
+        """Return a function of the time of a tick that calls a law in plain Python."""
+        given = *self._scratch, self._controller.parameters, self._controller.memory
+        torque_q = self._controller.torque_q
+
+        def call(t_s: float) -> None:
+            step(t_s, *given, torque_q)
+
+        return call
 
     @property
     def q_rad(self) -> NDArray[np.float64]:
@@ -165,9 +171,25 @@ class Runtime:
         return REASONS[int(self._controller.supervision.watchdog.reason[0])]
 
     @cached_property
-    def loop(self) -> Callable[..., tuple[int, int]]:
-        """Loop for the types of the parts; the first access compiles it."""
-        return for_types_of(self._functions.loop, NO_INPUTS, *self._parts, np.empty((0, self.row_width)))
+    def loop(self) -> Callable[[loops.Inputs, NDArray[np.float64]], tuple[int, int]]:
+        """Loop of the components, a function of inputs and rows; the first access compiles it."""
+        stages = compiled_stages(self._controller, self._sensors, self._plant, self.signals)
+        parts = (
+            self._functions.law,
+            self._functions.allocate,
+            self._functions.estimate,
+            self._controller,
+            stages.stages,
+            self.row_width - width(self.law.signals),
+            self._scratch,
+            self._connection.external,
+        )
+        entry = for_types_of(loops.loop, NO_INPUTS, *parts, np.empty((0, self.row_width)))
+
+        def run(inputs: loops.Inputs, log: NDArray[np.float64], _: object = stages.memory) -> tuple[int, int]:
+            return entry(inputs, *parts, log)
+
+        return run
 
     def apply_faults(self, tick: int) -> int:
         """Apply the faults that are due at a control tick; return the next tick at which they may change."""
@@ -186,7 +208,7 @@ class Runtime:
         """Run the loop and store the first exception of the law."""
         if not self._may_raise:
             with outside_turn:
-                done = self.loop(inputs, *self._parts, log)
+                done = self.loop(inputs, log)
             self._connection.raise_error()
             return done
         raised: list[BaseException] = []
@@ -196,8 +218,10 @@ class Runtime:
             self._controller.torque_q[:] = np.nan  # the law may have written part of a torque
 
         with outside_turn, callback_errors(receive):
-            ticks, code = self.loop(inputs, *self._parts, log)
+            ticks, code = self.loop(inputs, log)
         self._connection.raise_error()
+        if raised and isinstance(raised[0], KeyboardInterrupt):
+            raise raised[0]
         if raised and self.law_error is None:
             # With a watchdog the loop goes on after the exception, while the currents decay.
             t_s = inputs.t[ticks - int(self._controller.supervision.watchdog.ticks_since_trip[0])]

@@ -10,6 +10,7 @@ from typing import Any, TypeVar, cast
 import numba
 import numpy as np
 from llvmlite import ir
+from numba import types
 from numba.extending import intrinsic, overload
 from numpy.typing import NDArray
 
@@ -101,7 +102,7 @@ def for_types_of(function: Any, *arguments: Any) -> Callable[..., Any]:
     return _ENTRIES[key]
 
 
-_ENTRIES: dict[tuple[Any, bytes], Callable[..., Any]] = {}
+_ENTRIES: dict[tuple[Any, bytes], Any] = {}
 
 
 def uncompiled(function: Callable[..., Any]) -> Callable[..., Any]:
@@ -134,6 +135,28 @@ def compiled_callback(signature: Any, function: Callable[..., Any], *, check_bou
     if key not in callbacks:
         callbacks[key] = c_callback(signature, plain, {"nopython": True, **_OPTIONS}, check_bounds)
     return callbacks[key]
+
+
+def stage_address(signature: Any, function: Callable[..., Any], value: Any) -> int:
+    """Compile a function of the tuple at an address, as `allocation_free` does; return its own address.
+
+    Its callers are compiled once for all types of tuples.
+
+    Parameters
+    ----------
+    signature : numba signature
+        With an address as the first argument.
+    function : callable
+        Plain function; reads the tuple as entry 0 of its first argument.
+    value : tuple
+        Of arrays and numbers; the function gets the address of a copy by `in_memory`.
+    """
+    key = function, fingerprint_of_types((value,))
+    if key not in _ENTRIES:
+        own = signature.return_type(types.CPointer(numba.typeof(value)), *signature.args[1:])
+        options = {"nopython": True, **_OPTIONS, **NO_ALLOCATION}
+        _ENTRIES[key] = c_callback(own, function, options, False, TupleCompiler)
+    return int(_ENTRIES[key].address)
 
 
 _HEADINGS = re.compile(r"(\w+Error: )?(Failed in \w+ mode pipeline|During: )")

@@ -1,21 +1,26 @@
 """The closed loop: the paper's figures, compiled and plain Python, laws of users, pace of a live run."""
 
+import os
+import subprocess
+import sys
 from types import SimpleNamespace
 
 import numba
 import numpy as np
 import pytest
 
-from spheretwin import loop as loops
-from spheretwin import runtime as machines
 from spheretwin import scenario as scenarios
 from spheretwin import session as sessions
 from spheretwin import simulation
 from spheretwin.control.law import Law
-from spheretwin.loop import Functions
+from spheretwin.loop import loop
+from spheretwin.models.telemetry.table import Table
 from spheretwin.session import Session
 from spheretwin.simulation import follow, simulate
+from tests.requirements import needs_compiled_functions
 from tests.twin.session_cases import compiled_law, plain_law
+
+LAWS = ("pd", "adaptive_fuzzy", "afsm")
 
 
 def run(name, law=None, **overrides):
@@ -63,16 +68,30 @@ def test_nutation_is_tracked_from_rest():
     np.testing.assert_array_equal(table["qdot_rad_s"][0], 0)
 
 
-def dispatch_to_python(law, allocate, estimate, **options):
-    return Functions(loops.loop.py_func, law.step, allocate, estimate, ())
+UNCOMPILED = """
+import sys
+import numpy as np
+from tests.twin.test_simulation import LAWS, run
+
+for name in LAWS:
+    finished = run("nutation", controller__law=name, duration=0.1)
+    np.save(f"{sys.argv[1]}/{name}.npy", finished.telemetry.values)
+"""
 
 
-@pytest.mark.parametrize("name", ["pd", "adaptive_fuzzy", "afsm"])
-def test_compiled_and_uncompiled_loop_agree(name, monkeypatch):
-    overrides = {"controller__law": name, "duration": 0.1}
-    compiled = run("nutation", **overrides)
-    monkeypatch.setattr(machines, "dispatch", dispatch_to_python)
-    plain = run("nutation", **overrides)
+@pytest.fixture(scope="module")
+def uncompiled(tmp_path_factory):
+    """Telemetry of the same runs in a process without a compiler."""
+    folder = tmp_path_factory.mktemp("uncompiled")
+    environment = {**os.environ, "NUMBA_DISABLE_JIT": "1"}
+    subprocess.run([sys.executable, "-c", UNCOMPILED, folder], check=True, env=environment)
+    return {name: np.load(folder / f"{name}.npy") for name in LAWS}
+
+
+@pytest.mark.parametrize("name", LAWS)
+def test_compiled_and_uncompiled_loop_agree(name, uncompiled):
+    compiled = run("nutation", controller__law=name, duration=0.1)
+    plain = Table(compiled.telemetry.signals, uncompiled[name])
     # Fused multiply-adds round once where Python rounds twice. Where sgn(s) first flips, a rounding may
     # decide its tick; up to there the traces differ by rounding alone.
     rows = 100
@@ -80,11 +99,19 @@ def test_compiled_and_uncompiled_loop_agree(name, monkeypatch):
         flips = np.flatnonzero(np.any(np.diff(np.sign(compiled.telemetry["sliding_s"]), axis=0), axis=1))
         rows = flips[0] if len(flips) else rows
     assert rows >= 20
-    np.testing.assert_allclose(
-        plain.telemetry.values[:rows], compiled.telemetry.values[:rows], rtol=1e-9, atol=1e-12
-    )
+    np.testing.assert_allclose(plain.values[:rows], compiled.telemetry.values[:rows], rtol=1e-9, atol=1e-12)
     # A flip a tick apart moves the angle by J^-1 torque T²/2, some 1e-5 rad.
-    np.testing.assert_allclose(largest_error(plain), largest_error(compiled), atol=1e-4)
+    largest = np.abs(plain["error_rad"]).max(axis=0)
+    np.testing.assert_allclose(largest, largest_error(compiled), atol=1e-4)
+
+
+@needs_compiled_functions
+def test_engines_drives_and_laws_in_plain_python_share_one_loop():
+    run("hold", duration=0.01)
+    compiled = len(loop.signatures)
+    for options in ({"plant__engine": "lagrangian"}, {"hardware": "electronics"}, {"law": plain_law()}):
+        run("hold", duration=0.01, **options)
+    assert len(loop.signatures) == compiled
 
 
 def test_a_plain_python_law_runs_as_a_compiled_one_does():

@@ -3,8 +3,8 @@
 *Functions by address* (`cgutils`, `FunctionType`). Reason: the loop is compiled once for all laws.
 Consequence of a change: the loop does not compile.
 
-*Values in memory* (`get_data_type`, `get_abi_sizeof`). Reason: C code passes an address to compiled code,
-which reads a tuple of arrays there. Consequence: a plugin reads invalid memory.
+*Values in memory* (the layout of arrays and tuples). Reason: stages of the loop, and the plugin, are
+compiled alone and get the address of their data. Consequence: they read invalid memory.
 
 `tests/models/base/test_internals.py` checks both.
 """
@@ -17,13 +17,10 @@ from typing import Any
 import llvmlite.binding
 import numpy as np
 from llvmlite import ir
-from numba import typeof, types
+from numba import types
 from numba.core import cgutils
-from numba.core.registry import cpu_target
 from numba.extending import intrinsic, overload
 from numpy.typing import NDArray
-
-from spheretwin.models.base.numba_internals.functions import NO_ALLOCATION, compiled_function
 
 
 def external_function(name: str, address: int, signature: Any) -> Any:
@@ -81,32 +78,45 @@ def function_at(signature: Any) -> Callable[[Any], Callable[..., Any]]:
     return at
 
 
-def _build_store(typing_context: Any, address: Any, value: Any) -> Any:
-    def build(context: Any, builder: Any, _: Any, arguments: Any) -> Any:
-        pointer = builder.inttoptr(arguments[0], context.get_data_type(value).as_pointer())
-        builder.store(context.data_model_manager[value].as_data(builder, arguments[1]), pointer)
-        return context.get_dummy_value()
-
-    return types.void(types.intp, value), build
-
-
-_store: Any = intrinsic(_build_store)
-
-
-def _write(address: int, value: Any) -> None:
-    _store(address, value)
-
-
-_compiled_write: Any = compiled_function(_write, **NO_ALLOCATION)
-
-
 def in_memory(value: Any) -> NDArray[np.uint8]:
     """Return a copy of a tuple of arrays and numbers as compiled code has it in memory.
 
     Compiled code with the address of the copy as an argument of the type ``CPointer(typeof(value))`` reads
-    the tuple as entry 0. The arrays are shared: they must exist as long as the copy is read.
+    the tuple as entry 0. The arrays are shared: they must exist as long as the copy is read. Numba's own
+    conversion of a tuple of a hundred arrays would take seconds to compile, for each type.
     """
-    context = cpu_target.target_context
-    copy = np.zeros(context.get_abi_sizeof(context.get_data_type(typeof(value))), np.uint8)
-    _compiled_write(copy.ctypes.data, value)
-    return copy
+    memory = bytearray()
+    _append(memory, value)
+    return np.frombuffer(memory, np.uint8)
+
+
+def _append(memory: bytearray, value: Any) -> None:
+    """Append a value at the next address that has its alignment."""
+    if isinstance(value, tuple):
+        _pad(memory, alignment := _alignment(value))
+        for part in value:
+            _append(memory, part)
+        _pad(memory, alignment)
+    elif isinstance(value, bool | np.bool_):
+        memory.append(value)
+    else:
+        _pad(memory, 8)
+        memory += _words(value).tobytes()
+
+
+def _words(value: Any) -> NDArray[Any]:
+    """Return what compiled code has of an array, a number or None, in words of eight bytes."""
+    if isinstance(value, np.ndarray):  # without the two objects that count its references
+        place = [0, 0, value.size, value.itemsize, value.ctypes.data]
+        return np.array([*place, *value.shape, *value.strides], np.int64)
+    return np.array(0 if value is None else value, np.int64 if isinstance(value, int | None) else np.float64)
+
+
+def _alignment(value: Any) -> int:
+    parts = value if isinstance(value, tuple) else ()
+    least = 1 if isinstance(value, tuple | bool | np.bool_) else 8
+    return max([least, *map(_alignment, parts)])
+
+
+def _pad(memory: bytearray, alignment: int) -> None:
+    memory += bytes(-len(memory) % alignment)

@@ -15,18 +15,23 @@ from types import CellType, FunctionType
 from typing import Any
 
 from numba.core.ccallback import CFunc
+from numba.core.compiler import Compiler, CompilerBase
 
 from spheretwin.models.base.numba_internals.functions import Dispatcher
 from spheretwin.models.base.numba_internals.machine_code import MachineCode
 
 
 def c_callback(
-    signature: Any, function: Callable[..., Any], options: dict[str, Any], check_bounds: bool
+    signature: Any,
+    function: Callable[..., Any],
+    options: dict[str, Any],
+    check_bounds: bool,
+    pipeline_class: type[CompilerBase] = Compiler,
 ) -> Any:
     """Compile a plain function as a C callback, whose field `address` is its address."""
     step = _with_bounds_checks(function, {}) if check_bounds else function
     options = {**options, "boundscheck": check_bounds}
-    callback: Any = CFunc(step, (signature.args, signature.return_type), {}, options)
+    callback: Any = CFunc(step, (signature.args, signature.return_type), {}, options, pipeline_class)
     if not check_bounds:
         callback._cache = MachineCode(function, "callback")
     callback.compile()

@@ -1,5 +1,6 @@
 """Reports of `simulate` and `review`: faults, hardware, use of tolerances, time of compilation."""
 
+import inspect
 import re
 from pathlib import Path
 
@@ -40,7 +41,7 @@ def test_the_time_of_a_run_does_not_contain_that_of_its_compilation(monkeypatch)
     run = Runtime.run
 
     def run_with_check(runtime, inputs, log):
-        entries.append(vars(runtime)["loop"])
+        entries.append(inspect.getclosurevars(vars(runtime)["loop"]).nonlocals["entry"])
         return run(runtime, inputs, log)
 
     monkeypatch.setattr(Runtime, "run", run_with_check)

@@ -1,0 +1,125 @@
+"""Stages of a tick that are compiled alone: the loop calls them by address, with the addresses of their data.
+
+The loop is compiled once for a controller; another engine, drive, sensor or channel compiles only its stage.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cache
+from typing import Any, NamedTuple
+
+import numpy as np
+from numba import types
+from numpy.typing import NDArray
+
+from spheretwin.channels import CHANNELS, Channel
+from spheretwin.control.controller import Controller
+from spheretwin.electronics.sensors import Sensors, sense
+from spheretwin.electronics.transducers import CurrentSensors
+from spheretwin.models.base.compiled import COMPILES, stage_address
+from spheretwin.models.base.numba_internals.addresses import function_at, in_memory
+from spheretwin.models.telemetry.signals import Signal, offsets
+from spheretwin.plant.plant_tick import Plant, PlantOutput, plant_tick
+
+Array = NDArray[np.float64]
+
+_ROW, _ROWS = types.float64[::1], types.float64[:, ::1]
+_SENSE = types.boolean(types.intp, _ROW, _ROW, _ROW, _ROWS)
+_ADVANCE = types.int64(types.intp, _ROW, _ROW, _ROW, _ROW, _ROW)
+_WRITE = types.void(types.intp, _ROW)
+
+sense_at, advance_at, write_at = function_at(_SENSE), function_at(_ADVANCE), function_at(_WRITE)
+
+
+class Stages(NamedTuple):
+    """Stages as the loop calls them, and the arrays of the plant that the loop itself reads.
+
+    Functions and their data, which are the first arguments, are addresses in compiled code. In Python they
+    are functions and tuples with one entry.
+    """
+
+    sense: Any  # (sensors, q, qdot, noise, measurement): true if the measurement is finite
+    sensors: Any
+    advance: Any  # (plant, command, disturbance, current, mean current, torque): code of a status
+    plant: Any
+    writers: Any  # (parts, row), one for each channel of the run
+    parts: Any  # data of the writers
+    columns: NDArray[np.intp]  # first columns of these channels
+    q: Array  # (3,) rad
+    qdot: Array  # (3,) rad/s
+    current: Array  # (n,) A
+    draws: Array
+    current_sensors: CurrentSensors
+
+
+class CompiledStages(NamedTuple):
+    """Stages, and the memory that they have addresses of."""
+
+    stages: Stages
+    memory: list[Any]
+
+
+def compiled_stages(
+    controller: Controller, sensors: Sensors, plant: Plant, signals: tuple[Signal, ...]
+) -> CompiledStages:
+    """Compile the stages of a run.
+
+    Parameters
+    ----------
+    controller : Controller
+    sensors : Sensors
+    plant : Plant
+    signals : tuple of Signal
+        Columns of the run: its channels are among them.
+    """
+    parts: dict[str, Any] = {"controller": controller, "sensors": sensors, "plant": plant}
+    own = plant.rotor.q, plant.rotor.qdot, plant.current, plant.draws, plant.current_sensors
+    memory: list[Any] = []
+
+    def stage(signature: Any, function: Callable[..., Any], part: Any) -> tuple[Any, Any]:
+        if not COMPILES:
+            return function, (part,)
+        memory.append(in_memory(part))
+        return stage_address(signature, function, part), memory[-1].ctypes.data
+
+    first = offsets(signals)
+    logged = {channel: name for channel in CHANNELS if (name := channel.signals(1)[0].name) in first}
+    writers = [
+        stage(_WRITE, _writer(channel), tuple(parts[name] for name in channel.parts)) for channel in logged
+    ]
+    sequence: Callable[[list[Any]], Any] = (lambda values: np.array(values, np.intp)) if COMPILES else list
+    return CompiledStages(
+        Stages(
+            *stage(_SENSE, _sense, sensors),
+            *stage(_ADVANCE, _advance, plant),
+            sequence([function for function, _ in writers]),
+            sequence([data for _, data in writers]),
+            np.array([first[name] for name in logged.values()], np.intp),
+            *own,
+        ),
+        memory,
+    )
+
+
+def _sense(sensors: Any, q: Array, qdot: Array, noise: Array, measurement: Array) -> bool:
+    return sense(sensors[0], q, qdot, noise, measurement)
+
+
+def _advance(
+    plant: Any, command: Array, disturbance: Array, current: Array, mean_current: Array, torque_S: Array
+) -> int:
+    return plant_tick(plant[0], command, disturbance, PlantOutput(current, mean_current, torque_S))
+
+
+@cache
+def _writer(channel: Channel) -> Callable[..., None]:
+    write = channel.write
+
+    def of_one(parts: Any, row: Array) -> None:
+        write(row, parts[0][0])
+
+    def of_two(parts: Any, row: Array) -> None:
+        write(row, parts[0][0], parts[0][1])
+
+    return of_two if len(channel.parts) == 2 else of_one
