@@ -181,7 +181,7 @@ DAMAGES = {
 
 @pytest.mark.parametrize("damage", DAMAGES.values(), ids=DAMAGES)
 def test_entry_that_cannot_be_used_is_made_again(tmp_path, monkeypatch, damage):
-    monkeypatch.setattr(cache, "_root", lambda: tmp_path)
+    monkeypatch.setattr(cache, "cache_folder", lambda: tmp_path)
 
     def double(x):
         return 2 * x
@@ -240,7 +240,7 @@ def test_uncompiled_is_the_plain_function():
 
 
 def test_cached_array_is_computed_once(tmp_path, monkeypatch):
-    monkeypatch.setattr(cache, "_root", lambda: tmp_path)
+    monkeypatch.setattr(cache, "cache_folder", lambda: tmp_path)
     made = []
 
     def compute():
