@@ -23,10 +23,9 @@ from spheretwin.paper.rival_conditions import (
 )
 from spheretwin.run import Run
 from spheretwin.scenario.fields import quantity_text
+from spheretwin.study.statistics import interval
 
 OUR_LAW = "afsm_eso"
-LEVEL = 1.05
-"""Ratio of two errors up to which they are called level."""
 
 
 class Result(NamedTuple):
@@ -37,6 +36,9 @@ class Result(NamedTuple):
     limit_A_s: float | None
     """None of a preset, which was not searched here."""
     largest_rad: float
+    low_rad: float
+    high_rad: float
+    """Ends of the 95 % interval of this median."""
     worst_rad: float
     """The largest one of all seeds."""
     variation_A_s: float
@@ -46,6 +48,10 @@ class Result(NamedTuple):
     def is_lost(self) -> bool:
         """Whether any run did not complete."""
         return not np.isfinite(self.largest_rad)
+
+    def is_level(self, other: Result) -> bool:
+        """True if the intervals overlap: the seeds do not rank the two."""
+        return self.low_rad <= other.high_rad and other.low_rad <= self.high_rad
 
 
 def results(
@@ -104,15 +110,16 @@ def start_error(run: Run) -> Array:
     return np.where(until, np.abs(error), 0.0).max(axis=0)
 
 
-def _medians(hardware: Hardware, runs: Sequence[Outcome]) -> tuple[float, float, float, float]:
+def _medians(hardware: Hardware, runs: Sequence[Outcome]) -> tuple[float, ...]:
     if not all(run.is_complete for run in runs):
-        return np.nan, np.nan, np.nan, np.nan
+        return (np.nan,) * 6
     largest, tail = (
         [float(ERRORS[error](run)[list(hardware.hinges)].max()) for run in runs]
         for error in ("max_abs_error", "tail_rms_error")
     )
     variation = np.median(figures_named(runs, "current_variation_A_s"))
-    return float(np.median(largest)), max(largest), float(variation), float(np.median(tail))
+    ends = interval(largest)
+    return float(np.median(largest)), *ends, max(largest), float(variation), float(np.median(tail))
 
 
 ALLOCATION_LABELS = {"least_norm": "full current, least norm", "bounded": "full current, bounded allocation"}
@@ -187,7 +194,9 @@ def complete_prototype(hardware: Hardware, outcomes: Outcomes) -> list[ResultTab
         (NONE if result.limit_A_s is None else f"{result.limit_A_s:g}", result.label, *_spread(result))
         for result in sorted(every, key=_by_limit_and_error)
     ]
-    head = ("limit, A/s", "law", "median error, degrees", "worst error, degrees", "variation, A/s")
+    head = (
+        "limit, A/s", "law", "median error, degrees", "worst error of the seeds, degrees", "variation, A/s",
+    )  # fmt: skip
     return [ResultTable(f"{hardware.title} with every imperfection", head, rows, 2)] if every else []
 
 
@@ -216,7 +225,7 @@ def _by_limit_and_preset(every: Sequence[Result]) -> list[Result]:
 
 
 def _predictive_cells(figures: Sequence[float]) -> tuple[str, str]:
-    largest_rad, _, variation_A_s, _ = figures
+    largest_rad, variation_A_s = figures[0], figures[4]
     if not np.isfinite(largest_rad):
         return "lost", NONE
     return f"{np.degrees(largest_rad):.3f}", f"{variation_A_s:.1f}"
@@ -225,8 +234,8 @@ def _predictive_cells(figures: Sequence[float]) -> tuple[str, str]:
 def _spread(result: Result) -> tuple[str, str, str]:
     if result.is_lost:
         return "lost", NONE, NONE
-    median_deg, worst_deg = np.degrees([result.largest_rad, result.worst_rad])
-    return f"{median_deg:.3f}", f"{worst_deg:.3f}", f"{result.variation_A_s:.1f}"
+    worst_deg = np.degrees(result.worst_rad)
+    return _error(ELECTRONICS, result), f"{worst_deg:.3f}", f"{result.variation_A_s:.1f}"
 
 
 def _by_limit_and_error(result: Result) -> tuple[float, bool, float]:
@@ -240,7 +249,7 @@ def _tables(
     """A table for each measure: a row for each law, by limit and by the error under the first condition."""
     unit = _unit(hardware)
     measures: dict[str, Callable[[Result], str]] = {
-        f"largest error, {unit}": lambda result: _angle(hardware, result.largest_rad),
+        f"largest error, {unit}": lambda result: _error(hardware, result),
         "variation of the commands, A/s": lambda result: f"{result.variation_A_s:.1f}",
         f"RMS error of the second half, {unit}": lambda result: _angle(hardware, result.tail_rad),
     }
@@ -275,6 +284,14 @@ def _cell(result: Result | None, text: Callable[[Result], str]) -> str:
     if result is None:
         return NONE
     return "lost" if result.is_lost else text(result)
+
+
+def _error(hardware: Hardware, result: Result) -> str:
+    """Median and its interval; a dash for an end for which the seeds are too few."""
+    low, high = (
+        _angle(hardware, end) if np.isfinite(end) else NONE for end in (result.low_rad, result.high_rad)
+    )
+    return f"{_angle(hardware, result.largest_rad)} [{low}, {high}]"
 
 
 def _angle(hardware: Hardware, value_rad: float) -> str:
@@ -321,12 +338,13 @@ def _by_limit(hardware: Hardware, condition: Condition, outcomes: Outcomes) -> l
 def _comparison(ordered: Sequence[Result]) -> str:
     """Compare some laws, the least error first, with our own."""
     own = BY_LAW[OUR_LAW].label
-    errors = {result.label: result.largest_rad for result in ordered}
-    ours = errors.pop(own, None)
+    ours = next((result for result in ordered if result.label == own), None)
+    first = ours or ordered[0]
+    level = [result.label for result in ordered if result is not first and first.is_level(result)]
     if ours is None:
-        return f"{ordered[0].label} has the smallest error, and {own} loses the rotor or exceeds the limit"
-    better = [law for law, error in errors.items() if LEVEL * error < ours]
-    level = [law for law, error in errors.items() if ours / LEVEL <= error <= LEVEL * ours]
+        text = f"{first.label} has the smallest error{f', level with {_listed(level)}' if level else ''}"
+        return f"{text}; {own} loses the rotor or exceeds the limit"
+    better = [result.label for result in ordered if result.high_rad < ours.low_rad]
     if better:
         text = f"{_listed(better)} {'have' if len(better) > 1 else 'has'} a smaller error than {own}"
         return f"{text}, which is level with {_listed(level)}" if level else text

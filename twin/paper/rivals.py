@@ -10,7 +10,7 @@ from spheretwin.paper import rival_results
 from spheretwin.paper.experiment import Experiment, Outcomes, Section
 from spheretwin.paper.laws import BY_LAW
 from spheretwin.paper.rival_conditions import HARDWARE, Condition, Hardware, cases, study
-from spheretwin.paper.rival_results import LEVEL, current_limits_rad, results, start_error
+from spheretwin.paper.rival_results import current_limits_rad, results, start_error
 from spheretwin.viz.pages.markdown import Drawing
 
 if TYPE_CHECKING:
@@ -75,7 +75,8 @@ METHOD = (
     " currents. All laws have the same seed. The reference governor and the feed-forward of inertia and"
     " friction are gains of every law, and each may be off. The package contains the gains;"
     " `make tune-rivals` repeats the search. The tables show medians over the seeds of this page, which the"
-    f" search did not use. Two laws are *level* if their errors differ by at most {100 * (LEVEL - 1):.0f} %."
+    " search did not use, each error with the 95 % interval of its median in brackets. Two laws whose"
+    " intervals overlap are *level*: the order of their rows is that of the medians and ranks nothing."
     " A dash in a table stands for a law without gains within the limit."
 )
 OBJECTIVES = {

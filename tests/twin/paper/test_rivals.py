@@ -1,6 +1,7 @@
 """The comparison of laws: frozen gains are those of the search, tables and findings say what ran."""
 
 import json
+from collections import Counter
 from types import SimpleNamespace
 
 import numpy as np
@@ -145,19 +146,45 @@ def test_results_are_medians_and_no_numbers_if_a_run_was_lost():
     assert second.is_lost
 
 
+def seeds_about(median):
+    """Seven errors, of which all but the least and the largest are the interval of the median: ±2 %."""
+    return tuple(median * (1 + percent / 100) for percent in (-9, -2, -1, 0, 1, 2, 9))
+
+
 @pytest.mark.parametrize(
     ("errors", "expected"),
     [
-        ({"afsm_eso": (1e-3,), "adrc": (1.04e-3,)}, "AFSM-ESO is level with ADRC"),
+        ({"afsm_eso": 1e-3, "adrc": 1.03e-3}, "AFSM-ESO is level with ADRC"),
+        ({"afsm_eso": 1e-3, "adrc": 1.05e-3}, "AFSM-ESO has the smallest error"),
         (
-            {"afsm_eso": (1e-3,), "adrc": (0.9e-3,), "pid": (0.8e-3,), "lqi": (0.98e-3,)},
+            {"afsm_eso": 1e-3, "adrc": 0.9e-3, "pid": 0.8e-3, "lqi": 0.98e-3},
             "tuned PID and ADRC have a smaller error than AFSM-ESO, which is level with LQI",
         ),
     ],
 )
-def test_findings_say_where_rivals_are_level_or_better(errors, expected):
-    (finding,) = rival_results.findings(made_up(30.0, errors))
+def test_findings_rank_no_laws_whose_intervals_overlap(errors, expected):
+    outcomes = made_up(30.0, {law: seeds_about(error) for law, error in errors.items()})
+    (finding,) = rival_results.findings(outcomes)
     assert finding.text == f"{IDEAL.title}, {IDEAL.conditions[0].name}: within 30 A/s {expected}"
+
+
+def test_too_few_seeds_rank_nothing():
+    (finding,) = rival_results.findings(made_up(30.0, {"afsm_eso": (1e-3,) * 5, "adrc": (9e-3,) * 5}))
+    assert finding.text.endswith("AFSM-ESO is level with ADRC")
+
+
+def test_tables_have_the_interval_of_each_error():
+    outcomes = made_up(30.0, {"pid": seeds_about(1e-3), "adrc": (2e-3, 2e-3)})
+    (largest, *_) = rival_results.errors(IDEAL, outcomes)
+    cells = {row[1]: row[2] for row in largest.rows}
+    assert cells["tuned PID"] == "1.000 [0.980, 1.020]"
+    assert cells["ADRC"] == "2.000 [–, –]"
+
+
+def test_laws_with_sensors_have_more_seeds():
+    jobs = make_plan(EXPERIMENT).jobs
+    counted = Counter(job.case.name for job in jobs if "prototype" in job.case.name)
+    assert {counted[name] for name in counted if "predictive" not in name} == {rival_conditions.SEEDS}
 
 
 def test_nothing_is_found_where_nothing_or_not_our_law_ran():
