@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from spheretwin.models import torque_curve, torque_field
 from spheretwin.models.base.errors import InputError, distinct_texts
+from spheretwin.models.coil_group import CoilGroup, read_group
 from spheretwin.models.mjcf import Mjcf, read
 from spheretwin.models.mjcf_reader import (
     LARGEST_LENGTH_M,
@@ -41,9 +42,6 @@ COLLINEAR_TOLERANCE = 1e-9
 
 # A torque has three components.
 LEAST_GROUPS = 3
-
-# Beyond this an inductance or a resistance is a mistake of its unit.
-LONGEST_TIME_CONSTANT_S = 1e3
 
 
 @dataclass(frozen=True)
@@ -118,15 +116,6 @@ class CoilGeometry:
     turns: float
 
 
-@dataclass(frozen=True)
-class CoilGroup:
-    """Coils in series, and the amplifier that drives them."""
-
-    resistance_ohm: float
-    inductance_H: float
-    current_limit_A: float
-
-
 @dataclass(frozen=True, eq=False)
 class Actuator:
     """Geometry, inertia, magnets and coils of the actuator.
@@ -150,8 +139,10 @@ class Actuator:
         Least and greatest angle of each hinge; infinite for a free hinge.
     shaft_tip_m, payload_mount_m : (3,) array, m
         In the rotor frame.
-    magnet, coil, group
-        Data shared by all of a kind.
+    magnet, coil
+        Geometry shared by all poles and by all coils.
+    group
+        Electrical and thermal data of the groups.
     torque_data
         Torque of one coil per ampere: on one pole, or on the rotor.
     """
@@ -264,7 +255,7 @@ def from_model(model: mujoco.MjModel, torque_data: TorqueData) -> Actuator:
         payload_mount_m=_frozen(model.body_pos[body(model, "payload")]),
         magnet=_magnet(model, poles),
         coil=read_coil(model),
-        group=_group(model),
+        group=read_group(model, len(groups)),
         torque_data=torque_data,
     )
 
@@ -460,19 +451,3 @@ def read_coil(model: mujoco.MjModel) -> CoilGeometry:
             f"model: expected coil_inner_radius_m below the coils' radius of {outer} m, received {inner}"
         )
     return coil
-
-
-def _group(model: mujoco.MjModel) -> CoilGroup:
-    group = CoilGroup(
-        resistance_ohm=number(model, "group_resistance_ohm"),
-        inductance_H=number(model, "group_inductance_H"),
-        current_limit_A=number(model, "group_current_limit_A"),
-    )
-    time_constant_s = group.inductance_H / group.resistance_ohm
-    if time_constant_s > LONGEST_TIME_CONSTANT_S:
-        longest, received = distinct_texts(LONGEST_TIME_CONSTANT_S, time_constant_s)
-        raise InputError(
-            f"model: expected group_inductance_H / group_resistance_ohm of at most {longest} s,"
-            f" received {received}"
-        )
-    return group

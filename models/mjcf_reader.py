@@ -38,7 +38,10 @@ def site(model: mujoco.MjModel, name: str) -> int:
 def number(model: mujoco.MjModel, name: str) -> float:
     """Return the custom numeric of a name; raise `InputError` if it is implausible in its unit."""
     named(model, mujoco.mjtObj.mjOBJ_NUMERIC, "custom numeric", name)
-    return within(float(model.numeric(name).data[0]), LEAST, LARGEST, name)
+    data = model.numeric(name).data
+    if len(data) != 1:
+        raise InputError(f"model: expected one number {name}, received {len(data)}")
+    return within(float(data[0]), LEAST, LARGEST, name)
 
 
 def within(value: float, least: float, largest: float, what: str) -> float:

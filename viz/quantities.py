@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spheretwin.models.actuator import Actuator
+from spheretwin.models.coil_group import of_each_group
 from spheretwin.models.telemetry.signals import ANGLES
 from spheretwin.models.telemetry.table import Table
 from spheretwin.viz import theme
@@ -83,7 +84,9 @@ def copper_loss(rows: QuantityRows) -> Array:
     table = rows.table
     if any(signal.name == "copper_loss_W" for signal in table.signals):
         return np.sum(table["copper_loss_W"], axis=1, keepdims=True)
-    return rows.actuator.group.resistance_ohm * np.sum(table["current_A"] ** 2, axis=1, keepdims=True)
+    squares = table["current_A"] ** 2
+    resistance_ohm = of_each_group(rows.actuator.group.resistance_ohm, squares.shape[1])
+    return np.sum(resistance_ohm * squares, axis=1, keepdims=True)
 
 
 COPPER_LOSS = Quantity("copper_loss_total_W", "W", "heat of all coils", copper_loss, floor=0.5)

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from spheretwin.models.actuator import Actuator
 from spheretwin.models.base.compiled import compiled
+from spheretwin.models.coil_group import of_each_group
 from spheretwin.models.magnetics import TorqueModel, fill_torque_matrix, scratch_of, torque_model
 
 Array = NDArray[np.float64]
@@ -80,6 +81,14 @@ def torque_matrices(q: Array, actuator: Actuator) -> Array:
     return G
 
 
+def _least_heat(G: Array, actuator: Actuator, direction: Array, lost: Array) -> Array:
+    """Return the least heat per torque squared in a direction (n, 3): the currents minimise Σ R i²."""
+    per_heat = (G / of_each_group(actuator.group.resistance_ohm, G.shape[2])) @ G.transpose(0, 2, 1)
+    per_heat[lost] = np.eye(3)
+    heat: Array = np.einsum("ni,nij,nj->n", direction, np.linalg.inv(per_heat), direction)
+    return heat
+
+
 def _capability(q: Array, actuator: Actuator) -> Capability:
     G = torque_matrices(q, actuator)
     limit = actuator.group.current_limit_A
@@ -90,8 +99,8 @@ def _capability(q: Array, actuator: Actuator) -> Capability:
         inverse = (G.transpose(0, 2, 1) @ U / squared[:, None]) @ U.transpose(0, 2, 1)  # (n, groups, 3)
         rows = np.linalg.norm(inverse, axis=2)  # (n, groups)
         condition = np.where(lost, np.inf, sigma[:, 2] / sigma[:, 0])
-        copper = np.where(lost, np.inf, actuator.group.resistance_ohm / squared[:, 0])
     weak = U[:, :, 0]
+    copper = np.where(lost, np.inf, _least_heat(G, actuator, weak, lost))
     first = (
         np.arange(len(q)),
         np.argmax(rows, axis=1),

@@ -76,17 +76,19 @@ def test_least_norm_torque_is_the_worst_over_directions(actuator):
         assert worst <= reached.min() < 1.02 * worst  # 2000 directions are 3 degrees apart
 
 
-def test_singular_values_and_copper_loss(actuator):
-    q = random_poses(10)
+@pytest.mark.parametrize("resistance_ohm", [1.3, tuple(np.linspace(5.7, 8.3, 18))])
+def test_singular_values_and_copper_loss(actuator, resistance_ohm):
+    """The least heat of a torque is that of currents that minimise Σ R i², each with its own R."""
+    actuator = replace(actuator, group=replace(actuator.group, resistance_ohm=resistance_ohm))
+    q, root = random_poses(10), np.sqrt(np.broadcast_to(resistance_ohm, 18))
     figures = capability(q, actuator)
     for i, G in enumerate(torque_matrices(q, actuator)):
         assert_allclose(G, torque_matrix(q[i], actuator))
         sigma = np.linalg.svd(G, compute_uv=False)
         assert_allclose(figures.singular_value_Nm_per_A[i], sigma[2], rtol=1e-10)
         assert_allclose(figures.condition[i], sigma[0] / sigma[2], rtol=1e-10)
-        current = np.linalg.pinv(G) @ figures.weak_direction[i]  # for 1 N·m
-        heat = actuator.group.resistance_ohm * current @ current
-        assert_allclose(figures.copper_W_per_Nm2[i], heat, rtol=1e-10)
+        scaled_current = np.linalg.pinv(G / root) @ figures.weak_direction[i]  # sqrt(R) i for 1 N·m
+        assert_allclose(figures.copper_W_per_Nm2[i], scaled_current @ scaled_current, rtol=1e-10)
 
 
 # The workspace
