@@ -10,10 +10,11 @@ from math import exp, expm1
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from spheretwin.models.base.compiled import allocation_free
 from spheretwin.models.base.state import push
+from spheretwin.models.coil_group import PerGroup, of_each_group
 from spheretwin.models.kinematics import generalised_torque
 from spheretwin.models.magnetics import rotor_torque
 
@@ -24,10 +25,10 @@ ROUNDING = 1e-9
 class LagStep(NamedTuple):
     """First-order lag over a part of a period, with a constant command."""
 
-    decay: float
-    """Remaining share of the distance to the command at the end of the part."""
-    mean_share: float
-    """Mean remaining share of that distance."""
+    decay: NDArray[np.float64]
+    """(groups,) remaining share of the distance to the command at the end of the part."""
+    mean_share: NDArray[np.float64]
+    """(groups,) mean remaining share of that distance."""
 
 
 class AppliedTorque(NamedTuple):
@@ -51,7 +52,7 @@ class AppliedTorque(NamedTuple):
 
 
 def applied_torque(
-    on: bool, groups: int, period_s: float, delay_s: float, time_constant_s: float
+    on: bool, groups: int, period_s: float, delay_s: float, time_constant_s: PerGroup
 ) -> AppliedTorque:
     """Applied torque at rest: no currents and no pending commands.
 
@@ -61,15 +62,17 @@ def applied_torque(
         Whether it is used.
     groups : int
         Coil groups.
-    period_s, delay_s, time_constant_s : float, s
-        Control period, nominal delay, and time constant L/R of the lag; 0 for none.
+    period_s, delay_s : float, s
+        Control period and nominal delay.
+    time_constant_s : float or one for each group, s
+        Time constant L/R of the lag; 0 for none.
     """
     whole, fraction = split_delay(delay_s if on else 0.0, period_s)
     return AppliedTorque(
         on=on,
         fraction=fraction,
-        older_lag=lag_step(fraction * period_s, time_constant_s),
-        newer_lag=lag_step((1 - fraction) * period_s, time_constant_s),
+        older_lag=lag_step(fraction * period_s, time_constant_s, groups),
+        newer_lag=lag_step((1 - fraction) * period_s, time_constant_s, groups),
         commands=np.zeros((whole + 2, groups)),
         current=np.zeros(groups),
         mean=np.zeros(groups),
@@ -109,12 +112,12 @@ def estimate_applied_torque(
         push(commands, j, command[j])
         older, newer = commands[last, j], commands[last - 1, j]
         distance = current[j] - older
-        first = older + applied_torque.older_lag.mean_share * distance
-        distance = older + applied_torque.older_lag.decay * distance - newer
+        first = older + applied_torque.older_lag.mean_share[j] * distance
+        distance = older + applied_torque.older_lag.decay[j] * distance - newer
         mean[j] = fraction * first + (1.0 - fraction) * (
-            newer + applied_torque.newer_lag.mean_share * distance
+            newer + applied_torque.newer_lag.mean_share[j] * distance
         )
-        current[j] = newer + applied_torque.newer_lag.decay * distance
+        current[j] = newer + applied_torque.newer_lag.decay[j] * distance
     rotor_torque(G, mean, applied_torque.torque_S)
     generalised_torque(pose, applied_torque.torque_S, applied_torque.torque_q)
 
@@ -126,11 +129,17 @@ def split_delay(delay_s: float, period_s: float) -> tuple[int, float]:
     return whole, max(0.0, periods - whole)
 
 
-def lag_step(duration_s: float, time_constant_s: float) -> LagStep:
-    """Return the first-order lag over a duration."""
+def lag_step(duration_s: float, time_constant_s: ArrayLike, groups: int) -> LagStep:
+    """Return the first-order lag of all groups over a duration."""
+    constants_s = of_each_group(time_constant_s, groups).tolist()
+    return LagStep(*np.array([_shares(duration_s, constant_s) for constant_s in constants_s]).T.copy())
+
+
+def _shares(duration_s: float, time_constant_s: float) -> tuple[float, float]:
+    """Return remaining and mean remaining share of the distance to the command."""
     if duration_s == 0:
-        return LagStep(1.0, 0.0)
+        return 1.0, 0.0
     if time_constant_s == 0:
-        return LagStep(0.0, 0.0)
+        return 0.0, 0.0
     times = duration_s / time_constant_s
-    return LagStep(exp(-times), -expm1(-times) / times)
+    return exp(-times), -expm1(-times) / times

@@ -34,6 +34,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from spheretwin.control.applied_torque import AppliedTorque, LagStep, lag_step
 from spheretwin.models.base.compiled import allocation_free
+from spheretwin.models.coil_group import PerGroup
 from spheretwin.models.kinematics import generalised_torque, triple, turns
 from spheretwin.models.lagrangian import acceleration_entries
 from spheretwin.models.magnetics import (
@@ -86,7 +87,7 @@ class DelayModel(NamedTuple):
 
     period_s: float
     delay_s: float
-    time_constant_s: float
+    time_constant_s: PerGroup
     inertia: Array  # (3,) kg·m²
 
 
@@ -106,7 +107,7 @@ def prediction(section: PredictionSection, model: DelayModel, magnetics: TorqueM
         ahead_s=model.delay_s,
         period_s=model.period_s,
         inertia=model.inertia,
-        full_lag=lag_step(model.period_s, model.time_constant_s),
+        full_lag=lag_step(model.period_s, model.time_constant_s, groups),
         pose=np.zeros(3),
         rates=np.zeros(3),
         cached_matrix=cached_matrix(magnetics),
@@ -194,8 +195,8 @@ def _step(
         return False
     for j in range(command.shape[0]):
         distance = prediction.current[j] - command[j]
-        prediction.mean[j] = command[j] + lag.mean_share * distance
-        prediction.current[j] = command[j] + lag.decay * distance
+        prediction.mean[j] = command[j] + lag.mean_share[j] * distance
+        prediction.current[j] = command[j] + lag.decay[j] * distance
     rotor_torque(prediction.cached_matrix.G, prediction.mean, prediction.torque_S)
     generalised_torque(midpoint, prediction.torque_S, prediction.torque_q)
     torque, inertia = triple(prediction.torque_q), triple(prediction.inertia)

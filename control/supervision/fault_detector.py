@@ -44,6 +44,7 @@ from spheretwin.control.supervision.enabled_groups import (
     EnabledGroups,
 )
 from spheretwin.models.base.compiled import allocation_free
+from spheretwin.models.coil_group import PerGroup, of_each_group
 from spheretwin.models.kinematics import angular_velocity
 
 DEVIATIONS = 6.0
@@ -80,11 +81,11 @@ class NominalCurrents(NamedTuple):
     """Largest difference between a command and its measured current at rest."""
     noise_A: float
     """Standard deviation of a measured current."""
-    time_constant_s: float
+    time_constant_s: PerGroup
     swing_V: float
     """Of the amplifiers; infinite if unknown."""
-    resistance_ohm: float
-    inductance_H: float
+    resistance_ohm: PerGroup
+    inductance_H: PerGroup
 
 
 class Detector(NamedTuple):
@@ -93,9 +94,9 @@ class Detector(NamedTuple):
     on: bool
     threshold_A: float
     ticks: int
-    decay: float  # of the current of a shorted coil, over a control period
-    resistance_ohm: float
-    reach_A: float  # current that the swing drives through the coil
+    decay: Array  # (n,) of the current of a shorted coil, over a control period
+    resistance_ohm: Array  # (n,)
+    reach_A: Array  # (n,) current that the swing drives through the coil
     measured_A: Array  # (n,) measured currents
     shorted_A: Array  # (n,) current of the shorted model
     indications: NDArray[np.int64]  # (n,) ticks that indicate a fault
@@ -115,12 +116,15 @@ def derived_threshold_A(nominal: NominalCurrents) -> float:
 
 
 def derived_ticks(nominal: NominalCurrents) -> int:
-    """Return the ticks for which a healthy current may look like none, plus one."""
-    spare_V = nominal.swing_V - nominal.resistance_ohm * nominal.current_limit_A
-    # If the swing cannot drive the limit at all, the current settles with L/R at best.
-    natural_s = SETTLING * nominal.inductance_H / nominal.resistance_ohm
-    swing_s = 2 * nominal.current_limit_A * nominal.inductance_H / spare_V if spare_V > 0 else natural_s
-    slow_s = min(swing_s, natural_s) + SETTLING * nominal.time_constant_s
+    """Return the ticks for which a healthy current of the slowest group may look like none, plus one."""
+    values = nominal.resistance_ohm, nominal.inductance_H, nominal.time_constant_s
+    slow_s = 0.0
+    for R, L, lag_s in zip(*map(np.ravel, np.broadcast_arrays(*values)), strict=True):
+        spare_V = nominal.swing_V - R * nominal.current_limit_A
+        # If the swing cannot drive the limit at all, the current settles with L/R at best.
+        natural_s = SETTLING * L / R
+        swing_s = 2 * nominal.current_limit_A * L / spare_V if spare_V > 0 else natural_s
+        slow_s = max(slow_s, min(swing_s, natural_s) + SETTLING * lag_s)
     return 1 + ceil(slow_s / nominal.period_s)
 
 
@@ -136,13 +140,15 @@ def detector(section: DetectorSection, on: bool, groups: int, nominal: NominalCu
     nominal : NominalCurrents
         Nominal currents of healthy groups.
     """
+    resistance_ohm = of_each_group(nominal.resistance_ohm, groups)
+    periods = nominal.period_s * resistance_ohm / of_each_group(nominal.inductance_H, groups)
     return Detector(
         on=on,
         threshold_A=section.threshold_A or derived_threshold_A(nominal),
         ticks=section.ticks or derived_ticks(nominal),
-        decay=exp(-nominal.period_s * nominal.resistance_ohm / nominal.inductance_H),
-        resistance_ohm=nominal.resistance_ohm,
-        reach_A=nominal.swing_V / nominal.resistance_ohm,
+        decay=np.array([exp(-rate) for rate in periods]),
+        resistance_ohm=resistance_ohm,
+        reach_A=nominal.swing_V / resistance_ohm,
         measured_A=np.zeros(groups),
         shorted_A=np.zeros(groups),
         indications=np.zeros(groups, dtype=np.int64),
@@ -176,11 +182,11 @@ def detect_faults(
     angular_velocity(q, qdot, detector.rate_S)
     for j in range(applied.shape[0]):
         emf = G[0, j] * detector.rate_S[0] + G[1, j] * detector.rate_S[1] + G[2, j] * detector.rate_S[2]
-        settled = -emf / detector.resistance_ohm
-        shorted = settled + (detector.shorted_A[j] - settled) * detector.decay
+        settled = -emf / detector.resistance_ohm[j]
+        shorted = settled + (detector.shorted_A[j] - settled) * detector.decay[j]
         detector.shorted_A[j] = shorted
         measured, state = detector.measured_A[j], groups.out[j]
-        driven = min(max(applied[j], -detector.reach_A), detector.reach_A)
+        driven = min(max(applied[j], -detector.reach_A[j]), detector.reach_A[j])
         open_error, shorted_error = abs(measured), abs(measured - shorted)
         if state == REPORTED:
             _reset(detector, j)

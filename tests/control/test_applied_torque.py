@@ -24,8 +24,8 @@ def test_mean_current_is_that_of_the_delayed_and_lagged_command(delay, lag_s):
     """Against the convolution of the piecewise constant command with the lag, by quadrature."""
     generator = np.random.default_rng(3)
     commands = generator.normal(size=12)
-    mine = applied_torque(True, 1, PERIOD_S, delay * PERIOD_S, lag_s)
-    G, pose = np.zeros((3, 1)), np.zeros(3)
+    mine = applied_torque(True, 2, PERIOD_S, delay * PERIOD_S, (2e-4, lag_s))  # the second group is measured
+    G, pose = np.zeros((3, 2)), np.zeros(3)
 
     def command(t):
         tick = int(np.floor(t / PERIOD_S - delay + 1e-9))
@@ -43,14 +43,14 @@ def test_mean_current_is_that_of_the_delayed_and_lagged_command(delay, lag_s):
         return total
 
     for tick in range(len(commands)):
-        estimate_applied_torque(mine, pose, G, commands[tick : tick + 1])
+        estimate_applied_torque(mine, pose, G, np.repeat(commands[tick], 2))
         begin, end = tick * PERIOD_S, (tick + 1) * PERIOD_S
         switch = begin + (delay % 1) * PERIOD_S
         parts = [(begin, switch), (switch, end)] if switch > begin else [(begin, end)]
         # Midpoints of a jump are no matter: each part is smooth. Quadrature keeps 1e-12 of the largest.
         inside = 1e-13
         mean = sum(quad(current, a + inside, b - inside, epsabs=0, epsrel=1e-11)[0] for a, b in parts)
-        np.testing.assert_allclose(mine.mean[0], mean / PERIOD_S, rtol=1e-8, atol=1e-9)
+        np.testing.assert_allclose(mine.mean[1], mean / PERIOD_S, rtol=1e-8, atol=1e-9)
 
 
 @numba.njit

@@ -30,6 +30,7 @@ from spheretwin.models.magnetics import torque_matrix
 from spheretwin.scenario.hardware import PROTOTYPE_DRIVE
 
 COUNT, R_OHM, L_H, PERIOD_S = 18, 1.3, 0.9e-3, 1e-3
+THERMAL = {"resistance_per_K": 0.0, "heat_capacity_J_K": 60.0, "thermal_resistance_K_W": 4.0}
 PROTOTYPE = NominalCurrents(
     period_s=PERIOD_S,
     current_limit_A=8.0,
@@ -63,7 +64,7 @@ def test_the_prototype_s_threshold_and_ticks():
 
 def test_the_sheet_of_the_prototype_s_drive_is_its_static_error_and_swing():
     fields = {name.removeprefix("drive."): value for name, value in PROTOTYPE_DRIVE.items()}
-    fields |= {"resistance_ohm": 1.3, "inductance_H": 0.9e-3, "current_limit_A": 8.0}
+    fields |= {"resistance_ohm": 1.3, "inductance_H": 0.9e-3, "current_limit_A": 8.0, **THERMAL}
     sheet = drive_sheet(ResolvedDrive(**fields))
     error_A = sheet["offset_error_A"] + sheet["gain_error"] * sheet["current_limit_A"]
     assert error_A == pytest.approx(PROTOTYPE.static_error_A, rel=1e-14)  # a sum of four products
@@ -109,13 +110,14 @@ def test_a_healthy_current_looks_like_none_for_fewer_ticks(
     stage = amplifier(
         AmplifierSection(supply_V=swing_V, bandwidth_rad_s=bandwidth_rad_s), 8.0, period_s, 1, 0
     )  # fmt: skip
-    winding = group_coils(CoilSection(), resistance_ohm, inductance_H, period_s, 1)
+    section = CoilSection(resistance_ohm=resistance_ohm, inductance_H=inductance_H, **THERMAL)
+    winding = group_coils(section, period_s, 1)
     reach = min(8.0, swing_V / resistance_ohm)
     current, sums, silent = np.array([-reach]), zero_flow(1), 0
     for _ in range(200):
         drive_coils(stage, winding, np.array([8.0]), np.zeros(1), current, sums)
         silent += abs(current[0]) <= watcher.threshold_A
-    if min(reach, watcher.reach_A) > 2 * watcher.threshold_A:  # else no tick says anything
+    if min(reach, watcher.reach_A[0]) > 2 * watcher.threshold_A:  # else no tick says anything
         assert silent < watcher.ticks
 
 
