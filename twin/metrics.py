@@ -7,8 +7,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from spheretwin.electronics.coil import current_lag
+from spheretwin.control.applied_torque import lag_step
 from spheretwin.models.base.compiled import rounding_each
+from spheretwin.models.coil_group import of_each_group
 from spheretwin.models.telemetry.signals import ANGLES
 from spheretwin.reduction import Metric, PlannedRun
 
@@ -18,9 +19,9 @@ Array = NDArray[np.float64]
 class CopperState(NamedTuple):
     """State of `CopperLoss`."""
 
-    first_step: float  # mean remaining share of the distance to the command over the first physics step
-    tick: float  # the same over the tick
-    tick_squared: float  # of its square, which decays twice as fast, over the tick
+    first_step: Array  # (n,) mean remaining share of the distance to the command over the first physics step
+    tick: Array  # (n,) the same over the tick
+    tick_squared: Array  # (n,) of its square, which decays twice as fast, over the tick
     limit_A: float
     follows: bool  # true if the currents relax towards the commands
     squares: Array  # (n,) A²
@@ -39,10 +40,10 @@ def _add_copper_loss(rows: Array, first: int, columns: tuple[int, ...], state: C
             else:
                 target = min(max(rows[i, command + j], -state.limit_A), state.limit_A)
                 distance = 0.0  # at the start of the tick; 0 without a lag
-                if state.first_step > 0.0:
-                    distance = (rows[i, current + j] - target) / state.first_step
-                crossed = 2.0 * state.tick * target * distance
-                decayed = state.tick_squared * (distance * distance)
+                if state.first_step[j] > 0.0:
+                    distance = (rows[i, current + j] - target) / state.first_step[j]
+                crossed = 2.0 * state.tick[j] * target * distance
+                decayed = state.tick_squared[j] * (distance * distance)
                 state.squares[j] += target * target + crossed + decayed
 
 
@@ -65,25 +66,21 @@ class CopperLoss(Metric):
     def __init__(self, planned: PlannedRun) -> None:
         super().__init__(planned)
         section, groups = planned.scenario.drive, len(planned.actuator.groups)
-        lag_s, limit_A = section.lag_s, section.current_limit_A
-        step, tick, tick_squared = (
-            float(current_lag(time_constant_s, span_s, limit_A).mean_share)
-            for time_constant_s, span_s in (
-                (lag_s, planned.scenario.plant.step_s),
-                (lag_s, planned.period_s),
-                (0.5 * lag_s, planned.period_s),
-            )
-        )
+        lag_s, period_s = of_each_group(section.lag_s, groups), planned.period_s
+        spans = (lag_s, planned.scenario.plant.step_s), (lag_s, period_s), (0.5 * lag_s, period_s)
+        step, tick, tick_squared = (lag_step(span_s, lag, groups).mean_share for lag, span_s in spans)
         squares, logged_W = np.zeros((2, groups))
         follows = not section.converts
-        self.state = CopperState(step, tick, tick_squared, float(limit_A), follows, squares, logged_W)
+        self.state = CopperState(
+            step, tick, tick_squared, float(section.current_limit_A), follows, squares, logged_W
+        )
 
     def value(self) -> float | None:
         """Return the loss in J; None without a row."""
         if not self._rows:
             return None
         resistance_ohm = self.planned.scenario.drive.resistance_ohm
-        heat_W = np.sum(resistance_ohm * self.state.squares) + np.sum(self.state.logged_W)
+        heat_W = np.sum(np.multiply(resistance_ohm, self.state.squares)) + np.sum(self.state.logged_W)
         return float(heat_W * self.planned.period_s)
 
 

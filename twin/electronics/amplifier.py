@@ -230,7 +230,7 @@ def _follow_four(
     h, limit, highest, lowest = _step_and_limits(amplifier)
     start, R, e = load(current, j), load(coil.resistance_ohm, j), load(emf, j)
     target = load(setpoint, j) + load(amplifier.offset_A, j)
-    volts = R * start + coil.inductance_H * amplifier.bandwidth_rad_s * (target - start) + e
+    volts = R * start + load(coil.inductance_H, j) * amplifier.bandwidth_rad_s * (target - start) + e
     last_volts = R * target + e
     if not (
         within(target, -limit, limit)
@@ -257,12 +257,12 @@ def _drive_group(
     target = min(max(unlimited, -limit), limit)
     e = min(max(emf[j], -LARGEST_EMF_V), LARGEST_EMF_V)
     start, R = current[j], coil.resistance_ohm[j]
-    volts = R * start + coil.inductance_H * amplifier.bandwidth_rad_s * (target - start) + e
+    volts = R * start + coil.inductance_H[j] * amplifier.bandwidth_rad_s * (target - start) + e
     last_volts = R * target + e
     if lowest <= volts <= highest and lowest <= last_volts <= highest:
         whole = _phase(amplifier.following, h, start, target, volts, last_volts)
     else:
-        whole, limited_s = _within_limits(amplifier, coil.inductance_H, R, e, target, start)
+        whole, limited_s = _within_limits(amplifier, coil.inductance_H[j], R, e, target, start)
         flow.voltage_limited_s[j] += limited_s
     current[j] = whole.current_A
     flow.mean_current_A[j] = whole.charge_As * (1.0 / h)
@@ -408,7 +408,7 @@ def advance_open_short(
         current[group] = mean[group] = 0.0
         return
     R, start = coil.resistance_ohm[group], current[group]
-    shares = relaxation(step_s * R / coil.inductance_H)
+    shares = relaxation(step_s * R / coil.inductance_H[group])
     last = -min(max(emf_V, -LARGEST_EMF_V), LARGEST_EMF_V) / R
     current[group] = start + shares.settled * (last - start)
     mean[group] = start + shares.mean * (last - start)

@@ -3,19 +3,21 @@
 A group obeys ``L di/dt = v - R i - e`` with the voltage v at its ends. The turning rotor induces
 ``e = G_t^T w``: the electrical power e i equals the power of the torque ``G_t i`` at the rate w, to the last
 digit. Copper loss heats a group, which loses heat to its surroundings: one heat capacity, one thermal
-resistance.
+resistance. Each group has its own values.
 """
 
 from __future__ import annotations
 
-from math import exp, expm1, factorial, inf
+from math import expm1, factorial, inf
 from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field
 
+from spheretwin.control.applied_torque import lag_step
 from spheretwin.models.base.compiled import inlined
+from spheretwin.models.coil_group import PerGroup, of_each_group
 
 # Terms -(-x)**n / (n + 1)! and (-x)**n (2**n - 2) / (n + 1)!, without (-x)**n and with the sign of the first;
 # up to x = 1/4, the omitted terms are beyond the last digit.
@@ -80,51 +82,69 @@ DRIVEN, OPEN, SHORTED = 0, 1, 2
 REFERENCE_degC = 20.0
 
 
+Resistance = Annotated[float, Field(ge=1e-3, le=1e6)]
+Inductance = Annotated[float, Field(ge=1e-9, le=1e3)]
+PerKelvin = Annotated[float, Field(ge=0, le=0.01)]
+HeatCapacity = Annotated[float, Field(ge=1e-3, le=1e6)]
+ThermalResistance = Annotated[float, Field(ge=0, le=1e6)]
+Shutdown = Annotated[float, Field(ge=-60, le=1e4)]
+
+
 class CoilSection(BaseModel):
     """Electrical and thermal parameters of a group."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
 
-    resistance_ohm: Annotated[float, Field(ge=1e-3, le=1e6)] | None = Field(
-        None, description="resistance of a group at 20 °C, ohm; the model file's unless given (assumed: 1.3)"
+    resistance_ohm: Resistance | tuple[Resistance, ...] | None = Field(
+        None,
+        description="resistance of a group at 20 °C, one number or one for each, ohm; the model file's unless"
+        " given (assumed: 1.3)",
     )
-    inductance_H: Annotated[float, Field(ge=1e-9, le=1e3)] | None = Field(
-        None, description="inductance of a group, H; the model file's unless given (assumed: 0.9e-3)"
+    inductance_H: Inductance | tuple[Inductance, ...] | None = Field(
+        None,
+        description="inductance of a group, one number or one for each, H; the model file's unless given"
+        " (assumed: 0.9e-3)",
     )
     coil_coupling: Annotated[float, Field(ge=0, le=1)] = Field(
         0.0,
         description="share of the mutual inductance of the groups, which is computed from the model's coils;"
         " 0 for none, 1 for all; needs supply_V",
     )
-    resistance_per_K: Annotated[float, Field(ge=0, le=0.01)] = Field(
-        0.0,
-        description="relative rise of the resistance, 1/K, from 20 °C (property of copper: 0.0039)",
+    resistance_per_K: PerKelvin | tuple[PerKelvin, ...] | None = Field(
+        None,
+        description="relative rise of the resistance, one number or one for each group, 1/K, from 20 °C; the"
+        " model file's unless given (property of copper: 0.0039)",
     )
-    heat_capacity_J_K: Annotated[float, Field(ge=1e-3, le=1e6)] = Field(
-        60.0, description="heat capacity of a group, J/K (assumed)"
+    heat_capacity_J_K: HeatCapacity | tuple[HeatCapacity, ...] | None = Field(
+        None,
+        description="heat capacity of a group, one number or one for each, J/K; the model file's unless given"
+        " (assumed: 60)",
     )
-    thermal_resistance_K_W: Annotated[float, Field(ge=0, le=1e6)] = Field(
-        4.0, description="thermal resistance from a group to its surroundings, K/W (assumed)"
+    thermal_resistance_K_W: ThermalResistance | tuple[ThermalResistance, ...] | None = Field(
+        None,
+        description="thermal resistance from a group to its surroundings, one number or one for each, K/W;"
+        " the model file's unless given (assumed: 4)",
     )
     ambient_degC: Annotated[float, Field(ge=-60, le=300)] = Field(
         20.0, description="ambient temperature, and initial temperature of the coils, °C (assumed)"
     )
-    shutdown_degC: Annotated[float, Field(ge=-60, le=1e4)] | None = Field(
+    shutdown_degC: Shutdown | tuple[Shutdown, ...] | None = Field(
         None,
-        description="temperature of a group from which its amplifier is shut down, °C; none unless given"
-        " (assumed: 155, insulation of class F)",
+        description="temperature of a group from which its amplifier is shut down, one number or one for"
+        " each, °C; the temperature limit of the model file unless given (assumed: 155, insulation of class"
+        " F)",
     )
 
 
 class GroupCoils(NamedTuple):
     """Coils of all groups, for compiled code."""
 
-    inductance_H: float
-    cold_resistance_ohm: float  # at `REFERENCE_degC`
-    resistance_per_K: float
-    thermal_resistance_K_W: float
-    shutdown_degC: float  # infinite if there is none
-    settled: float  # share of the way to the final temperature in a control period
+    inductance_H: NDArray[np.float64]  # (n,)
+    cold_resistance_ohm: NDArray[np.float64]  # (n,) at `REFERENCE_degC`
+    resistance_per_K: NDArray[np.float64]  # (n,)
+    thermal_resistance_K_W: NDArray[np.float64]  # (n,)
+    shutdown_degC: NDArray[np.float64]  # (n,) infinite if there is none
+    settled: NDArray[np.float64]  # (n,) share of the way to the final temperature in a control period
     period_s: float
     temperature_degC: NDArray[np.float64]  # (n,) present temperature
     resistance_ohm: NDArray[np.float64]  # (n,) at that temperature
@@ -140,29 +160,27 @@ class GroupCoils(NamedTuple):
         return (self.contact,)
 
 
-def group_coils(
-    section: CoilSection, resistance_ohm: float, inductance_H: float, period_s: float, groups: int
-) -> GroupCoils:
+def group_coils(section: Any, period_s: float, groups: int) -> GroupCoils:
     """Return coils at ambient temperature.
 
     Parameters
     ----------
     section : CoilSection
-    resistance_ohm, inductance_H : float, ohm, H
-        Values of the model file, used if the section has none.
+        With every value given, except that of no shutdown.
     period_s : float, s
         Control period, in which the temperature advances once.
     groups : int
     """
-    cold = resistance_ohm if section.resistance_ohm is None else section.resistance_ohm
-    time_constant_s = section.thermal_resistance_K_W * section.heat_capacity_J_K
+    thermal_K_W = of_each_group(section.thermal_resistance_K_W, groups)
+    time_constants_s = thermal_K_W * of_each_group(section.heat_capacity_J_K, groups)
+    shares = [relaxation(period_s / time_s).settled if time_s > 0 else 1.0 for time_s in time_constants_s]
     coils = GroupCoils(
-        inductance_H=inductance_H if section.inductance_H is None else section.inductance_H,
-        cold_resistance_ohm=cold,
-        resistance_per_K=section.resistance_per_K,
-        thermal_resistance_K_W=section.thermal_resistance_K_W,
-        shutdown_degC=inf if section.shutdown_degC is None else section.shutdown_degC,
-        settled=relaxation(period_s / time_constant_s).settled if time_constant_s > 0 else 1.0,
+        inductance_H=of_each_group(section.inductance_H, groups),
+        cold_resistance_ohm=of_each_group(section.resistance_ohm, groups),
+        resistance_per_K=of_each_group(section.resistance_per_K, groups),
+        thermal_resistance_K_W=thermal_K_W,
+        shutdown_degC=of_each_group(inf if section.shutdown_degC is None else section.shutdown_degC, groups),
+        settled=np.array(shares),
         period_s=period_s,
         temperature_degC=np.full(groups, section.ambient_degC),
         resistance_ohm=np.empty(groups),
@@ -178,7 +196,7 @@ def update_resistance(coil: GroupCoils) -> None:
     """Update the resistances: ``R = R20 (1 + a (T - 20 °C))`` at the present temperatures."""
     for j in range(coil.resistance_ohm.shape[0]):
         rise = coil.temperature_degC[j] - REFERENCE_degC
-        coil.resistance_ohm[j] = coil.cold_resistance_ohm * (1.0 + coil.resistance_per_K * rise)
+        coil.resistance_ohm[j] = coil.cold_resistance_ohm[j] * (1.0 + coil.resistance_per_K[j] * rise)
 
 
 @inlined
@@ -194,8 +212,8 @@ def advance_temperature(coil: GroupCoils, copper_J: NDArray[np.float64]) -> None
     """
     for j in range(copper_J.shape[0]):
         power = copper_J[j] / coil.period_s
-        last = coil.surroundings_degC[0] + coil.thermal_resistance_K_W * power
-        coil.temperature_degC[j] += (last - coil.temperature_degC[j]) * coil.settled
+        last = coil.surroundings_degC[0] + coil.thermal_resistance_K_W[j] * power
+        coil.temperature_degC[j] += (last - coil.temperature_degC[j]) * coil.settled[j]
     update_resistance(coil)
 
 
@@ -203,7 +221,7 @@ def advance_temperature(coil: GroupCoils, copper_J: NDArray[np.float64]) -> None
 def is_overheated(coil: GroupCoils) -> bool:
     """True if the temperature of a group has reached the shutdown limit or is not a number."""
     for j in range(coil.temperature_degC.shape[0]):
-        if not coil.temperature_degC[j] < coil.shutdown_degC:
+        if not coil.temperature_degC[j] < coil.shutdown_degC[j]:
             return True
     return False
 
@@ -236,20 +254,17 @@ def back_emf(
 class CurrentLag(NamedTuple):
     """First-order lag, solved exactly over one physics step with the command held."""
 
-    decay: float
-    """Share of the distance to the command that remains after a step."""
-    mean_share: float
-    """Share of that distance that remains on average over the step."""
+    decay: NDArray[np.float64]
+    """(n,) share of the distance to the command that remains after a step."""
+    mean_share: NDArray[np.float64]
+    """(n,) share of that distance that remains on average over the step."""
     current_limit_A: float
     """Limit of the amplifiers, for any command."""
 
 
-def current_lag(time_constant_s: float, step_s: float, current_limit_A: float) -> CurrentLag:
-    """Return the lag for a time constant L/R (s; 0: ideal amplifiers), a physics step (s) and a limit (A)."""
-    if time_constant_s == 0:
-        return CurrentLag(0.0, 0.0, current_limit_A)
-    steps = step_s / time_constant_s
-    return CurrentLag(exp(-steps), -expm1(-steps) / steps, current_limit_A)
+def current_lag(time_constant_s: PerGroup, step_s: float, current_limit_A: float, groups: int) -> CurrentLag:
+    """Return the lag for time constants L/R (s; 0: ideal amplifiers), a physics step (s) and a limit (A)."""
+    return CurrentLag(*lag_step(step_s, time_constant_s, groups), current_limit_A)
 
 
 @inlined
@@ -276,5 +291,5 @@ def advance_lag(
     for j in range(command.shape[0]):
         target = min(max(command[j], -limit), limit)
         distance = current[j] - target
-        mean[j] = target + lag.mean_share * distance
-        current[j] = target + lag.decay * distance
+        mean[j] = target + lag.mean_share[j] * distance
+        current[j] = target + lag.decay[j] * distance

@@ -31,6 +31,7 @@ from spheretwin.electronics.coil import GroupCoils, relaxation
 from spheretwin.electronics.drive_section import ResolvedDrive
 from spheretwin.models.base.compiled import inlined
 from spheretwin.models.base.errors import InputError, distinct_texts
+from spheretwin.models.coil_group import of_each_group
 
 Array = NDArray[np.float64]
 
@@ -71,16 +72,19 @@ def coupling(section: ResolvedDrive, mutual_H: Array | None, amplifier: Amplifie
 
 
 def check_coupling(section: ResolvedDrive, mutual_H: Array) -> None:
-    """Check that the inductance of a group exceeds the mutual inductances.
+    """Check that the inductances of the groups exceed the mutual inductances.
 
     Raises
     ------
     InputError
-        It does not, so that some currents would have a negative magnetic energy.
+        They do not, so that some currents would have a negative magnetic energy.
     """
-    least = section.coil_coupling * float(np.abs(np.linalg.eigvalsh(mutual_H)).max())
-    if not section.inductance_H > least:
-        smallest, received = distinct_texts(least, section.inductance_H)
+    inductance_H = of_each_group(section.inductance_H, len(mutual_H))
+    least_H = float(inductance_H.min())
+    shares = mutual_H / np.sqrt(np.outer(inductance_H, inductance_H))
+    largest = section.coil_coupling * float(np.abs(np.linalg.eigvalsh(shares)).max())
+    if not largest < 1:
+        smallest, received = distinct_texts(largest * least_H, least_H)
         raise InputError(
             f"drive: expected inductance_H above {smallest} H for a coil_coupling of"
             f" {section.coil_coupling:g} of the model's coils, received {received} H"
@@ -92,8 +96,9 @@ def predict_changes(
     coupling: Coupling, amplifier: Amplifier, coil: GroupCoils, setpoint: Array, current: Array
 ) -> None:
     """Predict the changes of the currents: those of uncoupled groups that are at a limit never or always."""
-    limit, per_volt = amplifier.current_limit_A, amplifier.step_s / coil.inductance_H
+    limit = amplifier.current_limit_A
     for j in range(current.shape[0]):
+        per_volt = amplifier.step_s / coil.inductance_H[j]
         target = min(max(setpoint[j] + amplifier.offset_A[j], -limit), limit)
         opposed = coil.resistance_ohm[j] * current[j] + coupling.own_emf[j]
         change = amplifier.following.settled * (target - current[j])

@@ -70,7 +70,7 @@ def build_drive(
         As in `drive_chain.drive_chain`.
     """
     if section.supply_V is None and not section.converts and faults is None:
-        return LagDrive(current_lag(section.lag_s, step_s, section.current_limit_A))
+        return LagDrive(current_lag(section.lag_s, step_s, section.current_limit_A, groups))
     return drive_chain(section, step_s, substeps, groups, seed, faults, mutual_H)
 
 

@@ -166,7 +166,7 @@ def drive_chain(
         converts=section.converts or faults is not None,
         supplied=section.supply_V is not None,
         supply_V=0.0 if section.supply_V is None else section.supply_V,
-        lag=current_lag(section.lag_s, step_s, section.current_limit_A),
+        lag=current_lag(section.lag_s, step_s, section.current_limit_A, groups),
         output=ControllerOutput(
             np.full(1, NORMAL), np.zeros(1, dtype=np.int64), faults.halt if faults else np.full(1, NORMAL)
         ),
@@ -174,7 +174,7 @@ def drive_chain(
         delay=command_delay,
         supply=fault_line(1),
         amplifier=amplifiers,
-        coil=group_coils(section, section.resistance_ohm, section.inductance_H, substeps * step_s, groups),
+        coil=group_coils(section, substeps * step_s, groups),
         coupling=coupling(section, mutual_H, amplifiers),
         flow=zero_flow(groups),
         draws=faults.draws if faults else np.empty(0),

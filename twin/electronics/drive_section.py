@@ -12,6 +12,9 @@ from spheretwin.electronics.coil import CoilSection
 from spheretwin.electronics.converters import DacSection
 from spheretwin.electronics.delay import DelaySection
 from spheretwin.electronics.stages import DriveStage
+from spheretwin.models.coil_group import PerGroup
+
+TimeConstant = Annotated[float, Field(ge=0, le=1e3)]
 
 
 class DriveSection(DelaySection, DacSection, AmplifierSection, CoilSection):
@@ -20,8 +23,10 @@ class DriveSection(DelaySection, DacSection, AmplifierSection, CoilSection):
     The bases that are a `DriveStage` are the list of the stages, in the order in which commands pass them.
     """
 
-    time_constant_s: Annotated[float, Field(ge=0, le=1e3)] | None = Field(
-        None, description="current lag L/R of amplifiers without a supply, s; 0 for none"
+    time_constant_s: TimeConstant | tuple[TimeConstant, ...] | None = Field(
+        None,
+        description="current lag L/R of amplifiers without a supply, one number or one for each group, s; 0"
+        " for none",
     )
     current_limit_A: Positive | None = Field(None, description="largest group current of the amplifiers, A")
 
@@ -39,9 +44,9 @@ class DriveSection(DelaySection, DacSection, AmplifierSection, CoilSection):
         return self
 
     @property
-    def lag_s(self) -> float:
+    def lag_s(self) -> PerGroup:
         """Time constant of the currents while no voltage is at its limit, s; given if there is no supply."""
-        return cast("float", self.time_constant_s) if self.supply_V is None else 1 / self.bandwidth_rad_s
+        return cast("PerGroup", self.time_constant_s) if self.supply_V is None else 1 / self.bandwidth_rad_s
 
     @property
     def converts(self) -> bool:
@@ -58,8 +63,11 @@ STAGES: dict[str, type[DriveStage]] = {
 class ResolvedDrive(DriveSection):
     """Drive of a run: coils and limit are given, and the lag if there is no supply."""
 
-    resistance_ohm: Positive
-    inductance_H: Positive
+    resistance_ohm: PerGroup
+    inductance_H: PerGroup
+    resistance_per_K: PerGroup
+    heat_capacity_J_K: PerGroup
+    thermal_resistance_K_W: PerGroup
     current_limit_A: Positive
 
 

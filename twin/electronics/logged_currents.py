@@ -18,7 +18,7 @@ def mean_currents(
     sample_A: Array,
     edge_s: Array,
     delay_s: float,
-    lag_s: float,
+    lag_s: Array,
     interpolated: bool,
     present_A: Array,
     mean_A: Array,
@@ -38,8 +38,8 @@ def mean_currents(
         Ends of the intervals, ascending.
     delay_s : float, s
         From a sample to its effect; negative if the clock of the samples is late.
-    lag_s : float, s
-        Time constant; 0 for none.
+    lag_s : (groups,) array, s
+        Time constant of each group; 0 for none.
     interpolated : bool
         True if the current changes linearly from sample to sample, false if it is held.
     present_A : (groups,) array, A
@@ -82,7 +82,7 @@ def _add_piece(
     place: int,
     start: float,
     end: float,
-    lag_s: float,
+    lag_s: Array,
     interpolated: bool,
     present_A: Array,
     sum_As: Array,
@@ -98,7 +98,7 @@ def _add_piece(
         if slopes:
             current += share * (sample_A[place + 1, j] - current)
         sum_As[j] += current * length
-        if lag_s > 0.0:
-            reached = current + (present_A[j] - current) * exp(-length / lag_s)
-            sum_As[j] -= lag_s * (reached - present_A[j])
+        if lag_s[j] > 0.0:
+            reached = current + (present_A[j] - current) * exp(-length / lag_s[j])
+            sum_As[j] -= lag_s[j] * (reached - present_A[j])
             present_A[j] = reached

@@ -22,6 +22,7 @@ from spheretwin.electronics.coil import REFERENCE_degC
 from spheretwin.electronics.drive_chain import DriveChain
 from spheretwin.models.base.compiled import inlined
 from spheretwin.models.base.errors import InputError
+from spheretwin.models.coil_group import PerGroup, of_each_group
 
 Array = NDArray[np.float64]
 Capacity = Annotated[float, Field(ge=1e-3, le=1e7)]
@@ -71,7 +72,7 @@ class MagnetHeat(NamedTuple):
 
     remanence_per_K: float
     ambient_degC: float
-    winding_J_K: float  # heat capacity of a winding
+    winding_J_K: Array  # (n,) heat capacity of the winding of each group
     period_s: float
     matrix_W_K: Array  # (2, 2) C / h + conductances, of stator and rotor
     capacity_W_K: Array  # (2,) C / h
@@ -88,7 +89,7 @@ class MagnetHeat(NamedTuple):
 
 
 def magnet_heat(
-    section: ThermalSection, drive: DriveChain, ambient_degC: float, winding_J_K: float
+    section: ThermalSection, drive: DriveChain, ambient_degC: float, winding_J_K: PerGroup
 ) -> MagnetHeat:
     """Return the heat of a plant; the stator becomes the surroundings of the drive's windings.
 
@@ -98,7 +99,7 @@ def magnet_heat(
     drive : DriveChain
         With a supply; at rest.
     ambient_degC : float, °C
-    winding_J_K : float, J/K
+    winding_J_K : float or one for each group, J/K
         Heat capacity of the winding of a group.
 
     Raises
@@ -108,7 +109,8 @@ def magnet_heat(
         windings take their steps in turn.
     """
     period_s, coil = drive.coil.period_s, drive.coil
-    exchanged_J_K = coil.settled * winding_J_K * len(coil.temperature_degC)
+    windings_J_K = of_each_group(winding_J_K, len(coil.settled))
+    exchanged_J_K = float(np.sum(coil.settled * windings_J_K))
     if not exchanged_J_K < section.stator_heat_capacity_J_K:
         raise InputError(
             f"scenario: expected a plant.thermal.stator_heat_capacity_J_K above {exchanged_J_K:g} J/K, which"
@@ -121,7 +123,7 @@ def magnet_heat(
     return MagnetHeat(
         remanence_per_K=section.remanence_per_K,
         ambient_degC=ambient_degC,
-        winding_J_K=winding_J_K,
+        winding_J_K=windings_J_K,
         period_s=period_s,
         matrix_W_K=np.diag(capacity + outer + gap) + gap * np.array([[0.0, -1.0], [-1.0, 0.0]]),
         capacity_W_K=capacity,
@@ -166,7 +168,7 @@ def advance_heat(heat: MagnetHeat | None) -> None:
         return
     released_J = 0.0
     for j in range(heat.copper_J.shape[0]):
-        released_J += heat.copper_J[j] - heat.winding_J_K * (heat.winding_degC[j] - heat.last_degC[j])
+        released_J += heat.copper_J[j] - heat.winding_J_K[j] * (heat.winding_degC[j] - heat.last_degC[j])
         heat.last_degC[j] = heat.winding_degC[j]
     matrix, ambient = heat.matrix_W_K, heat.ambient_degC
     stator = heat.capacity_W_K[0] * heat.stator_degC[0] + heat.to_ambient_W_K[0] * ambient

@@ -52,7 +52,12 @@ def problem(scenario: Scenario) -> Problem:
         nominal_inertia=np.array(actuator.inertia),
         inertia=(1 + plant.modelling_error) * actuator.inertia,
         magnetics=torque_model(actuator),
-        drive=current_lag(group.inductance_H / group.resistance_ohm, plant.step_s, group.current_limit_A),
+        drive=current_lag(
+            group.inductance_H / group.resistance_ohm,
+            plant.step_s,
+            group.current_limit_A,
+            len(actuator.groups),
+        ),
         period_s=period_s,
         step_s=plant.step_s,
         substeps=scenario.substeps,

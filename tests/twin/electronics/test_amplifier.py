@@ -67,6 +67,17 @@ class Stepped(NamedTuple):
     limited: float
 
 
+def coils_of(resistance_ohm, inductance_H, groups):
+    section = CoilSection(
+        resistance_ohm=resistance_ohm,
+        inductance_H=inductance_H,
+        resistance_per_K=0.0,
+        heat_capacity_J_K=60.0,
+        thermal_resistance_K_W=4.0,
+    )
+    return group_coils(section, PERIOD_S, groups)
+
+
 def made(case, groups=1):
     """Amplifiers and coils of a case."""
     highest = max(case.highest, -case.lowest)
@@ -76,7 +87,7 @@ def made(case, groups=1):
         drop_down_V=highest + case.lowest,
         bandwidth_rad_s=case.rate,
     )
-    coils = group_coils(CoilSection(), case.R, case.L, PERIOD_S, groups)
+    coils = coils_of(case.R, case.L, groups)
     return amplifier(section, case.limit, case.step_s, groups, 0), coils
 
 
@@ -133,7 +144,7 @@ def test_a_step_is_what_an_ode_solver_finds(case):
 
 def test_with_enough_voltage_the_current_is_the_ideal_lag():
     generator, groups = np.random.default_rng(0), 18
-    coils = group_coils(CoilSection(), 1.3, 0.9e-3, PERIOD_S, groups)
+    coils = coils_of(1.3, 0.9e-3, groups)
     for supply_V in (1e6, None):
         section = AmplifierSection(supply_V=supply_V, bandwidth_rad_s=4096.0)  # 1 / rate is exact
         amplifiers = amplifier(section, 8.0, STEP_S, groups, 0)
@@ -141,7 +152,7 @@ def test_with_enough_voltage_the_current_is_the_ideal_lag():
         for _ in range(100):
             setpoint = generator.uniform(-10, 10, groups)  # some beyond the limit
             drive_coils(amplifiers, coils, setpoint, generator.normal(size=groups), current, passed)
-            advance_lag(current_lag(1 / 4096.0, STEP_S, 8.0), setpoint, ideal, mean)
+            advance_lag(current_lag(1 / 4096.0, STEP_S, 8.0, groups), setpoint, ideal, mean)
             # Both are the same closed form; the roundings of a few currents of 8 A.
             np.testing.assert_allclose(current, ideal, rtol=0, atol=1e-14)
             np.testing.assert_allclose(passed.mean_current_A, mean, rtol=0, atol=1e-14)
@@ -248,7 +259,7 @@ def test_no_number_however_large_or_small_gives_anything_but_numbers(groups, R, 
     current, setpoint, emf = (np.array(column) for column in zip(*groups, strict=True))
     section = AmplifierSection(supply_V=supply, bandwidth_rad_s=bandwidth)
     amplifiers = amplifier(section, 8.0, step_s, 4, 0)
-    coils, passed = group_coils(CoilSection(), R, L, PERIOD_S, 4), zero_flow(4)
+    coils, passed = coils_of(R, L, 4), zero_flow(4)
     most = np.maximum(np.abs(current), (supply + 1e9) / R)
     for _ in range(3):
         drive_coils(amplifiers, coils, setpoint, emf, current, passed)
@@ -274,7 +285,7 @@ def test_the_target_keeps_to_the_current_limit_with_its_offset():
     section = AmplifierSection(**SUPPLY, amplifier_offset_V=5e-3)
     amplifiers = amplifier(section, 8.0, STEP_S, 18, 4)
     assert np.all(np.abs(amplifiers.offset_A) <= 4e-3)  # 5 mV at 0.8 A/V
-    coils, passed = group_coils(CoilSection(), 1.3, 0.9e-3, PERIOD_S, 18), zero_flow(18)
+    coils, passed = coils_of(1.3, 0.9e-3, 18), zero_flow(18)
     current = np.zeros(18)
     for setpoint, expected in ((1.0, 1.0 + amplifiers.offset_A), (9.0, 8.0), (-np.inf, -8.0)):
         reset_sums(passed)

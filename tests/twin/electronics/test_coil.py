@@ -22,31 +22,32 @@ from spheretwin.electronics.coil import (
 from spheretwin.models.magnetics import rotor_torque
 
 R, L, PERIOD_S = 1.3, 0.9e-3, 1e-3
-COPPER = CoilSection(resistance_per_K=0.0039)
 
 
-def test_figures_are_the_models_unless_given():
-    model = group_coils(CoilSection(), R, L, PERIOD_S, 2)
-    given_ = group_coils(CoilSection(resistance_ohm=2.0, inductance_H=1e-3), R, L, PERIOD_S, 2)
-    assert model.inductance_H == L
-    assert given_.inductance_H == 1e-3
-    np.testing.assert_array_equal(model.resistance_ohm, R)
-    np.testing.assert_array_equal(given_.resistance_ohm, 2.0)
+def coils(groups, period_s=PERIOD_S, **changes):
+    values = {"resistance_ohm": R, "inductance_H": L, "resistance_per_K": 0.0039}
+    values |= {"heat_capacity_J_K": 60.0, "thermal_resistance_K_W": 4.0}
+    return group_coils(CoilSection(**values | changes), period_s, groups)
 
 
 @pytest.mark.parametrize(("ambient", "share"), [(20.0, 1.0), (120.0, 1.39), (-30.0, 0.805)])
 def test_resistance_is_coppers(ambient, share):
-    made = group_coils(COPPER.model_copy(update={"ambient_degC": ambient}), R, L, PERIOD_S, 3)
-    np.testing.assert_allclose(made.resistance_ohm, R * share, rtol=1e-15)
+    resistance_ohm = np.array([1.3, 5.7, 8.3])
+    made = coils(3, ambient_degC=ambient, resistance_ohm=tuple(resistance_ohm))
+    np.testing.assert_allclose(made.resistance_ohm, resistance_ohm * share, rtol=1e-15)
 
 
 def test_constant_power_heats_as_one_exponential_to_its_rest():
+    """Each group heats with its own power, heat capacity and thermal resistance."""
     watts, period_s = np.array([0.0, 1.0, 80.0]), 0.5
-    made = group_coils(COPPER, R, L, period_s, 3)
+    capacity_J_K, thermal_K_W = np.array([60.0, 30.0, 60.0]), np.array([4.0, 8.0, 5.0])
+    made = coils(
+        3, period_s, heat_capacity_J_K=tuple(capacity_J_K), thermal_resistance_K_W=tuple(thermal_K_W)
+    )
     for period in range(1, 4001):
         advance_temperature(made, watts * period_s)
-        if period in (1, 480, 4000):  # 480 periods are one time constant, 240 s
-            exact = 20 + 4.0 * watts * -np.expm1(-period * period_s / 240)
+        if period in (1, 480, 4000):  # 480 periods are one time constant of the first two, 240 s
+            exact = 20 + thermal_K_W * watts * -np.expm1(-period * period_s / (thermal_K_W * capacity_J_K))
             np.testing.assert_allclose(made.temperature_degC, exact, rtol=1e-12)  # 4000 roundings
     np.testing.assert_allclose(made.resistance_ohm, R * (1 + 0.0039 * (exact - 20)), rtol=1e-12)
 
@@ -54,8 +55,7 @@ def test_constant_power_heats_as_one_exponential_to_its_rest():
 @given(st.floats(-50, 1000), st.floats(0, 1e4), st.floats(-6, 1), st.floats(-2, 3), st.floats(-2, 2))
 def test_one_period_is_the_exact_exponential(start, watts, log_period, log_capacity, log_resistance):
     period_s, capacity, thermal = 10.0**log_period, 10.0**log_capacity, 10.0**log_resistance
-    section = CoilSection(heat_capacity_J_K=capacity, thermal_resistance_K_W=thermal)
-    made = group_coils(section, R, L, period_s, 1)
+    made = coils(1, period_s, heat_capacity_J_K=capacity, thermal_resistance_K_W=thermal)
     made.temperature_degC[0] = start
     advance_temperature(made, np.array([watts * period_s]))
     final = 20.0 + thermal * watts
@@ -64,18 +64,18 @@ def test_one_period_is_the_exact_exponential(start, watts, log_period, log_capac
 
 
 def test_a_coil_that_is_cooled_at_once_stays_at_the_temperature_around_it():
-    made = group_coils(CoilSection(thermal_resistance_K_W=0.0, ambient_degC=40.0), R, L, PERIOD_S, 1)
+    made = coils(1, thermal_resistance_K_W=0.0, ambient_degC=40.0)
     advance_temperature(made, np.array([100.0]))
     assert made.temperature_degC[0] == 40.0
 
 
 def test_overheated_is_said_of_the_hottest_group():
-    made = group_coils(CoilSection(shutdown_degC=155.0), R, L, PERIOD_S, 3)
+    made = coils(3, shutdown_degC=(20.0001, 155.0, 155.0))
     assert not is_overheated(made)
     for hottest in (155.0, 400.0, np.nan):
         made.temperature_degC[1] = hottest
         assert is_overheated(made)
-    endless = group_coils(CoilSection(), R, L, PERIOD_S, 3)
+    endless = coils(3)
     endless.temperature_degC[1] = 1e30
     assert not is_overheated(endless)
 
@@ -93,15 +93,15 @@ def test_emf_takes_as_power_what_the_torque_gives(seed, groups):
     assert emf @ current == pytest.approx(torque @ rate, rel=0, abs=1e-13)
 
 
-@pytest.mark.parametrize("time_constant_s", [1e-4, 6.9e-4, 5e-2])
+@pytest.mark.parametrize("time_constant_s", [1e-4, 6.9e-4, 5e-2, (6.9e-4, 1e-4)])
 def test_one_step_is_the_exact_exponential_and_its_mean(time_constant_s):
     step_s = 5e-4
     command, current, mean = np.array([3.0, -1.0]), np.array([0.5, 2.0]), np.empty(2)
     start = current.copy()
-    advance_lag(current_lag(time_constant_s, step_s, 8.0), command, current, mean)
+    advance_lag(current_lag(time_constant_s, step_s, 8.0, 2), command, current, mean)
 
     def exact(t):
-        return command + (start - command) * np.exp(-t / time_constant_s)
+        return command + (start - command) * np.exp(-t / np.array(time_constant_s))
 
     np.testing.assert_allclose(current, exact(step_s), rtol=1e-14)
     expected = [quad(lambda t, j=j: exact(t)[j], 0, step_s, epsabs=1e-14)[0] / step_s for j in range(2)]
@@ -110,7 +110,7 @@ def test_one_step_is_the_exact_exponential_and_its_mean(time_constant_s):
 
 def test_without_lag_the_current_is_the_command():
     command, current, mean = np.array([4.0]), np.zeros(1), np.empty(1)
-    advance_lag(current_lag(0.0, 5e-4, 8.0), command, current, mean)
+    advance_lag(current_lag(0.0, 5e-4, 8.0, 1), command, current, mean)
     assert current[0] == mean[0] == 4.0
 
 

@@ -26,7 +26,8 @@ REMAINDER_V = np.abs(MUTUAL_H).sum(axis=1).max() / 5e-4 * TOLERANCE_A
 def chain_of(mutual_H, step_s, **changed):
     fields = {
         "supply_V": 24.0, "drop_up_V": 4.8, "drop_down_V": 4.6, "resistance_ohm": R, "inductance_H": L,
-        "current_limit_A": 1e3, "coil_coupling": 1.0,
+        "current_limit_A": 1e3, "coil_coupling": 1.0, "resistance_per_K": 0.0, "heat_capacity_J_K": 60.0,
+        "thermal_resistance_K_W": 4.0,
     }  # fmt: skip
     groups = GROUPS if mutual_H is None else len(mutual_H)
     return drive_chain(ResolvedDrive(**fields | changed), step_s, 1, groups, 0, None, mutual_H)
@@ -85,13 +86,16 @@ def test_all_groups_at_limits_are_the_matrix_exponential():
     generator = np.random.default_rng(3)
     volts = generator.choice([UP, DOWN], GROUPS)
     emf, start = generator.normal(size=GROUPS), generator.normal(size=GROUPS)
-    inductance, duration, errors = L * np.eye(GROUPS) + MUTUAL_H, 5e-4, []
-    last = (volts - emf) / R
-    expected = last + expm(-R * duration * np.linalg.inv(inductance)) @ (start - last)
+    own_H, resistance_ohm = np.linspace(1.0, 0.8, GROUPS) * L, np.linspace(1.0, 1.6, GROUPS) * R
+    coils = {"resistance_ohm": tuple(resistance_ohm), "inductance_H": tuple(own_H)}
+    duration, errors, command = 5e-4, [], np.sign(volts) * 1e3
+    last = (volts - emf) / resistance_ohm
+    decay = expm(-duration * np.linalg.inv(np.diag(own_H) + MUTUAL_H) @ np.diag(resistance_ohm))
+    expected = last + decay @ (start - last)
     for steps in (1, 4, 8, 16):
-        current, *_ = run(MUTUAL_H, duration, steps, start, np.sign(volts) * 1e3, emf)
+        current, *_ = run(MUTUAL_H, duration, steps, start, command, emf, **coils)
         errors.append(np.abs(current - expected).max())
-    uncoupled, *_ = run(np.zeros_like(MUTUAL_H), duration, 1, start, np.sign(volts) * 1e3, emf)
+    uncoupled, *_ = run(np.zeros_like(MUTUAL_H), duration, 1, start, command, emf, **coils)
     # At the step of the plant, the error is below a fifteenth of the effect of the coupling.
     assert errors[0] < np.abs(uncoupled - expected).max() / 15
     np.testing.assert_allclose(orders(errors)[1:], 2, atol=0.1)
@@ -216,6 +220,10 @@ def test_a_run_has_the_coupling_of_its_model():
     ("changes", "message"),
     [
         ({"hardware": "ideal"}, "expected a supply_V with a coil_coupling of 1.0, received none"),
+        (
+            {"drive.inductance_H": [9e-4] * 17 + [1e-5]},
+            r"expected inductance_H above 1\.\d*e-05 H for a coil_coupling of 1 .*, received 1e-05 H",
+        ),
         (
             {"drive.inductance_H": 1e-5},
             r"expected inductance_H above 0\.00012\d* H for a coil_coupling of 1 .*, received 1e-05 H",

@@ -25,7 +25,9 @@ def given_current(t_s, delay_s, interpolated):
 def means(edges, delay_s=0.0, lag_s=0.0, interpolated=False, start=None):
     present = SAMPLES_A[0].copy() if start is None else start
     result = np.empty((len(edges) - 1, 2))
-    mean_currents(SAMPLES_s, SAMPLES_A, np.asarray(edges), delay_s, lag_s, interpolated, present, result)
+    mean_currents(
+        SAMPLES_s, SAMPLES_A, np.asarray(edges), delay_s, np.full(2, lag_s), interpolated, present, result
+    )
     return result, present
 
 

@@ -26,7 +26,11 @@ SECTION = ThermalSection(on=True)
 
 def heat_of(period_s, section=SECTION):
     coils = {"supply_V": 24.0, "resistance_ohm": 1.3, "inductance_H": 9e-4, "current_limit_A": 8.0}
-    coils |= {"heat_capacity_J_K": WINDING_J_K, "thermal_resistance_K_W": WINDING_K_W}
+    coils |= {
+        "resistance_per_K": 0.0,
+        "heat_capacity_J_K": WINDING_J_K,
+        "thermal_resistance_K_W": WINDING_K_W,
+    }
     chain = drive_chain(ResolvedDrive(ambient_degC=AMBIENT_degC, **coils), period_s, 1, GROUPS, 0)
     return chain.coil, magnet_heat(section, chain, AMBIENT_degC, WINDING_J_K)
 
