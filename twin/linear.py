@@ -13,6 +13,7 @@ from spheretwin.active_config import initial_config
 from spheretwin.models.actuator import Actuator
 from spheretwin.models.base import extras
 from spheretwin.models.base.errors import InputError, distinct_texts, shown
+from spheretwin.models.coil_group import PerGroup, of_each_group
 from spheretwin.models.kinematics import rate_jacobian
 from spheretwin.models.lagrangian import gravity_stiffness, gravity_torque, inertia_matrix
 from spheretwin.models.mjcf_reader import HINGES
@@ -48,7 +49,7 @@ class LinearisationData(NamedTuple):
     """Magnetics from currents to torque."""
     nominal_magnetics: Magnetics
     """Magnetics of the allocation, from torque to currents."""
-    lag_s: float
+    lag_s: PerGroup
     """Time constant of the currents."""
     current_limit_A: float
     """Limit of the allocation; for the true model at most that of the drive."""
@@ -271,6 +272,11 @@ def linearise(
     data = linearisation_data(config.scenario, config.files, nominal=nominal)
     coils, lag_s = _holding_actuation(data, pose), data.lag_s if lag else 0.0
     if inputs == "torque":
+        if isinstance(lag_s, tuple):
+            raise InputError(
+                'linear model: expected one lag of all groups for the torque as input, or inputs="currents",'
+                f" received lags of {min(lag_s):g} to {max(lag_s):g} s"
+            )
         at_rest, (A, B) = coils.holding_torque_Nm, _driven_by_torque(data, coils, pose, lag_s)
         quantity, unit, channels = "torque", "Nm", tuple(HINGES)
     else:
@@ -306,7 +312,7 @@ def _driven_by_torque(
 
 
 def _driven_by_currents(
-    data: LinearisationData, coils: Actuation, q: Array, lag_s: float
+    data: LinearisationData, coils: Actuation, q: Array, lag_s: PerGroup
 ) -> tuple[Array, Array]:
     """Return the matrices A and B for commanded currents; with a lag the currents are states."""
     A, per_torque = _rotor_matrices(data, q, coils.stiffness_of_currents)
@@ -314,7 +320,7 @@ def _driven_by_currents(
     per_ampere = per_torque @ coils.of_currents
     if not lag_s:
         return A, np.vstack([np.zeros((3, groups)), per_ampere])
-    commanded = np.vstack([np.zeros((6, groups)), np.eye(groups) / lag_s])
+    commanded = np.vstack([np.zeros((6, groups)), np.eye(groups) / of_each_group(lag_s, groups)])
     return _behind_lag(A, per_ampere, np.zeros((groups, 6)), lag_s), commanded
 
 
@@ -332,11 +338,11 @@ def _rotor_matrices(data: LinearisationData, q: Array, pull: Array) -> tuple[Arr
     return A, per_torque
 
 
-def _behind_lag(A: Array, per_input: Array, follows: Array, lag_s: float) -> Array:
+def _behind_lag(A: Array, per_input: Array, follows: Array, lag_s: PerGroup) -> Array:
     """Return the matrix A of a rotor whose inputs are states with a lag that follow the motion."""
     lagging = len(follows)
     pushed = np.vstack([np.zeros((3, lagging)), per_input])
-    return np.block([[A, pushed], [follows, -np.eye(lagging) / lag_s]])
+    return np.block([[A, pushed], [follows, -np.eye(lagging) / of_each_group(lag_s, lagging)]])
 
 
 def _holding_actuation(data: LinearisationData, pose: Array) -> Actuation:

@@ -71,7 +71,7 @@ def build_variants(settings: Settings) -> Variants:
         disturbance=np.array([disturbance[:ticks] for _, disturbance in inputs]),
         hinge_range=np.array(configs[0].files.actuator.hinge_range_rad),
         period_s=first.controller.period_s,
-        lag=current_lag(drive.lag_s, settings.step_s, drive.current_limit_A),
+        lag=current_lag(drive.lag_s, settings.step_s, drive.current_limit_A, len(plants[0].group_gain)),
     )
 
 

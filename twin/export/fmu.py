@@ -95,7 +95,7 @@ def _with_derivatives(model: PlantCode) -> PlantCode:
     def above_zero(one: Variable) -> Variable:
         if one.name not in ("lag_s", "thermal_resistance_K_W"):
             return one
-        if one.values[0] <= 0:
+        if min(one.values) <= 0:
             field = {"lag_s": "drive.time_constant_s"}.get(one.name, f"drive.{one.name}")
             raise InputError(f"export: expected {field} above 0 for model-exchange, received 0")
         one = one._replace(least=SMALLEST)

@@ -13,6 +13,7 @@ from spheretwin.active_config import initial_config
 from spheretwin.export.c_text import constant, definitions, header
 from spheretwin.models import magnetics
 from spheretwin.models.base.errors import InputError
+from spheretwin.models.coil_group import PerGroup, of_each_group
 from spheretwin.models.magnetics import TorqueModel
 from spheretwin.models.mjcf_reader import HINGES
 from spheretwin.plant.magnet_heat import initial_degC, remanence
@@ -229,6 +230,12 @@ def _parameters(scenario: ResolvedScenario, step: Parameters, inputs: Inputs, gr
     def each_hinge(name: str, values: Array, unit: str, text: str, least: float = -LARGEST) -> Variable:
         return Variable(name, _numbers(values), unit, text, AXES, least)
 
+    def each_group(
+        name: str, value: PerGroup, unit: str, text: str, least: float = SMALLEST, **more: Any
+    ) -> Variable:
+        values = _numbers(of_each_group(value, groups))
+        return Variable(name, values, unit, text, _per_group(groups), least, **more)
+
     def single(
         name: str, value: float, unit: str, text: str, least: float = SMALLEST, **more: Any
     ) -> Variable:
@@ -253,30 +260,29 @@ def _parameters(scenario: ResolvedScenario, step: Parameters, inputs: Inputs, gr
         ),
         each_hinge("constant_torque_Nm", step.constant_torque_Nm, "N.m", "constant torque, subtracted"),
         each_hinge("spring_Nm_rad", step.spring_Nm_rad, "N.m/rad", "stiffness about each hinge", 0),
-        Variable(
+        each_group(
             "torque_gain",
-            _numbers(gain),
+            gain,
             "1",
             "torque of each group over nominal, at 20 degC",
-            _per_group(groups),
             -FASTEST,
-            FASTEST,
+            largest=FASTEST,
         ),
     ]
     if inputs == "currents":
         rows += [
             single("current_limit_A", drive.current_limit_A, "A", "largest current of the amplifiers", 0),
-            single("lag_s", drive.lag_s, "s", "time constant of the currents", 0),
+            each_group("lag_s", drive.lag_s, "s", "time constant of each current", 0),
         ]
     rows += [
-        single("resistance_ohm", drive.resistance_ohm, "Ohm", "resistance of a group at 20 degC"),
+        each_group("resistance_ohm", drive.resistance_ohm, "Ohm", "resistance of each group at 20 degC"),
     ]
     if inputs == "voltages":
-        rows.append(single("inductance_H", drive.inductance_H, "H", "inductance of a group"))
+        rows.append(each_group("inductance_H", drive.inductance_H, "H", "inductance of each group"))
     rows += [
-        single("resistance_per_K", drive.resistance_per_K, "1/K", "relative rise of the resistance", 0),
-        single("heat_capacity_J_K", drive.heat_capacity_J_K, "J/K", "heat capacity of a winding"),
-        single(
+        each_group("resistance_per_K", drive.resistance_per_K, "1/K", "relative rise of the resistance", 0),
+        each_group("heat_capacity_J_K", drive.heat_capacity_J_K, "J/K", "heat capacity of each winding"),
+        each_group(
             "thermal_resistance_K_W", drive.thermal_resistance_K_W, "K/W", "from a winding to the stator", 0
         ),
     ]

@@ -13,6 +13,7 @@ from spheretwin.active_config import initial_config
 from spheretwin.electronics.sensor_chain import SensorsSection, accuracy
 from spheretwin.models.actuator import Actuator
 from spheretwin.models.base.errors import InputError
+from spheretwin.models.coil_group import PerGroup
 from spheretwin.plant.plant_step import Parameters
 from spheretwin.plant_model import parameters_of
 from spheretwin.scenario.sections import ResolvedScenario, Scenario
@@ -34,7 +35,7 @@ class Model(NamedTuple):
     parameters: Parameters
     delay_s: float
     """From a command to the amplifier's input."""
-    lag_s: float
+    lag_s: PerGroup
     """Time constant of the currents."""
     offset_rad: Array
     """Known error of each angle sensor (3,)."""

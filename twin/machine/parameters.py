@@ -14,6 +14,7 @@ from spheretwin.electronics.transducers import HARMONICS
 from spheretwin.machine.model import Model, model_of
 from spheretwin.models.actuator import Actuator
 from spheretwin.models.base.errors import InputError, did_you_mean
+from spheretwin.models.coil_group import PerGroup
 from spheretwin.plant.plant_step import Parameters
 
 Array = NDArray[np.float64]
@@ -138,7 +139,7 @@ class Setup(NamedTuple):
 
     plant: Parameters
     delay_s: float
-    lag_s: float
+    lag_s: PerGroup
     current_offset_A: Array  # (groups,)
     offset_rad: Array  # (3,)
     gain_error: Array  # (3,)
@@ -172,7 +173,8 @@ class Machine:
             for part in kind.split("."):
                 value = getattr(value, part)
             return float(value if parameter.kind.members == _WHOLE else value[parameter.place])
-        return {"torque_scale": 1.0, "delay_s": self.model.delay_s, "lag_s": self.model.lag_s}.get(kind, 0.0)
+        lag_s = float(np.mean(self.model.lag_s))
+        return {"torque_scale": 1.0, "delay_s": self.model.delay_s, "lag_s": lag_s}.get(kind, 0.0)
 
     def setup(self, parameters: Sequence[Parameter], values: Sequence[float]) -> Setup:
         """Return the machine under some values.
@@ -188,13 +190,13 @@ class Machine:
         fields = {
             kind: numbers for kind, numbers in given.items() if kind.name.startswith(("plant.", "pole"))
         }
-        gain, model = given[KINDS["torque_scale"]][0], self.model
+        gain, model, lag = given[KINDS["torque_scale"]][0], self.model, KINDS["lag_s"]
         plant = self._plant(fields, {parameter.kind for parameter in parameters})
         residual = given[KINDS["sensor_residual_rad"]].reshape(2, HARMONICS, 2)
         return Setup(
             plant=plant._replace(torque_gain=gain * plant.torque_gain),
             delay_s=float(given[KINDS["delay_s"]][0]),
-            lag_s=float(given[KINDS["lag_s"]][0]),
+            lag_s=float(given[lag][0]) if any(one.kind == lag for one in parameters) else model.lag_s,
             current_offset_A=given[KINDS["current_offset_A"]],
             offset_rad=given[KINDS["sensors.angle_offset_rad"]],
             gain_error=given[KINDS["sensor_gain_error"]],

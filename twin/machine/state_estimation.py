@@ -14,6 +14,7 @@ from spheretwin.electronics.logged_currents import mean_currents
 from spheretwin.machine.log import MEASURED, Log, joined
 from spheretwin.machine.model import EDGE_SHARE, Model, model_of
 from spheretwin.models.base.errors import InputError
+from spheretwin.models.coil_group import of_each_group
 from spheretwin.models.telemetry.signals import ANGLES, Signal
 from spheretwin.models.telemetry.table import Table
 from spheretwin.plant.state_filter import STATES, Estimates, StateFilter, run_filter
@@ -164,7 +165,7 @@ class Shadow:
         sample_A = hold_last_value(np.concatenate([self._sample_A, log.current_A]))
         measured = log.currents == MEASURED
         delay_s = self.settings.shift_s + (0.0 if measured else self.model.delay_s)
-        lag_s = 0.0 if measured else self.model.lag_s
+        lag_s = of_each_group(0.0 if measured else self.model.lag_s, log.current_A.shape[1])
         if not len(self._t_s):
             self._present_A = sample_A[0].copy()
         mean_A, first = np.empty((len(log), len(self._present_A))), int(not len(self._t_s))

@@ -26,6 +26,7 @@ from spheretwin.machine.model import EDGE_SHARE
 from spheretwin.machine.parameters import Machine, Parameter, Setup, sensor_angles
 from spheretwin.machine.state_estimation import Shadow, hold_last_value
 from spheretwin.models.base.errors import InputError
+from spheretwin.models.coil_group import PerGroup, of_each_group
 from spheretwin.plant.plants import Plants
 
 Array = NDArray[np.float64]
@@ -241,7 +242,7 @@ def _period_s(window: Window) -> float:
     return float(times[-1] - times[0]) / window.rows
 
 
-def _currents(window: Window, delay_s: float, lag_s: float) -> Array:
+def _currents(window: Window, delay_s: float, lag_s: PerGroup) -> Array:
     """Return the mean currents between the rows of a window, (rows, groups)."""
     log, measured = window.log, window.log.currents == MEASURED
     # Some rows before and after: for delays, for shifted clocks, and until the lag has forgotten its start.
@@ -252,9 +253,8 @@ def _currents(window: Window, delay_s: float, lag_s: float) -> Array:
     means = np.empty((len(edges) - 1, samples.shape[1]))
     if measured:  # behind the drive
         delay_s, lag_s = delay_s - window.machine.model.delay_s, 0.0
-    mean_currents(
-        log.t_s[first:last], samples, edges, delay_s, max(lag_s, 0.0), measured, samples[0].copy(), means
-    )
+    lags_s = np.maximum(of_each_group(lag_s, samples.shape[1]), 0.0)
+    mean_currents(log.t_s[first:last], samples, edges, delay_s, lags_s, measured, samples[0].copy(), means)
     return means[window.first - first :]
 
 

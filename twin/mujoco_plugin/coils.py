@@ -32,8 +32,8 @@ class Coils(NamedTuple):
     matrix: CachedMatrix
     gain: Array  # (n,) torque per ampere over that of the matrix
     has_voltages: int  # 1 if the controls are voltages: the activations are currents behind R and L
-    resistance_ohm: float
-    inductance_H: float
+    resistance_ohm: Array  # (n,)
+    inductance_H: Array  # (n,)
     qpos_at: Addresses  # (3,)
     qvel_at: Addresses  # (3,)
     ctrl_at: Addresses  # (n,)
@@ -67,8 +67,8 @@ def coils_of(parts: Parts, data: dict[str, NDArray[Any]]) -> Coils:
         matrix=cached_matrix(magnetics),
         gain=parts.gain,
         has_voltages=int(parts.attributes.input == "voltage"),
-        resistance_ohm=parts.attributes.resistance_ohm,
-        inductance_H=parts.attributes.inductance_H,
+        resistance_ohm=parts.resistance_ohm,
+        inductance_H=parts.inductance_H,
         qpos_at=parts.qpos,
         qvel_at=parts.qvel,
         ctrl_at=parts.ctrl,
@@ -100,9 +100,9 @@ def respond(coils: Coils, task: int) -> None:
     _update_columns(coils)
     if task == ACT_DOT:
         for j in range(coils.gain.shape[0]):
-            resistive_V = coils.resistance_ohm * coils.act[coils.act_at[j]]
+            resistive_V = coils.resistance_ohm[j] * coils.act[coils.act_at[j]]
             voltage_V = _control(coils, j) - resistive_V - _emf(coils, j)
-            coils.act_dot[coils.act_at[j]] = voltage_V / coils.inductance_H
+            coils.act_dot[coils.act_at[j]] = voltage_V / coils.inductance_H[j]
     elif task == FORCE:
         _apply(coils)
     else:

@@ -16,12 +16,15 @@ from spheretwin.models import actuator as actuators
 from spheretwin.models import torque_curve, torque_field
 from spheretwin.models.actuator import Actuator, groups_of, polarities
 from spheretwin.models.base.errors import InputError, shown
+from spheretwin.models.coil_group import of_each_group
 from spheretwin.models.mjcf_reader import named, sites
 
 Array = NDArray[np.float64]
 Addresses = NDArray[np.int64]
 
 PLUGIN = "spheretwin.coils"
+
+Positive = Annotated[float, Field(gt=0)]
 
 QUANTITIES = ("current", "emf", "torque")
 """Ends of the names of its sensors."""
@@ -55,11 +58,11 @@ class Attributes(BaseModel):
         "current", description="current or voltage, the quantity of the controls"
     )
     # Those of the shipped actuator, a hand estimate (models/README.md).
-    resistance_ohm: float = Field(
-        1.3, gt=0, description="a number above 0, of a group with the input voltage"
+    resistance_ohm: Annotated[tuple[Positive, ...], BeforeValidator(_words)] = Field(
+        (1.3,), description="a number above 0 or one for each group, with the input voltage"
     )
-    inductance_H: float = Field(
-        0.9e-3, gt=0, description="a number above 0, of a group with the input voltage"
+    inductance_H: Annotated[tuple[Positive, ...], BeforeValidator(_words)] = Field(
+        (0.9e-3,), description="a number above 0 or one for each group, with the input voltage"
     )
 
 
@@ -69,6 +72,8 @@ class Parts(NamedTuple):
     attributes: Attributes
     actuator: Actuator
     gain: Array  # (n,)
+    resistance_ohm: Array  # (n,)
+    inductance_H: Array  # (n,)
     qpos: Addresses  # (3,) of the hinges
     qvel: Addresses  # (3,)
     ctrl: Addresses  # (n,)
@@ -98,8 +103,9 @@ def read(model: mujoco.MjModel, instance: int, texts: dict[str, str]) -> Parts:
     hinges = _hinges(model, attributes.hinges)
     actuator = _actuator(model, attributes, *model.jnt_bodyid[hinges[[0, 2]]])
     groups = len(actuator.groups)
-    if len(attributes.gain) not in (1, groups):
-        raise InputError(f"gain: expected one number or {groups}, received {len(attributes.gain)}")
+    for name in ("gain", "resistance_ohm", "inductance_H"):
+        if (count := len(getattr(attributes, name))) not in (1, groups):
+            raise InputError(f"{name}: expected one number or {groups}, received {count}")
     own = np.flatnonzero(model.actuator_plugin == instance)
     if len(own) != groups:
         raise InputError(f"expected {groups} actuators, one for each group of coils, received {len(own)}")
@@ -111,7 +117,9 @@ def read(model: mujoco.MjModel, instance: int, texts: dict[str, str]) -> Parts:
     return Parts(
         attributes=attributes,
         actuator=actuator,
-        gain=np.broadcast_to(attributes.gain, groups).astype(np.float64),
+        gain=of_each_group(attributes.gain, groups),
+        resistance_ohm=of_each_group(attributes.resistance_ohm, groups),
+        inductance_H=of_each_group(attributes.inductance_H, groups),
         qpos=model.jnt_qposadr[hinges].astype(np.int64),
         qvel=model.jnt_dofadr[hinges].astype(np.int64),
         ctrl=ctrl,

@@ -56,8 +56,8 @@ def test_an_fmu_has_the_fields_of_twin_and_command_line(folder):
 def test_voltages_replace_the_commanded_currents(folder):
     assert call("export", "fmu", "hold", "--inputs", "voltages", "--out", "v.fmu").code == 0
     starts = parameters_of(folder / "v.fmu")
-    assert {"voltage_V[17]", "inductance_H"} <= set(starts)
-    assert not {"current_command_A[0]", "lag_s"} & set(starts)
+    assert {"voltage_V[17]", "inductance_H[17]"} <= set(starts)
+    assert not {"current_command_A[0]", "lag_s[0]"} & set(starts)
     with zipfile.ZipFile(folder / "v.fmu") as archive:
         assert archive.testzip() is None
         assert "modelDescription.xml" in archive.namelist()

@@ -65,7 +65,9 @@ class CPlant:
         return self._plant.copy()
 
     def set(self, name, value):
-        self.parameters[self.names.index(name)] = value
+        """Set a parameter, or all numbers of one that has several."""
+        numbers = [place for place, own in enumerate(self.names) if own.partition("[")[0] == name]
+        self.parameters[numbers] = value
 
     def start(self, x):
         return self._c.st_plant_start(address(self._plant), address(x))

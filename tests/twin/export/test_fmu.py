@@ -278,7 +278,7 @@ def test_invalid_states_do_not_reach_the_derivatives(fmi, opened):
                 instance.fmu.setContinuousStates((ctypes.c_double * n)(*x), n)
     np.testing.assert_array_equal(instance.get(*ANGLES, *rates), before)
     with pytest.raises(fmpy.fmi1.FMICallException):
-        instance.set("lag_s", 0.0)
+        instance.set("lag_s[0]", 0.0)
 
 
 @needs_c_compiler

@@ -23,8 +23,10 @@ PROTOTYPE = {
     "plant.cable.stiffness_Nm_rad": [0.02, 0.03, 0.01],
     "plant.thermal.rotor_degC": 60.0,
     "plant.group_gain": np.linspace(0.97, 1.03, 18).tolist(),
+    "drive.resistance_ohm": np.linspace(1.0, 1.6, 18).tolist(),
+    "drive.thermal_resistance_K_W": np.linspace(3.0, 5.0, 18).tolist(),
 }
-"""General joint, scatter of poles and coils, a cable, warm magnets."""
+"""General joint, scatter of poles and coils, groups of other resistances, a cable, warm magnets."""
 
 
 CHANGES = {"ideal joint": FRICTION, "general joint": PROTOTYPE}
@@ -95,7 +97,12 @@ HEAT = {
     "plant.thermal.rotor_degC": 40.0,
     "plant.thermal.stator_heat_capacity_J_K": 5.0,
     "drive.resistance_per_K": 0.0039,
-    "drive.heat_capacity_J_K": 0.1,  # so that a winding is hotter by 1 K after some ticks
+    "drive.resistance_ohm": np.linspace(1.0, 1.6, 18).tolist(),
+    "drive.inductance_H": np.linspace(9e-4, 6e-4, 18).tolist(),
+    "drive.thermal_resistance_K_W": np.linspace(3.0, 5.0, 18).tolist(),
+    "drive.heat_capacity_J_K": np.linspace(
+        0.1, 0.15, 18
+    ).tolist(),  # so that a winding is hotter by 1 K after some ticks
     "drive.shutdown_degC": 300.0,
     "controller.law": "pd",
 }

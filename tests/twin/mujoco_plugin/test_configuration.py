@@ -79,11 +79,13 @@ def test_an_actuator_with_a_torque_field_has_its_torque():
 
 
 def test_voltages_drive_currents_through_resistance_and_inductance():
-    text = configured(with_actuators(actdim=1), input="voltage", resistance_ohm=2.0, inductance_H=0.5e-3)
+    resistance_ohm = np.linspace(5.7, 8.3, 18)
+    coils = {"resistance_ohm": " ".join(map(repr, resistance_ohm.tolist())), "inductance_H": 0.5e-3}
+    text = configured(with_actuators(actdim=1), input="voltage", **coils)
     data = forward(compiled(text), 12.0, act=np.linspace(-1, 1, 18))
     emf_V = data.sensor("coil_emf").data
     # Quotients of about 2e4 A/s, rounded four times.
-    np.testing.assert_allclose(data.act_dot, (12.0 - 2.0 * data.act - emf_V) / 0.5e-3, rtol=1e-14)
+    np.testing.assert_allclose(data.act_dot, (12.0 - resistance_ohm * data.act - emf_V) / 0.5e-3, rtol=1e-14)
     np.testing.assert_array_equal(data.sensor("coil_current").data, data.act)
 
 
@@ -125,6 +127,7 @@ INVALID = {
     "poles": (configured(poles="magnet_"), 'expected sites named "magnet_…", received none'),
     "sites": (configured(coils="pole_"), 'sites: expected those named "pole_…" in the body stator'),
     "curve": (configured(curve="none.csv"), "torque curve none.csv: expected a readable text file"),
+    "resistances": (configured(resistance_ohm="1 2"), "resistance_ohm: expected one number or 18"),
     "resistance": (configured(resistance_ohm=-1), "resistance_ohm: expected a number above 0"),
     "states": (configured(input="voltage"), 'actuators: expected actdim="1" and no dyntype'),
     "sensor": (TEXT.replace("coil_emf", "volts"), "sensor: expected a name that ends with current, emf"),

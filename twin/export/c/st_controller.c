@@ -98,10 +98,10 @@ static void st_estimate_torque(
         older = controller->commands[ST_COMMANDS - 1][j];
         newer = controller->commands[ST_COMMANDS - 2][j];
         distance = controller->current[j] - older;
-        first = older + ST_OLDER_MEAN * distance;
-        distance = older + ST_OLDER_DECAY * distance - newer;
-        mean = f * first + (1 - f) * (newer + ST_NEWER_MEAN * distance);
-        controller->current[j] = newer + ST_NEWER_DECAY * distance;
+        first = older + ST_OLDER_MEAN[j] * distance;
+        distance = older + ST_OLDER_DECAY[j] * distance - newer;
+        mean = f * first + (1 - f) * (newer + ST_NEWER_MEAN[j] * distance);
+        controller->current[j] = newer + ST_NEWER_DECAY[j] * distance;
         for (i = 0; i < 3; i++) {
             torque_S[i] += G[i][j] * mean;
         }

@@ -314,17 +314,15 @@ static void st_advance_currents(const st_parameters *p, const double *command, c
     st_plant *plant, double h, double mean[ST_GROUPS])
 {
     int j;
-#if !ST_VOLTAGES
-    const st_shares shares = st_relaxed(h, p->lag_s);
     (void)e;
-#endif
     for (j = 0; j < ST_GROUPS; j++) {
         const double start = plant->x[ST_CURRENT + j];
-        const double R = st_resistance(p, plant->x[ST_WINDING + j]);
+        const double R = st_resistance(p, j, plant->x[ST_WINDING + j]);
 #if ST_VOLTAGES
-        const st_shares shares = st_relaxed(h, p->inductance_H / R);
+        const st_shares shares = st_relaxed(h, p->inductance_H[j] / R);
         const double last = (command[j] - e[j]) / R;
 #else
+        const st_shares shares = st_relaxed(h, p->lag_s[j]);
         const double last = st_clipped(command[j], p->current_limit_A);
 #endif
         plant->x[ST_CURRENT + j] = start + shares.settled * (last - start);
@@ -339,16 +337,16 @@ static void st_advance_currents(const st_parameters *p, const double *command, c
 static void st_advance_heat(const st_parameters *p, st_plant *plant)
 {
     const double period_s = plant->heat_s;
-    const double settled = st_relaxed(period_s, p->thermal_resistance_K_W * p->heat_capacity_J_K).settled;
     double released_J = 0;
     int j;
     for (j = 0; j < ST_GROUPS; j++) {
+        const double to_stator_K_W = p->thermal_resistance_K_W[j], capacity_J_K = p->heat_capacity_J_K[j];
+        const double settled = st_relaxed(period_s, to_stator_K_W * capacity_J_K).settled;
         double *winding = &plant->x[ST_WINDING + j];
         const double before = *winding;
-        const double last
-            = plant->x[ST_STATOR] + p->thermal_resistance_K_W * (plant->copper_J[j] / period_s);
+        const double last = plant->x[ST_STATOR] + to_stator_K_W * (plant->copper_J[j] / period_s);
         *winding += (last - *winding) * settled;
-        released_J += plant->copper_J[j] - p->heat_capacity_J_K * (*winding - before);
+        released_J += plant->copper_J[j] - capacity_J_K * (*winding - before);
         plant->copper_J[j] = 0;
     }
 #if ST_THERMAL

@@ -108,9 +108,9 @@ static inline T NAME(friction_factor)(const st_parameters *p, int hinge, T rate)
 }
 
 /* Resistance of a group at a temperature of its winding, ohm. */
-static inline T NAME(resistance)(const st_parameters *p, T winding_degC)
+static inline T NAME(resistance)(const st_parameters *p, int group, T winding_degC)
 {
-    return p->resistance_ohm * (1 + p->resistance_per_K * (winding_degC - 20));
+    return p->resistance_ohm[group] * (1 + p->resistance_per_K[group] * (winding_degC - 20));
 }
 
 #if !ST_VOLTAGES
@@ -140,16 +140,16 @@ static inline void NAME(rates)(const st_parameters *p, const T *input, const T *
     NAME(back_emf)(p, x[ST_ROTOR], coil_q, coil_v, G, rate + ST_CURRENT);
 #endif
     for (j = 0; j < ST_GROUPS; j++) {
-        const T R = NAME(resistance)(p, winding[j]);
-        const T released = (winding[j] - x[ST_STATOR]) / p->thermal_resistance_K_W;
+        const T R = NAME(resistance)(p, j, winding[j]);
+        const T released = (winding[j] - x[ST_STATOR]) / p->thermal_resistance_K_W[j];
 #if ST_VOLTAGES
         const T e = rate[ST_CURRENT + j];
-        rate[ST_CURRENT + j] = (input[ST_COMMAND + j] - R * current[j] - e) / p->inductance_H;
+        rate[ST_CURRENT + j] = (input[ST_COMMAND + j] - R * current[j] - e) / p->inductance_H[j];
 #else
         rate[ST_CURRENT + j]
-            = (NAME(clipped)(input[ST_COMMAND + j], p->current_limit_A) - current[j]) / p->lag_s;
+            = (NAME(clipped)(input[ST_COMMAND + j], p->current_limit_A) - current[j]) / p->lag_s[j];
 #endif
-        rate[ST_WINDING + j] = (R * (current[j] * current[j]) - released) / p->heat_capacity_J_K;
+        rate[ST_WINDING + j] = (R * (current[j] * current[j]) - released) / p->heat_capacity_J_K[j];
         released_W += released;
     }
 #if ST_THERMAL

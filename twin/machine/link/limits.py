@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from math import exp
 from typing import Annotated
 
 import numpy as np
@@ -52,16 +51,17 @@ class CoilHeat:
     Parameters
     ----------
     drive : ResolvedDrive
-        Resistance, heat capacity and thermal resistance of a group.
+        Resistance, heat capacity and thermal resistance of each group.
     limits : Limits
     period_s : float
     """
 
     def __init__(self, drive: ResolvedDrive, limits: Limits, period_s: float) -> None:
-        hot = 1 + drive.resistance_per_K * max(limits.temperature_degC - drive.ambient_degC, 0.0)
-        time_constant_s = drive.heat_capacity_J_K * drive.thermal_resistance_K_W
-        self._decay = exp(-period_s / time_constant_s) if time_constant_s > 0 else 0.0
-        self._rise_K_A2 = drive.resistance_ohm * hot * drive.thermal_resistance_K_W
+        hot = 1 + np.multiply(drive.resistance_per_K, max(limits.temperature_degC - drive.ambient_degC, 0.0))
+        time_constants_s = np.multiply(drive.heat_capacity_J_K, drive.thermal_resistance_K_W)
+        with np.errstate(divide="ignore"):
+            self._decay = np.exp(-period_s / time_constants_s)
+        self._rise_K_A2 = np.multiply(drive.resistance_ohm, hot) * drive.thermal_resistance_K_W
         self._ambient_degC = drive.ambient_degC
         self._rise_K: Array | float = 0.0
 
