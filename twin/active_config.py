@@ -19,10 +19,11 @@ from spheretwin.electronics.drive_section import DriveSection, ResolvedDrive, dr
 from spheretwin.electronics.sensor_chain import SensorsSection, sensor_sheet
 from spheretwin.faults.fault import Fault
 from spheretwin.models import mjcf
-from spheretwin.models.actuator import Actuator, CoilGroup
+from spheretwin.models.actuator import Actuator
 from spheretwin.models.base.errors import InputError, distinct_texts, shown
 from spheretwin.models.base.reuse import reused
 from spheretwin.models.base.user_code import is_reference
+from spheretwin.models.coil_group import CoilGroup, per_group
 from spheretwin.models.inductance import mutual_inductance
 from spheretwin.models.lagrangian import loaded_inertia
 from spheretwin.models.magnetics import disagreements
@@ -34,7 +35,14 @@ from spheretwin.models.torque_field import TorqueField
 from spheretwin.plant.mujoco_rotor import integrator_name
 from spheretwin.scenario.changes import first_tick, scheduled_changes, with_change
 from spheretwin.scenario.files import Files, files_of, nominal_curve, reload_files
-from spheretwin.scenario.hardware import HARDWARE, SCATTER_OF_A_CURVE, amplifier_limit_A
+from spheretwin.scenario.hardware import (
+    HARDWARE,
+    MACHINE_FIELDS,
+    PER_GROUP,
+    SCATTER_OF_A_CURVE,
+    amplifier_limit_A,
+    assumed_value,
+)
 from spheretwin.scenario.plant_sections import NominalSection, PlantSection, ResolvedNominal, ResolvedPlant
 from spheretwin.scenario.reading import as_plain
 from spheretwin.scenario.sections import ResolvedScenario, Scenario, UserController, UserPath
@@ -120,17 +128,19 @@ def _with(kind: type[Section], section: BaseModel, **values: Any) -> Section:
 def _drive(section: DriveSection, group: CoilGroup, hardware: str) -> ResolvedDrive:
     """Return the drive: coils and, without a supply, lag are those of the model file unless given.
 
-    The current limit is the smaller one of the model file and of the amplifiers of the hardware set.
+    The current limit is the smaller one of the model file and of the amplifiers of the hardware set. Thermal
+    data that the model file does not state are those assumed with the set.
     """
+    stated = {MACHINE_FIELDS[name]: getattr(group, name) for name in MACHINE_FIELDS}
     sheet = {
-        "resistance_ohm": group.resistance_ohm,
-        "inductance_H": group.inductance_H,
-        "current_limit_A": min(group.current_limit_A, amplifier_limit_A(hardware)),
+        name: assumed_value(hardware, name) if value is None else value for name, value in stated.items()
     }
+    sheet["current_limit_A"] = min(group.current_limit_A, amplifier_limit_A(hardware))
     drive = _with(ResolvedDrive, section, **_given_or(section, sheet))
     if drive.time_constant_s is not None or drive.supply_V is not None:
         return drive
-    return drive.model_copy(update={"time_constant_s": drive.inductance_H / drive.resistance_ohm})
+    constants_s = np.divide(drive.inductance_H, drive.resistance_ohm)
+    return drive.model_copy(update={"time_constant_s": per_group(constants_s)})
 
 
 def _nominal(scenario: Scenario, drive: ResolvedDrive, actuator: Actuator) -> ResolvedNominal:
@@ -149,7 +159,10 @@ def _nominal_of(section: NominalSection, sheet: dict[str, Any], curve: str) -> R
 def _given_or(section: BaseModel, sheet: Mapping[str, Any]) -> dict[str, Any]:
     """Return the values of a sheet, replaced by the values that the section gives."""
     given = {name: getattr(section, name) for name in sheet}
-    return {name: sheet[name] if value is None else value for name, value in given.items()}
+    return {
+        name: sheet[name] if value is None else per_group(value) if name in PER_GROUP else value
+        for name, value in given.items()
+    }
 
 
 @reused
@@ -202,6 +215,10 @@ def _hardware_warnings(scenario: Scenario, actuator: Actuator) -> list[str]:
             f"hardware {hardware} without {', '.join(names)}: the torque field has all poles in one"
         )
     model_A, set_A = actuator.group.current_limit_A, amplifier_limit_A(hardware)
+    if isinstance(actuator.group.current_limits_A, tuple):
+        warnings.append(
+            f"the current limit of all groups is {model_A:.10g} A, the smallest that the model file states"
+        )
     smaller_A = min(model_A, set_A)
     if set_A not in (inf, model_A) and scenario.drive.current_limit_A in (None, smaller_A):
         warnings.append(
@@ -288,6 +305,12 @@ def _check_groups(scenario: Scenario, actuator: Actuator) -> None:
     counts = {
         "plant.group_gain": groups if gain is None else len(gain),
         currents: groups if series is None else series.values.shape[1],
+        **{
+            f"{section}.{name}": len(value)
+            for section, values in (("drive", scenario.drive), ("nominal", scenario.nominal))
+            for name in PER_GROUP
+            if isinstance(value := getattr(values, name, None), tuple)
+        },
     }
     for name, count in counts.items():
         if count != groups:

@@ -68,6 +68,9 @@ STATED = {
     "drive.current_limit_A": 4.0,
     "drive.resistance_ohm": 2.0,
     "drive.inductance_H": 2e-3,
+    "drive.resistance_per_K": 0.0039,
+    "drive.heat_capacity_J_K": 75.0,
+    "drive.thermal_resistance_K_W": 5.0,
 }
 TRUTH = other_truth()
 

@@ -11,17 +11,17 @@ from spheretwin.active_config import initial_config
 from spheretwin.cli.common import print_json
 from spheretwin.cli.options import Parser
 from spheretwin.models.base.errors import InputError, did_you_mean, shown
+from spheretwin.models.coil_group import PREFIX, CoilGroup
 from spheretwin.scenario import reading
 from spheretwin.scenario.fields import every_field, unit_of
-from spheretwin.scenario.hardware import HARDWARE, LIMITS, ORIGINS
+from spheretwin.scenario.hardware import HARDWARE, MACHINE, MACHINE_FIELDS, ORIGINS, Origin
 from spheretwin.scenario.sections import Scenario
 from spheretwin.viz.terminal.texts import print_facts
 
 DEFAULT = "default"
 
 MODEL_FILE = {
-    "resistance_ohm": "group_resistance_ohm",
-    "inductance_H": "group_inductance_H",
+    **{field: PREFIX + number for number, field in MACHINE_FIELDS.items()},
     "current_limit_A": "group_current_limit_A",
     "inertia_kg_m2": "inertia of the body rotor",
 }
@@ -91,9 +91,13 @@ def _of_hardware(name: str) -> Iterator[FieldFacts]:
     fields = dict(every_field(Scenario))
     for dotted, value in HARDWARE[name].items():
         yield _fact(dotted, value, fields[dotted], ORIGINS[name][dotted])
-    for dotted, limit in LIMITS[name].items():
-        origin = f"{limit.origin}; a smaller limit of the model file holds"
-        yield _fact(dotted, limit.value, fields[dotted], origin)
+    for dotted, assumed in MACHINE[name].items():
+        yield _fact(dotted, assumed.value, fields[dotted], _unless_stated(dotted, assumed))
+
+
+def _unless_stated(dotted: str, assumed: Origin) -> str:
+    stated = "a smaller limit" if dotted.endswith("limit_A") else "a value"
+    return f"{assumed.origin}; {stated} of the model file holds"
 
 
 def _of_scenario(source: str, everything: bool) -> Iterator[FieldFacts]:
@@ -108,28 +112,31 @@ def _of_scenario(source: str, everything: bool) -> Iterator[FieldFacts]:
         elif value == field.default:
             origin = DEFAULT
         else:
-            origin = _of_machine(dotted, scenario, config.files.actuator.group.current_limit_A)
+            origin = _of_machine(dotted, scenario, config.files.actuator.group)
         if everything or origin != DEFAULT:
             yield _fact(dotted, value, field, origin)
 
 
-def _of_machine(dotted: str, scenario: Scenario, limit_A: float) -> str:
+def _of_machine(dotted: str, scenario: Scenario, group: CoilGroup) -> str:
     """Return the origin of a value that neither the scenario nor the hardware set states.
 
     Parameters
     ----------
     dotted : str
     scenario : Scenario
-    limit_A : float
-        Current limit of the model file.
+    group : CoilGroup
+        Data of the model file.
     """
     section, _, name = dotted.partition(".")
     knows_truth = section == "nominal" and scenario.nominal.equals_truth
     if name not in MODEL_FILE or section not in ("drive", "nominal") or knows_truth:
         return "computed from the model file and other fields"
-    limit = LIMITS[scenario.hardware].get(f"drive.{name}")
-    if limit and limit.value < limit_A:
-        return f"hardware {scenario.hardware}: {limit.origin}, below {limit_A:.10g} A of the model file"
+    assumed, limit_A = MACHINE[scenario.hardware].get(f"drive.{name}"), group.current_limit_A
+    stated = getattr(group, MODEL_FILE[name].removeprefix(PREFIX), MODEL_FILE[name])
+    if assumed and stated is None:
+        return f"hardware {scenario.hardware}: {assumed.origin}"
+    if assumed and name == "current_limit_A" and assumed.value < limit_A:
+        return f"hardware {scenario.hardware}: {assumed.origin}, below {limit_A:.10g} A of the model file"
     return f"model file: {MODEL_FILE[name]}"
 
 
@@ -150,6 +157,9 @@ def _of_field(name: str) -> Iterator[FieldFacts]:
             if dotted in values:
                 origin = f"hardware {hardware}: {ORIGINS[hardware][dotted]}"
                 yield _fact(dotted, values[dotted], field, origin)
+            elif assumed := MACHINE[hardware].get(dotted):
+                origin = f"hardware {hardware}: {_unless_stated(dotted, assumed)}"
+                yield _fact(dotted, assumed.value, field, origin)
 
 
 def _fact(dotted: str, value: Any, field: Any, origin: str) -> FieldFacts:

@@ -15,21 +15,18 @@ from spheretwin.models.telemetry.signals import ANGLES
 from spheretwin.paper.experiment import Case, Experiment, Finding, Outcome, Outcomes, ResultTable, Section
 from spheretwin.paper.laws import BY_LAW
 from spheretwin.paper.page import of_axis, spread_deg
-from spheretwin.scenario.hardware import HARDWARE
+from spheretwin.scenario.hardware import HARDWARE, MACHINE
 from spheretwin.viz.pages.markdown import Drawing
 
 Array = NDArray[np.float64]
 
-PROTOTYPE = HARDWARE["prototype"]
+WARM_COILS = ("drive.resistance_per_K", "drive.shutdown_degC")
+PROTOTYPE = HARDWARE["prototype"] | {name: MACHINE["prototype"][name].value for name in WARM_COILS}
 
 # What an angle is in volts: no error by itself.
 VOLTS = ("sensors.potentiometer.electrical_angle_rad", "sensors.potentiometer.supply_V")
 
-COILS = (
-    "drive.resistance_per_K",
-    "drive.ambient_degC",
-    "drive.shutdown_degC",
-)
+COILS = (*WARM_COILS, "drive.ambient_degC")
 ESTIMATOR = ("estimator.kind",)
 BEARINGS = ("plant.coulomb_Nm", "plant.viscous_Nm_s")
 
@@ -158,7 +155,7 @@ STAGES = (
         ("drive.bandwidth_rad_s", *COILS),
         other_fields={"drive.supply_V": AMPLE_V},
     ),
-    Stage(ELECTRONICS, tuple(HARDWARE["electronics"]), is_random=True),
+    Stage(ELECTRONICS, (*HARDWARE["electronics"], *WARM_COILS), is_random=True),
     Stage(ALL, tuple(PROTOTYPE), is_random=True),
 )  # fmt: skip
 

@@ -236,7 +236,7 @@ OTHERWISE = "a valid value"
 
 def explain(error: ValidationError, scenario: type[BaseModel]) -> str:
     """Return the first error of a validation on one line: field, expected value, received value."""
-    first = error.errors(include_url=False)[0]
+    first = _first_error(error.errors(include_url=False))
     path = first["loc"]
     place, received = place_of(scenario, path), shown(first["input"])
     here = f"{place.dotted}: " if place.dotted else ""
@@ -260,6 +260,14 @@ def explain(error: ValidationError, scenario: type[BaseModel]) -> str:
             valid = re.findall("'([^']*)'", first["ctx"]["expected"])
             received += did_you_mean(str(first["input"]), valid)
     return f"{here}expected {_expected(first)}, received {received}"
+
+
+def _first_error(errors: list[Any]) -> Any:
+    """Return the first error; of a list where one number or a list is expected, the error of the list."""
+    first = errors[0]
+    if not (isinstance(first["input"], list) and str(first["loc"][-1]).endswith("float")):
+        return first
+    return next((error for error in errors if error["loc"][: len(first["loc"])] != first["loc"]), first)
 
 
 NUMBERS = {2: "two numbers", 3: "three numbers", 4: "four numbers", 6: "six numbers"}

@@ -47,9 +47,7 @@ _DRIVE = {
     "drive.bandwidth_rad_s": Origin(12566.370614359172, "assumed: 2 kHz"),
     "drive.transconductance_A_V": Origin(0.8, "assumed"),
     "drive.amplifier_offset_V": Origin(1e-3, "data sheet of the OPA549, typical; 5 mV at most"),
-    "drive.resistance_per_K": Origin(0.0039, "property of copper"),
     "drive.ambient_degC": Origin(20.0, "assumed"),
-    "drive.shutdown_degC": Origin(155.0, "assumed: insulation of class F"),
 }
 _BEARINGS = {
     "plant.coulomb_Nm": Origin((2e-3, 2e-3, 2e-3), "assumed: the lower of two estimates, 2 and 5 mN·m"),
@@ -136,13 +134,27 @@ HARDWARE: dict[str, dict[str, Any]] = {
 }
 """Hardware sets: fields by dotted name and their values; each field can also be set separately.
 
-A set is electronics and tolerances. Resistance, inductance, heat and inertia belong to the machine: its model
-file states them.
+A set is electronics and tolerances. Resistance, inductance, thermal data and inertia belong to the machine:
+its model file states them.
 """
 
-_AMPLIFIERS = {"drive.current_limit_A": Origin(8.0, "data sheet of the OPA549, continuous")}
-LIMITS: dict[str, dict[str, Origin]] = {"ideal": {}, "electronics": _AMPLIFIERS, "prototype": _AMPLIFIERS}
-"""Limits of each hardware set; where the model file states a smaller limit, that one holds."""
+_CURRENT_LIMIT = "drive.current_limit_A"
+_MACHINE = {
+    "drive.resistance_per_K": Origin(0.0, "assumed: constant resistance"),
+    "drive.heat_capacity_J_K": Origin(60.0, "assumed"),
+    "drive.thermal_resistance_K_W": Origin(4.0, "assumed"),
+}
+_OF_SETS = {
+    **_MACHINE,
+    "drive.resistance_per_K": Origin(0.0039, "property of copper"),
+    "drive.shutdown_degC": Origin(155.0, "assumed: insulation of class F"),
+    _CURRENT_LIMIT: Origin(8.0, "data sheet of the OPA549, continuous"),
+}
+MACHINE: dict[str, dict[str, Origin]] = {"ideal": _MACHINE, "electronics": _OF_SETS, "prototype": _OF_SETS}
+"""Values of each hardware set for a machine whose model file does not state them.
+
+Where the model file states one, it holds; of two current limits the smaller one.
+"""
 
 _STATED = {
     name: field.origin
@@ -166,9 +178,30 @@ SCATTER_OF_A_CURVE = (
 """Errors that only a machine with a torque curve can have: a torque field has all poles in one."""
 
 
+MACHINE_FIELDS = {
+    "resistance_ohm": "resistance_ohm",
+    "inductance_H": "inductance_H",
+    "resistance_per_K": "resistance_per_K",
+    "heat_capacity_J_K": "heat_capacity_J_K",
+    "thermal_resistance_K_W": "thermal_resistance_K_W",
+    "temperature_limit_degC": "shutdown_degC",
+}
+"""Fields of `drive` by the name of the number of the model file that is their default, without `group_`."""
+
+PER_GROUP = (*MACHINE_FIELDS.values(), "time_constant_s")
+"""Fields of `drive` and `nominal` with one value of all groups, or one for each."""
+
+
+def assumed_value(hardware: str, name: str) -> Any:
+    """Return the value of a field of `drive` for a machine that does not state it; None if there is none."""
+    assumed = MACHINE[hardware].get(f"drive.{name}")
+    return assumed.value if assumed else None
+
+
 def amplifier_limit_A(hardware: str) -> float:
     """Return the current limit of the amplifiers of a hardware set; infinity if it states none."""
-    return next((limit.value for limit in LIMITS[hardware].values()), inf)
+    limit = MACHINE[hardware].get(_CURRENT_LIMIT)
+    return limit.value if limit else inf
 
 
 def hardware_defaults(fields: dict[str, Any]) -> dict[str, Any]:

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Annotated, Literal
 from pydantic import BaseModel, ConfigDict, Field, field_validator
 
 from spheretwin.control.law import NonNegative, Positive
+from spheretwin.electronics.drive_section import TimeConstant
+from spheretwin.models.coil_group import PerGroup
 from spheretwin.plant.bristle_friction import StictionSection
 from spheretwin.plant.cable import CableSection
 from spheretwin.plant.end_stops import EndStopsSection
@@ -126,14 +128,18 @@ class NominalSection(Section):
     delay_s: Annotated[float, Field(ge=0, le=1)] | None = Field(
         None, description="delay from a command to the amplifiers, s; 0 unless given"
     )
-    time_constant_s: Annotated[float, Field(ge=0, le=1e3)] | None = Field(
-        None, description="lag of the currents, s; L/R of the model file unless given"
+    time_constant_s: TimeConstant | tuple[TimeConstant, ...] | None = Field(
+        None,
+        description="lag of the currents, one number or one for each group, s; L/R of the model file unless"
+        " given",
     )
-    resistance_ohm: Positive | None = Field(
-        None, description="resistance of a group, ohm; the model file's unless given"
+    resistance_ohm: Positive | tuple[Positive, ...] | None = Field(
+        None,
+        description="resistance of a group, one number or one for each, ohm; the model file's unless given",
     )
-    inductance_H: Positive | None = Field(
-        None, description="inductance of a group, H; the model file's unless given"
+    inductance_H: Positive | tuple[Positive, ...] | None = Field(
+        None,
+        description="inductance of a group, one number or one for each, H; the model file's unless given",
     )
     swing_V: NonNegative | None = Field(
         None, description="largest voltage of the amplifiers, V; 0 for no limit; 0 unless given"
@@ -178,9 +184,9 @@ class ResolvedNominal(NominalSection):
     coulomb_Nm: NonNegativeTriple
     viscous_Nm_s: NonNegativeTriple
     delay_s: float
-    time_constant_s: float
-    resistance_ohm: Positive
-    inductance_H: Positive
+    time_constant_s: PerGroup
+    resistance_ohm: PerGroup
+    inductance_H: PerGroup
     swing_V: NonNegative
     offset_error_A: NonNegative
     gain_error: NonNegative

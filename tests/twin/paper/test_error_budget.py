@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from spheretwin import scenario as scenarios
+from spheretwin.active_config import initial_config
 from spheretwin.electronics.sensor_chain import accuracy
 from spheretwin.paper import error_budget
 from spheretwin.paper.error_budget import ALL, ELECTRONICS, IDEAL, PROTOTYPE, STAGES, WITH_RATES
@@ -31,10 +32,15 @@ def test_single_stages_together_are_the_prototype():
 
 @pytest.mark.parametrize("name", [ELECTRONICS, ALL])
 def test_a_set_is_that_of_the_scenario(name):
-    resolved = scenario(BY_NAME[name])
-    whole = scenarios.load("tilt", {"hardware": name, "controller.law": "pd"})
+    stage, whole = (
+        initial_config(loaded, None, None).scenario
+        for loaded in (
+            scenario(BY_NAME[name]),
+            scenarios.load("tilt", {"hardware": name, "controller.law": "pd"}),
+        )
+    )
     for section in ("sensors", "estimator", "drive", "plant", "nominal"):
-        assert getattr(resolved, section) == getattr(whole, section)
+        assert getattr(stage, section) == getattr(whole, section)
 
 
 def test_ideal_has_the_true_state_and_currents_at_once():

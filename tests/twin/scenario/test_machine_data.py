@@ -1,7 +1,6 @@
 """Border of machine and electronics: a hardware set never replaces a value of the model file."""
 
 import json
-import re
 
 import pytest
 
@@ -10,24 +9,24 @@ from spheretwin import scenario as scenarios
 from spheretwin.active_config import initial_config, warnings_of
 from spheretwin.machine.link.limits import Limits
 from spheretwin.machine.link.machine_link import Link, LinkSettings
-from spheretwin.models import actuator as actuators
 from spheretwin.models.base.errors import InputError
-from spheretwin.scenario.hardware import HARDWARE, amplifier_limit_A
+from spheretwin.scenario.hardware import HARDWARE, PER_GROUP, amplifier_limit_A
 from spheretwin.session import Session
+from tests.twin import model_files
 
 NUMBERS = {"group_resistance_ohm": 50.0, "group_inductance_H": 0.03, "group_current_limit_A": 0.2}
 
 
+THERMAL = {
+    "group_resistance_per_K": 0.004,
+    "group_heat_capacity_J_K": [30.0] * 17 + [31.0],
+    "group_thermal_resistance_K_W": [8.0] * 17 + [9.0],
+    "group_temperature_limit_degC": [130.0] * 17 + [120.0],
+}
+
+
 def model_file(folder, **changes):
-    """Write the shipped model with other numbers of a group; return its path."""
-    text = actuators.MJCF_PATH.read_text()
-    for name, value in (NUMBERS | changes).items():
-        text, count = re.subn(rf'name="{name}" data="[^"]*"', f'name="{name}" data="{value}"', text)
-        assert count == 1, name
-    (path := folder / "mine.xml").write_text(
-        text.replace('meshdir="assets"', f'meshdir="{actuators.FOLDER}/assets"')
-    )
-    return str(path)
+    return model_files.model_file(folder, **NUMBERS | changes)
 
 
 def resolved(path, hardware, **changes):
@@ -49,6 +48,29 @@ def test_resistance_inductance_and_a_smaller_limit_are_those_of_the_model_file(t
     assert all("0.2 A of the model file and 8 A of hardware" in line for line in lines)
 
 
+@pytest.mark.parametrize("hardware", HARDWARE)
+def test_thermal_data_are_those_of_the_model_file_unless_a_field_states_them(tmp_path, hardware):
+    path = model_file(tmp_path, **THERMAL)
+    _, config = resolved(path, hardware, drive__thermal_resistance_K_W=2.0)
+    drive, stated = config.scenario.drive, iter(THERMAL.values())
+    assert (drive.resistance_per_K, list(drive.heat_capacity_J_K)) == (next(stated), next(stated))
+    assert (drive.thermal_resistance_K_W, list(drive.shutdown_degC)) == (2.0, [*stated][-1])
+
+
+def test_thermal_data_that_no_one_states_are_assumed_with_the_set(tmp_path):
+    path = model_file(tmp_path)
+    for hardware, per_K, shutdown_degC in (("ideal", 0.0, None), ("prototype", 0.0039, 155.0)):
+        drive = resolved(path, hardware)[1].scenario.drive
+        assert (drive.resistance_per_K, drive.shutdown_degC) == (per_K, shutdown_degC)
+        assert (drive.heat_capacity_J_K, drive.thermal_resistance_K_W) == (60.0, 4.0)
+
+
+def test_of_several_current_limits_the_smallest_holds_for_all_groups_and_the_run_says_so(tmp_path):
+    scenario, config = resolved(model_file(tmp_path, group_current_limit_A=[0.3] * 17 + [0.25]), "ideal")
+    assert config.scenario.drive.current_limit_A == config.scenario.nominal.current_limit_A == 0.25
+    assert "the current limit of all groups is 0.25 A" in "\n".join(warnings_of(scenario, config.files))
+
+
 @pytest.mark.parametrize(
     ("model_A", "given", "limit_A", "warns"),
     [(12.0, {}, 8.0, True), (8.0, {}, 8.0, False), (0.2, {"drive__current_limit_A": 0.3}, 0.3, False)],
@@ -61,9 +83,9 @@ def test_the_smaller_limit_holds_unless_a_field_states_one(tmp_path, model_A, gi
 
 
 def test_no_set_states_what_belongs_to_the_machine():
-    machine = ("resistance_ohm", "inductance_H", "current_limit_A", "inertia_kg_m2", "heat_capacity_J_K")
+    machine = (*PER_GROUP, "current_limit_A", "inertia_kg_m2")
     for fields in HARDWARE.values():
-        assert not [name for name in fields if name.rpartition(".")[2] in machine]
+        assert not [name for name in fields if name.startswith("drive.") and name[6:] in machine]
     assert [amplifier_limit_A(name) for name in HARDWARE] == [float("inf"), 8.0, 8.0]
 
 
@@ -80,7 +102,7 @@ def test_no_set_states_what_belongs_to_the_machine():
     ],
 )
 def test_explain_states_which_of_both_a_value_came_from(tmp_path, capsys, hardware, limit_A, origin):
-    path = model_file(tmp_path, group_current_limit_A=limit_A)
+    path = model_file(tmp_path, group_current_limit_A=limit_A, group_heat_capacity_J_K=[30.0] * 17 + [31.0])
     (tmp_path / "own.toml").write_text(
         f'name = "own"\nhardware = "{hardware}"\n[trajectory]\nshape = "sinusoid"\n[plant]\nmjcf = "{path}"\n'
     )
@@ -88,7 +110,10 @@ def test_explain_states_which_of_both_a_value_came_from(tmp_path, capsys, hardwa
     facts = {fact["field"]: fact["origin"] for fact in json.loads(capsys.readouterr().out)["fields"]}
     assert facts["drive.current_limit_A"] == facts["nominal.current_limit_A"] == origin
     assert facts["drive.resistance_ohm"] == "model file: group_resistance_ohm"
+    assert facts["drive.heat_capacity_J_K"] == "model file: group_heat_capacity_J_K"
+    assert facts["drive.thermal_resistance_K_W"] == f"hardware {hardware}: assumed"
     if hardware == "prototype":
+        assert facts["drive.shutdown_degC"] == "hardware prototype: assumed: insulation of class F"
         assert facts["drive.supply_V"].startswith("hardware prototype: ")
 
 
