@@ -82,3 +82,23 @@ def recorded(path, changes=(), law=None, ticks=600, **overrides):
     file.finish("completed" if live.status == "running" else live.status)
     file.close(record_of(live).metadata())
     return live, parts
+
+
+def not_compilable(t, reference, measurement, parameters, state, torque):
+    torque[:] = {}.fromkeys("abc").popitem()
+
+
+REFUSED = [
+    ("disturbance.loud", 1.0), ("disturbance.load", float("nan")),
+    ("disturbance", {"load": 2.0, "noise": 2.0}), ("disturbance.load", plain_law()), ("controller.law", None),
+    ("controller.law", Law("broken", numba.njit(not_compilable), [], [])), ("nominal.torque_scale", 0.0),
+    ("nominal.torque_curve", "/nowhere/curve.csv"), ("plant.torque_curve", "/nowhere/curve.csv"),
+    ("plant.group_gain", [1.0, 1.0]), ("plant.integrator", "Verlet"), ("plant.integrator", "Euler"),
+    ("fault", {"target": "coil.18", "mode": "open"}), ("state", {"current_A": [1.0] * 17}),
+    ("state", {"q_rad": [0.0, 2.0, 0.0]}), ("", 1.0), (None, 1.0),
+    # Fixed fields, and sections that would bring theirs with them.
+    ("name", 1.0), ("seed", 1.0), ("controller.preset", 0.05), ("plant.step_s", 1e-3), ("plant.mjcf", None),
+    ("plant.initial_rad_s", [0.0, 0.0, 0.0]), ("event", 1), ("event.0.t_s", 1),
+    ("plant", {"engine": "mujoco"}), ("plant", {}), ("controller", {"period_s": 2e-3}),
+]  # fmt: skip
+"""A refusal of each stage: name, value, law, its compilation, files, model, engine, faults, fixed fields."""

@@ -10,7 +10,6 @@ from hypothesis import strategies as st
 
 from spheretwin.models import actuator as actuators
 from spheretwin.models import mjcf
-from spheretwin.models.base.errors import InputError
 from spheretwin.models.lagrangian import inertia_matrix, loaded_inertia
 from spheretwin.plant.friction import friction, slow_down
 from spheretwin.plant.lagrangian_rotor import LagrangianRotor
@@ -163,18 +162,3 @@ def test_a_free_motion_is_that_under_mujoco_s_own_damping(actuator, engine):
 
 def test_friction_allocates_nothing(actuator):
     assert allocates_nothing(slow_down, viscous_friction(actuator, STEP_s), *np.zeros((3, 3)))
-
-
-@pytest.mark.parametrize(
-    ("coulomb", "viscous", "smoothing", "message"),
-    [
-        ([0, -1e-3, 0], NONE, 1e-3, r"expected coulomb_Nm of three finite .* received \[0, -0.001, 0\]"),
-        (NONE, [0, np.nan, 0], 1e-3, "expected viscous_Nm_s of three finite"),
-        (NONE, [1e-3], 1e-3, r"expected viscous_Nm_s .* received \[0.001\]"),
-        (NONE, NONE, 0.0, "expected a finite smoothing_rate_rad_s of at least 1e-12, received 0"),
-        (NONE, NONE, np.inf, "smoothing_rate_rad_s of at least 1e-12, received inf"),
-    ],
-)
-def test_coefficients_that_are_none_are_refused(actuator, coulomb, viscous, smoothing, message):
-    with pytest.raises(InputError, match=message):
-        friction(coulomb, viscous, smoothing, actuator.inertia, STEP_s)

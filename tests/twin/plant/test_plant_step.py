@@ -8,7 +8,6 @@ import spheretwin as st
 from spheretwin import plant
 from spheretwin.models import actuator as actuators
 from spheretwin.models import magnetics
-from spheretwin.models.base.errors import InputError
 from spheretwin.plant.plant_step import step
 
 FRICTION = {"plant.coulomb_Nm": [2e-3] * 3, "plant.viscous_Nm_s": [1e-4] * 3}
@@ -122,21 +121,6 @@ def test_a_user_s_compiled_code_calls_it():
     np.testing.assert_allclose(reached.qdot_rad_s, expected.qdot_rad_s, rtol=1e-13)
 
 
-@pytest.mark.parametrize(
-    ("changes", "message"),
-    [
-        ({"plant.stiction.on": True}, "expected smoothed friction"),
-        ({"plant.cable.hysteresis_Nm": [1e-3] * 3}, "hysteresis of a cable"),
-        ({"plant.payload": 1.0}, "payload"),
-    ],
-)
-def test_what_the_step_has_not_is_refused(changes, message):
-    with pytest.raises(InputError, match=message):
-        plant.parameters("tilt", changes)
-
-
-def test_changes_without_a_name_and_names_that_the_package_has_not_are_refused():
-    with pytest.raises(InputError, match="with the name or file"):
-        plant.parameters(st.load("tilt"), {"plant.payload_kg": 0.1})
+def test_names_that_the_package_has_not_are_refused():
     with pytest.raises(AttributeError, match="it has Parameters, Plants, State"):
         _ = plant.stepp

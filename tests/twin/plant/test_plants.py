@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from spheretwin import plant
-from spheretwin.models.base.errors import InputError
 from spheretwin.plant.plant_step import step
 from tests.twin.plant.test_plant_step import LOADED
 
@@ -126,35 +125,3 @@ def test_values_of_all_plants_are_given_once():
     plants.step(case[2][0], case[3][0], dt)
     expected = one_by_one([parameters], *case, 1)
     assert_equal((plants.q_rad, plants.qdot_rad_s), np.repeat(expected, 18, axis=1))
-
-
-@pytest.mark.parametrize(
-    ("call", "message"),
-    [
-        (lambda one: plant.Plants(one, 0), "expected at least one plant"),
-        (lambda one: plant.Plants([one, one], 2), "a count with one set of parameters, received 2"),
-        (lambda one: plant.Plants([one, _of_fewer_groups(one)]), "18 groups, received 8 and 12"),
-    ],
-)
-def test_plants_that_do_not_fit_are_refused(call, message):
-    with pytest.raises(InputError, match=message):
-        call(plant.parameters("tilt"))
-
-
-def _of_fewer_groups(parameters):
-    magnetics = parameters.magnetics
-    fewer = magnetics._replace(group_axes=np.ascontiguousarray(magnetics.group_axes[:, :12]))
-    return parameters._replace(magnetics=fewer, torque_gain=parameters.torque_gain[:12])
-
-
-@pytest.mark.parametrize(
-    ("method", "values", "message"),
-    [
-        ("step", (np.zeros(17), np.zeros(3)), "currents of 18 finite numbers, for all or for each of 2"),
-        ("step", (np.zeros(18), [0, np.nan, 0]), "expected disturbance of 3 finite numbers"),
-        ("step_torque", (np.zeros((3, 3)),), r"torque_q of 3 finite numbers, .* an array of \(3, 3\)"),
-    ],
-)
-def test_values_that_do_not_fit_are_refused(method, values, message):
-    with pytest.raises(InputError, match=message):
-        getattr(plant.Plants(plant.parameters("tilt"), 2), method)(*values, dt)
