@@ -108,23 +108,6 @@ def test_a_file_of_currents_is_replayed_and_its_limit_counts(tmp_path):
     assert rows["allocation_scale"][10] == pytest.approx(2 / 3)
 
 
-@pytest.mark.parametrize(
-    ("groups", "changes", "message"),
-    [
-        (None, {"manual.currents_A": [0.0, 1.0]}, r"expected manual\.currents_A for 18 groups, received 2"),
-        (None, {"manual.currents_A": [np.nan] * 18}, "currents_A"),
-        (17, {}, "expected manual.file for 18 groups, received 17"),
-        (0, {}, "expected each of the columns t_s, current_00_A once"),
-        (18, {"manual.currents_A": [0.0] * 18}, "expected either currents_A or file, received both"),
-    ],
-)
-def test_currents_that_do_not_fit_are_refused(tmp_path, groups, changes, message):
-    if groups is not None:
-        changes = {"manual.file": series_file(tmp_path, [0.0], [[0.1] * groups], groups)} | changes
-    with pytest.raises(InputError, match=message):
-        Session(scenarios.load("hold", FAST | changes))
-
-
 def test_the_bench_refuses_a_file_of_currents(tmp_path):
     path = series_file(tmp_path, [0.0], [[0.1] * 18])
     with pytest.raises(InputError, match=r"received manual\.file"):

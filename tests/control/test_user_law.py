@@ -8,7 +8,6 @@ import pytest
 from spheretwin import cli
 from spheretwin import scenario as scenarios
 from spheretwin.control.law import Law
-from spheretwin.models.base.errors import InputError
 from spheretwin.models.telemetry.signals import ANGLES, Signal
 from spheretwin.models.telemetry.table import read_parquet
 from spheretwin.scenario import reading
@@ -137,38 +136,6 @@ def test_a_session_keeps_the_law_that_it_read(file):
         edited.telemetry.values.tobytes()
         != simulate(load(f"{file}:ready")).telemetry.rows(0, 50).values.tobytes()
     )
-
-
-@pytest.mark.parametrize(
-    ("text", "name", "part"),
-    [
-        (FILE, "Feedbak", "did you mean Feedback"),
-        (FILE, "number", "a subclass of LawParameters, a Law, or a function, received 3"),
-        ("import nothing_of_that_name", "mine", "expected a file of Python that runs"),
-        ("1 +", "mine", "SyntaxError in line 1"),
-        (None, "mine", "expected a readable file of Python"),
-    ],
-)
-def test_what_cannot_be_had_is_refused(tmp_path, text, name, part):
-    path = tmp_path / "theirs.py"
-    if text is not None:
-        path.write_text(text)
-    with pytest.raises(InputError) as refusal:
-        load(f"{path}:{name}")
-    assert part in str(refusal.value)
-    assert str(refusal.value).isprintable()
-
-
-@pytest.mark.parametrize(
-    ("tokens", "message"),
-    [
-        ("--controller.stiffness 1 -2 3", r"stiffness\.1: expected a number greater than 0, received -2"),
-        ("--controller.stifness 3", r"in controller, received stifness; did you mean stiffness\?"),
-    ],
-)
-def test_an_invalid_parameter_is_refused_by_name(file, tokens, message):
-    with pytest.raises(InputError, match=message):
-        load(f"{file}:Feedback", *tokens.split())
 
 
 def test_a_signal_of_an_odd_name_is_recorded_quietly(tmp_path, capfd):

@@ -100,5 +100,3 @@ def test_one_that_fails_later_is_refused_then():
     assert len(run(lost, end=1700)[0]) == 1700
     with pytest.raises(InputError, match=r"expected a finite trajectory, received NaN at 1\.7 s"):
         lost.rows(1700, 1)
-    with pytest.raises(InputError, match=r"an object with sample\(t\)"):
-        InputGenerator(scenario(), 3.0)

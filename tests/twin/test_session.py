@@ -3,11 +3,9 @@
 import numpy as np
 import pytest
 
-from spheretwin import scenario as scenarios
 from spheretwin.control.law import Law, NominalModel
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.telemetry.signals import Signal
-from spheretwin.session import Session
 from spheretwin.simulation import simulate
 from tests.twin.session_cases import ENGINES, compiled_law, rows, scenario, session
 
@@ -122,16 +120,3 @@ def test_a_shipped_law_handed_over_is_the_same_law():
         section.build(NominalModel(1e-3, 0.0, np.array(session().scenario.nominal.inertia_kg_m2)))
     )
     assert rows(handed.advance(200)) == rows(session().advance(200))
-
-
-@pytest.mark.parametrize(
-    ("scenario", "law", "message"),
-    [
-        ("nutation", None, "expected a scenario, as spheretwin.load returns it, received 'nutation'"),
-        (None, None, "expected a scenario, as spheretwin.load returns it, received none"),
-        (scenarios.load("hold"), "mine.py:Mine", "expected a Law, received 'mine.py:Mine'"),
-    ],
-)
-def test_what_is_no_scenario_or_no_law_is_refused(scenario, law, message):
-    with pytest.raises(InputError, match=message):
-        Session(scenario, law)

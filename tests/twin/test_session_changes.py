@@ -2,7 +2,6 @@
 
 import os
 import pickle
-import re
 from pathlib import Path
 
 import numpy as np
@@ -270,25 +269,6 @@ def test_a_session_under_a_law_of_its_own_beside_one_from_a_file_is_pickled(file
     own = Law("own", lambda *_: None, [], [])
     with Session(hold(**{"controller.law": f"{file}:asks"}), own) as session:
         assert pickle.loads(pickle.dumps(session.snapshot())).scenario == session.scenario
-
-
-@pytest.mark.parametrize(
-    ("name", "value", "part"),
-    [
-        ("plant.group_gain", [1.0, 2.0], "18 groups, received 2"),
-        ("nominal.torque_curve", "/nowhere/curve.csv", "torque curve"),
-        ("controller.law", "FILE:Broken", "build(known) to make a Law, received ZeroDivisionError: division"),
-        ("controller.law", "FILE:Lazy", "expected a class with build(known), received one without"),
-    ],
-)
-def test_an_event_that_would_fail_is_found_before_the_first_tick(file, name, value, part):
-    """As it is refused when it is set during a run."""
-    value = value.replace("FILE", str(file)) if isinstance(value, str) else value
-    with Session(hold()) as session, pytest.raises(InputError, match=re.escape(part)):
-        session.set(name, value)
-    event = {"t_s": 0.1, "set": name, "value": value}
-    with pytest.raises(InputError, match=r"as (the event at 0\.1 s|event\.0) sets it"):
-        Session(hold(event=[event]))
 
 
 @pytest.mark.parametrize(("start_s", "warns"), [(0.049, False), (0.0495, True), (0.05, True), (3.0, True)])

@@ -122,12 +122,6 @@ class Mine(LawParameters):
 """
 
 
-def test_a_user_s_law_takes_none_of_their_names(tmp_path):
-    (path := tmp_path / "mine.py").write_text(FILE)
-    with pytest.raises(InputError, match="expected no parameter named governor"):
-        scenarios.load("hold", {"controller.law": f"{path}:Mine"})
-
-
 @pytest.mark.parametrize("mine", LAWS)
 def test_it_is_set_around_a_law_of_a_user_s_too(mine):
     with Session(tilt(), mine) as session:

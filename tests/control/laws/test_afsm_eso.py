@@ -5,7 +5,6 @@ import pytest
 
 from spheretwin import scenario as scenarios
 from spheretwin.control.laws.afsm_eso import PRESETS, AFSMWithObserver
-from spheretwin.models.base.errors import InputError
 from spheretwin.models.lagrangian import coriolis_matrix, inertia_matrix
 from spheretwin.scenario.changes import with_change
 from spheretwin.simulation import simulate
@@ -129,12 +128,6 @@ def test_of_a_section_of_the_preset_one_field_can_be_given_alone():
     law = {"controller.law": "afsm_eso", "controller.preset": "prototype"}
     fed = scenarios.load("hold", {**law, "controller.feed_forward.inertia": 0.5}).controller.feed_forward
     assert (fed.friction, fed.inertia) == ((0.8,) * 3, (0.5,) * 3)
-
-
-def test_an_unknown_preset_is_refused():
-    message = r"controller\.preset: expected 'ideal', 'fast', 'prototype' or 'robust'"
-    with pytest.raises(InputError, match=message):
-        scenarios.load("hold", {"controller.law": "afsm_eso", "controller.preset": "slow"})
 
 
 def test_ideal_is_the_default():

@@ -9,7 +9,6 @@ from gymnasium.vector import AutoresetMode
 import spheretwin as st
 from spheretwin import plant
 from spheretwin.envs import OBSERVATION, REWARD_TERMS, TwinEnv, TwinVectorEnv
-from spheretwin.models.base.errors import InputError
 
 FRICTION = {"plant.coulomb_Nm": [2e-3] * 3, "plant.viscous_Nm_s": [1e-4] * 3}
 PARTS = {part.name: slice(3 * place, 3 * place + 3) for place, part in enumerate(OBSERVATION)}
@@ -234,44 +233,3 @@ def test_returned_arrays_are_not_used_again():
         if isinstance(one, np.ndarray):
             assert not np.shares_memory(one, other)
     assert not np.shares_memory(first, results[0][0])
-
-
-@pytest.mark.parametrize(
-    ("settings", "message"),
-    [
-        ({"task": "Jump"}, "expected one of Track, Hold, Point, received 'Jump'"),
-        ({"num_envs": 0}, "expected at least one plant, received num_envs 0"),
-        ({"torque_limit": 1.0}, "received torque_limit; did you mean torque_limit_Nm"),
-        ({"episode_s": -1.0}, "episode_s: Input should be greater than 0, received -1.0"),
-        ({"changes": {"hardware": "electronics"}}, "expected ideal sensors and amplifiers"),
-        ({"changes": {"plant.payload": 1.0}}, "payload"),
-        (
-            {"changes": {"plant.mass.axis_tilt_rad": [[0.02, 0.0], [0.0, 0.0], [0.0, 0.0]]}},
-            "expected an ideal joint",
-        ),
-        (
-            {"axes": ({"kind": "values", "field": "plant.payload_kg", "values": [0.1]},)},
-            "expected tags: 'uniform', 'normal', received",
-        ),
-    ],
-)
-def test_settings_that_do_not_fit_are_refused(settings, message):
-    with pytest.raises(InputError, match=message):
-        TwinVectorEnv(**{"variants": 1, **settings})
-
-
-@pytest.mark.parametrize(
-    ("method", "argument", "message"),
-    [
-        ("step", {"actions": np.zeros((2, 4))}, r"shape \(2, 3\), received \(2, 4\)"),
-        ("step", {"actions": np.full((2, 3), np.nan)}, "nan"),
-        ("reset", {"seed": [1]}, "expected 2 seeds, received 1"),
-        ("reset", {"options": {"mask": 1}}, "expected reset_mask of 2 booleans"),
-        ("reset", {"options": {"reset_mask": np.ones(3, bool)}}, "expected reset_mask of 2 booleans"),
-    ],
-)
-def test_actions_and_resets_that_do_not_fit_are_refused(method, argument, message):
-    env = TwinVectorEnv(2, "Hold", variants=1)
-    env.reset()
-    with pytest.raises(InputError, match=message):
-        getattr(env, method)(**argument)

@@ -114,16 +114,3 @@ def test_conditions_of_a_log_are_fields_of_its_scenario(log):
     )
     with pytest.raises(InputError, match="name or file of a scenario for a log with conditions"):
         shadow(loaded, st.load(SCENARIO, NOMINAL))
-
-
-@pytest.mark.parametrize(
-    ("groups", "times", "said"),
-    [
-        (17, 1.0, "expected 18 group currents, received 17"),
-        (18, -1.0, "expected rising times"),
-        (18, 0.0, "expected rising times, received 0 s"),
-    ],
-)
-def test_what_does_not_fit_is_refused(log, model, groups, times, said):
-    with pytest.raises(InputError, match=said):
-        shadow(Log(times * log.t_s, log.current_A[:, :groups], log.angle_rad), model)

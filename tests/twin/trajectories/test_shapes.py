@@ -4,14 +4,9 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from pydantic import ValidationError
 from scipy import signal
 
-from spheretwin.trajectories import SHAPES
 from spheretwin.trajectories.shapes import Chirp, Component, Hold, Multisine, Nutation, Sinusoid, Steps, Tilt
-
-ZERO = (0.0, 0.0, 0.0)
-
 
 # --- exact solutions
 
@@ -108,26 +103,6 @@ def test_a_tick_whose_time_is_rounded_down_still_reaches_the_step(period, tick, 
     assert t[1] < time
     steps = Steps(times_s=(time,), angles_rad=((1.0, 1.0, 1.0),))
     np.testing.assert_array_equal(steps.sample(t)[:, 0, 0], [0.0, 1.0])
-
-
-# --- refusals
-
-
-# Bounds of single fields are in the approved schema of a scenario.
-@pytest.mark.parametrize(
-    ("name", "fields", "complaint"),
-    [
-        ("multisine", {"components": ({"frequency": 1.0},)}, "frequency"),
-        ("steps", {"times_s": (1.0, 2.0)}, "as many angles_rad as times_s, received 1 for 2 times"),
-        ("steps", {"times_s": (1.0, 1.0), "angles_rad": (ZERO, ZERO)}, "rising times, received 1 then 1"),
-        ("steps", {"times_s": (float("nan"),)}, "times_s"),
-        ("tilt", {"rounding_rad_s2": 0.01}, "rounding_rad_s2 of at least 0.152588 rad/s²"),
-    ],
-)
-def test_parameters_that_do_not_fit_are_refused_by_name(name, fields, complaint):
-    with pytest.raises(ValidationError) as refusal:
-        SHAPES[name](**fields)
-    assert complaint in str(refusal.value)
 
 
 # --- from a file to a run

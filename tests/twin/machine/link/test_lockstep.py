@@ -10,11 +10,10 @@ from spheretwin import scenario as scenarios
 from spheretwin.external import Measurement
 from spheretwin.machine.link import frame_format
 from spheretwin.machine.link.channel import Channel
-from spheretwin.machine.link.controller_scenario import check_measurement, controller_scenario, left_out
+from spheretwin.machine.link.controller_scenario import controller_scenario, left_out
 from spheretwin.machine.link.limits import Limits
 from spheretwin.machine.link.machine_link import Link, LinkSettings
 from spheretwin.machine.link.machine_server import MachineServer
-from spheretwin.models.base.errors import InputError
 from spheretwin.session import Session
 from tests.twin.machine.link.lines import GROUPS, Line, PERIOD_s, heat
 from tests.waiting import UNLIMITED_S
@@ -126,19 +125,6 @@ def test_a_line_that_loses_and_repeats_frames_changes_no_byte():
     counts = run.link.figures()["frames"]
     assert counts["duplicated"] > 10
     assert counts["corrupt"] > 10
-
-
-@pytest.mark.parametrize(
-    ("changes", "measurement", "said"),
-    [
-        ({}, (None, np.zeros(18)), r"expected an estimator of the rates, such as --estimator\.kind kalman"),
-        ({"detector.detect": True}, (np.zeros(3), None), "expected a machine that reports currents"),
-    ],
-)
-def test_measurements_that_the_controller_lacks_are_refused(changes, measurement, said):
-    resolved = Session(scenarios.load("sinusoid", changes)).initial_scenario
-    with pytest.raises(InputError, match=said):
-        check_measurement(resolved, Measurement(np.zeros(3), *measurement))
 
 
 def test_the_controller_has_nothing_of_the_plant():

@@ -112,27 +112,6 @@ def test_standard_output_is_for_frames_alone():
     assert (done.stdout, done.stderr.strip()) == (b"frame", b"for people")
 
 
-FORM = "expected udp://HOST:PORT, serial:DEVICE@BAUD, or - for standard"
-LINE = "expected a serial line that can be opened, received /dev/"
-WRONG = ["", "udp", "udp://", "udp://host", "udp://:x", "udp://:99999", "tcp://:5", "serial:",
-         "serial:/dev/x@fast", "udp://:5/path", "udp://:0", "--"]  # fmt: skip
-
-
-@pytest.mark.parametrize(
-    ("address", "listening", "message"),
-    [
-        *((address, False, FORM) for address in WRONG),
-        ("serial:/dev/no-such-line@9600", False, LINE),
-        ("serial:/dev/null", False, LINE),
-        # TEST-NET-1 of RFC 5737: no machine has it.
-        ("udp://192.0.2.1:5005", True, r"expected an address that can be used, received udp://192\.0\.2\.1"),
-    ],
-)
-def test_an_address_that_cannot_be_used_is_refused(address, listening, message):
-    with pytest.raises(InputError, match=message):
-        open_transport(address, listening=listening)
-
-
 def test_without_pyserial_the_message_names_the_extra(monkeypatch):
     monkeypatch.setitem(sys.modules, "serial", None)
     with pytest.raises(InputError, match="expected pyserial, which the extra machine installs: "):
