@@ -7,6 +7,7 @@ from spheretwin import scenario as scenarios
 from spheretwin.run import figures_of
 from spheretwin.session import Session
 from spheretwin.simulation import simulate
+from spheretwin.study.statistics import interval
 
 SEEDS = range(2)
 CONDITIONS = [(0.0, 0.0), (0.2, 1.0), (0.5, 0.0), (0.5, 5.0)]
@@ -132,12 +133,13 @@ MISMATCH = {
     "right": {},
     "friction": {"plant.coulomb_Nm": (5e-3, 5e-3, 5e-3)},
     "heavier": {"plant.modelling_error": 0.5},
+    "lighter": {"plant.modelling_error": -0.3},
 }
 
 
-@pytest.mark.release("120 runs, 3 s; the other targets have a shorter run of the same law")
+@pytest.mark.release("320 runs, 10 s; the other targets have a shorter run of the same law")
 def test_robust_bears_friction_and_inertia_that_the_nominal_model_does_not_have():
-    """Nominal friction is 2 of 5 mN·m, or the rotor half as heavy again.
+    """Nominal friction is 2 of 5 mN·m, or the rotor half as heavy again; it pays for it with a lighter rotor.
 
     Largest true error of α and β on the tilt, median over seeds that gains were neither searched nor chosen
     with.
@@ -151,12 +153,16 @@ def test_robust_bears_friction_and_inertia_that_the_nominal_model_does_not_have(
         assert run.status == "completed"
         return np.degrees(np.abs(run.telemetry["error_rad"][:, :2]).max())
 
-    median_deg = {
-        (preset, mismatch): np.median([error_deg(preset, mismatch, seed) for seed in range(100, 120)])
+    errors_deg = {
+        (preset, mismatch): [error_deg(preset, mismatch, seed) for seed in range(100, 140)]
         for preset in ("prototype", "robust")
         for mismatch in MISMATCH
     }
+    median_deg = {case: np.median(errors) for case, errors in errors_deg.items()}
     for mismatch in ("friction", "heavier"):
         assert median_deg["robust", mismatch] <= 0.042
         assert median_deg["prototype", mismatch] > 0.045  # so that the goal asks for something
     assert median_deg["robust", "right"] <= 1.1 * median_deg["prototype", "right"]
+    # 400 other seeds gave 0.047 degrees.
+    low_deg, high_deg = interval(errors_deg["robust", "lighter"])
+    assert interval(errors_deg["prototype", "lighter"])[1] < low_deg < 0.046 < high_deg
