@@ -113,7 +113,7 @@ SCENARIOS = [
     {"plant.mass.axis_tilt_error_rad": 0.1},
     {"plant.mass.axis_offset_m": [[1e-2, 0.0], [0.0] * 2, [0.0] * 2]},
     {**COUPLED, "hardware": "ideal"}, {**COUPLED, "drive.inductance_H": 1e-5},
-    {**COUPLED, "drive.inductance_H": [9e-4] * 17 + [1e-5]},
+    {**COUPLED, "drive.inductance_H": [9e-4] * 17 + [1e-6]},
     {"manual.currents_A": [0.0, 1.0]}, {"manual.currents_A": [np.nan] * 18},
     {"controller.law": "afsm_eso", "controller.preset": "slow"},
     {"trajectory": {"shape": "multisine", "components": [{"frequency": 1.0}]}},
