@@ -23,6 +23,7 @@ import mujoco
 import numpy as np
 
 from spheretwin.models.base.errors import InputError, without_breaks
+from spheretwin.models.base.files import regular_file
 from spheretwin.models.base.mujoco_library import compiler_warnings, silence_warnings
 
 PAYLOAD = "payload"
@@ -86,7 +87,7 @@ def read(path: Path) -> Mjcf:
         The file is missing or invalid; the message of the engine is on one line.
     """
     try:
-        if not path.is_file():
+        if not path.exists():
             raise InputError(f"model: expected an MJCF file, received {path}, which does not exist")
         key = (path.resolve(), fingerprint(path))
     except OSError as error:  # an invalid file name, here or in the file
@@ -327,7 +328,7 @@ def contents_digest(path: Path) -> str:
 
 def _texts_and_named(path: Path) -> tuple[dict[Path, bytes], set[Path]]:
     """Return the texts of a model and its includes, and every file that they name."""
-    texts = {path.resolve(): path.read_bytes()}
+    texts = {path.resolve(): regular_file(path).read_bytes()}
     named = _named(path, texts)
     while includes := {source.resolve() for source in named if _is_xml(source)} - texts.keys():
         texts |= {source: source.read_bytes() for source in includes}
@@ -343,7 +344,8 @@ def _named(path: Path, texts: Mapping[Path, bytes]) -> set[Path]:
     folders = {path.parent.resolve(), *(source.parent for source in texts)}
     below = {_decoded(name) for text in texts.values() for name in _FOLDERS.findall(text)}
     folders |= {folder / name for folder in folders for name in below}
-    return {source for folder in folders for name in names if (source := folder / name).is_file()}
+    sources = (folder / name for folder in folders for name in names)
+    return {regular_file(source) for source in sources if source.exists() and not source.is_dir()}
 
 
 def _is_xml(source: Path) -> bool:

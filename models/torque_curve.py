@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spheretwin.models.base.errors import InputError, distinct_texts, shown, without_breaks
+from spheretwin.models.base.files import regular_file
 
 if TYPE_CHECKING:
     from scipy.interpolate import CubicSpline
@@ -124,7 +125,7 @@ def read_bytes(path: Path) -> bytes:
         The file cannot be read.
     """
     try:
-        return path.read_bytes()
+        return regular_file(path).read_bytes()
     except OSError as error:
         raise InputError(
             f"torque curve {path}: expected a readable text file, {without_breaks(error)}"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -22,18 +23,30 @@ if TYPE_CHECKING:
     from spheretwin.viz.recording.recorder import Recorder
 
 
-def check(paths: list[Path]) -> None:
+def check(record: Path | None, telemetry: Path | None, logs: Sequence[Path] = ()) -> None:
     """Check before a run that its files can be written.
+
+    Parameters
+    ----------
+    record, telemetry : Path, optional
+        Recording of Rerun, ``.rrd``, and table of columns, ``.parquet``.
+    logs : sequence of Path
+        Further files, which others check.
 
     Raises
     ------
     InputError
-        A file cannot be written, or two paths are equal.
+        A file cannot be written, its name is that of another format, or two paths are equal.
     """
-    for path in paths:
-        check_writable(path)
-    if len({path.resolve() for path in paths}) < len(paths):
-        raise InputError(f"output: expected a separate path for each file, received {paths[0]} twice")
+    if record:
+        check_writable(record, ".rrd")
+    if telemetry:
+        check_writable(telemetry, ".parquet")
+    paths = [path for path in (record, telemetry, *logs) if path]
+    places = [path.resolve() for path in paths]
+    for path, place in zip(paths, places, strict=True):
+        if places.count(place) > 1:
+            raise InputError(f"output: expected a separate path for each file, received {path} twice")
 
 
 def check_rate(rate: float | None, record: Path | None, period_s: float) -> None:
@@ -101,7 +114,7 @@ class Outputs:
     ) -> None:
         self._session = session
         self.record, self.telemetry = record, telemetry
-        check(self.paths)
+        check(record, telemetry)
         self._file: TelemetryFile | None = None
         self._live = _live_view(session, view, live_window_s) if live else None
         # The recorder last: it would leave a file if another output were refused.

@@ -10,6 +10,7 @@ from typing import Any
 
 from spheretwin.models import mjcf
 from spheretwin.models.actuator import MJCF_PATH
+from spheretwin.models.base.files import regular_file
 from spheretwin.models.telemetry.run_record import Change, RunFacts, RunRecord, versions
 from spheretwin.scenario import reading
 from spheretwin.scenario.sections import ResolvedScenario, UserController
@@ -73,7 +74,7 @@ def digest(dotted: str, path: str) -> str | None:
     try:
         if dotted == "plant.mjcf":
             return mjcf.contents_digest(Path(path))
-        return hashlib.sha256(Path(path).read_bytes()).hexdigest()
+        return hashlib.sha256(regular_file(path).read_bytes()).hexdigest()
     except OSError:  # a finished run must not lose its telemetry for this reason
         return None
 

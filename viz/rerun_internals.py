@@ -40,6 +40,7 @@ import rerun_cli
 from rerun.chunk import Chunk
 
 from spheretwin.models.base.errors import InputError, SpheretwinError, without_breaks
+from spheretwin.models.base.files import regular_file
 
 # Rerun's file format 2: magic, version and options, then messages, each with its kind and its length before
 # it. The last message of a file is the footer, with the places of all others.
@@ -96,7 +97,7 @@ def extent(path: Path) -> Extent:
         length is not a valid one.
     """
     try:
-        with path.open("rb") as file:
+        with regular_file(path).open("rb") as file:
             size = path.stat().st_size
             if file.read(HEADER_BYTES)[: len(_FILE_MAGIC)] != _FILE_MAGIC or size < HEADER_BYTES:
                 raise InputError(f"recording {path}: expected a Rerun recording, received another file")

@@ -1,10 +1,11 @@
-"""Output files: checked for write access before work begins, and written completely or not at all."""
+"""Files: inputs are regular files; outputs are checked before work begins, and written completely or not."""
 
 from __future__ import annotations
 
 import os
 import secrets
 import shutil
+import stat
 import tempfile
 import threading
 from collections.abc import Iterator
@@ -117,13 +118,37 @@ class OpenFiles:
 OPEN_FILES = OpenFiles()
 
 
-def check_writable(path: Path) -> None:
+def regular_file(path: str | Path) -> Path:
+    """Return the path of an input file that has an end; a file without one would be read for ever.
+
+    Raises
+    ------
+    OSError
+        It does not exist, or it is a folder, a pipe, a socket or a device, or a link to one.
+    """
+    mode = os.stat(path).st_mode
+    if not stat.S_ISREG(mode):
+        raise OSError(0, f"it is {_KINDS.get(stat.S_IFMT(mode), 'a device')}, not a regular file", str(path))
+    return Path(path)
+
+
+_KINDS = {stat.S_IFDIR: "a folder", stat.S_IFIFO: "a named pipe", stat.S_IFSOCK: "a socket"}
+
+
+def check_writable(path: Path, suffix: str = "") -> None:
     """Check that a file can be written at `path`, without a change on disk.
+
+    Parameters
+    ----------
+    path : Path
+    suffix : str
+        End of the name that belongs to the format, such as ``.parquet``; any unless given.
 
     Raises
     ------
     InputError
-        The path is not that of a file, or its folder is missing or read-only.
+        The path is not that of a file, its name is that of another format, or its folder is missing or
+        read-only.
     """
     target = _behind_links(path)
     try:
@@ -138,6 +163,8 @@ def check_writable(path: Path) -> None:
             target.open("ab").close()
     except OSError as error:
         raise _not_writable(path, error) from None
+    if suffix and path.suffix != suffix:
+        raise InputError(f"output: expected a name that ends in {suffix}, received {path}")
 
 
 @contextmanager

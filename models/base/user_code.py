@@ -16,6 +16,7 @@ from types import ModuleType
 from typing import Any
 
 from spheretwin.models.base.errors import InputError, did_you_mean, shown, without_breaks
+from spheretwin.models.base.files import regular_file
 
 _REFERENCE = re.compile(r"(?P<file>.+\.py):(?P<name>[^\W\d]\w*)", re.DOTALL)
 
@@ -152,7 +153,7 @@ _SOURCES: dict[str, bytes] = {}
 
 def _read(path: Path, what: str) -> tuple[ModuleType, str]:
     try:
-        source = path.read_bytes()
+        source = regular_file(path).read_bytes()
     except (OSError, ValueError) as error:  # ValueError: a zero in the path
         raise InputError(f"{what}: expected a readable file of Python, {without_breaks(error)}") from None
     digest = hashlib.sha256(source).hexdigest()

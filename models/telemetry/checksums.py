@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spheretwin.models.base.errors import LONGEST_WORD, InputError, shortened, without_breaks
-from spheretwin.models.base.files import whole_file
+from spheretwin.models.base.files import regular_file, whole_file
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -183,7 +183,7 @@ def has_checksums(path: Path) -> bool:
     OSError
         The file cannot be read.
     """
-    with path.open("rb") as file:
+    with regular_file(path).open("rb") as file:
         _, footer = _footer(file)
     match = _FOOTER_VALUE.search(footer)
     listed = _SEGMENTS.encode() + _TEXT in footer
@@ -222,7 +222,7 @@ def _is_recording(path: Path) -> bool:
     if path.suffix != ".rrd":
         return False
     try:
-        with path.open("rb") as file:
+        with regular_file(path).open("rb") as file:
             return file.read(3) == b"RRF"
     except OSError:
         return False

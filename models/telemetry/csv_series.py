@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spheretwin.models.base.errors import InputError, distinct_texts, shown, without_breaks
+from spheretwin.models.base.files import regular_file
 
 TIME = "t_s"
 
@@ -171,7 +172,7 @@ def read(
 def _rows(what: str, path: Path) -> list[CsvRow]:
     """Return header and rows of a file; an empty header for an empty file."""
     try:
-        text = path.read_text(encoding="utf-8-sig")  # spreadsheets write a byte-order mark
+        text = regular_file(path).read_text(encoding="utf-8-sig")  # spreadsheets write a byte-order mark
     except (OSError, ValueError) as error:  # ValueError: no UTF-8, or a zero in the path
         raise InputError(f"{what} {path}: expected a readable CSV file, {without_breaks(error)}") from None
     try:

@@ -54,7 +54,7 @@ class TelemetryFile:
     """
 
     def __init__(self, path: Path, signals: tuple[Signal, ...], facts: Mapping[str, str]) -> None:
-        check_writable(path)
+        check_writable(path, ".parquet")
         self._path, self._facts = path, dict(facts)
         self._rows = Table(signals, np.empty((0, width(signals))))
         self._waiting: list[Table] = []

@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from spheretwin.models.base.errors import InputError, shown
+from spheretwin.models.base.files import regular_file
 from spheretwin.models.telemetry.checksums import Segment, SegmentedFile, damaged, text_checksum, unreadable
 from spheretwin.models.telemetry.signals import Signal, width
 from spheretwin.models.telemetry.table import Table
@@ -232,7 +233,7 @@ def _opened(part: Path) -> Iterator[pa.MemoryMappedFile]:
     import pyarrow as pa
 
     try:
-        source = pa.memory_map(str(part))
+        source = pa.memory_map(str(regular_file(part)))
     except OSError as error:
         raise unreadable(part, error, _STREAM) from None
     with source:

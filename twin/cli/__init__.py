@@ -80,6 +80,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return _refused(f"{error}", FAILED)
     except KeyboardInterrupt:
         return _refused("interrupted", FAILED)
+    except MemoryError:
+        return _refused("expected enough memory for the command, received too little", FAILED)
     except BrokenPipeError:  # the reader of our output has gone, as `head` does
         _discard_stdout()
         return FAILED

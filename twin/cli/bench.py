@@ -269,7 +269,7 @@ def run(options: argparse.Namespace) -> bool:
     scenario = scenarios.load(options.scenario, reading.overrides(options.fields))
     scenario = limited_rate(scenario, options.limit_rate_rad_s)
     recordings = [options.record.resolve()] if options.record else []
-    outputs.check(recordings)
+    outputs.check(options.record, None)
     folder = Folder(options.folder, scenario, recordings)
     # viser may be missing.
     from spheretwin.viz.bench import server

@@ -95,7 +95,7 @@ def run(options: argparse.Namespace) -> bool:
     warn(left_out(scenario))
     shadow = RunningShadow(Shadow(scenario)) if options.shadow else None
     if shadow:
-        check_writable(options.shadow)
+        check_writable(options.shadow, ".parquet")
     with (
         interruptible() as stop_requested,
         open_link(options, scenario, stop_requested, shadow=shadow) as link,

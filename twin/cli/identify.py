@@ -77,9 +77,9 @@ def declare(parser: Parser) -> None:
 def run(options: argparse.Namespace) -> bool:
     """Run the verb; return True if the result is accepted."""
     check_given(options)
-    for path in (options.out, options.currents):
+    for path, suffix in ((options.out, ".toml"), (options.currents, ".csv")):
         if path:
-            check_writable(path)
+            check_writable(path, suffix)
     if options.design:
         return _design(options)
     if options.payload or options.candidates or options.currents:
@@ -90,7 +90,7 @@ def run(options: argparse.Namespace) -> bool:
     with counted("identify", "evaluations") as report:
         result = identify(logs, scenario_of(options), names, changes, settings, report)
     if options.json:
-        print_json(_figures(result))
+        print_json({**_figures(result), "logs": {log.name: log.digest for log in logs}})
     else:
         _print(result)
     if result.accepted and options.out:

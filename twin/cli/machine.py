@@ -18,6 +18,7 @@ from spheretwin.machine.link.machine_server import MachineServer
 from spheretwin.machine.link.transports import Transport, Udp, open_transport
 from spheretwin.metrics import BAND_rad
 from spheretwin.models.base.errors import InputError
+from spheretwin.models.base.files import check_writable
 from spheretwin.models.base.mujoco_library import timers_stopped
 from spheretwin.models.telemetry.status import Status
 from spheretwin.outputs import Outputs
@@ -137,8 +138,10 @@ def read_scenario(options: argparse.Namespace, address: str) -> Scenario:
         raise InputError(f"command line: expected --{address} ADDRESS, received none")
     if value == STANDARD_STREAMS and options.json:
         raise InputError("command line: expected --json without the address -, which uses stdout for frames")
-    paths = (options.record, options.telemetry, getattr(options, "log", None))
-    outputs.check([path for path in paths if path])
+    log = getattr(options, "log", None)
+    if log:
+        check_writable(log, ".parquet")
+    outputs.check(options.record, options.telemetry, [log] if log else ())
     return scenarios.load(options.scenario, reading.overrides(options.fields))
 
 

@@ -192,7 +192,7 @@ def run_curve(options: argparse.Namespace) -> bool:
     if options.csv:
         return _judge(options.csv, options.mjcf, options.json)
     if options.out:
-        check_writable(options.out)
+        check_writable(Path(options.out), ".csv")
     return _compute(options)
 
 
@@ -228,7 +228,7 @@ def _compute(options: argparse.Namespace) -> bool:
 def run_field(options: argparse.Namespace) -> bool:
     """Run the part; return True if no bound is broken."""
     if options.out:
-        check_writable(options.out)
+        check_writable(Path(options.out), ".csv")
     computed = rotor_field.compute(
         options.mjcf, options.step, options.degree, options.on_iron, tracked("field of the magnets")
     )

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
+from spheretwin import outputs
 from spheretwin.cli.common import interruptible, print_json, print_message
 from spheretwin.cli.log_options import (
     add_stream,
@@ -32,7 +33,6 @@ from spheretwin.machine.state_estimation import (
     signals,
 )
 from spheretwin.models.base.errors import InputError
-from spheretwin.models.base.files import check_writable
 from spheretwin.models.telemetry.signals import ANGLES
 from spheretwin.models.telemetry.table import Table
 from spheretwin.viz.terminal import runs
@@ -58,9 +58,7 @@ def declare(parser: Parser) -> None:
 def run(options: argparse.Namespace) -> bool:
     """Run the verb; return True if model and log are consistent."""
     check_given(options)
-    for path in (options.telemetry, options.record):
-        if path:
-            check_writable(path)
+    outputs.check(options.record, options.telemetry)
     settings = ShadowSettings(offset_walk_rad=1e-5 if options.offsets else None)
     shift = None
     log = file_log(options)
@@ -105,6 +103,7 @@ def run(options: argparse.Namespace) -> bool:
         print_json(
             {
                 "rows": len(log),
+                "log_sha256": log.digest,
                 "accepted_findings": list(log.accepted),
                 "chi2": result.chi2,
                 "consistent": result.consistent,

@@ -107,7 +107,7 @@ def run(options: argparse.Namespace) -> bool:
         )
     own = load_metrics(options.metric)
     exported = export.check_paths(options.export_log, options.export_truth)
-    outputs.check([*filter(None, [options.record, options.telemetry]), *exported])
+    outputs.check(options.record, options.telemetry, exported)
     outputs.check_rate(options.record_rate, options.record, plan.scenario.controller.period_s)
     with interruptible() as stop_requested, Session(plan.scenario) as session:
         figures = Figures(PlannedRun(session.initial_scenario, session.actuator, plan.ticks))

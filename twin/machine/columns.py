@@ -15,6 +15,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_valida
 
 from spheretwin.machine.log import COMMANDED, MEASURED, Log
 from spheretwin.models.base.errors import InputError, did_you_mean, without_breaks
+from spheretwin.models.base.files import regular_file
 from spheretwin.models.telemetry.joint_states import ANGLE_NAMES
 from spheretwin.scenario.fields import explain
 
@@ -175,7 +176,7 @@ def load(source: str | Path) -> ColumnMap:
         It cannot be read, or a field is unknown, of the wrong type or out of range.
     """
     try:
-        fields = tomllib.loads(Path(source).read_text(encoding="utf-8-sig"))
+        fields = tomllib.loads(regular_file(source).read_text(encoding="utf-8-sig"))
     except (OSError, ValueError, RecursionError) as error:
         raise InputError(
             f"columns {source}: expected a readable TOML file, {without_breaks(error)}"

@@ -14,7 +14,7 @@ from spheretwin.electronics.drive import build_drive
 from spheretwin.electronics.sensor_chain import sensor_chain
 from spheretwin.machine.files import CONDITIONS, CURRENTS, log_signals
 from spheretwin.machine.log import COMMANDED, MEASURED
-from spheretwin.models.base.errors import InputError, SpheretwinError
+from spheretwin.models.base.errors import SpheretwinError
 from spheretwin.models.base.files import check_writable, whole_file
 from spheretwin.models.telemetry.parquet import TelemetryFile
 from spheretwin.models.telemetry.run_record import versions
@@ -88,12 +88,9 @@ def check_paths(log: Path | None, truth: Path | None) -> list[Path]:
     InputError
         One has another suffix, or cannot be written.
     """
-    for option, path, suffix in (("--export-log", log, ".parquet"), ("--export-truth", truth, ".json")):
-        if path and path.suffix != suffix:
-            raise InputError(f"command line: expected {option} FILE{suffix}, received {path}")
     paths = [path for path in (log, truth, truth and states_path(truth)) if path]
     for path in paths:
-        check_writable(path)
+        check_writable(path, ".json" if path == truth else ".parquet")
     return paths
 
 

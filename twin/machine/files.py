@@ -15,7 +15,7 @@ from spheretwin.machine import columns as column_maps
 from spheretwin.machine.columns import ColumnMap
 from spheretwin.machine.log import COMMANDED, MEASURED, Log
 from spheretwin.models.base.errors import InputError, shown
-from spheretwin.models.base.files import whole_file
+from spheretwin.models.base.files import regular_file, whole_file
 from spheretwin.models.telemetry import joint_states
 from spheretwin.models.telemetry.checksums import METADATA, open_parquet, unreadable
 from spheretwin.models.telemetry.joint_states import ANGLE_NAMES, Topic, group_names
@@ -137,7 +137,7 @@ def _read_columns(path: Path) -> tuple[dict[str, Array], dict[str, str]]:
 
     try:
         if path.suffix == ".csv":
-            table = pyarrow.csv.read_csv(path)
+            table = pyarrow.csv.read_csv(regular_file(path))
         else:
             with open_parquet(path) as file:
                 table = file.read(use_threads=False)

@@ -10,7 +10,6 @@ import tomllib
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from importlib import resources
 from importlib.resources.abc import Traversable
-from pathlib import Path
 from typing import Any, get_args
 
 import numpy as np
@@ -18,6 +17,7 @@ from pydantic import BaseModel, ValidationError
 from pydantic.fields import FieldInfo
 
 from spheretwin.models.base.errors import InputError, did_you_mean, is_plain, shown, without_breaks
+from spheretwin.models.base.files import regular_file
 from spheretwin.models.base.user_code import file_of, is_reference
 from spheretwin.scenario.fields import (
     every_field,
@@ -78,7 +78,7 @@ def read_toml(what: str, source: str, shipped_folder: Traversable) -> tuple[dict
         text = (shipped_folder / f"{source}.toml").read_text(encoding="utf-8")
     elif source.endswith(".toml"):
         try:
-            text = Path(path).read_text(encoding="utf-8-sig")  # some editors write a byte-order mark
+            text = regular_file(path).read_text(encoding="utf-8-sig")  # some editors write a byte-order mark
         except (OSError, ValueError) as error:  # ValueError: not UTF-8, or a null character in the path
             raise InputError(
                 f"{what} {source}: expected a readable TOML file, {without_breaks(error)}"

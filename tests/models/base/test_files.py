@@ -7,8 +7,8 @@ import stat
 import numpy as np
 import pytest
 
-from spheretwin.models.base.errors import InputError, SpheretwinError
-from spheretwin.models.base.files import OutputFile, check_writable, whole_file
+from spheretwin.models.base.errors import InputError, SpheretwinError, without_breaks
+from spheretwin.models.base.files import OutputFile, check_writable, regular_file, whole_file
 from spheretwin.models.telemetry.parquet import PART_ROWS, TelemetryFile
 from spheretwin.models.telemetry.signals import common_signals, width
 from spheretwin.models.telemetry.table import Table
@@ -140,8 +140,32 @@ def test_a_name_too_long_to_be_hidden_is_found_before_work_begins(tmp_path):
 
 
 def test_the_longest_name_leaves_room_for_the_parts_of_a_run(tmp_path):
-    check_writable(path := tmp_path / ("n" * LONGEST))
+    name = "n" * (LONGEST - len(".parquet")) + ".parquet"
+    check_writable(path := tmp_path / name, ".parquet")
     file = TelemetryFile(path, SIGNALS, {})
     file.write(Table(SIGNALS, np.zeros((PART_ROWS + 1, width(SIGNALS)))))
     file.close({})
-    assert os.listdir(tmp_path) == ["n" * LONGEST]
+    assert os.listdir(tmp_path) == [name]
+
+
+def test_a_file_of_another_format_is_refused_by_its_name(tmp_path):
+    check_writable(tmp_path / "run.parquet", ".parquet")
+    for name in ("run.csv", "run.mat", "run.PARQUET", "run", ".parquet"):
+        with pytest.raises(InputError, match=rf"expected a name that ends in \.parquet, received .*{name}$"):
+            check_writable(tmp_path / name, ".parquet")
+
+
+def test_an_input_without_an_end_is_refused_at_once(tmp_path):
+    (tmp_path / "zero").symlink_to("/dev/zero")
+    os.mkfifo(tmp_path / "pipe")
+    (tmp_path / "folder").mkdir()
+    (tmp_path / "file").write_text("1")
+    (tmp_path / "link").symlink_to("file")
+    assert regular_file(tmp_path / "link").read_text() == "1"
+    kinds = {"zero": "a device", "pipe": "a named pipe", "folder": "a folder"}
+    for name, kind in kinds.items():
+        with pytest.raises(OSError, match=None) as error:  # noqa: PT011
+            regular_file(tmp_path / name)
+        assert without_breaks(error.value) == f"it is {kind}, not a regular file: {tmp_path / name}"
+    with pytest.raises(FileNotFoundError):
+        regular_file(tmp_path / "missing")

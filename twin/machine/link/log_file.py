@@ -31,7 +31,7 @@ class LogFile:
     """
 
     def __init__(self, path: Path, late_ticks: Container[int], period_s: float) -> None:
-        check_writable(path)
+        check_writable(path, ".parquet")
         self._path, self._late_ticks, self._period_s = path, late_ticks, period_s
         self._parts: list[tuple[np.ndarray, ...]] = []
 
