@@ -6,7 +6,8 @@ Rerun, Foxglove and PlotJuggler show their numbers by name; messages in JSON or 
 from __future__ import annotations
 
 import struct
-from collections.abc import Mapping, Sequence
+import zlib
+from collections.abc import Iterator, Mapping, Sequence
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -16,7 +17,7 @@ from numpy.typing import NDArray
 
 from spheretwin.models.base.errors import InputError, without_breaks
 from spheretwin.models.base.extras import missing
-from spheretwin.models.base.files import whole_file
+from spheretwin.models.base.files import regular_file, whole_file
 
 Array = NDArray[np.float64]
 
@@ -40,6 +41,7 @@ uint32 nanosec
 METADATA = "spheretwin"
 ANGLE_NAMES = ("alpha", "beta", "gamma")
 _SECOND_ns = 10**9
+_FOOTER_BYTES, _CRC_AND_MAGIC_BYTES = 37, 12
 _LITTLE_ENDIAN = b"\x00\x01\x00\x00"
 
 
@@ -69,7 +71,7 @@ def write(path: Path, t_s: Array, topics: Mapping[str, Topic], metadata: Mapping
         raise InputError(f"MCAP {path}: expected times from 0 to 2**31 s, received others")
     stamps = np.rint(t_s * _SECOND_ns).astype(np.int64).tolist()
     with whole_file(path) as temporary, temporary.open("wb") as file:
-        writer = Writer(file)
+        writer = Writer(file, enable_data_crcs=True)
         writer.start(profile="ros2", library="spheretwin")
         writer.add_metadata(METADATA, dict(metadata))
         schema = writer.register_schema(TYPE, "ros2msg", DEFINITION.encode())
@@ -137,29 +139,58 @@ def read(path: Path) -> tuple[dict[str, Array], dict[str, str]]:
         The package mcap is not installed, the file cannot be read, or has no joint states.
     """
     _package()
-    from mcap.exceptions import McapError
-    from mcap.reader import make_reader
+    from mcap.records import Channel, DataEnd, Message, Metadata, Schema
 
     rows: list[dict[str, float]] = []
     metadata: dict[str, str] = {}
+    schemas: dict[int, Schema] = {}
+    topics: dict[int, str | None] = {}  # None for messages of another type
+    in_summary = False  # which repeats schemas and channels
     try:
-        with path.open("rb") as file:
-            reader = make_reader(file)
-            for record in reader.iter_metadata():
-                metadata |= record.metadata if record.name == METADATA else {}
-            for schema, channel, message in reader.iter_messages(log_time_order=False):
-                if schema is None or schema.name != TYPE or channel.message_encoding != ENCODING:
-                    continue
-                stamp_s, numbers = _decode(channel.topic.strip("/"), message.data)
-                if not rows or rows[-1]["t_s"] != stamp_s or not numbers.keys().isdisjoint(rows[-1]):
-                    rows.append({"t_s": stamp_s})
-                rows[-1] |= numbers
-    except (OSError, McapError, struct.error, ValueError, IndexError) as error:
+        for record in _records(path):
+            match record:
+                case DataEnd():
+                    in_summary = True
+                case Metadata(name=name) if name == METADATA:
+                    metadata |= record.metadata
+                case Schema() if not in_summary:
+                    schemas[record.id] = record
+                case Channel() if not in_summary:
+                    schema = schemas.get(record.schema_id)
+                    is_read = schema and schema.name == TYPE and record.message_encoding == ENCODING
+                    topics[record.id] = record.topic.strip("/") if is_read else None
+                case Message(channel_id=channel) if channel not in topics:
+                    raise ValueError(f"it has a message of channel {channel}, but not the channel")
+                case Message(channel_id=channel) if (topic := topics[channel]) is not None:
+                    stamp_s, numbers = _decode(topic, record.data)
+                    if not rows or rows[-1]["t_s"] != stamp_s or not numbers.keys().isdisjoint(rows[-1]):
+                        rows.append({"t_s": stamp_s})
+                    rows[-1] |= numbers
+    # The packages of MCAP, zstd and LZ4 raise errors of their own, and lack of memory, for a damaged file.
+    except Exception as error:
         raise InputError(f"MCAP {path}: expected a readable file, {without_breaks(error)}") from None
     if not rows:
         raise InputError(f"MCAP {path}: expected messages {TYPE} in CDR, received none")
     names = dict.fromkeys(name for row in rows for name in row)
     return {name: np.array([row.get(name, np.nan) for row in rows]) for name in names}, metadata
+
+
+def _records(path: Path) -> Iterator[Any]:
+    """Yield the records of a file in their order; compare the checksums of chunks, data and summary.
+
+    The reader of the package that seeks by the summary compares those of the chunks alone.
+    """
+    from mcap.records import Footer
+    from mcap.stream_reader import StreamReader
+
+    with regular_file(path).open("rb") as file:
+        size = path.stat().st_size
+        for record in StreamReader(file, validate_crcs=True, record_size_limit=size).records:
+            yield record
+        if isinstance(record, Footer) and record.summary_crc:
+            file.seek(record.summary_start or size - _FOOTER_BYTES)
+            if zlib.crc32(file.read()[:-_CRC_AND_MAGIC_BYTES]) != record.summary_crc:
+                raise ValueError("the checksum of its summary differs")
 
 
 def _decode(topic: str, data: bytes) -> tuple[float, dict[str, float]]:

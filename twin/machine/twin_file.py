@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
+import re
 import tomllib
 from collections.abc import Mapping, Sequence
 from importlib.metadata import version
@@ -15,12 +17,15 @@ from numpy.typing import NDArray
 from spheretwin.machine.intervals import Uncertainty
 from spheretwin.machine.log import Log
 from spheretwin.models.base.errors import InputError, shown, without_breaks
-from spheretwin.models.base.files import whole_file
+from spheretwin.models.base.files import regular_file, whole_file
 
 if TYPE_CHECKING:
     from spheretwin.machine.identification import Identified
 
 FORMAT = 1
+UNCHECKED = "unchecked"
+"""Digest of a file that was written or edited by hand."""
+UNSIGNED = f'sha256 = "{UNCHECKED}"'
 
 
 def write_twin(
@@ -48,6 +53,7 @@ def write_twin(
         raise InputError(f"twin {path}: expected an accepted identification, received {result.reasons[0]}")
     lines = [
         f"format = {FORMAT}",
+        UNSIGNED,
         f"scenario = {_text(scenario)}",
         f"versions = {_text({name: version(name) for name in ('spheretwin', 'numpy', 'scipy')})}",
         f"held_out_chi2 = {result.held_out.chi2!r}",
@@ -73,8 +79,9 @@ def write_twin(
             for log in logs
         ),
     ]
+    text = "\n".join(lines)
     with whole_file(path) as temporary:
-        temporary.write_text("\n".join(lines), encoding="utf-8")
+        temporary.write_text(text.replace(UNSIGNED, f'sha256 = "{_digest(text)}"', 1), encoding="utf-8")
 
 
 def read_twin(path: Path) -> dict[str, Any]:
@@ -152,15 +159,29 @@ def _identified(path: Path) -> tuple[str, dict[str, float], NDArray[np.float64]]
 
 def _content(path: Path) -> dict[str, Any]:
     try:
-        content = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
+        text = regular_file(path).read_text(encoding="utf-8-sig")
+        content = tomllib.loads(text)
+    except (OSError, ValueError, RecursionError) as error:
         raise InputError(f"twin {path}: expected a readable TOML file, {without_breaks(error)}") from None
     if content.get("format") != FORMAT or not isinstance(content.get("fields"), dict):
         raise InputError(
             f"twin {path}: expected format = {FORMAT} and a table [fields], received format"
             f" {content.get('format', 'none')!r} and fields {shown(content.get('fields', 'none'))}"
         )
+    digest = content.get("sha256")
+    if digest not in (UNCHECKED, _digest(text)):
+        received = "none" if digest is None else "one of another content: the file is damaged, or was edited"
+        raise InputError(
+            f"twin {path}: expected sha256 with the digest that `identify` wrote, received {received}; the"
+            f" line {UNSIGNED} accepts a file as it is, also one of an earlier version"
+        )
     return content
+
+
+def _digest(text: str) -> str:
+    """Return the digest of the text of a twin, without its first digest and the line breaks at its end."""
+    unsigned = re.sub(r"^sha256 = .*$", "", text.rstrip("\n"), count=1, flags=re.MULTILINE)
+    return hashlib.sha256(unsigned.encode()).hexdigest()
 
 
 def _text(value: Any) -> str:

@@ -1,11 +1,12 @@
 """Joint states in MCAP: every number comes back, and the bytes are CDR as the OMG specifies it."""
 
+import random
 import struct
 
 import numpy as np
 import pytest
 from mcap.reader import make_reader
-from mcap.writer import Writer
+from mcap.writer import CompressionType, Writer
 
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.telemetry import joint_states
@@ -83,3 +84,39 @@ def test_a_file_that_cannot_be_read_is_refused(path, damage):
 def test_times_before_zero_are_refused(tmp_path):
     with pytest.raises(InputError, match="expected times from 0"):
         joint_states.write(tmp_path / "a.mcap", np.array([-1.0, 0.0]), {}, {})
+
+
+def test_each_flipped_bit_and_each_cut_of_a_file_is_found(path):
+    content, draws = path.read_bytes(), random.Random(43)
+    for _ in range(300):
+        place, bit = draws.randrange(len(content)), 1 << draws.randrange(8)
+        damaged = bytearray(content)
+        damaged[place] ^= bit
+        for wrong in (damaged, content[:place]):
+            path.write_bytes(wrong)
+            with pytest.raises(InputError, match=r"MCAP .*run\.mcap: expected a readable file"):
+                joint_states.read(path)
+
+
+@pytest.mark.parametrize("compression", [CompressionType.ZSTD, CompressionType.LZ4])
+@pytest.mark.parametrize("chunked", [True, False])
+def test_a_damaged_file_of_another_program_is_no_other_error(path, compression, chunked, monkeypatch):
+    options = {"compression": compression, "use_chunking": chunked}
+    monkeypatch.setattr("mcap.writer.Writer", lambda file, **_: Writer(file, **options))
+    joint_states.write(path, TIMES, {"angles": Topic(ANGLE_NAMES, {"position": NUMBERS})}, {})
+    content, draws, changed = path.read_bytes(), random.Random(43), 0
+    numbers = joint_states.read(path)[0]
+    for _ in range(200):
+        damaged = bytearray(content)
+        damaged[draws.randrange(len(content))] ^= 1 << draws.randrange(8)
+        path.write_bytes(damaged)
+        try:
+            columns = joint_states.read(path)[0]
+        except InputError:
+            continue
+        same = columns.keys() == numbers.keys() and all(
+            np.array_equal(columns[name], numbers[name]) for name in numbers
+        )
+        changed += not same
+    if chunked:  # without chunks its writer computes no checksum of the data
+        assert not changed

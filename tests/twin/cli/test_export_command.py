@@ -11,6 +11,7 @@ from tests.requirements import needs_c_compiler
 from tests.twin.cli.calls import call, refusal
 
 TWIN = """format = 1
+sha256 = "unchecked"
 scenario = "hold"
 [fields]
 "plant.payload_kg" = 0.05

@@ -1,0 +1,65 @@
+"""File of a twin: its digest, and how a file without one is accepted."""
+
+import random
+import re
+
+import numpy as np
+import pytest
+
+from spheretwin.machine import Log
+from spheretwin.machine.identification import Estimate, Fit, Identified
+from spheretwin.machine.twin_file import UNSIGNED, read_twin, read_uncertainty, write_twin
+from spheretwin.models.base.errors import InputError
+
+FIELDS = {"plant.coulomb_Nm": [0.003, 0.003, 0.004], "plant.modelling_error": 0.1}
+FIT = Fit(1.0, np.ones(3))
+RESULT = Identified(
+    accepted=True,
+    parameters={"torque_scale": Estimate(0.97, (0.96, 0.98), "1")},
+    refused=(), correlations=(), train=FIT, held_out=FIT, held_out_before=FIT, improvement=0.5, reasons=(),
+    covariance=np.array([[2.5e-5]]),
+    fields=FIELDS,
+)  # fmt: skip
+LOG = Log([0.0, 1.0], np.zeros((2, 18)), np.zeros((2, 3)), name="log.csv")
+
+
+@pytest.fixture
+def path(tmp_path):
+    write_twin(path := tmp_path / "twin.toml", RESULT, "hold", {"plant.payload_kg": 0.05}, [LOG])
+    return path
+
+
+def test_each_changed_character_and_each_cut_is_refused_by_name(path):
+    text, draws = path.read_text(), random.Random(43)
+    assert LOG.digest in text
+    digits = [match.start() for match in re.finditer(r"\d", text)]
+    assert len(digits) > 100
+    for place in digits:
+        wrong = f"{text[:place]}{(int(text[place]) + 1) % 10}{text[place + 1 :]}"
+        path.write_text(wrong)
+        with pytest.raises(InputError, match=r"twin .*twin\.toml: expected (sha256|format)"):
+            read_twin(path)
+    for _ in range(300):
+        place, content = draws.randrange(len(text)), bytearray(text.encode())
+        content[place] ^= 1 << draws.randrange(8)
+        for wrong in (content, content[:place]):
+            path.write_bytes(wrong)
+            with pytest.raises(InputError, match=r"twin .*twin\.toml: expected"):
+                read_twin(path)
+
+
+def test_line_breaks_of_another_system_are_no_change(path):
+    text = path.read_text()
+    path.write_bytes(b"\xef\xbb\xbf" + text.rstrip("\n").replace("\n", "\r\n").encode())
+    assert read_twin(path) == {"plant.payload_kg": 0.05, **FIELDS}
+    assert read_uncertainty(path).names == ("torque_scale",)
+
+
+@pytest.mark.parametrize("line", ["", "sha256 = 5", 'sha256 = ["unchecked"]', 'sha256 = "Unchecked"'])
+def test_the_line_that_accepts_an_edited_file_or_one_of_an_earlier_version(path, line):
+    edited = path.read_text().replace("0.004", "0.005")
+    path.write_text(re.sub("^sha256 = .*$", line, edited, count=1, flags=re.MULTILINE))
+    with pytest.raises(InputError, match=f"the line {UNSIGNED} accepts a file as it is"):
+        read_twin(path)
+    path.write_text(re.sub("^sha256 = .*$", UNSIGNED, edited, count=1, flags=re.MULTILINE))
+    assert read_twin(path)["plant.coulomb_Nm"] == [0.003, 0.003, 0.005]
