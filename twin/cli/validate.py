@@ -35,6 +35,7 @@ def run(options: argparse.Namespace) -> bool:
         print_json(
             {
                 "accepted": result.accepted,
+                "log_sha256": log.digest,
                 "accepted_findings": list(log.accepted),
                 "chi2": {"all": result.chi2, **result.hinge_chi2},
                 "structure": result.structure,

@@ -68,7 +68,8 @@ def run(options: argparse.Namespace) -> bool:
         for block in blocks(options, log, model.groups, stop_requested):
             alarms = watch.advance(block)
             for alarm in alarms:
-                print_json({**alarm._asdict(), "accepted_findings": list(block.accepted)})
+                of_log = {"log_sha256": log and log.digest, "accepted_findings": list(block.accepted)}
+                print_json({**alarm._asdict(), **of_log})
             if view and estimator:
                 view.judge(watch.judged, [(alarm.t_s, alarm.text()) for alarm in alarms])
                 view.write(estimator.advance(block), block.current_A)

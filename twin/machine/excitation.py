@@ -7,7 +7,7 @@ from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
 from spheretwin import scenario as scenarios
 from spheretwin.machine.identification import Problem
@@ -15,6 +15,7 @@ from spheretwin.machine.log import Log
 from spheretwin.models.base.errors import SpheretwinError
 from spheretwin.models.telemetry.status import Status
 from spheretwin.models.telemetry.table import Table
+from spheretwin.scenario.fields import SettingsModel
 from spheretwin.scenario.sections import Scenario
 from spheretwin.simulation import simulate
 
@@ -24,10 +25,8 @@ REFERENCE = {"trajectory.shape": "nutation"}
 """Motion with which a design is compared."""
 
 
-class DesignSettings(BaseModel):
+class DesignSettings(SettingsModel):
     """Settings of a design."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
     duration_s: Annotated[float, Field(ge=0.5, le=600)] = Field(
         4.0, description="length of the experiment, s"

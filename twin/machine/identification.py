@@ -8,7 +8,7 @@ from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 from scipy.optimize import least_squares
 
 from spheretwin.machine.intervals import Cost, Uncertainty, interval
@@ -16,6 +16,7 @@ from spheretwin.machine.log import Log
 from spheretwin.machine.parameters import Machine, Parameter, priors, selected, short_names
 from spheretwin.machine.windows import Part, Shooting, Window, windows_of
 from spheretwin.models.base.errors import InputError
+from spheretwin.scenario.fields import SettingsModel
 
 Array = NDArray[np.float64]
 
@@ -23,10 +24,8 @@ Array = NDArray[np.float64]
 _MOST_EVALUATIONS = 30
 
 
-class IdentifySettings(BaseModel):
+class IdentifySettings(SettingsModel):
     """Settings of an identification."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
     window_s: Annotated[float, Field(gt=0, le=60)] = Field(0.2, description="length of a window, s")
     held_out: Annotated[float, Field(ge=0.1, le=0.5)] = Field(

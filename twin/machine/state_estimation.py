@@ -8,7 +8,7 @@ from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
 from spheretwin.electronics.logged_currents import mean_currents
 from spheretwin.machine.log import MEASURED, Log, joined
@@ -18,15 +18,14 @@ from spheretwin.models.coil_group import of_each_group
 from spheretwin.models.telemetry.signals import ANGLES, Signal
 from spheretwin.models.telemetry.table import Table
 from spheretwin.plant.state_filter import STATES, Estimates, StateFilter, run_filter
+from spheretwin.scenario.fields import SettingsModel
 from spheretwin.scenario.sections import Scenario
 
 Array = NDArray[np.float64]
 
 
-class ShadowSettings(BaseModel):
+class ShadowSettings(SettingsModel):
     """Settings of the shadow."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
     disturbance_walk_Nm: Annotated[float, Field(ge=0, le=1e3)] = Field(
         0.01, description="growth of the disturbance torque within a second, N·m (assumed: 0.01)"

@@ -16,13 +16,14 @@ from typing import Annotated, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
 from spheretwin.machine.log import Log, joined
 from spheretwin.machine.parameters import Kind, Machine, Parameter, selected
 from spheretwin.machine.state_estimation import Shadow
 from spheretwin.machine.windows import Part, Shooting, Window
 from spheretwin.models.base.errors import InputError
+from spheretwin.scenario.fields import SettingsModel
 
 Array = NDArray[np.float64]
 
@@ -32,10 +33,8 @@ WATCHED = ("torque_scale", "plant.group_gain", "plant.coulomb_Nm", "sensors.angl
 UNNAMED = "unexplained"
 
 
-class WatchSettings(BaseModel):
+class WatchSettings(SettingsModel):
     """Settings of a watch."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
     window_s: Annotated[float, Field(gt=0, le=60)] = Field(0.1, description="length of a window, s")
     false_alarms_per_hour: Annotated[float, Field(gt=0, le=3600)] = Field(

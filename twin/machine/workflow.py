@@ -11,7 +11,7 @@ from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
 from spheretwin import scenario as scenarios
 from spheretwin.machine.excitation import Design, DesignSettings, design
@@ -27,6 +27,7 @@ from spheretwin.machine.verdict import Verdict, check
 from spheretwin.machine.watching import Alarm, Watch
 from spheretwin.models import actuator as actuators
 from spheretwin.models.base.errors import SpheretwinError
+from spheretwin.scenario.fields import SettingsModel
 from spheretwin.session import Session
 
 Array = NDArray[np.float64]
@@ -59,10 +60,8 @@ CHANGED_s, AFTER_s = 2.5, 1.0
 """Time of a change, after the watch has measured the noise, and time that follows it."""
 
 
-class WorkflowSettings(BaseModel):
+class WorkflowSettings(SettingsModel):
     """Settings of the workflow."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
     seed: Annotated[int, Field(ge=0)] = Field(0, description="seed of the hidden machine and of its sensors")
     design: DesignSettings = Field(

@@ -9,10 +9,10 @@ from functools import cache, lru_cache
 from types import NoneType, UnionType
 from typing import Annotated, Any, NamedTuple, Union, get_args, get_origin
 
-from pydantic import BaseModel, ValidationError
+from pydantic import BaseModel, ConfigDict, ValidationError
 from pydantic.fields import FieldInfo
 
-from spheretwin.models.base.errors import did_you_mean, shown
+from spheretwin.models.base.errors import InputError, did_you_mean, shown
 from spheretwin.models.base.user_code import is_reference
 
 INDEX = "#"
@@ -232,6 +232,18 @@ EXPECTED = {
 
 OTHERWISE = "a valid value"
 """Expected value of a type that only a section of the user has."""
+
+
+class SettingsModel(BaseModel):
+    """Settings of a function: a value that they cannot have is an `InputError`, as in a scenario."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+    def __init__(self, **values: Any) -> None:
+        try:
+            super().__init__(**values)
+        except ValidationError as error:
+            raise InputError(f"settings: {explain(error, type(self))}") from None
 
 
 def explain(error: ValidationError, scenario: type[BaseModel]) -> str:

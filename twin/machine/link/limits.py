@@ -6,21 +6,22 @@ from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import ConfigDict, Field
 
 from spheretwin.control.supervision.watchdog import Reason
 from spheretwin.electronics.drive_section import ResolvedDrive
 from spheretwin.external import Measurement
+from spheretwin.scenario.fields import SettingsModel
 
 Array = NDArray[np.float64]
 
 Positive = Annotated[float, Field(gt=0, le=1e6)]
 
 
-class Limits(BaseModel):
+class Limits(SettingsModel):
     """Limits of the measurements of a machine."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
+    model_config = ConfigDict(strict=True)
 
     current_A: Positive = Field(description="largest commanded current of a group, A")
     current_excess_A: Positive = Field(

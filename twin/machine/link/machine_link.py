@@ -8,7 +8,7 @@ from typing import Annotated, Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import ConfigDict, Field
 
 from spheretwin.control.supervision.watchdog import Reason
 from spheretwin.external import Measurement
@@ -21,6 +21,7 @@ from spheretwin.machine.link.limits import CoilHeat, Limits
 from spheretwin.machine.link.timing import Distribution
 from spheretwin.machine.link.transports import open_transport
 from spheretwin.models.base.errors import InputError, SpheretwinError, distinct_texts
+from spheretwin.scenario.fields import SettingsModel
 from spheretwin.scenario.sections import ResolvedScenario, Scenario
 from spheretwin.session import Session
 
@@ -49,10 +50,10 @@ class ParallelShadow(Protocol):
         """
 
 
-class LinkSettings(BaseModel):
+class LinkSettings(SettingsModel):
     """Settings of the drive of a machine."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
+    model_config = ConfigDict(strict=True)
 
     armed: bool = Field(False, description="whether currents are sent; otherwise all are 0: a dry run")
     ramp_s: Annotated[float, Field(ge=0, le=1e3)] = Field(
