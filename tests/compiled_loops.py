@@ -1,4 +1,4 @@
-"""Compile the loop and the stages of the first suite; otherwise each process of the tests would compile its own."""
+"""Compile the loop and the stages of the first suite, which otherwise each process of the tests compiles."""
 
 from multiprocessing import get_context
 

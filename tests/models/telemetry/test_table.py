@@ -46,6 +46,19 @@ def test_another_reader_can_compare_the_checksums_of_pages(table, tmp_path):
         pyarrow.parquet.ParquetFile(path, page_checksum_verification=True).read()
 
 
+@pytest.mark.release("flips every byte for 2 s; test_damage.py has each kind of damage")
+def test_every_byte_of_a_file_is_checked(table, tmp_path):
+    """Magic, pages with their headers, footer, its length and its checksum."""
+    table.write_parquet(path := tmp_path / "run.parquet", {"scenario": "{}"})
+    content = path.read_bytes()
+    for place in [*range(0, len(content) - 600, 7), *range(len(content) - 600, len(content))]:
+        damaged = bytearray(content)
+        damaged[place] ^= 1 << place % 8  # another bit of each byte
+        path.write_bytes(damaged)
+        with pytest.raises(InputError, match=r"the file is damaged|expected a telemetry file"):
+            read_parquet(path)
+
+
 def test_a_foreign_file_is_bad_input(tmp_path):
     (foreign := tmp_path / "foreign.parquet").write_text("no parquet")
     with pytest.raises(InputError, match="expected a telemetry file"):

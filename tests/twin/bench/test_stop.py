@@ -3,8 +3,49 @@
 import numpy as np
 import pytest
 
+from spheretwin import scenario as scenarios
+from spheretwin.bench import Bench
 from spheretwin.bench.driver import HELD_s
 from tests.twin.bench.cases import begun, bench, done, kept_rows, said, same_when_replayed
+
+# Enough to tip the rotor over from any pose, and some friction, so that it comes to rest.
+TIPPING = {"disturbance__load": 0.05, "plant__payload_kg": 0.05, "plant__viscous_Nm_s": [2e-3, 2e-3, 2e-3]}
+
+
+STOPS = pytest.mark.release("compiles a loop of its own for 10 s; tests/twin/plant has its rest")
+
+
+@STOPS
+@pytest.mark.parametrize("command", ["off", "manual", "stop"])
+def test_a_rotor_that_is_let_go_comes_to_rest_at_its_limit(command):
+    arguments = {"group": 3, "current_A": 1.0} if command == "manual" else {}
+    with begun("hold", plant__end_stops__on=True, **TIPPING) as bench:
+        bench.advance(50)
+        done(bench, command, **arguments)
+        bench.advance(20_000)
+        state = bench.state()
+        assert (state.status, state.reason, state.tick) == ("running", None, 20_050)
+        assert np.abs(state.qdot_rad_s[:2]).max() < 1e-3
+        assert np.all(np.abs(state.q_rad[:2]) < np.radians(80))
+        # Usable: the law brings it back.
+        if command == "stop":
+            done(bench, "reset")
+            done(bench, "start")
+        done(bench, "point", pose_rad=[0.2, 0.1, 0.0])
+        bench.advance(6000)
+        assert bench.state().error_mrad < 50
+
+
+@STOPS
+def test_the_bench_that_starts_without_arguments_can_be_left_without_currents():
+    """No constant load may accelerate the axis without an end until the watchdog ends the run."""
+    with Bench(scenarios.load("bench", {"plant.engine": "lagrangian"})) as bench:
+        done(bench, "start")
+        bench.advance(1000)
+        done(bench, "off")
+        bench.advance(15_000)
+        assert (bench.state().mode, bench.state().status) == ("off", "running")
+        done(bench, "hold")
 
 
 @pytest.mark.uncompiled

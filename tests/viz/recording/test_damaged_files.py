@@ -1,11 +1,20 @@
 """Damage that crashes Rerun's reader only ends a separate process, and is reported on one line."""
 
+import os
+import random
+import subprocess
 import sys
 
 import pytest
 
+from spheretwin import scenario as scenarios
 from spheretwin.models.base.errors import InputError, SpheretwinError
+from spheretwin.outputs import Outputs
+from spheretwin.session import Session
+from spheretwin.simulation import follow
 from spheretwin.viz import rerun_internals
+
+FILES = 24
 
 
 def program(folder, text):
@@ -32,3 +41,39 @@ def test_a_missing_reader_is_reported(tmp_path, monkeypatch):
     monkeypatch.setattr(rerun_internals, "PROGRAM", tmp_path / "none")
     with pytest.raises(SpheretwinError, match="expected Rerun at"):
         rerun_internals.check_readable(tmp_path / "run.rrd", "run.rrd")
+
+
+READ = """
+import sys
+from spheretwin import cli
+for path in sys.argv[1:]:
+    print(cli.main(["review", path, "--json"]), path, file=sys.stderr)
+"""
+
+
+@pytest.mark.release("reads 24 files for 2.3 s; test_a_reader_that_dies_is_damage has the end of a reader")
+def test_no_damage_ends_the_process_or_says_more_than_a_line(tmp_path):
+    """Bits, bytes, blocks, wherever they are; a damaged number may stay a number."""
+    whole = tmp_path / "whole.rrd"
+    with Session(scenarios.load("hold", {"plant.engine": "lagrangian", "duration": 0.3})) as session:
+        files = Outputs(session, whole, None, live=False)
+        follow(session, session.scenario.ticks, files.sinks)
+        assert files.close() == []
+    content, draws, paths = whole.read_bytes(), random.Random(0), []
+    for number in range(FILES):
+        damaged = bytearray(content)
+        at = draws.randrange(12, len(damaged) - 5000)
+        size = (1, 1, 2000, 4)[number % 4]
+        damaged[at : at + size] = draws.randbytes(size) if number % 4 else bytes([damaged[at] ^ 8])
+        paths.append(tmp_path / f"{number}.rrd")
+        paths[-1].write_bytes(damaged)
+    done = subprocess.run(
+        [sys.executable, "-c", READ, *map(str, paths)], capture_output=True, text=True,
+        env={**os.environ, "RUST_BACKTRACE": "0"},
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    lines = done.stderr.splitlines()
+    messages = [[line for line in lines if str(path) in line] for path in paths]
+    for of_file in messages:
+        assert (of_file[-1].split()[0], len(of_file)) in {("0", 1), ("2", 2)}
+    assert sum(map(len, messages)) == len(lines)

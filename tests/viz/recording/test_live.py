@@ -1,8 +1,13 @@
 """Live view of a run: envelopes of all ticks, unchanged telemetry, no request to other machines."""
 
+import os
+import signal
 import socket
+import subprocess
+import sys
 import urllib.parse
 import urllib.request
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -111,6 +116,36 @@ def test_plots_follow_the_cursor_over_the_chosen_window():
     assert encoded.to_pylist() == [{"start": -4_000_000_000, "end": 0}]
     for end in ("start", "end"):
         assert encoded.field(end).type_codes.to_pylist() == [1]  # relative to the cursor
+
+
+@pytest.mark.release("1.2 s; test_viewer_server.py has a server of a killed process")
+def test_a_killed_run_leaves_no_server():
+    """Nothing that it started goes on: the kernel closes its ports, and no process has its mark."""
+    mark = f"LIVE_MARK_{os.getpid()}"
+    command = [sys.executable, "-m", "spheretwin", "simulate", "hold", "--live", "--duration", "60"]
+    command += ["--plant.engine", "lagrangian"]
+    process = subprocess.Popen(
+        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env={**os.environ, mark: "1"}
+    )
+    parts = urllib.parse.urlsplit(process.stderr.readline().split()[1])
+    asking(parts.geturl()).close()
+    process.send_signal(signal.SIGKILL)
+    process.communicate()
+    wait_for(lambda: not marked(mark))
+    with socket.socket() as probe:
+        assert probe.connect_ex((parts.hostname, parts.port)) != 0
+
+
+def marked(mark):
+    """Processes that have a variable in their environment."""
+    results = []
+    for process in Path("/proc").glob("[0-9]*"):
+        try:
+            if mark.encode() in (process / "environ").read_bytes() and process.name != str(os.getpid()):
+                results.append((process / "cmdline").read_bytes())
+        except OSError:  # it has ended, or is another's
+            continue
+    return results
 
 
 @pytest.mark.release("browser and viewer, 14 s; test_viewer_server.py has the addresses")
