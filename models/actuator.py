@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sized
+from collections.abc import Mapping, Sized
 from dataclasses import dataclass, replace
 from functools import cache, lru_cache
 from math import hypot, pi, sqrt
 from pathlib import Path
+from types import MappingProxyType
 
 import mujoco
 import numpy as np
@@ -14,7 +15,7 @@ from numpy.typing import NDArray
 
 from spheretwin.models import torque_curve, torque_field
 from spheretwin.models.base.errors import InputError, distinct_texts
-from spheretwin.models.coil_group import CoilGroup, read_group
+from spheretwin.models.coil_group import CoilGroup, read_group, read_heat
 from spheretwin.models.mjcf import Mjcf, read
 from spheretwin.models.mjcf_reader import (
     LARGEST_LENGTH_M,
@@ -143,6 +144,8 @@ class Actuator:
         Geometry shared by all poles and by all coils.
     group
         Electrical and thermal data of the groups.
+    heat
+        Thermal data of stator and rotor that the model file states, by the name of the number.
     torque_data
         Torque of one coil per ampere: on one pole, or on the rotor.
     """
@@ -159,6 +162,7 @@ class Actuator:
     magnet: Magnet
     coil: CoilGeometry
     group: CoilGroup
+    heat: Mapping[str, float]
     torque_data: TorqueData
 
     @property
@@ -256,6 +260,7 @@ def from_model(model: mujoco.MjModel, torque_data: TorqueData) -> Actuator:
         magnet=_magnet(model, poles),
         coil=read_coil(model),
         group=read_group(model, len(groups)),
+        heat=MappingProxyType(read_heat(model)),
         torque_data=torque_data,
     )
 

@@ -1,4 +1,4 @@
-"""Electrical and thermal data of the coil groups in a model file: one value of all, or one for each."""
+"""Electrical and thermal data in a model file; of the coil groups one value of all, or one for each."""
 
 from __future__ import annotations
 
@@ -29,6 +29,17 @@ THERMAL = {
 """Bounds of the numbers that a model file may state."""
 
 PREFIX = "group_"
+
+HEAT = {
+    "magnet_remanence_per_K": (-0.01, 0.0),
+    "magnet_temperature_limit_degC": (-60.0, 300.0),
+    "stator_heat_capacity_J_K": (1e-3, 1e7),
+    "rotor_heat_capacity_J_K": (1e-3, 1e7),
+    "stator_to_ambient_K_W": (1e-6, 1e6),
+    "air_gap_K_W": (1e-6, 1e6),
+    "rotor_to_ambient_K_W": (1e-6, 1e6),
+}
+"""Bounds of the thermal data of stator and rotor that a model file may state."""
 
 
 @dataclass(frozen=True)
@@ -88,6 +99,21 @@ def read_group(model: mujoco.MjModel, groups: int) -> CoilGroup:
     return group
 
 
+def read_heat(model: mujoco.MjModel) -> dict[str, float]:
+    """Read the thermal data of stator and rotor that a compiled model states.
+
+    Raises
+    ------
+    InputError
+        A number is out of bounds.
+    """
+    return {
+        name: float(np.max(_numbers(model, name, 1, bounds)))
+        for name, bounds in HEAT.items()
+        if _index(model, name) >= 0
+    }
+
+
 def _index(model: mujoco.MjModel, name: str) -> int:
     return int(mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_NUMERIC, name))
 
@@ -107,8 +133,6 @@ def _numbers(model: mujoco.MjModel, name: str, groups: int, bounds: tuple[float,
     named(model, mujoco.mjtObj.mjOBJ_NUMERIC, "custom numeric", name)
     values = [within(float(value), *bounds, name) for value in model.numeric(name).data]
     if len(values) not in (1, groups):
-        raise InputError(
-            f"model: expected {name} as one number or one for each of {groups} groups,"
-            f" received {len(values)} numbers"
-        )
+        each = f" or one for each of {groups} groups" if groups > 1 else ""
+        raise InputError(f"model: expected {name} as one number{each}, received {len(values)} numbers")
     return per_group(values)

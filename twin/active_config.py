@@ -23,7 +23,7 @@ from spheretwin.models.actuator import Actuator
 from spheretwin.models.base.errors import InputError, distinct_texts, shown
 from spheretwin.models.base.reuse import reused
 from spheretwin.models.base.user_code import is_reference
-from spheretwin.models.coil_group import CoilGroup, per_group
+from spheretwin.models.coil_group import per_group
 from spheretwin.models.inductance import mutual_inductance
 from spheretwin.models.lagrangian import loaded_inertia
 from spheretwin.models.magnetics import disagreements
@@ -32,16 +32,16 @@ from spheretwin.models.mjcf_reader import HINGES
 from spheretwin.models.telemetry.run_record import Change
 from spheretwin.models.telemetry.signals import Signal, with_more
 from spheretwin.models.torque_field import TorqueField
+from spheretwin.plant.magnet_heat import ResolvedThermal
 from spheretwin.plant.mujoco_rotor import integrator_name
 from spheretwin.scenario.changes import first_tick, scheduled_changes, with_change
 from spheretwin.scenario.files import Files, files_of, nominal_curve, reload_files
 from spheretwin.scenario.hardware import (
     HARDWARE,
-    MACHINE_FIELDS,
     PER_GROUP,
     SCATTER_OF_A_CURVE,
     amplifier_limit_A,
-    assumed_value,
+    machine_values,
 )
 from spheretwin.scenario.plant_sections import NominalSection, PlantSection, ResolvedNominal, ResolvedPlant
 from spheretwin.scenario.reading import as_plain
@@ -64,7 +64,8 @@ def fill_defaults(
     """
     actuator, section = files.actuator, _applicable(scenario, files.actuator)
     _check_groups(scenario, actuator)
-    drive = _drive(scenario.drive, actuator.group, scenario.hardware)
+    drive = _drive(scenario.drive, actuator, scenario.hardware)
+    heat = machine_values(actuator, scenario.hardware, "plant.thermal")
     if section.thermal.on and drive.supply_V is None:
         raise InputError("scenario: expected a drive.supply_V with plant.thermal.on, received none")
     if drive.coil_coupling:
@@ -75,6 +76,7 @@ def fill_defaults(
         initial_rad=section.initial_rad
         or (_first_pose(trajectory) if trajectory else _shipped_first_pose(scenario.trajectory)),
         gravity_m_s2=_gravity(section, files.model),
+        thermal=_with(ResolvedThermal, section.thermal, **_given_or(section.thermal, heat)),
         group_gain=section.group_gain or (1.0,) * len(actuator.groups),
         end_stops=section.end_stops.model_copy(update={"on": bool(section.end_stops.on)}),
     )
@@ -125,17 +127,14 @@ def _with(kind: type[Section], section: BaseModel, **values: Any) -> Section:
     return kind.model_construct(**{**dict(section), **values})
 
 
-def _drive(section: DriveSection, group: CoilGroup, hardware: str) -> ResolvedDrive:
+def _drive(section: DriveSection, actuator: Actuator, hardware: str) -> ResolvedDrive:
     """Return the drive: coils and, without a supply, lag are those of the model file unless given.
 
     The current limit is the smaller one of the model file and of the amplifiers of the hardware set. Thermal
     data that the model file does not state are those assumed with the set.
     """
-    stated = {MACHINE_FIELDS[name]: getattr(group, name) for name in MACHINE_FIELDS}
-    sheet = {
-        name: assumed_value(hardware, name) if value is None else value for name, value in stated.items()
-    }
-    sheet["current_limit_A"] = min(group.current_limit_A, amplifier_limit_A(hardware))
+    sheet = machine_values(actuator, hardware, "drive")
+    sheet["current_limit_A"] = min(sheet["current_limit_A"], amplifier_limit_A(hardware))
     drive = _with(ResolvedDrive, section, **_given_or(section, sheet))
     if drive.time_constant_s is not None or drive.supply_V is not None:
         return drive
@@ -171,12 +170,12 @@ def _model_sheet(actuator: Actuator, hardware: str) -> dict[str, Any]:
 
     The current limit is the one that holds with the amplifiers of the hardware set.
     """
-    group, ideal = actuator.group, (0.0, 0.0, 0.0)
+    ideal = (0.0, 0.0, 0.0)
     return {
         "coulomb_Nm": ideal,
         "viscous_Nm_s": ideal,
         "inertia_kg_m2": tuple(actuator.inertia.tolist()),
-        **drive_sheet(_drive(DriveSection(), group, hardware)),
+        **drive_sheet(_drive(DriveSection(), actuator, hardware)),
         **sensor_sheet(SensorsSection()),
     }
 

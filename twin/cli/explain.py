@@ -10,22 +10,15 @@ from spheretwin import scenario as scenarios
 from spheretwin.active_config import initial_config
 from spheretwin.cli.common import print_json
 from spheretwin.cli.options import Parser
+from spheretwin.models.actuator import Actuator
 from spheretwin.models.base.errors import InputError, did_you_mean, shown
-from spheretwin.models.coil_group import PREFIX, CoilGroup
 from spheretwin.scenario import reading
 from spheretwin.scenario.fields import every_field, unit_of
-from spheretwin.scenario.hardware import HARDWARE, MACHINE, MACHINE_FIELDS, ORIGINS, Origin
+from spheretwin.scenario.hardware import HARDWARE, MACHINE, MODEL_FILE, ORIGINS, Origin, stated_value
 from spheretwin.scenario.sections import Scenario
 from spheretwin.viz.terminal.texts import print_facts
 
 DEFAULT = "default"
-
-MODEL_FILE = {
-    **{field: PREFIX + number for number, field in MACHINE_FIELDS.items()},
-    "current_limit_A": "group_current_limit_A",
-    "inertia_kg_m2": "inertia of the body rotor",
-}
-"""Fields of `drive` and `nominal` whose default is a number of the model file, and its name there."""
 
 
 class FieldFacts(NamedTuple):
@@ -112,32 +105,32 @@ def _of_scenario(source: str, everything: bool) -> Iterator[FieldFacts]:
         elif value == field.default:
             origin = DEFAULT
         else:
-            origin = _of_machine(dotted, scenario, config.files.actuator.group)
-        if everything or origin != DEFAULT:
+            origin = _of_machine(dotted, scenario, config.files.actuator)
+        if everything or not origin.startswith(DEFAULT):
             yield _fact(dotted, value, field, origin)
 
 
-def _of_machine(dotted: str, scenario: Scenario, group: CoilGroup) -> str:
+def _of_machine(dotted: str, scenario: Scenario, actuator: Actuator) -> str:
     """Return the origin of a value that neither the scenario nor the hardware set states.
 
     Parameters
     ----------
     dotted : str
     scenario : Scenario
-    group : CoilGroup
+    actuator : Actuator
         Data of the model file.
     """
-    section, _, name = dotted.partition(".")
-    knows_truth = section == "nominal" and scenario.nominal.equals_truth
-    if name not in MODEL_FILE or section not in ("drive", "nominal") or knows_truth:
+    section, _, name = dotted.rpartition(".")
+    if dotted not in MODEL_FILE or (section == "nominal" and scenario.nominal.equals_truth):
         return "computed from the model file and other fields"
-    assumed, limit_A = MACHINE[scenario.hardware].get(f"drive.{name}"), group.current_limit_A
-    stated = getattr(group, MODEL_FILE[name].removeprefix(PREFIX), MODEL_FILE[name])
-    if assumed and stated is None:
-        return f"hardware {scenario.hardware}: {assumed.origin}"
+    of_the_drive = dotted.replace("nominal.", "drive.")
+    assumed, limit_A = MACHINE[scenario.hardware].get(of_the_drive), actuator.group.current_limit_A
+    if assumed and stated_value(actuator, dotted) is None:
+        of_any = MACHINE["ideal"].get(of_the_drive) == assumed
+        return f"{DEFAULT if of_any else f'hardware {scenario.hardware}'}: {assumed.origin}"
     if assumed and name == "current_limit_A" and assumed.value < limit_A:
         return f"hardware {scenario.hardware}: {assumed.origin}, below {limit_A:.10g} A of the model file"
-    return f"model file: {MODEL_FILE[name]}"
+    return f"model file: {MODEL_FILE[dotted]}"
 
 
 def _of_field(name: str) -> Iterator[FieldFacts]:

@@ -37,34 +37,54 @@ class ThermalSection(BaseModel):
     on: bool = Field(
         False, description="the losses of the windings heat stator and rotor; needs drive.supply_V"
     )
-    remanence_per_K: Annotated[float, Field(ge=-0.01, le=0)] = Field(
-        -0.0011,
-        description="relative change of the remanence, 1/K, from 20 °C (sintered NdFeB: -0.0011 to -0.0012;"
-        " Arnold Magnetic Technologies, catalogue of NdFeB magnets, N35: -0.0012)",
+    remanence_per_K: Annotated[float, Field(ge=-0.01, le=0)] | None = Field(
+        None,
+        description="relative change of the remanence, 1/K, from 20 °C; the model file's unless given"
+        " (assumed: -0.0011; sintered NdFeB: -0.0011 to -0.0012; Arnold Magnetic Technologies, catalogue of"
+        " NdFeB magnets, N35: -0.0012)",
     )
-    knee_degC: Annotated[float, Field(ge=-60, le=300)] = Field(
-        80.0,
+    knee_degC: Annotated[float, Field(ge=-60, le=300)] | None = Field(
+        None,
         description="temperature of the rotor above which magnets may be demagnetised, °C: a run that exceeds"
-        " it has a warning (the same catalogue, N35: 80)",
+        " it has a warning; the temperature limit of the magnets in the model file unless given (assumed: 80,"
+        " the same catalogue, N35)",
     )
     rotor_degC: Annotated[float, Field(ge=-60, le=300)] | None = Field(
         None, description="initial temperature of the rotor, °C; drive.ambient_degC unless given"
     )
-    stator_heat_capacity_J_K: Capacity = Field(
-        1000.0, description="heat capacity of the stator, J/K (assumed: 1.1 kg of aluminium)"
+    stator_heat_capacity_J_K: Capacity | None = Field(
+        None, description="heat capacity of the stator, J/K; the model file's unless given (assumed: 1000)"
     )
-    rotor_heat_capacity_J_K: Capacity = Field(
-        900.0, description="heat capacity of the rotor, J/K (assumed: 2 kg of steel and NdFeB)"
+    rotor_heat_capacity_J_K: Capacity | None = Field(
+        None, description="heat capacity of the rotor, J/K; the model file's unless given (assumed: 900)"
     )
-    stator_to_ambient_K_W: Resistance = Field(
-        0.8, description="thermal resistance from stator to surroundings, K/W (assumed: 0.12 m² of free air)"
+    stator_to_ambient_K_W: Resistance | None = Field(
+        None,
+        description="thermal resistance from stator to surroundings, K/W; the model file's unless given"
+        " (assumed: 0.8)",
     )
-    air_gap_K_W: Resistance = Field(
-        2.0, description="thermal resistance from stator to rotor, K/W (assumed: 1 to 2 mm of air on 0.03 m²)"
+    air_gap_K_W: Resistance | None = Field(
+        None,
+        description="thermal resistance from stator to rotor, K/W; the model file's unless given"
+        " (assumed: 2)",
     )
-    rotor_to_ambient_K_W: Resistance = Field(
-        5.0, description="thermal resistance from rotor to surroundings, K/W (assumed: shaft and open caps)"
+    rotor_to_ambient_K_W: Resistance | None = Field(
+        None,
+        description="thermal resistance from rotor to surroundings, K/W; the model file's unless given"
+        " (assumed: 5)",
     )
+
+
+class ResolvedThermal(ThermalSection):
+    """Temperatures of stator and rotor of a run: thermal data of the machine are given."""
+
+    remanence_per_K: float
+    knee_degC: float
+    stator_heat_capacity_J_K: float
+    rotor_heat_capacity_J_K: float
+    stator_to_ambient_K_W: float
+    air_gap_K_W: float
+    rotor_to_ambient_K_W: float
 
 
 class MagnetHeat(NamedTuple):
@@ -89,13 +109,13 @@ class MagnetHeat(NamedTuple):
 
 
 def magnet_heat(
-    section: ThermalSection, drive: DriveChain, ambient_degC: float, winding_J_K: PerGroup
+    section: ResolvedThermal, drive: DriveChain, ambient_degC: float, winding_J_K: PerGroup
 ) -> MagnetHeat:
     """Return the heat of a plant; the stator becomes the surroundings of the drive's windings.
 
     Parameters
     ----------
-    section : ThermalSection
+    section : ResolvedThermal
     drive : DriveChain
         With a supply; at rest.
     ambient_degC : float, °C
@@ -141,7 +161,7 @@ def initial_degC(section: ThermalSection, ambient_degC: float) -> float:
     return ambient_degC if section.rotor_degC is None else section.rotor_degC
 
 
-def remanence(section: ThermalSection, ambient_degC: float) -> float:
+def remanence(section: ResolvedThermal, ambient_degC: float) -> float:
     """Return the initial remanence over that of the torque curve; 1 if no temperatures are computed."""
     rise = initial_degC(section, ambient_degC) - REFERENCE_degC
     return 1.0 + section.remanence_per_K * rise if section.on else 1.0

@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 
 from spheretwin.electronics.drive_section import DriveSection, amplifier_sheet
 from spheretwin.electronics.sensor_chain import SensorsSection, sensor_sheet
+from spheretwin.models.actuator import Actuator
 
 NOMINAL = "nominal"
 
@@ -139,7 +140,15 @@ its model file states them.
 """
 
 _CURRENT_LIMIT = "drive.current_limit_A"
+_HEAT = "plant.thermal"
 _MACHINE = {
+    f"{_HEAT}.remanence_per_K": Origin(-0.0011, "assumed: sintered NdFeB"),
+    f"{_HEAT}.knee_degC": Origin(80.0, "assumed: NdFeB N35, catalogue of Arnold Magnetic Technologies"),
+    f"{_HEAT}.stator_heat_capacity_J_K": Origin(1000.0, "assumed: 1.1 kg of aluminium"),
+    f"{_HEAT}.rotor_heat_capacity_J_K": Origin(900.0, "assumed: 2 kg of steel and NdFeB"),
+    f"{_HEAT}.stator_to_ambient_K_W": Origin(0.8, "assumed: 0.12 m² of free air"),
+    f"{_HEAT}.air_gap_K_W": Origin(2.0, "assumed: 1 to 2 mm of air on 0.03 m²"),
+    f"{_HEAT}.rotor_to_ambient_K_W": Origin(5.0, "assumed: shaft and open caps"),
     "drive.resistance_per_K": Origin(0.0, "assumed: constant resistance"),
     "drive.heat_capacity_J_K": Origin(60.0, "assumed"),
     "drive.thermal_resistance_K_W": Origin(4.0, "assumed"),
@@ -178,24 +187,54 @@ SCATTER_OF_A_CURVE = (
 """Errors that only a machine with a torque curve can have: a torque field has all poles in one."""
 
 
-MACHINE_FIELDS = {
-    "resistance_ohm": "resistance_ohm",
-    "inductance_H": "inductance_H",
-    "resistance_per_K": "resistance_per_K",
-    "heat_capacity_J_K": "heat_capacity_J_K",
-    "thermal_resistance_K_W": "thermal_resistance_K_W",
-    "temperature_limit_degC": "shutdown_degC",
-}
-"""Fields of `drive` by the name of the number of the model file that is their default, without `group_`."""
-
-PER_GROUP = (*MACHINE_FIELDS.values(), "time_constant_s")
+PER_GROUP = (
+    "resistance_ohm",
+    "inductance_H",
+    "resistance_per_K",
+    "heat_capacity_J_K",
+    "thermal_resistance_K_W",
+    "shutdown_degC",
+    "time_constant_s",
+)
 """Fields of `drive` and `nominal` with one value of all groups, or one for each."""
 
+MODEL_FILE = {
+    **{f"drive.{name}": f"group_{name}" for name in (*PER_GROUP[:5], "current_limit_A")},
+    **{f"nominal.{name}": f"group_{name}" for name in (*PER_GROUP[:2], "current_limit_A")},
+    "drive.shutdown_degC": "group_temperature_limit_degC",
+    "nominal.inertia_kg_m2": "inertia of the body rotor",
+    f"{_HEAT}.remanence_per_K": "magnet_remanence_per_K",
+    f"{_HEAT}.knee_degC": "magnet_temperature_limit_degC",
+    **{
+        f"{_HEAT}.{name}": name
+        for name in (
+            "stator_heat_capacity_J_K",
+            "rotor_heat_capacity_J_K",
+            "stator_to_ambient_K_W",
+            "air_gap_K_W",
+            "rotor_to_ambient_K_W",
+        )
+    },
+}
+"""Number of the model file that is the default of a field, by the name of the field."""
 
-def assumed_value(hardware: str, name: str) -> Any:
-    """Return the value of a field of `drive` for a machine that does not state it; None if there is none."""
-    assumed = MACHINE[hardware].get(f"drive.{name}")
-    return assumed.value if assumed else None
+
+def stated_value(actuator: Actuator, dotted: str) -> Any:
+    """Return the value of a field that the model file of the machine states; None if it does not."""
+    number = MODEL_FILE[dotted]
+    name = number.removeprefix("group_")
+    return actuator.heat.get(number) if name == number else getattr(actuator.group, name)
+
+
+def machine_values(actuator: Actuator, hardware: str, section: str) -> dict[str, Any]:
+    """Return the values of the machine in a section, by field: those of its model file, or assumed ones."""
+    values = {}
+    for dotted in MODEL_FILE:
+        before, _, name = dotted.rpartition(".")
+        if before == section:
+            value, assumed = stated_value(actuator, dotted), MACHINE[hardware].get(dotted)
+            values[name] = assumed.value if value is None and assumed else value
+    return values
 
 
 def amplifier_limit_A(hardware: str) -> float:

@@ -12,7 +12,7 @@ from spheretwin.models.coil_group import PerGroup
 from spheretwin.plant.bristle_friction import StictionSection
 from spheretwin.plant.cable import CableSection
 from spheretwin.plant.end_stops import EndStopsSection
-from spheretwin.plant.magnet_heat import ThermalSection
+from spheretwin.plant.magnet_heat import ResolvedThermal, ThermalSection
 from spheretwin.plant.mass_properties import MassSection
 from spheretwin.plant.part_scatter import PartScatter
 from spheretwin.plant.plant_tick import ENGINES
@@ -171,6 +171,7 @@ class NominalSection(Section):
 class ResolvedPlant(PlantSection):
     """Plant of a run. Without `gravity_m_s2` the gravity of the model file acts, in any direction."""
 
+    thermal: ResolvedThermal
     group_gain: tuple[Bounded, ...]
     initial_rad: Triple
 

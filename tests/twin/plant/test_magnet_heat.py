@@ -13,15 +13,27 @@ from spheretwin.electronics.drive_chain import drive_chain
 from spheretwin.electronics.drive_section import ResolvedDrive
 from spheretwin.models.actuator import load
 from spheretwin.models.base.errors import InputError
-from spheretwin.plant.magnet_heat import ThermalSection, advance_heat, magnet_heat, update_gain
+from spheretwin.plant.magnet_heat import ResolvedThermal, advance_heat, magnet_heat, update_gain
 from spheretwin.reduction import PlannedRun
 from spheretwin.run import Figures
+from spheretwin.scenario.hardware import MACHINE
 from spheretwin.session import Session
 
 AMBIENT_degC, GROUPS, PERIOD_s = 25.0, 4, 1.0
 WINDING_J_K, WINDING_K_W = 60.0, 4.0
 LOSS_W = np.array([0.0, 2.0, 5.0, 9.0])
-SECTION = ThermalSection(on=True)
+ASSUMED = {
+    name.removeprefix("plant.thermal."): value.value
+    for name, value in MACHINE["ideal"].items()
+    if name.startswith("plant.thermal.")
+}
+
+
+def thermal(**values):
+    return ResolvedThermal(**{"on": True, **ASSUMED, **values})
+
+
+SECTION = thermal()
 
 
 def heat_of(period_s, section=SECTION):
@@ -85,7 +97,7 @@ positive = st.floats(0.1, 1e4)
 def test_energy_is_conserved(stator_J_K, rotor_J_K, stator_K_W, gap_K_W, rotor_K_W, rotor_degC):
     capacities = {"stator_heat_capacity_J_K": stator_J_K, "rotor_heat_capacity_J_K": rotor_J_K}
     outer = {"stator_to_ambient_K_W": stator_K_W, "rotor_to_ambient_K_W": rotor_K_W}
-    section = ThermalSection(on=True, rotor_degC=rotor_degC, air_gap_K_W=gap_K_W, **capacities, **outer)
+    section = thermal(rotor_degC=rotor_degC, air_gap_K_W=gap_K_W, **capacities, **outer)
     degC, coil, _ = heated(20 * PERIOD_s, PERIOD_s, section)
     stored = WINDING_J_K * (coil.temperature_degC - AMBIENT_degC).sum()
     stored += [stator_J_K, rotor_J_K] @ (degC[-1] - [AMBIENT_degC, rotor_degC])
@@ -97,7 +109,7 @@ def test_energy_is_conserved(stator_J_K, rotor_J_K, stator_K_W, gap_K_W, rotor_K
 
 def test_gains_fall_with_the_remanence():
     gains = np.array([1.0, 0.9, 1.1, 1.0])
-    _, heat = heat_of(1e-3, ThermalSection(on=True, rotor_degC=60.0))
+    _, heat = heat_of(1e-3, thermal(rotor_degC=60.0))
     present = np.empty(GROUPS)
     update_gain(heat, gains, present)
     np.testing.assert_allclose(present, gains * (1 - 0.0011 * 40), rtol=1e-15)
@@ -148,4 +160,4 @@ def test_temperatures_need_a_supply():
 def test_a_stator_that_stores_less_than_the_windings_release_is_refused():
     message = r"stator_heat_capacity_J_K above 0\.99\d* J/K, .* received 0\.5 J/K"
     with pytest.raises(InputError, match=message):
-        heat_of(PERIOD_s, ThermalSection(on=True, stator_heat_capacity_J_K=0.5))
+        heat_of(PERIOD_s, thermal(stator_heat_capacity_J_K=0.5))

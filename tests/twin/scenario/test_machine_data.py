@@ -10,7 +10,8 @@ from spheretwin.active_config import initial_config, warnings_of
 from spheretwin.machine.link.limits import Limits
 from spheretwin.machine.link.machine_link import Link, LinkSettings
 from spheretwin.models.base.errors import InputError
-from spheretwin.scenario.hardware import HARDWARE, PER_GROUP, amplifier_limit_A
+from spheretwin.models.coil_group import HEAT
+from spheretwin.scenario.hardware import HARDWARE, MODEL_FILE, PER_GROUP, amplifier_limit_A
 from spheretwin.session import Session
 from tests.twin import model_files
 
@@ -55,6 +56,23 @@ def test_thermal_data_are_those_of_the_model_file_unless_a_field_states_them(tmp
     drive, stated = config.scenario.drive, iter(THERMAL.values())
     assert (drive.resistance_per_K, list(drive.heat_capacity_J_K)) == (next(stated), next(stated))
     assert (drive.thermal_resistance_K_W, list(drive.shutdown_degC)) == (2.0, [*stated][-1])
+
+
+@pytest.mark.parametrize("hardware", HARDWARE)
+def test_thermal_data_of_stator_and_rotor_are_those_of_the_model_file(tmp_path, hardware):
+    stated = {name: (low if low > 0 else -0.003) * 1.5 for name, (low, _) in HEAT.items()}
+    stated["magnet_temperature_limit_degC"] = 65.0
+    _, config = resolved(model_file(tmp_path, **stated), hardware, plant__thermal__air_gap_K_W=3.0)
+    heat = config.scenario.plant.thermal
+    fields = {number: getattr(heat, dotted.rpartition(".")[2]) for dotted, number in MODEL_FILE.items()
+              if number in HEAT}  # fmt: skip
+    assert fields == stated | {"air_gap_K_W": 3.0}
+
+
+def test_a_number_of_the_stator_beyond_its_bounds_is_refused(tmp_path):
+    path = model_file(tmp_path, stator_heat_capacity_J_K=-1.0)
+    with pytest.raises(InputError, match=r"expected stator_heat_capacity_J_K from 0\.001 to .*, received -1"):
+        resolved(path, "ideal")
 
 
 def test_thermal_data_that_no_one_states_are_assumed_with_the_set(tmp_path):
@@ -106,12 +124,13 @@ def test_explain_states_which_of_both_a_value_came_from(tmp_path, capsys, hardwa
     (tmp_path / "own.toml").write_text(
         f'name = "own"\nhardware = "{hardware}"\n[trajectory]\nshape = "sinusoid"\n[plant]\nmjcf = "{path}"\n'
     )
-    assert cli.main(["explain", "scenario", str(tmp_path / "own.toml"), "--json"]) == 0
+    assert cli.main(["explain", "scenario", str(tmp_path / "own.toml"), "--all", "--json"]) == 0
     facts = {fact["field"]: fact["origin"] for fact in json.loads(capsys.readouterr().out)["fields"]}
     assert facts["drive.current_limit_A"] == facts["nominal.current_limit_A"] == origin
     assert facts["drive.resistance_ohm"] == "model file: group_resistance_ohm"
     assert facts["drive.heat_capacity_J_K"] == "model file: group_heat_capacity_J_K"
-    assert facts["drive.thermal_resistance_K_W"] == f"hardware {hardware}: assumed"
+    assert facts["drive.thermal_resistance_K_W"] == "default: assumed"
+    assert facts["plant.thermal.air_gap_K_W"] == "default: assumed: 1 to 2 mm of air on 0.03 m²"
     if hardware == "prototype":
         assert facts["drive.shutdown_degC"] == "hardware prototype: assumed: insulation of class F"
         assert facts["drive.supply_V"].startswith("hardware prototype: ")
