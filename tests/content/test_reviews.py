@@ -16,6 +16,8 @@ from spheretwin.provenance import facts_of, record_of
 from spheretwin.viz.recording.recorder import Recorder
 from spheretwin.viz.terminal import reviews as reviews_printed
 from spheretwin.viz.terminal import runs, tables, texts
+from spheretwin.viz.terminal.reviews import SignalTolerance
+from spheretwin.viz.terminal.reviews import differences as compare
 from spheretwin.viz.terminal.texts import Verdict
 from tests.content.content import Cases, command, content_test, printed, scratch
 from tests.content.pages import folder_text
@@ -23,8 +25,17 @@ from tests.content.recordings import recording_text
 from tests.content.runs import FAULTS, made_run, session_of
 from tests.content.values import array, tree
 from tests.twin.analysis.runs import made_of, named
-from tests.viz.terminal.test_reviews import RUN
 from tests.viz.terminal.test_runs import SUMMARY
+
+RUN = {
+    "path": "a.parquet", "scenario": "hold", "law": "pd", "modelling_error": 0.2, "load": 1.0,
+    "hardware": "ideal", "seed": 0, "status": "completed", "reason": None, "simulated_s": 1.0,
+    "max_abs_error_rad": [0.03, 0.02, 0.01], "rms_error_rad": [0.01, 0.01, 0.01],
+    "tail_rms_error_rad": [0.01, 0.01, 0.01], "overshoot_rad": [None, None, None],
+    "settling_time_s": [0.3, None, 0.0], "max_abs_current_A": 2.0, "saturated_fraction": 0.0096,
+    "rms_torque_Nm": 0.1, "current_variation_A_s": 3.0, "copper_loss_J": 4.0, "mechanical_work_J": 0.001,
+    "energy_J": 4.001,
+}  # fmt: skip
 
 
 @cache
@@ -192,8 +203,28 @@ def terminal() -> str:
     return "\n".join([printed(all_tables), printed(all_tables, columns=50)])
 
 
+def differs(row: list[str]) -> bool:
+    return row[2] not in (row[1], "the same")
+
+
+DIFFERING = [
+    ("max_abs_current_A", 2.0, 2.0), ("max_abs_current_A", 2.0, 2.0 - 4e-7), ("max_abs_current_A", 2.0, None),
+    ("copper_loss_J", 4.0, 400.0), ("saturated_fraction", 0.0096, 0.01),
+    ("max_abs_error_rad", [0.03, 0.02, 0.01], [0.015, 0.02, 0.01]),
+    # A percentage is of a reference that is not near zero: not smaller than the difference.
+    *(("mechanical_work_J", first, value) for first, value in (
+        (-0.5, -0.375), (-0.5, -0.625), (0.5, 1.0), (0.25, 0.75), (-0.25, -1.0), (0.25, -0.25), (0.0, 0.5),
+    )),
+]  # fmt: skip
+TOLERANCES = [
+    SignalTolerance("q_rad", 0.42, "β", 0.341, 0.0), SignalTolerance("error_rad", 0.0, "α", 0.0, 0.0),
+    SignalTolerance("current_A", 36.6, "group 5", 0.952, 1.83),
+    SignalTolerance("torque_Nm", float("inf"), "", 1.0, float("inf")),
+]  # fmt: skip
+
+
 def many_events() -> str:
-    """Report of a run with more events than are printed, and of one without numbers."""
+    """Report of a run with more events than are printed, of one without numbers, differences, tolerances."""
     events = [{"t_s": 0.125 * place, "level": "WARN", "text": f"event [{place}]"} for place in range(15)]
     peak = {"frequency_Hz": 5.0, "amplitude_rad": 1e-3}
     peaks = {"α": [peak, {**peak, "frequency_Hz": 0.5}], "β": [], "γ": [{**peak, "amplitude_rad": 2e-3}]}
@@ -205,9 +236,16 @@ def many_events() -> str:
         "overshoot_rad": [0.1, None, 1e-9],
     }
     errors = [reviews_printed.NominalError("nominal.x", "1", "2")]
-    return "\n".join(
+    reports = [
         printed(lambda run=run: reviews_printed.print_run_report(run, errors, 0.01)) for run in (some, few)
-    )
+    ]
+    differing = [
+        f"{key} {first} {value}: "
+        f"{[row for row in compare([{**RUN, key: first}, {**RUN, key: value}], 0.01) if differs(row)]}"
+        for key, first, value in DIFFERING
+    ]
+    tolerances = printed(lambda: reviews_printed.print_tolerances("a.rrd", "b.rrd", TOLERANCES))
+    return "\n".join([*reports, *differing, tolerances])
 
 
 def fault_texts() -> str:

@@ -276,35 +276,3 @@ def test_files_without_checksums_are_used_with_a_warning(files, left, tmp_path, 
     (parts / "000000.arrows").write_bytes((left / "000000.arrows").read_bytes())
     assert warned(["recover", parts, "--out", tmp_path / "out.parquet"], parts, capsys)
     assert len(read(tmp_path / "out.parquet").table) == 8192
-
-
-ODD = {
-    "no text": {"scenario": b"\xff" * 3000},
-    "no journal": {"journal": None},
-    "a long journal": {"journal": b"x" * 3000},
-    "no scenario of a run": {"scenario": b'{"controller": 3}'},
-}
-
-
-@pytest.mark.parametrize("odd", ODD.values(), ids=ODD)
-@pytest.mark.parametrize("verb", ["review", "--replay", "recover"])
-def test_odd_metadata_are_refused_on_one_line(files, tmp_path, capfd, odd, verb):
-    """Of files without checksums, whose metadata may be anything."""
-    import pyarrow.parquet
-
-    arrow = pyarrow.parquet.ParquetFile(files[0]).read()
-    metadata = {name: text for name, text in arrow.schema.metadata.items() if name.decode() not in METADATA}
-    metadata |= {name.encode(): text for name, text in odd.items()}
-    results = {name: text for name, text in metadata.items() if text is not None}
-    pyarrow.parquet.write_table(arrow.replace_schema_metadata(results), path := tmp_path / "run.parquet")
-    commands = {
-        "review": ["review", str(path)],
-        "--replay": ["simulate", "--replay", str(path)],
-        "recover": ["recover", str(path), "--out", str(tmp_path / "out.parquet")],
-    }
-    assert cli.main(commands[verb]) == cli.BAD_INPUT
-    printed = capfd.readouterr()
-    (line,) = printed.err.splitlines()
-    assert str(path) in line
-    assert len(line) <= LONGEST_LINE
-    assert "Error" not in line

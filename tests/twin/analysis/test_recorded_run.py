@@ -3,7 +3,6 @@
 import csv
 import json
 import os
-import shutil
 import signal
 import subprocess
 import sys
@@ -183,43 +182,6 @@ def test_wherever_a_recording_is_cut_its_whole_ticks_are_read(files, tmp_path):
     assert rows == sorted(rows)
     assert len(set(rows) - {0, len(whole)}) > 0
     assert rows[-1] == len(whole)
-
-
-def cut(path):
-    path.write_bytes(path.read_bytes()[:5000])
-
-
-FOREIGN = {
-    "empty.parquet": lambda path: path.touch(),
-    "empty.rrd": lambda path: path.touch(),
-    "text.parquet": lambda path: path.write_text("no run"),
-    "text.rrd": lambda path: path.write_text("no run, and longer than a header"),
-    "missing.parquet": lambda path: None,
-    "folder.rrd": lambda path: path.mkdir(),
-    "folder.parquet": lambda path: path.mkdir(),
-    "header.rrd": lambda path: path.write_bytes(b"RRF2\x00)\x00\x00\x01\x02\x00\x00"),
-}
-
-
-@pytest.mark.parametrize("verb", ["review", "recover"])
-@pytest.mark.parametrize("name", [*FOREIGN, "cut.parquet", "cut.rrd"])
-def test_what_is_no_run_is_refused_on_one_line(files, tmp_path, name, verb, capsys):
-    path = tmp_path / name
-    if name in FOREIGN:
-        FOREIGN[name](path)
-    else:
-        shutil.copy(files[0 if name.endswith("parquet") else 1], path)
-        cut(path)
-    before = sorted(os.listdir(tmp_path))
-    out = ["--out", str(tmp_path / "out")] if verb == "recover" else []
-    assert cli.main([verb, str(path), *out]) == 2
-    printed = capsys.readouterr()
-    (line,) = printed.err.splitlines()
-    assert line.startswith("spheretwin: ")
-    assert "expected" in line
-    assert name in line
-    assert printed.out == ""
-    assert sorted(os.listdir(tmp_path)) == before
 
 
 def test_a_recording_of_something_else_is_refused(tmp_path):
