@@ -187,8 +187,9 @@ def of_outputs():
 
     one = folder / "one.parquet"
     (folder / "x").mkdir()
-    attempt("twice", outputs.check, [one, folder / "x" / ".." / "one.parquet"])
-    attempt("folder", outputs.check, [folder])
+    attempt("twice", outputs.check, None, one, [folder / "x" / ".." / "one.parquet"])
+    attempt("folder", outputs.check, None, folder)
+    attempt("format", outputs.check, folder / "one.mcap", one)
     for rate, record, period_s in (
         (None, None, 1e-3), (10.0, None, 1e-3), (1000.0, one, 1e-3), (1000.1, one, 1e-3), (999.9, one, 1e-3),
     ):  # fmt: skip

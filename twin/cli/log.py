@@ -59,15 +59,15 @@ def run(options: argparse.Namespace) -> bool:
     accepted = check_names(options.accept)
     column_map = columns.load(options.columns) if options.columns else None
     scenario = scenarios.load(options.scenario)
-    verdicts = {}
+    verdicts, digests = {}, {}
     for path in options.files:
         log = machine.read(path, column_map, accepted)
         verdict = machine.check(log, scenario)
         if verdict.accepted and len(log) >= _LEAST_ROWS:
             verdict = replace(verdict, identifiability=identifiability(log, options.scenario))
-        verdicts[str(path)] = verdict
+        verdicts[str(path)], digests[str(path)] = verdict, log.digest
     if options.json:
-        _print_json(verdicts)
+        _print_json(verdicts, digests)
     else:
         for path, verdict in verdicts.items():
             rate = f"{verdict.rate_Hz:.4g} Hz" if verdict.rate_Hz else "no rate"
@@ -81,9 +81,11 @@ def run(options: argparse.Namespace) -> bool:
     return all(verdict.accepted for verdict in verdicts.values())
 
 
-def _print_json(verdicts: dict[str, Verdict]) -> None:
+def _print_json(verdicts: dict[str, Verdict], digests: dict[str, str]) -> None:
     """Print the verdict; with several logs the common one, and that of each log."""
-    logs_ = [{"path": path, **verdict.figures()} for path, verdict in verdicts.items()]
+    logs_ = [
+        {"path": path, "log_sha256": digests[path], **verdict.figures()} for path, verdict in verdicts.items()
+    ]
     print_json(
         {
             "accepted": all(log["accepted"] for log in logs_),

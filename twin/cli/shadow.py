@@ -96,7 +96,8 @@ def run(options: argparse.Namespace) -> bool:
         from spheretwin.analysis.comparison import subject_of  # Rerun is slow to import
         from spheretwin.viz.comparison import shadow_recording
 
-        text = Verdict(result.chi2, result.consistent).markdown(log)
+        verdict = Verdict(result.chi2, result.consistent).markdown(log)
+        text = f"{verdict}\n\nSHA-256 of the numbers of the log: {log.digest}"
         subject = subject_of(model.scenario, model.actuator)
         shadow_recording.write(options.record, result.telemetry, log.current_A, subject, text)
     if options.json:

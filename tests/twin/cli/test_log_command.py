@@ -82,6 +82,11 @@ def test_a_wrong_log_is_refused_unless_its_finding_is_accepted(files, tmp_path):
     both = call("log", "check", path, files[0], "--json")
     assert (both.code, both.json["rows"]) == (1, 1800)
     assert [entry["accepted"] for entry in both.json["logs"]] == [False, True]
+    digests = [log.rows(0, 300).digest, log.digest]
+    assert [entry["log_sha256"] for entry in both.json["logs"]] == digests
+    text = path.read_text()
+    path.write_text(text.replace(repr(float(log.angle_rad[7, 0])), repr(float(log.angle_rad[7, 0]) + 1e-9)))
+    assert machine.read(path).digest != digests[0]  # one digit of a file without a checksum
 
 
 def test_a_column_map_is_applied(tmp_path):

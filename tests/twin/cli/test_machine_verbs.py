@@ -6,7 +6,7 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
-from spheretwin.machine import write
+from spheretwin.machine import read, write
 from spheretwin.models.telemetry.table import read_parquet
 from spheretwin.viz.recording.live import LivePage
 from tests.twin.cli.calls import call, refusal, succeeded
@@ -43,7 +43,7 @@ def test_shadow(log, tmp_path):
     assert len(table) == 2000
     innovation = np.sqrt(np.nanmean(table["innovation_rad"] ** 2, axis=0))
     assert np.allclose(figures["rms_innovation_rad"], innovation, rtol=1e-12)
-    assert len(metadata["log_sha256"]) == 64
+    assert metadata["log_sha256"] == figures["log_sha256"] == read(log).digest
     assert figures["accepted_findings"] == json.loads(metadata["accepted_findings"]) == ["jitter"]
     assert recording.stat().st_size > 10_000
     result = call("shadow", log, *MACHINE, "--offsets")
@@ -78,6 +78,7 @@ def test_a_twin_is_identified_validated_and_simulated(log, tmp_path):
     accepted = ["--accept", "jitter", "--json"]
     figures = call("validate", log, "--scenario", SCENARIO, "--twin", twin, *accepted).json
     assert figures["accepted_findings"] == ["jitter"]
+    assert figures["log_sha256"] == read(log).digest
     assert figures["chi2"]["all"] == pytest.approx(1.0, abs=0.1)
     # Six of three hinges by angle and by rate, if a count changes there.
     assert 33 <= len(figures["bins"]) <= 36
@@ -125,7 +126,8 @@ def test_watch_prints_a_line_of_json_for_each_alarm(tmp_path):
     alarms = [json.loads(line) for line in result.out.splitlines()]
     assert result.code == 1
     assert alarms[0]["what"] == "sensors.angle_offset_rad.0"
-    assert set(alarms[0]) == {"t_s", "what", "size", "unit", "confidence", "accepted_findings"}
+    assert set(alarms[0]) == {"t_s", "what", "size", "unit", "confidence", "accepted_findings", "log_sha256"}
+    assert alarms[0]["log_sha256"] == read(path).digest
     assert alarms[0]["accepted_findings"] == ["jitter"]
     assert "fewer than 0.1 in an hour" in result.err
 
