@@ -32,6 +32,8 @@ class Check:
         The least value that passes, if there is one.
     detail : mapping
         The figures behind the value, by name.
+    reason : str
+        Reason for a value that is not finite, such as "left the workspace".
     """
 
     name: str
@@ -43,6 +45,7 @@ class Check:
     unit: str = "1"
     at_least: float | None = None
     detail: Mapping[str, float] = field(default_factory=dict)
+    reason: str = ""
 
     @property
     def ok(self) -> bool:
@@ -64,11 +67,13 @@ class Check:
             "ok": self.ok,
             "why": self.why,
             "detail": {name: _finite(value) for name, value in self.detail.items()},
-        }
+        } | ({"reason": self.reason} if self.reason else {})
 
     def value_text(self) -> str:
         """Return the value for a table."""
-        return "not taken" if self.value is None else _text(self.value, self.unit)
+        if self.value is None:
+            return "not taken"
+        return self.reason if self.reason and not isfinite(self.value) else _text(self.value, self.unit)
 
     def bound_text(self) -> str:
         """Return the bound for a table."""
