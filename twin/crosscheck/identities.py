@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from spheretwin.crosscheck.dynamics import random_states
+from spheretwin.crosscheck.equations import ideal_file, ring_share
 from spheretwin.models.actuator import Actuator
 from spheretwin.models.base.checks import Check
 from spheretwin.models.kinematics import rotation, rotor_rate_jacobian
@@ -116,9 +117,6 @@ START_rad = np.array([0.1, -0.2, 0.0])
 NODDING = np.array([0.08, 0.05, 1.0])  # rates of α and β as shares of the spin
 SPINS_rad_s = {"2π": 2 * np.pi, "30": 30.0}
 
-# The gimbal rings, which the formulas below do not have: 6e-13 of the rotor's inertia.
-RINGS = 1e-12
-
 
 class Motion(NamedTuple):
     """A rotor in flight; one row a sample."""
@@ -155,7 +153,7 @@ class FreeRotor(NamedTuple):
 
 
 def check_free_rotor(mjcf: Path, actuator: Actuator) -> FreeRotor:
-    """Let the rotor spin freely in the engine at two rates, as it is and with J1 = J2.
+    """Let the rotor spin freely in the engine at two rates, on an ideal joint, as it is and with J1 = J2.
 
     Parameters
     ----------
@@ -164,6 +162,8 @@ def check_free_rotor(mjcf: Path, actuator: Actuator) -> FreeRotor:
     actuator : Actuator
         Its inertia is what energy and momentum are made of.
     """
+    mjcf = ideal_file(mjcf, actuator)
+    rings = ring_share(mjcf, actuator)
     drifts: dict[str, dict[str, Drift]] = {"energy": {}, "angular momentum": {}, "attitude": {}}
     t_s = np.zeros(0)
     for name, spin in SPINS_rad_s.items():
@@ -171,12 +171,13 @@ def check_free_rotor(mjcf: Path, actuator: Actuator) -> FreeRotor:
         nods = _nodding_share(free)
         truncation = (spin * STEP_s) ** 4
         drifts["energy"][name] = Drift(
-            np.abs(free.energy_J / free.energy_J[0] - 1), nods**2 * truncation + RINGS
+            np.abs(free.energy_J / free.energy_J[0] - 1), nods**2 * truncation + rings
         )
-        drifts["angular momentum"][name] = Drift(_momentum_drift(free), nods * truncation + RINGS)
+        drifts["angular momentum"][name] = Drift(_momentum_drift(free), nods * truncation + rings)
         axisymmetric = fly(mjcf, actuator.inertia[[0, 0, 2]], spin)
-        turned = spin * DURATION_s
-        drifts["attitude"][name] = Drift(_attitude_error(axisymmetric), turned * (truncation / 120 + RINGS))
+        fastest = spin * max(1.0, float(actuator.inertia[2] / actuator.inertia[0]))
+        shares = (fastest * STEP_s) ** 4 / 120 + rings
+        drifts["attitude"][name] = Drift(_attitude_error(axisymmetric), fastest * DURATION_s * shares)
         t_s = free.t_s
     checks = [
         _drift_check(quantity, spin, drift) for quantity in drifts for spin, drift in drifts[quantity].items()
@@ -255,12 +256,14 @@ _COMPARED = {
     "attitude": "attitude with Euler's exact solution at J1 = J2, angle between them",
 }
 _WHY = {
-    "energy": "the gimbal rings (1e-12), and (ωh)⁴ of the share of the energy that nods at the spin rate:"
-    " a fourth-order step's truncation, with its coefficient, 1/120 or less, as the margin",
-    "angular momentum": "the gimbal rings (1e-12), and (ωh)⁴ of the share of the momentum that turns with the"
-    " spin: a fourth-order step's truncation, with its coefficient, 1/120 or less, as the margin",
-    "attitude": "phase error of a fourth-order step, (ωh)⁴/120 of the angle turned, which is ωT;"
-    " and 1e-12 of that angle for the gimbal rings",
+    "energy": "the share of the gimbal rings in the inertia, and (ωh)⁴ of the share of the energy that nods"
+    " at the spin rate: a fourth-order step's truncation, with its coefficient, 1/120 or less, as the margin",
+    "angular momentum": "the share of the gimbal rings in the inertia, and (ωh)⁴ of the share of the momentum"
+    " that turns with the spin: a fourth-order step's truncation, with its coefficient, 1/120 or less, as the"
+    " margin",
+    "attitude": "phase error of a fourth-order step, (ωh)⁴/120 of the angle turned, which is ωT, with the"
+    " faster of spin and precession as ω;"
+    " and that angle times the share of the gimbal rings in the inertia",
 }
 
 
