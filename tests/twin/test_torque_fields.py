@@ -6,6 +6,7 @@ import pytest
 import spheretwin as st
 from spheretwin import cli, plant
 from spheretwin.crosscheck import coil_driven
+from spheretwin.crosscheck.scale import scale_of
 from spheretwin.models import actuator as actuators
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.magnetics import torque_matrix
@@ -66,13 +67,13 @@ def test_plants_of_different_kinds_are_refused_in_one_line():
 
 
 @pytest.mark.parametrize("engine", ["mujoco", "lagrangian"])
-def test_coil_driven_motion_agrees_with_dop853(engine, monkeypatch):
+def test_coil_driven_motion_agrees_with_dop853(engine):
     """The part of the cross-check with G_t(q) I(t) at every evaluation, at currents for a light rotor."""
-    monkeypatch.setattr(coil_driven, "AMPLITUDE_A", 0.3)
     actuator = actuators.load(SECOND)
-    reference = coil_driven.integrate(actuator)
+    scale = scale_of(actuator)._replace(current=0.15)  # 0.3 A
+    reference = coil_driven.integrate(SECOND, actuator, scale)
     errors = [
-        np.abs(coil_driven.by_plant(SECOND, engine, step_s) - reference)[:, :3].max()
+        np.abs(coil_driven.by_plant(SECOND, scale, engine, step_s) - reference)[:, :3].max()
         for step_s in (1e-3, 5e-4, 2.5e-4)
     ]
     assert np.abs(reference[-1, :3] - reference[0, :3]).max() > 0.1  # the coils move it

@@ -13,10 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spheretwin.crosscheck.coil_driven import drive_plant
-from spheretwin.crosscheck.trajectories import ENGINES, solve
-from spheretwin.models.actuator import Actuator
+from spheretwin.crosscheck.equations import equations_of
+from spheretwin.crosscheck.scale import Scale, scale_of
+from spheretwin.crosscheck.trajectories import ENGINES, reason_of, solve
+from spheretwin.models.actuator import MJCF_PATH, Actuator
 from spheretwin.models.base.checks import Check
-from spheretwin.models.lagrangian import acceleration
 from spheretwin.plant.end_stops import EndStopsSection
 
 Array = NDArray[np.float64]
@@ -47,9 +48,10 @@ def compare(mjcf: Path, actuator: Actuator) -> Contacts:
     actuator : Actuator
         Its inertia and hinge ranges are those of the reference.
     """
-    expected, contacts = Reference(actuator, STOPS).integrate()
+    section = stops(scale_of(actuator))
+    expected, contacts = Reference(actuator, section, mjcf).integrate()
     # A contact turns a rate v with (natural h)²/12 of it, as the trapezoid of a spring does.
-    natural_s = STOPS.stiffness_Nm_rad / float(min(actuator.inertia))
+    natural_s = section.stiffness_Nm_rad / float(min(actuator.inertia))
     fastest = float(np.abs(expected[:, 3:]).max())
     bound = contacts * fastest * natural_s * STEP_s**2
     return Contacts(
@@ -67,10 +69,13 @@ class Reference:
     ----------
     actuator : Actuator
     section : EndStopsSection
+    mjcf : Path
+        Model file of the actuator.
     """
 
-    def __init__(self, actuator: Actuator, section: EndStopsSection) -> None:
-        self._actuator, self._inertia, self._stiffness = actuator, actuator.inertia, section.stiffness_Nm_rad
+    def __init__(self, actuator: Actuator, section: EndStopsSection, mjcf: Path = MJCF_PATH) -> None:
+        self._actuator, self._equations = actuator, equations_of(mjcf, actuator)
+        self._stiffness = section.stiffness_Nm_rad
         self._damping = 2 * section.damping_ratio * np.sqrt(section.stiffness_Nm_rad * actuator.inertia)
         self._low, self._high = (actuator.hinge_range_rad + section.travel_rad * np.array([1.0, -1.0])).T
 
@@ -83,7 +88,8 @@ class Reference:
             The integrator could not hold its tolerance.
         """
         t_s = SAMPLE_s * np.arange(round(DURATION_s / SAMPLE_s) + 1)
-        start = np.array([*start_rad(self._actuator), *START_rad_s])
+        rates = scale_of(self._actuator).rates_rad_s(START_rad_s)
+        start = np.array([*start_rad(self._actuator), *rates])
         states = solve("end stop reference", self._flow, (0.0, t_s[-1]), start, t_eval=t_s, **TIGHT).y.T
         touches = (states[:, :3] > self._high) | (states[:, :3] < self._low)
         return states, int(np.count_nonzero(np.diff(touches.astype(int), axis=0) > 0))
@@ -93,25 +99,35 @@ class Reference:
         above, below = q - self._high, self._low - q
         upper = np.where(above > 0, np.maximum(self._stiffness * above + self._damping * qdot, 0), 0.0)
         lower = np.where(below > 0, np.maximum(self._stiffness * below - self._damping * qdot, 0), 0.0)
-        return np.concatenate([qdot, acceleration(q, qdot, lower - upper, self._inertia, 0.0)])
+        return self._equations.flow(state, lower - upper)
+
+
+def stops(scale: Scale) -> EndStopsSection:
+    """Return the end stops of a machine: a contact lasts as long as in the shipped one."""
+    return EndStopsSection(
+        on=True,
+        travel_rad=max(scale.angle * STOPS.travel_rad, 1e-6),
+        stiffness_Nm_rad=min(max(scale.inertia * STOPS.stiffness_Nm_rad, 1e-3), 1e6),
+    )
 
 
 def start_rad(actuator: Actuator) -> tuple[float, float, float]:
-    """Return the first pose: α before its upper buffer, β and γ on either side of 0."""
-    alpha, beta, gamma = actuator.hinge_range_rad
-    return float(alpha[1] - BEFORE_rad), float(max(-0.5, 0.7 * beta[0])), float(min(0.3, 0.7 * gamma[1]))
+    """Return the first pose: α before its upper buffer, β and γ on either side of the middle."""
+    scale, end = scale_of(actuator), float(actuator.hinge_range_rad[0, 1])
+    _, beta, gamma = scale.pose_rad((0.0, -0.5, 0.3))
+    return end - scale.angle * BEFORE_rad, beta, gamma
 
 
 def by_plant(mjcf: Path, actuator: Actuator, engine: str) -> Array:
     """Return the states (n + 1, 6) at the samples by the plant without currents."""
-    count = round(DURATION_s / STEP_s)
+    count, scale = round(DURATION_s / STEP_s), scale_of(actuator)
     fields: dict[str, Any] = {
         "plant.engine": engine,
         "plant.step_s": STEP_s,
         "plant.initial_rad": start_rad(actuator),
-        "plant.initial_rad_s": START_rad_s,
+        "plant.initial_rad_s": scale.rates_rad_s(START_rad_s),
         "controller.period_s": STEP_s,
-        **{f"plant.end_stops.{name}": value for name, value in STOPS.model_dump().items()},
+        **{f"plant.end_stops.{name}": value for name, value in stops(scale).model_dump().items()},
     }
     every = round(SAMPLE_s / STEP_s)
     return drive_plant(mjcf, fields, lambda groups: np.zeros((count, groups)), np.zeros((count, 3)), every)
@@ -127,5 +143,6 @@ def _motion(name: str, difference: Array, bound: float) -> Check:
         bound=bound,
         why="a contact turns a rate with an error of (natural frequency times step)² of the rate",
         unit="rad/s",
+        reason=reason_of(float(difference.max())),
         detail={"largest difference of an angle, rad": float(difference[:, :3].max())},
     )

@@ -33,6 +33,7 @@ from spheretwin.crosscheck.hinge import (
     run,
     slope_Nm_s,
 )
+from spheretwin.crosscheck.scale import scale_of
 from spheretwin.models.actuator import Actuator
 from spheretwin.models.base.checks import Check
 from spheretwin.scenario.hardware import PROTOTYPE_BEARINGS
@@ -40,7 +41,8 @@ from spheretwin.scenario.plant_sections import PlantSection
 
 Array = NDArray[np.float64]
 
-# The prototype's bearing, and the heavier of the two guesses that its figure is the lighter of.
+# The prototype's bearing, and the heavier of the two guesses that its figure is the lighter of; those of a
+# machine are in proportion to its inertia.
 LEVELS_Nm: tuple[float, ...] = (PROTOTYPE_BEARINGS["plant.coulomb_Nm"][GAMMA], 5e-3)
 VISCOUS_Nm_s: float = PROTOTYPE_BEARINGS["plant.viscous_Nm_s"][GAMMA]
 SMOOTHING_rad_s: float = PlantSection.model_fields["friction_smoothing_rad_s"].default
@@ -71,11 +73,14 @@ def compare(mjcf: Path, actuator: Actuator) -> HingeFriction:
     """
     movers: dict[str, Mover] = {
         OURS: lambda *motion: by_stage(actuator, *motion),
-        MUJOCO: lambda *motion: by_mujoco(mjcf, *motion),
+        MUJOCO: lambda *motion: by_mujoco(mjcf, actuator, *motion),
     }
-    inertia = float(actuator.inertia[GAMMA])
+    inertia, share = float(actuator.inertia[GAMMA]), scale_of(actuator).inertia
+    viscous = share * VISCOUS_Nm_s
     bearings = {
-        f"{1e3 * level:g} mN·m": run(Hinge(inertia, level, VISCOUS_Nm_s, SMOOTHING_rad_s), movers)
+        f"{1e3 * share * level:.4g} mN·m": run(
+            Hinge(inertia, share * level, viscous, SMOOTHING_rad_s), movers
+        )
         for level in LEVELS_Nm
     }
     checks = [
@@ -83,7 +88,7 @@ def compare(mjcf: Path, actuator: Actuator) -> HingeFriction:
         for figure in (_creep, _breakaway, _stopping_time, _stopping_angle)
         for way in movers
     ]
-    alone = Hinge(inertia, 0.0, VISCOUS_Nm_s, SMOOTHING_rad_s)
+    alone = Hinge(inertia, 0.0, viscous, SMOOTHING_rad_s)
     return HingeFriction(
         [
             *checks,

@@ -25,9 +25,10 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from spheretwin.crosscheck.equations import ideal_file
 from spheretwin.models.actuator import Actuator
 from spheretwin.models.base.compiled import compiled
-from spheretwin.models.mjcf import Mjcf, read
+from spheretwin.models.mjcf import ROTOR, Mjcf, read
 from spheretwin.plant.friction import Friction, friction, slow_down
 from spheretwin.plant.lagrangian_rotor import LagrangianRotor
 from spheretwin.plant.mujoco_rotor import MujocoRotor
@@ -178,23 +179,25 @@ def by_stage(actuator: Actuator, hinge: Hinge, rate_rad_s: float, torque_Nm: Arr
     return _motion(rotor.start(np.zeros(3), _on_gamma(rate_rad_s)), bearing, torque_Nm)
 
 
-def by_mujoco(mjcf: Path, hinge: Hinge, rate_rad_s: float, torque_Nm: Array) -> Motion:
-    """Motion of MuJoCo under its own friction loss and damping; as in `by_stage`.
+def by_mujoco(mjcf: Path, actuator: Actuator, hinge: Hinge, rate_rad_s: float, torque_Nm: Array) -> Motion:
+    """Motion of MuJoCo, on an ideal joint, under its own friction loss and damping; as in `by_stage`.
 
     Raises
     ------
     InputError
         The model cannot be read.
     """
-    model = read(mjcf)
-    rotor = MujocoRotor(_with_bearing(model, hinge), STEP_s, "RK4", 0.0, 0.0, gravity_m_s2=0.0)
+    model = _with_bearing(read(ideal_file(mjcf, actuator)), actuator, hinge)
+    rotor = MujocoRotor(model, STEP_s, "RK4", 0.0, 0.0, gravity_m_s2=0.0)
     none = friction(np.zeros(3), np.zeros(3), hinge.smoothing_rad_s, np.ones(3), STEP_s)
     return _motion(rotor.start(np.zeros(3), _on_gamma(rate_rad_s)), none, torque_Nm)
 
 
-def _with_bearing(mjcf: Mjcf, hinge: Hinge) -> Mjcf:
+def _with_bearing(mjcf: Mjcf, actuator: Actuator, hinge: Hinge) -> Mjcf:
     """A model with MuJoCo's friction on γ, under MuJoCo's own defaults whatever the file's options are."""
     model = copy(mjcf.bare)
+    model.body_inertia[model.body(ROTOR).id] = actuator.inertia
+    model.jnt_limited[:] = 0
     model.dof_frictionloss[GAMMA], model.dof_damping[GAMMA] = hinge.coulomb_Nm, hinge.viscous_Nm_s
     model.dof_solref[GAMMA] = TIME_CONSTANT_s, DAMPING_RATIO
     model.dof_solimp[GAMMA] = IMPEDANCE, LARGEST_IMPEDANCE, *RISE

@@ -14,10 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spheretwin.crosscheck.coil_driven import drive_plant
-from spheretwin.crosscheck.trajectories import ENGINES, solve
-from spheretwin.models.actuator import Actuator
+from spheretwin.crosscheck.equations import equations_of
+from spheretwin.crosscheck.scale import Scale, scale_of
+from spheretwin.crosscheck.trajectories import ENGINES, reason_of, solve
+from spheretwin.models.actuator import MJCF_PATH, Actuator
 from spheretwin.models.base.checks import Check
-from spheretwin.models.lagrangian import acceleration
 from spheretwin.plant.bristle_friction import LAST, SLIP_SHARES, StictionSection
 
 Array = NDArray[np.float64]
@@ -49,16 +50,21 @@ def compare(mjcf: Path, actuator: Actuator) -> Stiction:
     actuator : Actuator
         Its inertia is that of the Lagrangian.
     """
-    expected, break_aways = Reference(actuator, STICTION, COULOMB_Nm).integrate(START_rad, DURATION_s)
-    drop = max(COULOMB_Nm) * (STICTION.break_away - 1) / float(min(actuator.inertia))
+    scale = scale_of(actuator)
+    reference = Reference(actuator, STICTION, scale.torques_Nm(COULOMB_Nm), mjcf, scale.torque)
+    expected, break_aways = reference.integrate(scale.pose_rad(START_rad), DURATION_s)
+    drop = max(scale.torques_Nm(COULOMB_Nm)) * (STICTION.break_away - 1) / float(min(actuator.inertia))
     bound = 1.5 * STEP_s * drop * break_aways
     return Stiction(
-        [_motion(name, np.abs(by_plant(mjcf, engine) - expected), bound) for name, engine in ENGINES.items()]
+        [
+            _motion(name, np.abs(by_plant(mjcf, scale, engine) - expected), bound)
+            for name, engine in ENGINES.items()
+        ]
     )
 
 
 def torque_Nm(t_s: float) -> Array:
-    """Return the torque on the hinges (3,) at a time."""
+    """Return the torque on the hinges (3,) of the shipped actuator at a time."""
     torque: Array = AMPLITUDE_Nm * np.sin(FREQUENCY_rad_s * t_s)
     return torque
 
@@ -71,14 +77,25 @@ class Reference:
     actuator : Actuator
     stiction : StictionSection
     coulomb_Nm : (3,) tuple, N·m
+    mjcf : Path
+        Model file of the actuator.
+    torque : float
+        Factor of the torques on the hinges.
     """
 
-    def __init__(self, actuator: Actuator, stiction: StictionSection, coulomb_Nm: tuple[float, ...]) -> None:
-        self._inertia, self._stiction = actuator.inertia, stiction
+    def __init__(
+        self,
+        actuator: Actuator,
+        stiction: StictionSection,
+        coulomb_Nm: tuple[float, ...],
+        mjcf: Path = MJCF_PATH,
+        torque: float = 1.0,
+    ) -> None:
+        self._equations, self._stiction, self._torque = equations_of(mjcf, actuator), stiction, torque
         self._slip = np.array(SLIP_SHARES)[:, None] * stiction.presliding_rad
         self._stiffness = stiction.break_away * np.array(coulomb_Nm) / self._slip.sum()
         # Two springs in parallel have critical damping 2 sqrt(2 k J), a half each.
-        self._damping = stiction.damping_ratio * np.sqrt(2 * self._stiffness * self._inertia)
+        self._damping = stiction.damping_ratio * np.sqrt(2 * self._stiffness * actuator.inertia)
         self._direction = np.zeros((2, 3))  # of slip; 0 for a slider that sticks
         self._anchor = np.zeros((2, 3))  # pose without deflection of a slider that sticks
 
@@ -119,8 +136,7 @@ class Reference:
         most = self._stiffness * self._limits(qdot)
         sticking = self._stiffness * (q - self._anchor) + self._damping * qdot
         friction = np.where(self._direction == 0, np.clip(sticking, -most, most), self._direction * most)
-        torque = torque_Nm(t) - friction.sum(axis=0)
-        return np.concatenate([qdot, acceleration(q, qdot, torque, self._inertia, 0.0)])
+        return self._equations.flow(state, self._torque * torque_Nm(t) - friction.sum(axis=0))
 
     def _margin(self, element: int, hinge: int, t: float, state: Array) -> float:
         """Return a number that falls through 0 as a slider begins to slip, or sticks again."""
@@ -141,14 +157,14 @@ class Reference:
         return element == LAST
 
 
-def by_plant(mjcf: Path, engine: str) -> Array:
+def by_plant(mjcf: Path, scale: Scale, engine: str) -> Array:
     """Return the states (n + 1, 6) at the samples by the plant without currents."""
     count = round(DURATION_s / STEP_s)
-    torque = np.array([torque_Nm(STEP_s * (step + 0.5)) for step in range(count)])
+    torque = scale.torque * np.array([torque_Nm(STEP_s * (step + 0.5)) for step in range(count)])
     fields: dict[str, Any] = {
         "plant.engine": engine,
-        "plant.initial_rad": START_rad,
-        "plant.coulomb_Nm": COULOMB_Nm,
+        "plant.initial_rad": scale.pose_rad(START_rad),
+        "plant.coulomb_Nm": scale.torques_Nm(COULOMB_Nm),
         "controller.period_s": STEP_s,
         **{f"plant.stiction.{name}": value for name, value in STICTION.model_dump().items()},
     }
@@ -167,5 +183,6 @@ def _motion(name: str, difference: Array, bound: float) -> Check:
         why="after each break-away the Stribeck effect begins a step and a half late at most; it takes the"
         " difference of both levels at most",
         unit="rad/s",
+        reason=reason_of(float(difference.max())),
         detail={"largest difference of an angle, rad": float(difference[:, :3].max())},
     )

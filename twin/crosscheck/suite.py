@@ -15,13 +15,13 @@ from spheretwin.crosscheck import (
     stiction,
     trajectories,
 )
-from spheretwin.crosscheck.friction import HingeFriction, VISCOUS_Nm_s
+from spheretwin.crosscheck.friction import HingeFriction
 from spheretwin.crosscheck.hinge import PUSH, Bearing, START_rad_s
 from spheretwin.models import actuator as actuators
 from spheretwin.models.actuator import Actuator
 from spheretwin.models.base.checks import Check, bound_shares
 from spheretwin.models.base.errors import InputError
-from spheretwin.models.mjcf import beyond_a_free_rotor, read
+from spheretwin.models.mjcf import read
 from spheretwin.viz.pages import markdown as pieces
 from spheretwin.viz.pages.markdown import Drawing, write_page
 
@@ -65,7 +65,7 @@ PARTS = (
     Part("static friction", lambda on: stiction.compare(on.mjcf, on.actuator)),
     Part("end stops", lambda on: end_stops.compare(on.mjcf, on.actuator)),
     Part("coil-driven motion", lambda on: coil_driven.compare(on.mjcf, on.actuator)),
-    Part("closed loop", lambda on: trajectories.compare_closed_loop(on.mjcf)),
+    Part("closed loop", lambda on: trajectories.compare_closed_loop(on.mjcf, on.actuator)),
 )
 
 
@@ -106,9 +106,9 @@ def run(
         The reference trajectory could not be integrated.
     """
     subject = Subject(mjcf, actuators.load(mjcf), states)
-    if unknown := beyond_a_free_rotor(read(mjcf).loaded):
+    if unknown := read(mjcf).unknown_to_the_lagrangian:
         raise InputError(
-            f"crosscheck {mjcf}: expected a rigid rotor on three ideal hinges, which the Lagrangian is,"
+            f"crosscheck {mjcf}: expected rigid bodies on three hinges, which the Lagrangian computes,"
             f" received a model with {', '.join(unknown)}"
         )
     findings: dict[str, Finding] = {}
@@ -156,9 +156,9 @@ def draw_differences(evidence: Evidence) -> Drawing:
     """Differences of engines and Lagrangian at random states."""
     from spheretwin.viz.figures import crosscheck
 
-    bounds = {quantity.name: quantity.bound for quantity in dynamics.QUANTITIES}
+    measured = evidence.of(dynamics.Dynamics)
     figure = crosscheck.spreads(
-        evidence.of(dynamics.Dynamics).differences, bounds, "Engines against the Lagrangian at random states"
+        measured.differences, measured.bounds, "Engines against the Lagrangian at random states"
     )
     caption = "Relative differences at random states of all three plants; 1e-18 stands for none at all."
     return Drawing("dynamics.svg", caption, figure)
@@ -182,7 +182,7 @@ def draw_friction(evidence: Evidence) -> Drawing:
     bearings = evidence.of(HingeFriction).bearings
     figure = crosscheck.hinge_friction(
         {
-            f"Coulomb {name}, viscous {1e3 * VISCOUS_Nm_s:g} mN·m·s": measured(bearing)
+            f"Coulomb {name}, viscous {1e3 * bearing.hinge.viscous_Nm_s:.4g} mN·m·s": measured(bearing)
             for name, bearing in bearings.items()
         },
         "Friction of one hinge: our stage, and MuJoCo's friction loss and damping",
