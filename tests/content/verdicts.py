@@ -60,9 +60,14 @@ def evidence() -> Evidence:
     session = session_of("nutation")
     mujoco, other = rows_of(session, 300), rows_of(session, 300)
     other["q_rad"][:] += 1e-9 * np.arange(300)[:, None]
-    pairs = {"AFSM": Pair(mujoco, other, True), "PD": Pair(mujoco.rows(0, 250), other.rows(0, 200), False)}
+    pairs = {
+        "AFSM": Pair(mujoco, other, True, "completed"),
+        "PD": Pair(mujoco.rows(0, 250), other.rows(0, 200), False, "left_workspace"),
+    }
     findings = {
-        "dynamics": Dynamics(checks("inertia", "bias"), differences),
+        "dynamics": Dynamics(
+            checks("inertia", "bias"), differences, {each.name: each.bound for each in QUANTITIES}
+        ),
         "trajectories": Trajectories(
             checks("motion", "order", "slope"), T_s, three, 1e-9 * three, convergence
         ),

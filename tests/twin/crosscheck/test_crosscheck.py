@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from spheretwin import cli
+from spheretwin import scenario as scenario_files
 from spheretwin.crosscheck import coil_driven, dynamics, identities, suite, trajectories
 from spheretwin.models import actuator as actuators
 from spheretwin.models.kinematics import rotation
@@ -170,9 +171,11 @@ def test_a_wrong_term_breaks_its_rows(monkeypatch, actuator, name, wrong, of_dyn
 def test_wrong_inertia_breaks_the_trajectory(monkeypatch, actuator):
     monkeypatch.setattr(trajectories, "STEPS_s", (1e-2, 5e-3))
     right = trajectories.integrate
-    monkeypatch.setattr(
-        trajectories, "integrate", lambda pieces, inertia: right(pieces, inertia * (1 + 2e-8 * np.eye(3)[1]))
-    )
+
+    def wrong(pieces, motion):
+        return right(pieces, motion._replace(inertia=motion.inertia * (1 + 2e-8 * np.eye(3)[1])))
+
+    monkeypatch.setattr(trajectories, "integrate", wrong)
     assert "trajectory: MuJoCo RK4" in broken(
         trajectories.compare_trajectories(actuators.MJCF_PATH, actuator).checks
     )
@@ -223,7 +226,7 @@ def test_wrong_plant_breaks_the_closed_loop(monkeypatch, error, rows):
         return LagrangianRotor(actuator, step_s, integrator, modelling_error + error, payload_kg, **rest)
 
     monkeypatch.setattr(plant, "LagrangianRotor", heavier)
-    assert broken(trajectories.compare_closed_loop(actuators.MJCF_PATH).checks) == rows
+    assert broken(trajectories.compare_closed_loop(actuators.MJCF_PATH, actuators.load()).checks) == rows
 
 
 def lagging(*arguments):
@@ -255,7 +258,7 @@ def test_closed_loops_of_the_shipped_joint_keep_their_bounds_unless_the_field_la
     assert list(conditions) == ["PD", "AFSM"]
     monkeypatch.setattr(trajectories, "CONDITIONS", conditions)
     monkeypatch.setattr(coil_driven.assembly, "plant_of", plant_of)
-    checks = trajectories.compare_closed_loop(actuators.MJCF_PATH).checks
+    checks = trajectories.compare_closed_loop(actuators.MJCF_PATH, actuators.load()).checks
     assert broken(checks) == rows
     assert len(checks) == 4
 
@@ -278,7 +281,7 @@ def test_runs_that_end_apart_break_their_rows(monkeypatch):
         return dataclasses.replace(finished, status="left_workspace", telemetry=cut) if early else finished
 
     monkeypatch.setattr(trajectories, "simulate", ends_early)
-    checks = trajectories.compare_closed_loop(actuators.MJCF_PATH).checks
+    checks = trajectories.compare_closed_loop(actuators.MJCF_PATH, actuators.load()).checks
     laws = ("PD", "AFSM", "PD, general joint")
     assert broken(checks) == {f"closed loop under {law}: trace" for law in laws}
     assert checks[0].row()["value"] is None
@@ -309,19 +312,83 @@ def test_parts_are_announced_as_they_begin(monkeypatch):
 
 
 @pytest.mark.release("1 to 2 s; other rows are broken in less")
-def test_a_model_the_lagrangian_does_not_have_exits_1_and_the_table_tells(tmp_path, monkeypatch):
-    with_rings = ("dynamics", "identities", "closed loop")
-    monkeypatch.setattr(suite, "PARTS", tuple(part for part in suite.PARTS if part.name in with_rings))
-    # Gimbal rings of a millionth of the rotor's inertia; the Lagrangian has none.
-    model = edited(tmp_path, ("1.1e-15", "1.1e-9"))
-    code, out, err = crosscheck("--mjcf", model, "--states", FEW)
+def test_a_wrong_engine_exits_1_and_the_table_tells(monkeypatch):
+    monkeypatch.setattr(suite, "PARTS", tuple(part for part in suite.PARTS if part.name == "dynamics"))
+    monkeypatch.setattr(dynamics, "coriolis_matrix", wrong_sign)
+    code, out, err = crosscheck("--states", FEW)
     assert code == cli.FAILED
     assert "BROKEN" in out
     (line,) = err.splitlines()
-    for name in ("inertia matrix M: MuJoCo", "inertia matrix M: Pinocchio", "closed loop under PD: trace"):
-        assert name in line
-    for name in ("orientation", "skew", "coupling", "step size"):
-        assert name not in line
+    assert all(name in line for name in BIASED)
+    assert "inertia matrix" not in line
+
+
+# Other machines
+
+
+GENERAL = {
+    "centre": [('<inertial pos="0 0 0" mass="1.6"', '<inertial pos="0.001 -0.002 0.004" mass="1.6"')],
+    "rings": [("mass=\"2.3e-12\" diaginertia=\"1.1e-15 1.1e-15 1.1e-15\"",
+               "mass=\"0.15\" diaginertia=\"2e-4 2.5e-4 3e-4\"")],
+    "light rings": [("1.1e-15", "4e-10")],
+    "tilted": [('class="tilt_hinge" axis="1 0 0"', 'class="tilt_hinge" axis="1 0.02 0.01" pos="0 0.0002 0"')],
+    "products": [("diaginertia=\"2.219e-3 2.176e-3 2.256e-3\"",
+                  "fullinertia=\"2.219e-3 2.176e-3 2.256e-3 3e-5 -4e-5 2e-5\"")],
+    "tiny": [("2.219e-3 2.176e-3 2.256e-3", "2.219e-6 2.176e-6 2.256e-6")],
+    "uneven": [("2.219e-3 2.176e-3 2.256e-3", "1.2e-3 2.6e-3 3.1e-3")],
+    "big, short range": [("2.219e-3 2.176e-3 2.256e-3", "2.2 2.1 2.3"), ('range="-80 80"', 'range="-5 20"')],
+}  # fmt: skip
+OF_STATES = ("dynamics", "identities", "trajectories", "torque-free rotor", "friction")
+
+
+def checks_of(mjcf, names):
+    subject = suite.Subject(mjcf, actuators.load(mjcf), FEW)
+    return [check for part in suite.PARTS if part.name in names for check in part.examine(subject).checks]
+
+
+@pytest.mark.release("2 s each; the command takes the same parts of the shipped model in less")
+@pytest.mark.parametrize("kind", GENERAL)
+def test_the_parts_without_coils_hold_on_what_the_lagrangian_engine_runs(tmp_path, kind):
+    checks = checks_of(edited(tmp_path, *GENERAL[kind]), OF_STATES)
+    assert broken(checks) == set()
+    assert len(checks) == 35
+
+
+VENTUSFF = Path(scenario_files.__file__).parent / "shipped" / "ventusff" / "actuator.xml"
+
+
+def test_bounds_of_a_lighter_machine_have_the_share_of_its_rings():
+    """Rings of 1e-15 kg·m² are 1.5e-11 of a rotor of 1.3e-4 kg·m²."""
+    checks = {check.name: check for check in checks_of(VENTUSFF, ("dynamics",))}
+    assert broken(checks.values()) == set()
+    assert checks["inertia matrix M: MuJoCo"].value == pytest.approx(9.9e-12, rel=0.05)
+    assert checks["inertia matrix M: MuJoCo"].bound == pytest.approx(2e-15 / 1.3e-4 + 1e-13, rel=1e-6)
+
+
+@pytest.mark.release("compiles loops of another machine, 4 min")
+@pytest.mark.parametrize("kind", ["ventusff", "centre", "rings", "big, short range"])
+def test_every_row_holds_on_other_machines(tmp_path, kind):
+    mjcf = VENTUSFF if kind == "ventusff" else edited(tmp_path, *GENERAL[kind])
+    code, out, _ = crosscheck("--mjcf", mjcf, "--states", FEW, "--json")
+    rows = json.loads(out)["checks"]
+    assert [row["name"] for row in rows if not row["ok"]] == []
+    assert code == cli.DONE
+    assert len(rows) == len(ROWS)
+
+
+def test_a_run_that_left_the_workspace_says_so(monkeypatch, actuator):
+    def leaving(*arguments):
+        states = np.zeros((31, 6))
+        states[7:] = np.nan
+        return states
+
+    monkeypatch.setattr(coil_driven, "drive_plant", leaving)
+    checks = coil_driven.compare(actuators.MJCF_PATH, actuator).checks
+    assert broken(checks) == {check.name for check in checks}
+    for check in checks:
+        assert check.value_text() == "left the workspace"
+        assert check.row()["reason"] == "left the workspace"
+        assert check.row()["value"] is None
 
 
 @pytest.mark.parametrize(

@@ -142,7 +142,7 @@ def test_mujoco_moves_the_hinge_as_its_soft_constraint_reads(hinge, rate):
             a3 = constrained(hinge, T, w + h / 2 * a2)
             w += h / 6 * (a1 + 2 * a2 + 2 * a3 + constrained(hinge, T, w + h * a3))
         v.append(w)
-    motion = by_mujoco(actuators.MJCF_PATH, hinge, rate, torque)
+    motion = by_mujoco(actuators.MJCF_PATH, actuators.load(), hinge, rate, torque)
     # The force has corners within steps: h²/8 times what the slope of the acceleration changes by there.
     corner = STEP_s**2 / 8 * hinge.mujoco_relaxation_1_s() * 2 * hinge.coulomb_Nm / J
     np.testing.assert_allclose(motion.qdot_rad_s, v, rtol=0, atol=corner)
