@@ -7,7 +7,7 @@ BIN := .venv/bin
 WHEEL := .venv-wheel/bin
 SYNC = $(UV) sync --quiet --frozen --no-default-groups --python $(PYTHON)
 
-.PHONY: demo test test-all compiled check format benchmark peers reproduce tune-rivals screenshots docs docs-snippets results extras dist setup clean
+.PHONY: demo test test-all compiled check format benchmark peers reproduce tune-rivals screenshots docs docs-snippets fuzz results extras dist setup clean
 
 demo: .venv/demo ## run the nutation under AFSM and leave a recording and its telemetry
 	$(BIN)/spheretwin simulate nutation --record nutation.rrd --telemetry nutation.parquet
@@ -61,6 +61,17 @@ docs: .venv/docs ## build the site without a network, with warnings as errors, i
 
 docs-snippets: setup ## also run the snippets of the documentation that take minutes
 	SPHERETWIN_LONG_SNIPPETS=1 $(BIN)/pytest tests/docs -rs
+
+# libFuzzer is part of clang. An input that breaks a promise is written to build/fuzz as crash-*, and
+# `build/fuzz/edges crash-*` repeats it.
+CLANG ?= clang
+FUZZ_S ?= 300
+fuzz: setup ## fuzz the exported C code and its FMU with libFuzzer under sanitizers, for FUZZ_S seconds (needs clang)
+	mkdir -p build/fuzz/corpus
+	$(BIN)/python -m tests.twin.export.fuzz_target build/fuzz
+	cd build/fuzz && $(CLANG) -std=c99 -g -O1 -fsanitize=fuzzer,address,undefined,float-cast-overflow \
+		-fno-sanitize-recover=all -o edges edges_fuzz.c st_fmu.c st_plant.c st_controller.c -lm && \
+		./edges -max_len=512 -max_total_time=$(FUZZ_S) corpus
 
 results: setup ## remake the pages of the results in build/results; conditions.txt there has date, versions and machine
 	mkdir -p build/results
