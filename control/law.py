@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from pydantic import BeforeValidator, Field
 
 from spheretwin.control import lti
+from spheretwin.models.base.arrays import real_array
 from spheretwin.models.base.errors import InputError, distinct_texts, is_plain, shown
 from spheretwin.models.telemetry.signals import COMMON_NAMES, Signal, width
 
@@ -206,19 +207,14 @@ def _independent(step: Callable[..., Any]) -> Callable[..., Any]:
 
 def _numbers(law: str, field: str, value: ArrayLike) -> NDArray[np.float64]:
     """Return a copy of an array in the layout that compiled code takes."""
-    try:
-        array = np.asarray(value)
-    except ValueError:  # rows of different lengths
-        raise InputError(f"law {law}: expected {field} as an array, received {shown(value)}") from None
-    # Anything else would be parsed, or lose its imaginary part, silently.
-    if array.dtype.kind not in "biuf":
+    array = real_array(value)
+    if array is None:
         raise InputError(f"law {law}: expected {field} as real numbers, received {shown(value)}")
     if array.ndim != 1:
         raise InputError(
             f"law {law}: expected {field} as a one-dimensional array, received shape {array.shape}"
         )
-    with np.errstate(over="ignore"):  # a wider float becomes infinite, and is refused below
-        numbers = np.array(array, dtype=np.float64, order="C")
+    numbers = np.array(array, order="C")
     if not np.all(np.isfinite(numbers)):
         entry = int(np.argmin(np.isfinite(numbers)))
         raise InputError(

@@ -22,6 +22,7 @@ from spheretwin.control.user_law import reference_of
 from spheretwin.external import ExternalController, ExternalPlant
 from spheretwin.inputs import InputGenerator
 from spheretwin.models.actuator import Actuator
+from spheretwin.models.base.arrays import real_array
 from spheretwin.models.base.errors import InputError, LawError, SpheretwinError, shown
 from spheretwin.models.telemetry.run_record import Change
 from spheretwin.models.telemetry.signals import Signal, with_more
@@ -267,7 +268,7 @@ class Session:
             Another number of values, one that is not finite, or a pose beyond the workspace.
         """
         given = {"q_rad": q_rad, "qdot_rad_s": qdot_rad_s, "current_A": current_A}
-        self.set(STATE, {name: np.asarray(v).tolist() for name, v in given.items() if v is not None})
+        self.set(STATE, {name: _plain(values) for name, values in given.items() if values is not None})
 
     def snapshot(self) -> Snapshot:
         """Return the complete state of the session."""
@@ -460,3 +461,9 @@ class Session:
         self.journal, self.events = snapshot.journal, snapshot.events
         self._inputs = self._input_generator()
         self._inputs.restore(snapshot.inputs)
+
+
+def _plain(values: Any) -> Any:
+    """Return an array as lists; anything else as it is, for the check."""
+    array = real_array(values)
+    return values if array is None else array.tolist()

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from math import isfinite
-from typing import Any
+from typing import Any, TypeGuard
 
 import numpy as np
 from gymnasium import spaces
@@ -26,8 +26,9 @@ from spheretwin.envs.episode import (
 )
 from spheretwin.envs.settings import settings_of
 from spheretwin.envs.variants import build_variants
+from spheretwin.models.base.arrays import real_array
 from spheretwin.models.base.compiled import for_types_of
-from spheretwin.models.base.errors import InputError
+from spheretwin.models.base.errors import InputError, shown
 from spheretwin.plant.lanes import LANES
 from spheretwin.plant.plants import Plants
 
@@ -139,6 +140,8 @@ class TwinVectorEnv(VectorEnv[Any, Any, Any]):
         InputError
             Unknown options, or another number of seeds than of plants.
         """
+        if not isinstance(options, Mapping | None):
+            raise InputError(f"environment: expected options as a table, received {shown(options)}")
         options = dict(options or {})
         mask = np.asarray(options.pop("reset_mask", np.ones(self.num_envs, np.bool_)))
         if options or mask.shape != (self.num_envs,) or mask.dtype != np.bool_:
@@ -146,12 +149,16 @@ class TwinVectorEnv(VectorEnv[Any, Any, Any]):
                 f"environment: expected reset_mask of {self.num_envs} booleans, received {options or mask}"
             )
         if seed is not None:
-            seeds = [seed + i for i in range(self.num_envs)] if isinstance(seed, int) else list(seed)
+            seeds = [seed + i for i in range(self.num_envs)] if _is_seed(seed) else seed
+            if not (isinstance(seeds, Sequence) and all(one is None or _is_seed(one) for one in seeds)):
+                raise InputError(
+                    f"environment: expected whole numbers from 0 on as seeds, received {shown(seed)}"
+                )
             if len(seeds) != self.num_envs:
                 raise InputError(f"environment: expected {self.num_envs} seeds, received {len(seeds)}")
             for i, one in enumerate(seeds):
                 if one is not None and mask[i]:
-                    self._generators[i] = seeding.np_random(one)[0]
+                    self._generators[i] = seeding.np_random(int(one))[0]
         self._start(np.flatnonzero(mask))
         return self._observations(), self._infos_of_start(mask)
 
@@ -177,12 +184,14 @@ class TwinVectorEnv(VectorEnv[Any, Any, Any]):
             Another shape of actions, or one that is not finite.
         """
         n, episodes = self.num_envs, self._episodes
-        actions = self._physics.limit * np.asarray(actions, dtype=np.float64)
-        if actions.shape != self.action_space.shape or not isfinite(actions.sum()):
-            raise InputError(
-                f"environment: expected finite actions of shape {self.action_space.shape},"
-                f" received {actions if actions.shape == self.action_space.shape else actions.shape}"
-            )
+        given, shape = real_array(actions), self.action_space.shape
+        with np.errstate(over="ignore"):  # each is cut at the limit
+            if given is None or given.shape != shape or not isfinite(given.sum()):
+                raise InputError(
+                    f"environment: expected finite actions of shape {shape}, received"
+                    f" {shown(actions) if given is None or given.shape == shape else given.shape}"
+                )
+            actions = self._physics.limit * given
         over = episodes.code != RUNNING if self._any_over else np.zeros(n, np.bool_)
         observations = np.empty((n, len(BOUNDS)), np.float32)
         rewards, terms = np.empty(n), np.empty((n, len(REWARD_TERMS)))
@@ -273,3 +282,7 @@ class TwinVectorEnv(VectorEnv[Any, Any, Any]):
             "rms_error_rad": np.where(mask, rms, 0.0),
         }
         return columns | {f"_{name}": mask.copy() for name in columns}
+
+
+def _is_seed(value: object) -> TypeGuard[int]:
+    return isinstance(value, int | np.integer) and bool(value >= 0)

@@ -170,15 +170,18 @@ def step(state: State, currents: Array, disturbance: Array, parameters: Paramete
     Raises
     ------
     InputError
-        An array of another length, or a number that is not finite or out of range. The checks cost 2 % of a
-        step; `Plants` makes them once for many steps.
+        An array of another length, or a number that is not finite or out of range; also of the result. The
+        checks cost 2 % of a step; `Plants` makes those of its arguments once for many steps.
     """
     check_parameters(parameters)
     _check_state(state)
     _check_load(disturbance, dt)
     if not _has(currents, parameters.torque_gain.shape[0]):
         raise InputError("plant: expected currents of one finite number for each group, received others")
-    return step_of_checked(state, currents, disturbance, parameters, dt)
+    after = step_of_checked(state, currents, disturbance, parameters, dt)
+    if not (_has(after.q_rad, 3) and _has(after.qdot_rad_s, 3)):
+        raise InputError("plant: expected a step with a finite result, received one that diverges")
+    return after
 
 
 @compiled

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from spheretwin.models.base.arrays import is_real, real_array
 from spheretwin.models.base.errors import InputError, shown
 from spheretwin.models.magnetics import TorqueModel, scratch_of
 from spheretwin.plant import lanes
@@ -125,7 +126,7 @@ class Plants:
         """
         count = len(np.atleast_2d(self._read(lanes.Q)[plants]))
         states = [
-            (first, _checked(name, values if np.ndim(values) else np.full(3, values), count, 3))
+            (first, _checked(name, values, count, 3, single=True))
             for first, name, values in ((lanes.Q, "q_rad", q_rad), (lanes.QDOT, "qdot_rad_s", qdot_rad_s))
         ]
         for first, given in states:
@@ -216,10 +217,11 @@ class Plants:
         InputError
             Another shape of currents or disturbance, or a number that is not finite.
         """
-        sequence = np.asarray(currents, np.float64)
-        if sequence.ndim != 3 or sequence.shape[1:] != (len(self), self.groups):
+        sequence = real_array(currents)
+        if sequence is None or sequence.ndim != 3 or sequence.shape[1:] != (len(self), self.groups):
             raise InputError(
-                f"plants: expected currents of (rows, {len(self)}, {self.groups}), received {sequence.shape}"
+                f"plants: expected currents of (rows, {len(self)}, {self.groups}),"
+                f" received {shown(currents) if sequence is None else sequence.shape}"
             )
         if not np.all(np.isfinite(sequence)):
             raise InputError("plants: expected finite currents, received others")
@@ -338,19 +340,21 @@ class Plants:
         self.blocks[:, first : first + 3 * LANES] = rows.reshape(len(self.blocks), -1)
 
 
-def _checked(name: str, values: ArrayLike, count: int, width: int) -> Array:
-    """Return values for each of some plants, (count, width)."""
-    given = np.asarray(values, np.float64)
-    if given.shape not in ((width,), (count, width)) or not np.all(np.isfinite(given)):
+def _checked(name: str, values: ArrayLike, count: int, width: int, *, single: bool = False) -> Array:
+    """Return values for each of some plants, (count, width); a single number may be that of all."""
+    given = real_array(values)
+    shapes = ((), (width,), (count, width)) if single else ((width,), (count, width))
+    if given is None or given.shape not in shapes or not np.all(np.isfinite(given)):
+        is_large = given is not None and given.size > width
         raise InputError(
             f"plants: expected {name} of {width} finite numbers, for all or for each of {count},"
-            f" received {'an array of ' + str(given.shape) if given.size > width else given}"
+            f" received {f'an array of {np.shape(values)}' if is_large else shown(values)}"
         )
     return np.broadcast_to(given, (count, width))
 
 
 def _check_steps(dt: float, steps: int) -> None:
-    if not 0 < dt <= LONGEST_STEP_s:
+    if not (is_real(dt) and 0 < dt <= LONGEST_STEP_s):
         raise InputError(
             f"plants: expected a step dt above 0, up to {LONGEST_STEP_s:g} s, received {shown(dt)}"
         )

@@ -40,6 +40,7 @@ class _Field:
         self.is_integer = QUANTITIES[self.name].is_integer
         self.is_float = "float" in field.type
         bits = int(field.type.lstrip("uintfloa"))
+        self.largest = float(np.finfo(np.float32).max) if bits == 32 else math.inf
         signed = not field.type.startswith("u")
         self.lowest = -(2 ** (bits - 1)) if signed else 0
         self.highest = 2 ** (bits - signed) - 1
@@ -56,7 +57,11 @@ class _Field:
         raw = np.ravel(value).tolist()
         if not self.is_exact:
             raw = [(number - self.offset) / self.scale for number in raw]
-        return raw if self.is_float else [self._whole(number) for number in raw]
+        return [self._float(number) if self.is_float else self._whole(number) for number in raw]
+
+    def _float(self, number: float) -> float:
+        # A shorter type has no larger number but infinity, and would raise.
+        return math.copysign(math.inf, number) if abs(number) > self.largest else number
 
     def _whole(self, number: float) -> int:
         if not math.isfinite(number):
@@ -106,7 +111,10 @@ class Codec:
         self.size = len(self.start) + self._struct.size + crc_size + len(self._end)
 
     def encode(self, values: Mapping[str, Any]) -> bytes:
-        """Return the frame of values in SI units; integers saturate, and a field not given is missing."""
+        """Return the frame of values in SI units; a field not given is missing.
+
+        Numbers too large for their type saturate: integers at its ends, floats at infinity.
+        """
         numbers = [field.numbers(values) for field in self._fields]
         if self.frame.encoding == "json":
             return self._encode_line(numbers)

@@ -66,6 +66,12 @@ def test_integers_saturate_and_their_lowest_value_stands_for_none(angle, count):
     assert raw().encode({"angle": angle}) == count.to_bytes(2, "big", signed=True)
 
 
+def test_a_number_beyond_single_precision_becomes_infinite():
+    codec = raw(type="float32")
+    assert codec.decode(codec.encode({"angle": -1e200}))["angle"] == -np.inf
+    assert codec.decode(codec.encode({"angle": 1e38}))["angle"] == np.float32(1e38)
+
+
 def test_a_missing_integer_is_no_number():
     assert np.isnan(raw().decode(b"\x80\x00")["angle"])
     assert np.all(np.isnan(MEASUREMENT.decode(measurement(1))["current"]))
