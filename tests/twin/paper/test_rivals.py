@@ -18,6 +18,7 @@ from spheretwin.paper.rivals import EXPERIMENT
 from spheretwin.paper.runner import make_plan, run_plan, scenario_of
 from spheretwin.study.grid import Grid
 from spheretwin.study.row import Rows
+from spheretwin.study.statistics import interval
 from spheretwin.study.study import load
 from spheretwin.study.tuning import gains as tuning_gains
 from spheretwin.study.tuning import trials
@@ -199,6 +200,27 @@ def test_the_error_at_the_start_is_the_largest_until_the_rates_agree():
     table = {"error_rad": error, "qdot_rad_s": rate_error, "qdot_ref_rad_s": np.zeros((3, 3))}
     # α agrees at the third tick, β at the second, γ not at all.
     np.testing.assert_array_equal(start_error(SimpleNamespace(telemetry=table)), [0.3, 0.4, 0.3])
+
+
+@pytest.mark.release("20 runs of two laws, whose loops compile for 20 s")
+def test_pid_reaches_the_limit_of_the_currents_at_the_light_load_too():
+    """With the gains that the search found for computed torque: at L = 5 the search finds others for PID."""
+    light = IDEAL.conditions[0]
+    tuned = next(
+        gains
+        for gains in tuned_gains(IDEAL.study)
+        if (gains.law, gains.limit_A_s) == ("computed_torque", 30.0)
+    )
+    pid, full_current = (
+        rival_conditions.tuned_case(IDEAL, light, tuned._replace(law="pid")),
+        rival_conditions.limit_case(light, "least_norm"),
+    )
+    outcomes = run_plan(make_plan(EXPERIMENT._replace(cases=lambda: [pid, full_current])))
+    errors_rad = [run.max_abs_error.max() for run in outcomes[pid.name]]
+    limits_rad = [np.max(run.data) for run in outcomes[full_current.name]]
+    assert interval(errors_rad)[0] < interval(limits_rad)[1]
+    assert np.median(errors_rad) == pytest.approx(1.185e-3, abs=1e-6)
+    assert max(run.figures["current_variation_A_s"] for run in outcomes[pid.name]) < 30
 
 
 @pytest.mark.release("runs all rivals for 15 s; content of paper_rivals has rows and page")
