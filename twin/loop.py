@@ -111,7 +111,7 @@ def loop(
     ----------
     inputs : Inputs
         At least as many rows as `log`.
-    law, allocate, estimate : address, or callable in the uncompiled loop (``loop.py_func``)
+    law, allocate, estimate : address, or callable if nothing is compiled
         Functions of `control.law.SIGNATURE`, `control.allocation.SIGNATURE` and
         `control.estimators.estimator.SIGNATURE`.
     controller : Controller

@@ -56,7 +56,7 @@ class Run:
     actuator : Actuator
         Simulated actuator.
     law_error : LawError, optional
-        Exception of a compiled law, which ended the run; one of a law in plain Python is raised.
+        Exception of the law, which ended the run.
     record : RunRecord, optional
         Provenance: with it, a saved run can be replayed.
     """

@@ -5,14 +5,9 @@ from __future__ import annotations
 import json
 from typing import Any, NamedTuple
 
-import numpy as np
-
 from spheretwin.bench import modes
 from spheretwin.bench.modes import Limits
-from spheretwin.control.law import Law
-from spheretwin.loop import is_user_law
 from spheretwin.models.base.errors import InputError, exception_text
-from spheretwin.models.base.numba_internals.functions import Dispatcher
 from spheretwin.models.telemetry.run_record import RunRecord
 from spheretwin.models.telemetry.table import Table
 from spheretwin.provenance import record_of
@@ -91,25 +86,8 @@ def compiled_session(scenario: Scenario) -> Session:
     if scenario.manual.file is not None:
         raise InputError("bench: expected manual.currents_A or none, received manual.file")
     session = Session(scenario)
-    if runs_in_python(session):
-        # A law in plain Python runs in a loop in plain Python, whose parts its first tick compiles.
-        without_events = scenario.model_copy(update={"event": ()})
-        Session(without_events, Law("idle", _idle, np.empty(0), np.empty(0))).advance(1)
     session.compile()
     return session
-
-
-def runs_in_python(session: Session) -> bool:
-    """True if the law of a session, and so its loop, is plain Python."""
-    return is_user_law(session.law) and not isinstance(session.law.step, Dispatcher)
-
-
-def _idle(*arguments: Any) -> None:
-    """Command no torque."""
-    arguments[-1][:] = 0.0
-
-
-_idle.__module__ = "__main__"  # a function of this package would be compiled
 
 
 def with_end_stops(scenario: Scenario) -> Scenario:
