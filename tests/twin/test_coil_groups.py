@@ -7,6 +7,7 @@ from spheretwin import scenario as scenarios
 from spheretwin.active_config import initial_config
 from spheretwin.electronics.coil import SHORTED
 from spheretwin.electronics.drive_chain import advance, begin, drive_chain, end
+from spheretwin.machine.parameters import KINDS, Machine, Parameter
 from spheretwin.models.base.errors import InputError
 from spheretwin.session import Session
 from tests.twin.model_files import model_file
@@ -136,3 +137,9 @@ def test_other_numbers_of_a_model_file_are_refused_by_name(tmp_path, numbers, me
 def test_other_lists_of_a_scenario_are_refused_by_name(field, value, message):
     with pytest.raises(InputError, match=message):
         initial_config(scenarios.load("hold", {field: value}), None, None)
+
+
+def test_identification_has_the_lag_of_each_group_unless_it_fits_one():
+    machine = Machine("hold", {"drive.time_constant_s": (L / R).tolist()})
+    np.testing.assert_array_equal(machine.setup([], []).lag_s, L / R)
+    assert machine.setup([Parameter(KINDS["lag_s"], 0)], [2e-3]).lag_s == 2e-3

@@ -126,19 +126,33 @@ def responses(A, B, C):
     return np.array([C @ np.linalg.solve(1j * w * np.eye(len(A)) - A, B) for w in (1.0, 30.0, 300.0)])
 
 
-@pytest.mark.parametrize(("inputs", "states"), [("torque", 9), ("currents", 24)])
-def test_a_lag_is_one_more_pole_of_every_response(inputs, states):
+LAGS_s = np.linspace(2e-3, 6e-3, 18)
+
+
+@pytest.mark.parametrize(
+    ("inputs", "states", "lag_s"), [("torque", 9, 4e-3), ("currents", 24, 4e-3), ("currents", 24, LAGS_s)]
+)
+def test_a_lag_is_one_more_pole_of_every_response(inputs, states, lag_s):
     """Where no current flows at rest, x' = A x + B i and i' = (u - i) / lag: G / (1 + lag s)."""
-    unloaded = {"plant.payload_kg": 0.0, "drive.time_constant_s": 4e-3, "plant.viscous_Nm_s": [1e-3] * 3}
+    lag_s = np.broadcast_to(lag_s, 18)[: states - 6]
+    given = lag_s.tolist() if inputs == "currents" else lag_s[0]
+    unloaded = {"plant.payload_kg": 0.0, "drive.time_constant_s": given, "plant.viscous_Nm_s": [1e-3] * 3}
     plain, late = (linearise(scenario(unloaded), TILTED, inputs=inputs, lag=lag) for lag in (False, True))
     assert late.system.A.shape == (states, states)
-    pole = 1 + 4e-3j * np.array([1.0, 30.0, 300.0])
+    poles = 1 + 1j * lag_s * np.array([1.0, 30.0, 300.0])[:, None, None]
     np.testing.assert_allclose(
-        responses(late.system.A, late.system.B, late.system.C) * pole[:, None, None],
+        responses(late.system.A, late.system.B, late.system.C) * poles,
         responses(plain.system.A, plain.system.B, plain.system.C),
         rtol=1e-9,
         atol=1e-12,
     )
+
+
+def test_a_torque_behind_different_lags_is_refused():
+    with pytest.raises(
+        InputError, match=r"expected one lag of all groups .*, received lags of 0\.002 to 0\.006"
+    ):
+        linearise(scenario({"drive.time_constant_s": LAGS_s.tolist()}), TILTED, lag=True)
 
 
 def test_a_lag_under_load_is_the_same_for_torques_and_for_the_currents_that_answer_them(actuator):

@@ -25,9 +25,8 @@ def given_current(t_s, delay_s, interpolated):
 def means(edges, delay_s=0.0, lag_s=0.0, interpolated=False, start=None):
     present = SAMPLES_A[0].copy() if start is None else start
     result = np.empty((len(edges) - 1, 2))
-    mean_currents(
-        SAMPLES_s, SAMPLES_A, np.asarray(edges), delay_s, np.full(2, lag_s), interpolated, present, result
-    )
+    lags_s = np.multiply(lag_s, [1.0, 1.5])  # of each group
+    mean_currents(SAMPLES_s, SAMPLES_A, np.asarray(edges), delay_s, lags_s, interpolated, present, result)
     return result, present
 
 
@@ -44,7 +43,8 @@ def test_they_are_those_of_the_lag_that_is_solved(delay_s, lag_s, interpolated):
 
         def slope(t, y, middle=(first + last) / 2):
             u = given_current(t if interpolated else middle, delay_s, interpolated)
-            return np.concatenate([(u - y[:2]) / lag_s, y[:2]]) if lag_s else np.concatenate([0 * u, u])
+            rate = (u - y[:2]) / np.multiply(lag_s, [1.0, 1.5]) if lag_s else 0 * u
+            return np.concatenate([rate, y[:2]]) if lag_s else np.concatenate([0 * u, u])
 
         solved = solve_ivp(slope, (first, last), np.concatenate([current, charge]), rtol=1e-10, atol=1e-14)
         current, charge = solved.y[:2, -1], solved.y[2:, -1]

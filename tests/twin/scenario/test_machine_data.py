@@ -164,3 +164,11 @@ def test_a_link_is_not_armed_with_a_limit_above_that_of_the_model_file(changes, 
             Link.open("udp://127.0.0.1:9", scenario, armed, limits)
     else:
         Link.open("udp://127.0.0.1:9", scenario, armed, limits).channel.transport.close()
+
+
+@pytest.mark.parametrize(("highest_degC", "limit_degC"), [(120.0, 90.0), (80.0, 80.0)])
+def test_a_link_removes_the_currents_at_the_lowest_temperature_limit(tmp_path, highest_degC, limit_degC):
+    path = model_file(tmp_path, group_temperature_limit_degC=[130.0] * 17 + [90.0])
+    limits = Limits(current_A=0.1, temperature_degC=highest_degC)
+    with Link.open("udp://127.0.0.1:9", scenarios.load("hold", {"plant.mjcf": path}), limits=limits) as link:
+        assert link._limits.temperature_degC == limit_degC

@@ -156,7 +156,8 @@ class Link:
         settings : LinkSettings, optional
             Default: a dry run.
         limits : Limits, optional
-            Default: the nominal current limit of the scenario.
+            Default: the nominal current limit of the scenario. A lower temperature limit of the model file
+            holds.
         frame : str
             Shipped name or TOML file of the frames.
         report : callable, optional
@@ -182,6 +183,9 @@ class Link:
                 f"link: expected a current limit of at most {stated} A, that of the model file, to arm,"
                 f" received {used} A"
             )
+        if (stated_degC := complete.actuator.group.temperature_limit_degC) is not None:
+            highest_degC = min(limits.temperature_degC, float(np.min(stated_degC)))
+            limits = limits.model_copy(update={"temperature_degC": highest_degC})
         period_s = resolved.controller.period_s
         channel = Channel(open_transport(address), frames.command, frames.measurement, groups, report)
         heat = CoilHeat(resolved.drive, limits, period_s)
