@@ -3,12 +3,19 @@
 import functools
 import json
 import re
+from unittest.mock import patch
 
 import numpy as np
 
 from spheretwin import cli, machine
+from spheretwin.cli import reproduce
+from spheretwin.paper.experiment import Case, Finding
+from spheretwin.study.optimise import Objective
+from spheretwin.study.tuning import report
 from tests.content.content import command, content_test, scratch
 from tests.content.values import tree
+from tests.twin.paper.cases import LOST, experiment
+from tests.twin.study.tuning.cases import FIGURES
 
 TIMES = re.compile(
     r'(?<="wall_s": )[^,}]+|(?<="startup_s": )[^,}]+|(?<="realtime_factor": )[^,}]+|(?<= simulated in ).*'
@@ -154,6 +161,93 @@ def sweeps():
     )
 
 
+TUNED = """
+name = "small"
+scenario = "hold"
+seeds = 2
+metrics = ["figures.py:miss", "figures.py:slowness"]
+law = [{ law = "pd" }, { law = "pid" }]
+fields = { duration = 0.005 }
+
+[optimise]
+trials = 8
+fresh = 2
+objective = [{ metric = "miss" }, { metric = "slowness" }]
+gain = [
+    { field = "controller.stiffness", low = 30.0, high = 3000.0, log = true, start = 100.0 },
+    { name = "damping of pd", field = "controller.damping", law = "pd", low = 5, high = 500, start = 20 },
+    { name = "damping of pid", field = "controller.damping", law = "pid", low = 5, high = 500, start = 60 },
+]
+"""
+
+LIMITED = """
+name = "limited"
+scenario = "hold"
+metrics = ["figures.py:miss", "figures.py:slowness"]
+fields = { duration = 0.005, "controller.law" = "pd" }
+
+[optimise]
+sampler = "local"
+draws = 12
+perturbations = 4
+objective = [{ metric = "miss" }, { metric = "slowness", limits = [0.01, 0.7, 9.0] }]
+gain = [
+    { field = "controller.stiffness", low = 30.0, high = 3000.0, log = true, reason = "about 300" },
+    { field = "controller.damping", low = 5.0, high = 500.0, log = true, optional = true },
+]
+"""
+
+
+OBJECTIVES = [
+    ("max_abs_error_rad", {}), ("max_abs_error_rad", {"of": ("alpha", "beta")}), ("slowness", {}),
+    ("current_variation_A_s", {"over": "median"}), ("rms_torque_Nm", {"over": "geometric_mean"}),
+]  # fmt: skip
+
+
+def tunings():
+    """Tuning with a front, with one objective, and with the best trial within each limit."""
+    folder = scratch("tunings")
+    (folder / "figures.py").write_text(FIGURES)
+    single = TUNED.replace(', { metric = "slowness" }', "")
+    studies = {"small": (TUNED, "--json"), "single": (single, "--trials 3"), "limited": (LIMITED, "")}
+    for name, (study, _) in studies.items():
+        (folder / f"{name}.toml").write_text(study)
+    calls = [f"sweep {folder}/{name}.toml --optimise --threads 1 --out {folder}/{name} {more}"
+             for name, (_, more) in studies.items()]  # fmt: skip
+    text = several([*calls, calls[0].removesuffix("--json")])
+    gains = (folder / "limited" / "gains.json").read_text()
+    page = (folder / "limited" / "tuning.md").read_text(encoding="utf-8")
+    files = sorted(str(path.relative_to(folder)) for path in folder.glob("*/*"))
+    trial = {"trial": 1, "gains": {}, "fields": {"controller.damping": 1.0}, "ended": "completed"}
+    for name, more in OBJECTIVES:
+        made = Objective(metric=name, **more)
+        trial |= {"values": {made.called: 2.0}, "fresh": None, "fresh_reason": None}
+        files.append(str(report.chosen({"start": None, "best": [trial]})[0]))
+    return "\n".join([text, *tree(json.loads(gains)), page, *files])
+
+
+def reproductions():
+    """Experiments by name, all of them, one that ends early, and one with what its law does not have."""
+    folder = scratch("reproductions")
+    good, bad = Finding(True, "the order holds" + " under every condition" * 9), Finding(False, "it is 0.36")
+    case = Case("ideal", "hold", {"duration": 0.05}, is_random=False)
+    made = {f"figure{number}": experiment(case, findings=lambda _: [good, bad]) for number in range(10)}
+    made |= {"lost": experiment(case, LOST), "engine": experiment(case)}
+    own = case._replace(fields={"controller.law": "pd", "controller.surface_slope": 5.0})
+    made |= {"own": experiment(own), "none": experiment(case, findings=lambda _: [])}
+    made["bad"] = experiment(case, findings=lambda _: [bad])
+    made = {name: each._replace(name=name) for name, each in made.items()}
+    with patch.object(reproduce, "EXPERIMENTS", made):
+        calls = ["lost --json", f"own --out {folder}/own", "figure1 engine figure1 --seeds 1 --json",
+                 "engine --plant mujoco --json", "figure3 --seeds 1", "none --seeds 1 --verbose",
+                 f"engine --seeds 1 --limit 3 --plant lagrangian --out {folder}/page"]  # fmt: skip
+        text = several([f"reproduce {call}" for call in calls])
+        del made["own"], made["lost"]
+        text += several(["reproduce all --seeds 1"])
+    page = (folder / "page" / "reproduce.md").read_text(encoding="utf-8")
+    return "\n".join([text, page, *sorted(path.name for path in folder.glob("*/*"))])
+
+
 def magnetics():
     folder = recorded()
     return several(
@@ -166,6 +260,7 @@ def magnetics():
 CASES = {
     "command_help": lambda: several(HELP), "command_explain": lambda: several(EXPLAIN),
     "command_runs": runs, "command_reviews": reviews, "command_sweeps": sweeps,
+    "command_tunings": tunings, "command_reproductions": reproductions,
     "command_logs": logs, "command_magnetics": magnetics,
 }  # fmt: skip
 

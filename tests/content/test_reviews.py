@@ -9,6 +9,8 @@ import numpy as np
 from spheretwin import scenario as scenarios
 from spheretwin.analysis import review
 from spheretwin.analysis.comparison import labels
+from spheretwin.analysis.tolerances import Exceeded
+from spheretwin.cli.review import _first as first_exceeded
 from spheretwin.models.telemetry.fault_log import FaultLog
 from spheretwin.models.telemetry.status import Status
 from spheretwin.models.telemetry.table import read_parquet
@@ -245,7 +247,11 @@ def many_events() -> str:
         for key, first, value in DIFFERING
     ]
     tolerances = printed(lambda: reviews_printed.print_tolerances("a.rrd", "b.rrd", TOLERANCES))
-    return "\n".join([*reports, *differing, tolerances])
+    places = [Exceeded("b.parquet", name, axis, 0.5, 0.125) for name, axis in (
+        ("q_rad", "β"), ("torque_Nm", ""), ("current_A", "group 5"),
+    )]  # fmt: skip
+    first = [first_exceeded(places[begin:end], TOLERANCES) for begin, end in ((0, 1), (0, 2), (0, 3), (1, 2))]
+    return "\n".join([*reports, *differing, tolerances, *first])
 
 
 def fault_texts() -> str:

@@ -8,13 +8,11 @@ import pytest
 
 from spheretwin import cli
 from spheretwin import scenario as scenarios
-from spheretwin.analysis.tolerances import Exceeded
-from spheretwin.cli import review, simulate
+from spheretwin.cli import simulate
 from spheretwin.models.base.errors import InputError, SpheretwinError
 from spheretwin.runtime import Runtime
 from spheretwin.scenario.reading import shipped
 from spheretwin.session import Session
-from spheretwin.viz.terminal.reviews import SignalTolerance
 from tests.twin.cli.calls import call, refusal, succeeded, under_law
 
 PLANT = ["--plant.engine", "lagrangian"]
@@ -94,25 +92,3 @@ def test_a_run_without_a_tick_has_no_time_and_no_pose(tmp_path):
     result = call(*under_law(tmp_path, "torque[:] = float('inf')"), "--duration", 0.01)
     message = "spheretwin: the run ended before its first tick was complete: diverged\n"
     assert (result.code, result.err) == (cli.FAILED, message)
-
-
-@pytest.mark.parametrize(
-    ("count", "more"), [(1, ""), (2, "; 1 more signal later"), (3, "; 2 more signals later")]
-)
-def test_the_first_violation_is_stated_with_the_largest_excess_of_its_signal(count, more):
-    places = [
-        Exceeded("b.parquet", name, axis, 0.5, 0.125)
-        for name, axis in (("q_rad", "β"), ("t_s", ""), ("error_rad", "γ"))
-    ]
-    signals = [
-        SignalTolerance("error_rad", 4.0, "γ", 0.75, 0.25),
-        SignalTolerance("q_rad", 2.0, "α", 0.625, 0.375),
-        SignalTolerance("t_s", 2.0, "", 0.875, 0.4375),
-    ]
-    assert review._first(places[:count], signals) == (
-        "b.parquet: q_rad β leaves its tolerance first at 0.5 s, by 0.125;"
-        f" its largest excess is 0.375 at 0.625 s{more}"
-    )
-    assert review._first(places[1:2], signals).startswith(
-        "b.parquet: t_s leaves its tolerance first at 0.5 s"
-    )
