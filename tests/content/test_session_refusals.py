@@ -167,7 +167,7 @@ def invalid_sessions():
     for engine in ENGINES:
         with session(**{"plant.engine": engine}) as live:
             lines += [engine, listed(lambda change, live=live: live.set(*change), REFUSED)]
-    text = re.sub("in line \\d{2,}", "in line N", "\n".join(lines))
+    text = re.sub("line \\d{2,}", "line N", "\n".join(lines))
     return re.sub(r"\S+/x{9,}…x*", "x…x", text)  # as many as fit beside the path of one of two folders
 
 
