@@ -26,6 +26,8 @@ class OutputFile:
     ----------
     target : Path
         Path of the complete file.
+    suffix : str
+        As in `check_writable`.
 
     Attributes
     ----------
@@ -35,11 +37,11 @@ class OutputFile:
     Raises
     ------
     InputError
-        No file can be made there.
+        No file can be made there, or its name is that of another format.
     """
 
-    def __init__(self, target: Path) -> None:
-        check_writable(target)
+    def __init__(self, target: Path, suffix: str = "") -> None:
+        check_writable(target, suffix)
         self._target = _behind_links(target)
         self.path = _hidden(self._target)
         try:
@@ -168,19 +170,19 @@ def check_writable(path: Path, suffix: str = "") -> None:
 
 
 @contextmanager
-def whole_file(path: Path) -> Iterator[Path]:
+def whole_file(path: Path, suffix: str = "") -> Iterator[Path]:
     """Yield a temporary path in the same folder; it is renamed to `path` if the block succeeds.
 
-    A link stays a link: the file it points to is replaced.
+    A link stays a link: the file it points to is replaced. The suffix is that of `check_writable`.
 
     Raises
     ------
     InputError
-        No file can be made there.
+        No file can be made there, or its name is that of another format.
     SpheretwinError
         Writing failed, for example on a full disk; an earlier file at `path` is unchanged.
     """
-    output = OutputFile(path)
+    output = OutputFile(path, suffix)
     try:
         yield output.path
         output.keep()

@@ -125,7 +125,7 @@ def write_parquet(path: Path, schema: pa.Schema, tables: Iterable[pa.Table], **o
     import pyarrow.parquet  # slow to import, and most runs write no file
 
     rows, segments = 0, []
-    with whole_file(path) as temporary:
+    with whole_file(path, ".parquet") as temporary:
         sink = SegmentedFile(temporary)
         try:
             with pyarrow.parquet.ParquetWriter(sink, schema, write_page_checksum=True, **options) as writer:

@@ -7,6 +7,7 @@ import mujoco
 from mujoco import viewer
 
 from spheretwin.models.base.errors import without_breaks
+from spheretwin.models.base.files import regular_file
 from spheretwin.mujoco_plugin import EXAMPLE
 
 
@@ -16,8 +17,8 @@ def main() -> int:
     parser.add_argument("model", nargs="?", default=f"{EXAMPLE}", help="MJCF file; default: the shipped one")
     path = parser.parse_args().model
     try:
-        model = mujoco.MjModel.from_xml_path(path)
-    except ValueError as error:
+        model = mujoco.MjModel.from_xml_path(str(regular_file(path)))
+    except (OSError, ValueError) as error:
         print(f"model {path}: expected valid MJCF, {without_breaks(error)}", file=sys.stderr)
         return 2
     viewer.launch(model)

@@ -94,7 +94,7 @@ def recorded(path: Path, application: str, layout: rrb.Blueprint) -> Iterator[rr
         Writing failed; the previous file is unchanged.
     """
     rr.set_strict_mode(True)  # otherwise a mistake is a warning, and its data are dropped
-    with whole_file(path) as temporary:
+    with whole_file(path, ".rrd") as temporary:
         pipe = FilePipe(temporary) if PIPE_PATHS.is_dir() else None
         stream = rr.RecordingStream(application)
         try:

@@ -96,7 +96,7 @@ def rewrite(path: Path, target: Path) -> Recorded:
     groups = next(signal.size for signal in signals if signal.name == "current_A")
     decimated = facts.get(RATE) is not None
     view = View(facts["duration_s"], facts["current_limit_A"], groups, own, live=False, decimated=decimated)
-    with _chunks(path) as (chunks, _), whole_file(target) as temporary:
+    with _chunks(path) as (chunks, _), whole_file(target, ".rrd") as temporary:
         recording = rr.RecordingStream(application(view))
         recording.set_log_time_enabled(False)
         recording.set_sinks(rr.FileSink(temporary))

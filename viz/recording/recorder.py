@@ -159,7 +159,7 @@ class Recorder(Stream):
         selection = FirstAndExtremeRows(rate_Hz) if rate_Hz else RowSelection()
         super().__init__(actuator, signals, facts, selection, live=False, shown=shown, rate_Hz=rate_Hz)
         self._path = path
-        self._output = OutputFile(path)
+        self._output = OutputFile(path, ".rrd")
         self._pipe = _pipe_to(self._output) if PIPE_PATHS.is_dir() else None
         self.begin()
         OPEN_FILES.add(self)

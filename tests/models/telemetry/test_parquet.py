@@ -39,7 +39,7 @@ def test_a_run_in_chunks_of_any_size_has_the_bytes_of_its_table(rows, tmp_path):
     whole, facts, files = table(rows), {"ticks": str(rows)}, set()
     arrow, group = whole.arrow(FACTS | facts), telemetry_file.GROUP_BATCHES * PART_ROWS
     groups = [arrow.slice(first, group) for first in range(0, rows, group)]
-    write_parquet(expected := tmp_path / "expected", arrow.schema, groups, **PARQUET_FORMAT)
+    write_parquet(expected := tmp_path / "expected.parquet", arrow.schema, groups, **PARQUET_FORMAT)
     for chunk in (1, 20, 63, 64, 65, 200, 333):
         streamed(path := tmp_path / "run.parquet", whole, chunk).close(facts)
         files.add(path.read_bytes())

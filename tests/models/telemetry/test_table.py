@@ -76,3 +76,10 @@ def test_a_column_that_is_there_twice_is_bad_input(table, tmp_path):
     for rows in (True, False):
         with pytest.raises(InputError, match="expected each column once, received t_s twice"):
             read_parquet(path, rows=rows)
+
+
+def test_a_table_has_no_name_of_another_format(table, tmp_path):
+    for name in ("run.csv", "run.mat"):
+        with pytest.raises(InputError, match=r"expected a name that ends in \.parquet"):
+            table.write_parquet(tmp_path / name, {})
+    assert not any(tmp_path.iterdir())
