@@ -3,7 +3,6 @@
 import os
 
 import pyarrow as pa
-import pyarrow.parquet as pq
 import pyarrow.parquet
 import pytest
 
@@ -47,7 +46,7 @@ def columns(*values, kind=None, described=True):
 FOREIGN = {
     "text": lambda path: path.write_text("no stream"),
     "like a stream": lambda path: path.write_bytes(b"\xff\xff\xff\xff\x08\0\0\0" + bytes(8)),
-    "parquet": lambda path: pq.write_table(table(10).arrow(FACTS), path),
+    "parquet": lambda path: pyarrow.parquet.write_table(table(10).arrow(FACTS), path),
     "missing": lambda path: None,
     "folder": lambda path: path.mkdir(),
     "no columns": lambda path: arrow_stream(path, pa.table({})),
