@@ -15,7 +15,7 @@ from spheretwin.study.tuning import report
 from tests.content.content import command, content_test, scratch
 from tests.content.values import tree
 from tests.twin.paper.cases import LOST, experiment
-from tests.twin.study.tuning.cases import FIGURES
+from tests.twin.study.tuning.cases import FIGURES, STUDY
 
 TIMES = re.compile(
     r'(?<="wall_s": )[^,}]+|(?<="startup_s": )[^,}]+|(?<="realtime_factor": )[^,}]+|(?<= simulated in ).*'
@@ -161,25 +161,6 @@ def sweeps():
     )
 
 
-TUNED = """
-name = "small"
-scenario = "hold"
-seeds = 2
-metrics = ["figures.py:miss", "figures.py:slowness"]
-law = [{ law = "pd" }, { law = "pid" }]
-fields = { duration = 0.005 }
-
-[optimise]
-trials = 8
-fresh = 2
-objective = [{ metric = "miss" }, { metric = "slowness" }]
-gain = [
-    { field = "controller.stiffness", low = 30.0, high = 3000.0, log = true, start = 100.0 },
-    { name = "damping of pd", field = "controller.damping", law = "pd", low = 5, high = 500, start = 20 },
-    { name = "damping of pid", field = "controller.damping", law = "pid", low = 5, high = 500, start = 60 },
-]
-"""
-
 LIMITED = """
 name = "limited"
 scenario = "hold"
@@ -208,8 +189,8 @@ def tunings():
     """Tuning with a front, with one objective, and with the best trial within each limit."""
     folder = scratch("tunings")
     (folder / "figures.py").write_text(FIGURES)
-    single = TUNED.replace(', { metric = "slowness" }', "")
-    studies = {"small": (TUNED, "--json"), "single": (single, "--trials 3"), "limited": (LIMITED, "")}
+    single = STUDY.replace(', { metric = "slowness" }', "")
+    studies = {"small": (STUDY, "--json"), "single": (single, "--trials 3"), "limited": (LIMITED, "")}
     for name, (study, _) in studies.items():
         (folder / f"{name}.toml").write_text(study)
     calls = [f"sweep {folder}/{name}.toml --optimise --threads 1 --out {folder}/{name} {more}"

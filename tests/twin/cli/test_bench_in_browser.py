@@ -13,7 +13,6 @@ from spheretwin import scenario as scenarios
 from spheretwin.bench import Bench
 from spheretwin.bench.operators import Operators, SILENCE_s
 from spheretwin.cli.bench import choices_of
-from spheretwin.models.base.errors import InputError
 from spheretwin.models.kinematics import rotation
 from spheretwin.viz.bench import server
 from spheretwin.viz.bench.page import Page
@@ -123,20 +122,6 @@ def test_a_bench_is_driven_from_a_browser(tmp_path):
     assert again.read_bytes() == telemetry_path.read_bytes()
 
 
-def test_what_is_out_of_range_is_refused_in_the_words_of_the_command_line():
-    with driven(size=(800, 600)) as (_, _, tab):
-        show_tab(tab, "law")
-        tab.click("text=all fields of the controller")
-        write(tab, "period_s", "-1")
-        tab.click("text=Set gains")
-        tab.wait_for("document.body.innerText.includes('controller.period_s: expected')")
-        with pytest.raises(InputError) as refusal:
-            scenarios.load("hold", {**LAGRANGIAN, "controller.period_s": -1})
-        shown = tab.evaluate("document.body.innerText")
-        assert str(refusal.value).partition("controller.period_s")[2] in shown
-        assert errors(tab) == []
-
-
 # The page's own thread does nothing else, as if the browser had frozen; its sockets stay open.
 FREEZE = "setTimeout(() => { while (true); }, 0)"
 
@@ -152,39 +137,6 @@ def test_a_frozen_page_is_lost_and_the_twin_holds():
         until(bench, lambda state: state.mode == "hold")
         assert bench.state().note == "the operator is gone: the twin holds"
         assert page._server.get_clients()  # it has not left
-
-
-def test_a_law_that_never_returns_is_shown_and_leaves_the_page_alive(tmp_path):
-    (tmp_path / "law.py").write_text(WAITS)
-    with driven() as (bench, _, tab):
-        show_tab(tab, "law")
-        tab.click("text=load law from file")
-        write(tab, "law file", f"{tmp_path / 'law.py'}:waits")
-        tab.click("text=Load law from file")
-        until(bench, lambda state: state.law.endswith("law.py:waits"))
-        law = bench._bench_state.driver.session.law.step.__globals__
-        try:
-            tab.click("text=start")
-            says(tab, "LOOP STALLED", "STOPPED", "FAULT")
-            assert not np.any(bench.state().current_command_A)
-            tab.key(" ")
-            assert errors(tab) == []
-        finally:
-            law["GO"].set()
-        until(bench, lambda state: not bench.stalled)
-        tab.click("text=reset")
-        until(bench, lambda state: state.mode == "trajectory")
-
-
-WAITS = """
-import threading
-GO = threading.Event()
-
-def waits(t, reference, measurement, parameters, state, torque):
-    torque[:] = 0.0
-    if t > 0.05:
-        GO.wait()
-"""
 
 
 def test_a_rotor_that_is_let_go_stays_on_the_bench_and_the_currents_return_to_zero():

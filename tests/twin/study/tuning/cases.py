@@ -35,6 +35,26 @@ def noise(run, which):
 '''
 
 
+STUDY = """
+name = "small"
+scenario = "hold"
+seeds = 2
+metrics = ["figures.py:miss", "figures.py:slowness"]
+law = [{ law = "pd" }, { law = "pid" }]
+fields = { duration = 0.005 }
+
+[optimise]
+trials = 8
+fresh = 2
+objective = [{ metric = "miss" }, { metric = "slowness" }]
+gain = [
+    { field = "controller.stiffness", low = 30.0, high = 3000.0, log = true, start = 100.0 },
+    { name = "damping of pd", field = "controller.damping", law = "pd", low = 5, high = 500, start = 20 },
+    { name = "damping of pid", field = "controller.damping", law = "pid", low = 5, high = 500, start = 60 },
+]
+"""
+
+
 def gain(name="stiffness", low=30.0, high=3000.0, **fields):
     """A gain of the law, by the name of its field."""
     return {"field": f"controller.{name}", "low": low, "high": high, "log": True, **fields}
