@@ -6,14 +6,14 @@ from collections.abc import Mapping, Sequence
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from spheretwin import scenario as scenarios
 from spheretwin.active_config import initial_config
 from spheretwin.export.c_text import constant, definitions, header
 from spheretwin.models import magnetics
 from spheretwin.models.base.errors import InputError
-from spheretwin.models.coil_group import PerGroup, of_each_group
+from spheretwin.models.coil_group import of_each_group
 from spheretwin.models.magnetics import TorqueModel
 from spheretwin.models.mjcf_reader import HINGES
 from spheretwin.plant.magnet_heat import initial_degC, remanence
@@ -231,7 +231,7 @@ def _parameters(scenario: ResolvedScenario, step: Parameters, inputs: Inputs, gr
         return Variable(name, _numbers(values), unit, text, AXES, least)
 
     def each_group(
-        name: str, value: PerGroup, unit: str, text: str, least: float = SMALLEST, **more: Any
+        name: str, value: ArrayLike, unit: str, text: str, least: float = SMALLEST, **more: Any
     ) -> Variable:
         values = _numbers(of_each_group(value, groups))
         return Variable(name, values, unit, text, _per_group(groups), least, **more)
