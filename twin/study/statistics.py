@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 Texts = NDArray[np.object_]
 
-MAIN = "max_abs_error_rad"
+MAIN, TILT = "max_abs_error_rad", "max_abs_tilt_error_rad"
 
 TEXTS = ("key", "law", "status", "reason", "error")
 
@@ -327,14 +327,18 @@ def summary(rows: Rows) -> dict[str, Any]:
     dict
         By law: ``statuses`` with their counts, and for each figure of the completed rows ``median``, the
         interval ``median_95`` of this median (None for an end for which the rows are too few), and
-        ``range_95`` of the rows; of a figure of each hinge, the largest of the three is taken.
+        ``range_95`` of the rows; of a figure of each hinge, the largest of the three is taken. The largest
+        error of α and β alone is ``max_abs_tilt_error_rad``: a coarse encoder may make γ the largest.
     """
     by_law: dict[str, Any] = {}
+    figures = dict(rows.figures)
+    if rows.hinges_rad is not None:
+        figures = {MAIN: figures.pop(MAIN), TILT: rows.hinges_rad[:, :2].max(axis=1), **figures}
     for law in rows.law_names:
         of_law = rows.laws == law
         by_law[law] = {
             "statuses": dict(Counter(rows.statuses[of_law].tolist())),
-            **{name: _spread(values[of_law & rows.completed]) for name, values in rows.figures.items()},
+            **{name: _spread(values[of_law & rows.completed]) for name, values in figures.items()},
         }
     return by_law
 

@@ -227,6 +227,10 @@ def test_medians_by_condition_are_those_of_each_hinge(tmp_path):
     assert first[6].strip() == quantile_text(worse, "{:.4g}".format)
     assert float(first[6].split()[0]) == pytest.approx(np.median(worse), rel=1e-3)
     assert second[4].strip() == quantile_text(errors_deg[20:, 1], "{:.4g}".format)
+    tilt = summary(rows)["pd"]["max_abs_tilt_error_rad"]["median"]  # without γ, also in the printed table
+    assert tilt == pytest.approx(np.median(np.radians(np.delete(errors_deg, 3, 0)[:, :2].max(axis=1))))
+    assert summary(rows)["pd"]["max_abs_error_rad"]["median"] > 3 * tilt
+    assert [row[0] for row in report.medians(summary(rows))[1][1:2]] == ["largest tilt error, rad"]
     assert (
         conditions.section(made(2, {"max_abs_error_rad": np.ones(2)}, {"drive.delay_s": delays[19:21]})) == []
     )
