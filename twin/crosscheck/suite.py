@@ -12,6 +12,7 @@ from spheretwin.crosscheck import (
     end_stops,
     friction,
     identities,
+    prototype,
     stiction,
     trajectories,
 )
@@ -66,6 +67,7 @@ PARTS = (
     Part("end stops", lambda on: end_stops.compare(on.mjcf, on.actuator)),
     Part("coil-driven motion", lambda on: coil_driven.compare(on.mjcf, on.actuator)),
     Part("closed loop", lambda on: trajectories.compare_closed_loop(on.mjcf, on.actuator)),
+    Part("prototype", lambda on: prototype.compare(on.mjcf, on.actuator)),
 )
 
 

@@ -225,14 +225,17 @@ def apply_bristles(
         M (v - v*) = -h (F(d) - F'),    d = d* + h (v - v*) / 2 + (g - 1/2) h (v - v0).
 
     As F - F' is of first order in the step, so is the part of the motion that the rotor's step does not see,
-    and the whole step is of second order. For constant M the result does not depend on F'.
+    and the whole step is of second order within presliding. In the steps in which a slider breaks away or
+    sticks again, the instant is not found: a motion that reverses is of first order. For constant M the
+    result does not depend on F'.
 
     F is the mean torque over the path from 0 to d, which is integrated in closed form. For g = 1/2 this is
     the mean-value discrete gradient: exact work and second order. For large stiffness g rises to 1, as for
     implicit Euler (L-stable): g - 1/2 is of second order in the step. F rises with d, so that the solution is
     unique. Deflections follow the pose itself: at rest ``v = 0, d = 0`` is an exact solution, without drift.
 
-    Without other torques the sum of kinetic energy and energy of the springs never rises. Its change is
+    Without other torques and for constant M the sum of kinetic energy and energy of the springs never rises.
+    Its change is
     ``-F.d + (energy of the springs) - (g - 1/2) h**2 F.M**-1 F``, and the work F.d is at least what the
     springs store: an implicit spring, damping and slip take energy, and a smaller slip deflection releases it
     as heat.

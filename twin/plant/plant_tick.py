@@ -112,7 +112,7 @@ def plant_tick(
     Each physics step: half of the friction, coil currents and torque, rotor with static friction and cable,
     other half of the friction. The torque matrix, the back-EMF and the spring of the cable are those of the
     predicted pose and rates in the middle of the step. With friction split symmetrically around the rotor's
-    step, the whole step is of second order.
+    step, the whole step is of second order; with static friction, between break-aways and reversals.
 
     Parameters
     ----------
