@@ -5,7 +5,8 @@ import dataclasses
 import numpy as np
 import pytest
 
-from spheretwin.crosscheck import end_stops, stiction
+from spheretwin.crosscheck import coil_driven, end_stops, stiction
+from spheretwin.crosscheck.scale import scale_of
 from spheretwin.models import actuator as actuators
 from spheretwin.models.lagrangian import inertia_matrix
 from spheretwin.plant.bristle_friction import StictionSection
@@ -14,7 +15,7 @@ SECTIONS = {end_stops: "end stops", stiction: "static friction"}
 
 
 def checks_of(module, actuator):
-    checks = module.compare(actuators.MJCF_PATH, actuator).checks
+    checks = module.compare(actuators.MJCF_PATH, actuator).checks[:2]
     names = [f"{SECTIONS[module]}: motion, {engine}" for engine in ("MuJoCo", "Lagrangian")]
     assert [check.name for check in checks] == names
     return checks
@@ -27,6 +28,17 @@ def test_every_bound_is_met_with_a_margin(actuator, module, share):
     for check in checks_of(module, actuator):
         assert check.value < share * check.bound, check.name
         assert check.unit == "rad/s"
+
+
+def test_the_order_is_2_within_presliding_and_1_where_the_stribeck_effect_reverses(actuator):
+    scale = scale_of(actuator)
+    orders = [
+        stiction._order(actuators.MJCF_PATH, actuator, scale, name)
+        for name in (stiction.PRESLIDING, stiction.REVERSING)
+    ]
+    assert orders[0].value == pytest.approx(2.03, abs=0.05)
+    assert orders[1].value == pytest.approx(1.0, abs=0.3)
+    assert [order.bound for order in orders] == [2.2, None]
 
 
 @pytest.mark.parametrize(
@@ -107,3 +119,44 @@ def test_the_motion_starts_before_the_buffer_of_any_model(actuator):
         start = np.array(end_stops.start_rad(one))
         assert np.all((low < start) & (start < high))
         assert end_stops.Reference(one, end_stops.STOPS).integrate()[1] > 0
+
+
+def thrown(actuator, ratio, throws, duration_s=20.0):
+    """Energy of random throws of 8 rad/s after each step of 0.5 ms, over that at the start."""
+    random, step_s, energies = np.random.default_rng(1), 5e-4, []
+    ends = actuator.hinge_range_rad + end_stops.STOPS.travel_rad * np.array([1.0, -1.0])
+    count = round(duration_s / step_s)
+    for _ in range(throws):
+        direction = random.normal(size=3)
+        fields = {
+            "plant.engine": "lagrangian",
+            "plant.step_s": step_s,
+            "controller.period_s": step_s,
+            "plant.initial_rad_s": tuple((8 * direction / np.linalg.norm(direction)).tolist()),
+            "plant.initial_rad": tuple(random.uniform(-1, 1, 3).tolist()),
+            "plant.end_stops.on": True,
+            "plant.end_stops.damping_ratio": ratio,
+        }
+        states = coil_driven.drive_plant(
+            actuators.MJCF_PATH, fields, lambda groups: np.zeros((count, groups)), np.zeros((count, 3)), 1
+        )
+        beyond = states[:, :3] - np.clip(states[:, :3], *ends.T)
+        kinetic = [
+            0.5 * v @ inertia_matrix(q, actuator.inertia) @ v
+            for q, v in zip(*np.split(states, 2, 1), strict=True)
+        ]
+        energy = np.array(kinetic) + 0.5 * end_stops.STOPS.stiffness_Nm_rad * (beyond**2).sum(axis=1)
+        energies.append(energy / energy[0])
+    return np.array(energies)
+
+
+@pytest.mark.release("20 s; the energy of one hinge is exact in test_end_stops.py")
+def test_coupled_hinges_gain_energy_in_end_stops_without_damping_alone(actuator):
+    """The figures of `plant.end_stops` and of the page on bench safety."""
+    free = thrown(actuator, 0.0, 20)
+    assert free.max() == pytest.approx(1.44, abs=0.1)  # a bounce multiplies rounding
+    assert np.median(free[:, -1]) == pytest.approx(1.07, abs=0.04)
+    damped = thrown(actuator, 0.05, 20)
+    assert damped.max() < 1 + 1e-8  # of Runge and Kutta between the contacts
+    assert 1e-3 < np.diff(damped).max() < 3e-3
+    assert damped[:, -1].max() < 1 + 1e-8
