@@ -10,7 +10,9 @@ import numpy as np
 from spheretwin import cli, machine
 from spheretwin.cli import reproduce
 from spheretwin.paper.experiment import Case, Finding
+from spheretwin.study.grid import Grid
 from spheretwin.study.optimise import Objective
+from spheretwin.study.study import load
 from spheretwin.study.tuning import report
 from tests.content.content import command, content_test, scratch
 from tests.content.values import tree
@@ -151,12 +153,15 @@ def sweeps():
         '[[law]]\nlaw = "pd"\n[[law]]\nlaw = "pid"\n'
     )
     study = f"{folder}/mine.toml"
+    rows = Grid(load(study))
     return several(
         [
             f"sweep {study} --limit 2 --threads 1 --out {folder}/sweep --json",
             f"sweep {study} --threads 1 --out {folder}/sweep --json",
             f"sweep {study} --threads 1 --out {folder}/sweep",
-            f"sweep {study} --row {{}}".format("0" * 16),
+            f"sweep {study} --row {'0' * 16}",
+            f"sweep {study} --row {rows[2].key} --json",
+            *(f"sweep {study} --row {rows[5].key}{more}" for more in ("", " --json")),
         ]
     )
 

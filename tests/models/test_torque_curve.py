@@ -47,7 +47,6 @@ def test_data_from_elsewhere_say_nothing_of_a_geometry(tmp_path, shipped):
     assert torque_curve.read(path).computed_for is None
 
 
-GOOD_ROWS = [f"{phi},0.001" for phi in range(0, 181, 20)]
 HEADER = "phi_deg,torque_Nm_per_A"
 
 

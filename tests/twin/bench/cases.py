@@ -71,10 +71,6 @@ def same_when_replayed(path):
     return again.read_bytes() == path.read_bytes()
 
 
-def as_arrays(state):
-    return {name: np.array(getattr(state, name)) for name in ("q_rad", "q_ref_rad", "error_rad")}
-
-
 def table(first, last, more=()):
     """Rows of the ticks of a run at rest, with the signals that all runs have, and more."""
     signals = (*common_signals(GROUPS), *more)

@@ -1,6 +1,5 @@
 """``spheretwin sweep``: its two streams, its exit codes, its folder."""
 
-import shlex
 from pathlib import Path
 
 import pytest
@@ -93,17 +92,6 @@ def test_plants_that_differ_are_told_in_one_line(source, tmp_path, monkeypatch):
 
 
 @pytest.mark.parametrize(
-    ("load", "code", "status"), [("1.0", cli.DONE, "completed"), ("-1.0", cli.FAILED, "refused")]
-)
-def test_the_exit_code_of_one_row_is_that_of_its_run(source, load, code, status):
-    path = Path(source)
-    path.write_text(path.read_text().replace("disturbance.load", "plant.payload_kg").replace("1.0", load))
-    key = Grid(load_study(source))[1].key
-    result = call("sweep", source, "--row", key, "--json")
-    assert (result.code, result.json["status"]) == (code, status)
-
-
-@pytest.mark.parametrize(
     ("rows", "of", "startup_s", "code"),
     [(3, 3, 1.26, cli.DONE), (2, 3, None, cli.FAILED), (4, 3, 0.0, cli.DONE)],
 )
@@ -139,21 +127,6 @@ def test_a_study_is_run_with_its_options(source, tmp_path, monkeypatch):
     assert call("sweep", source).code == cli.FAILED
     assert call("sweep", source, "--out", tmp_path / "out", *flags).code == cli.FAILED
     assert received == [("short", None, plain), ("short", tmp_path / "out", chosen)]
-
-
-def test_one_row_is_printed_with_its_values_its_figures_and_its_command(source, monkeypatch):
-    monkeypatch.setenv("COLUMNS", "200")
-    row = Grid(load_study(source))[2]
-    result = call("sweep", source, "--row", row.key, "--json").json
-    assert (result["row"], result["key"], result["seed"]) == (2, row.key, row.seed)
-    assert result["values"] == {"disturbance.load": 2.0}
-    assert [result[name] for name in ("law", "reason", "error")] == [None] * 3
-    again = call(*shlex.split(result["command"])[1:], "--json").json
-    assert again["rms_error_rad"] == result["rms_error_rad"]
-    title, *lines, command = succeeded("sweep", source, "--row", row.key).splitlines()
-    assert (title.strip(), command) == ("row 2 of short", f"command  {result['command']}")
-    cells = [[cell.strip() for cell in line.split("|")[1:-1]] for line in lines if line.startswith("| ")]
-    assert cells == [["", "value"], *([name, str(result[name])] for name in result if name != "command")]
 
 
 @pytest.mark.parametrize(
