@@ -117,7 +117,8 @@ def test_a_supply_that_the_controller_does_not_know_leaves_its_thresholds():
     for each in (nominal, weak, scenario(duration=0.1, **supply(8.0))):
         with Session(each) as session:
             detector = session._runtime._controller.supervision.detector
-            figures.append((detector.threshold_A, detector.ticks, detector.reach_A))
+            limits = detector.threshold_A, detector.ticks, detector.reach_A
+            figures.append([np.asarray(numbers).tolist() for numbers in limits])
     assert figures[0] == figures[1] != figures[2]
 
 
