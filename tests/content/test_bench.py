@@ -92,10 +92,7 @@ def page() -> str:
             ("jog", {"mode": "jog", "jog_rates_rad_s": (0.0, 0.2, 0.0), "limits": (0.7, 9.0)}),
             ("point of a script", {"mode": "point", "pose_rad": (0.2, -0.3, 0.5)}),
             ("manual", {"mode": "manual", "pose_rad": None, "manual_currents_A": MANUAL_A}),
-            (
-                "replay",
-                {"mode": "replay", **REPLAY},
-            ),
+            ("replay", {"mode": "replay", **REPLAY}),
         ):
             bench.now.__dict__.update(state)
             for step in range(FRAMES_A_SETTING):

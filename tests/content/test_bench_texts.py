@@ -5,14 +5,7 @@ import math
 
 from spheretwin import scenario as scenarios
 from spheretwin.bench.commands import COMMANDS
-from spheretwin.bench.modes import (
-    Limits,
-    approach_fields,
-    current_motion,
-    hold_shape,
-    jog_shape,
-    point_shape,
-)
+from spheretwin.bench.modes import Limits, approach_fields, current_motion, hold_shape, jog_shape, point_shape
 from spheretwin.bench.operators import Operators
 from spheretwin.bench.pace import Pace
 from spheretwin.cli.bench import choices_of, settings_of, shape_settings

@@ -236,11 +236,9 @@ def reproductions():
 
 def magnetics():
     folder = recorded()
-    return several(
-        [
-            f"magnetics map --largest-tilt 10 --need 0.1 --verbose --out {folder}/map",
-        ]
-    ) + "\n".join(path.read_text(encoding="utf-8") for path in sorted(folder.glob("map/*.md")))
+    return several([f"magnetics map --largest-tilt 10 --need 0.1 --verbose --out {folder}/map"]) + "\n".join(
+        path.read_text(encoding="utf-8") for path in sorted(folder.glob("map/*.md"))
+    )
 
 
 CASES = {

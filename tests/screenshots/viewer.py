@@ -52,9 +52,7 @@ class HeadlessViewer:
         size = f"{width}x{height + TOP_BAR_PIXELS}"
         options = ["--headless", "--window-size", size, "--port", f"{port}", "--bind", HOST]
         self._process = subprocess.Popen(
-            [PROGRAM, *options, "--hide-welcome-screen"],
-            stdout=subprocess.DEVNULL,
-            stderr=subprocess.DEVNULL,
+            [PROGRAM, *options, "--hide-welcome-screen"], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
         )
         self._address = f"rerun+http://{HOST}:{port}/proxy"
         self._client: rerun.experimental.ViewerClient

@@ -16,10 +16,7 @@ SIGNALS = [signal for columns in CHANNELS for signal in columns.signals(18)]
 @pytest.mark.parametrize("columns", CHANNELS, ids=lambda each: each.signals(18)[0].name)
 @pytest.mark.parametrize(
     "changes",
-    [
-        {},
-        {"hardware": "prototype", "plant.engine": "lagrangian"},
-    ],
+    [{}, {"hardware": "prototype", "plant.engine": "lagrangian"}],
     ids=["nothing acts", "stages act"],
 )
 def test_every_column_is_there_where_its_stage_says_so_and_moves_no_other(columns, changes):

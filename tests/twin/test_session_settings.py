@@ -87,10 +87,7 @@ def test_a_law_object_may_replace_a_shipped_one_and_back(kind):
 
 @pytest.mark.parametrize(
     ("law", "changes"),
-    [
-        (compiled_law(), {"name": "hold"}),
-        *((None, {"plant.engine": engine} | WORN) for engine in ENGINES),
-    ],
+    [(compiled_law(), {"name": "hold"}), *((None, {"plant.engine": engine} | WORN) for engine in ENGINES)],
     ids=["law with a memory", *ENGINES],
 )
 def test_a_limit_that_is_never_met_may_move_without_a_trace(law, changes):

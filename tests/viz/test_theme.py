@@ -13,11 +13,7 @@ from spheretwin.control.laws import LAWS as CONTROL_LAWS
 from spheretwin.viz import theme
 from spheretwin.viz.figures import style
 
-GROUNDS = {
-    "viewer, dark": (13, 13, 13),
-    "viewer, light": (255, 255, 255),
-    "page, dark": (0x15, 0x18, 0x1C),
-}
+GROUNDS = {"viewer, dark": (13, 13, 13), "viewer, light": (255, 255, 255), "page, dark": (0x15, 0x18, 0x1C)}
 
 # Machado, Oliveira and Fernandes (2009), severity 1.0, on linear red, green and blue.
 VISION = {

@@ -25,10 +25,6 @@ class Rotor:
     def step(self, state, torque_q):
         q, qdot, inertia = state
         model = self._model.replace(body_inertia=self._model.body_inertia.at[self._rotor].set(inertia))
-        data = self._data.replace(
-            qpos=jnp.stack(q),
-            qvel=jnp.stack(qdot),
-            qfrc_applied=jnp.stack(torque_q),
-        )
+        data = self._data.replace(qpos=jnp.stack(q), qvel=jnp.stack(qdot), qfrc_applied=jnp.stack(torque_q))
         after = mjx.step(model, data)
         return tuple(after.qpos), tuple(after.qvel), inertia

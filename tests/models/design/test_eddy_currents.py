@@ -4,11 +4,7 @@ import magpylib
 import numpy as np
 import pytest
 
-from spheretwin.models.design.eddy_currents import (
-    ALUMINIUM_S_m,
-    eddy_viscous_bound_Nm_s,
-    face_field_T_per_A,
-)
+from spheretwin.models.design.eddy_currents import ALUMINIUM_S_m, eddy_viscous_bound_Nm_s, face_field_T_per_A
 
 
 def loops(coil, current_A=1.0, across=8, along=20):

@@ -147,9 +147,7 @@ def magpylib_loops(coil: CoilGeometry, across: int, along: int) -> list[magpylib
     heights = coil.distance_m + 0.5 * coil.length_m * v
     return [
         magpylib.current.Circle(
-            diameter=2 * radius,
-            current=0.25 * share_u[i] * share_v[k] * coil.turns,
-            position=(0, 0, height),
+            diameter=2 * radius, current=0.25 * share_u[i] * share_v[k] * coil.turns, position=(0, 0, height)
         )
         for i, radius in enumerate(radii)
         for k, height in enumerate(heights)

@@ -226,10 +226,7 @@ def test_parts_are_clear_of_each_other_at_rest(solids):
 @pytest.mark.parametrize("seed", range(8))
 @pytest.mark.parametrize(
     ("parts", "largest_tilt_deg", "obstacles"),
-    [
-        (["shaft"], stator.SHAFT_TILT_DEG, ["stator"]),
-        (["ball", "hoop", "poles"], 50.0, ["stator", "coils"]),
-    ],
+    [(["shaft"], stator.SHAFT_TILT_DEG, ["stator"]), (["ball", "hoop", "poles"], 50.0, ["stator", "coils"])],
     ids=["shaft", "rotor"],
 )
 def test_the_rotor_clears_stator_and_joint(parts, largest_tilt_deg, obstacles, seed, solids):

@@ -13,14 +13,7 @@ from spheretwin.machine.link.machine_link import Link, LinkSettings
 from spheretwin.machine.link.machine_server import MachineServer
 from spheretwin.models.base.errors import InputError
 from spheretwin.session import Session
-from tests.twin.machine.link.lines import (
-    GROUPS,
-    Line,
-    PERIOD_s,
-    controller_channel,
-    heat,
-    machine_channel,
-)
+from tests.twin.machine.link.lines import GROUPS, Line, PERIOD_s, controller_channel, heat, machine_channel
 from tests.waiting import UNLIMITED_S
 
 TICKS, STOPPED = 60, 20

@@ -29,11 +29,7 @@ OTHERS = [
     ("snapshot", {}),
     ("limits", {"rate_rad_s": 2.0}),
 ]
-COMMANDS = [
-    *MODES.items(),
-    *(("set", {"name": name, "value": value}) for name, value in SETTINGS),
-    *OTHERS,
-]
+COMMANDS = [*MODES.items(), *(("set", {"name": name, "value": value}) for name, value in SETTINGS), *OTHERS]
 
 
 @settings(max_examples=12)

@@ -11,13 +11,7 @@ from spheretwin.models.base.extras import install_command
 from spheretwin.models.design import curve_check, field_check, torque_map
 from spheretwin.models.torque_curve import TorqueCurve
 from spheretwin.viz.pages import magnetics, markdown
-from tests.content.verdicts import (
-    computed_curve,
-    field_verdict,
-    judged_curve,
-    survey,
-    workspace_verdict,
-)
+from tests.content.verdicts import computed_curve, field_verdict, judged_curve, survey, workspace_verdict
 from tests.twin.cli.calls import call, refusal
 
 

@@ -12,13 +12,7 @@ from tests.twin.export.test_controller_code import CASES
 pytestmark = needs_c_compiler
 
 DELAY = {"nominal.delay_s": 1.5e-3}
-LAWS = {
-    "pd": {},
-    "pid": {},
-    "lqi": DELAY,
-    "afsm": {},
-    "afsm_eso": DELAY,
-}
+LAWS = {"pd": {}, "pid": {}, "lqi": DELAY, "afsm": {}, "afsm_eso": DELAY}
 ESTIMATORS = ("ideal", "difference", "kalman", "differentiator")
 REFERENCE, ANGLE, RATE = 0, 1, 2
 """Arguments of a tick."""

@@ -52,10 +52,7 @@ HOT = {"drive.shutdown_degC": 1e4}  # the sinusoid takes the coils past 155 °C 
 SLOW = {"drive.bandwidth_rad_s": 300.0, "nominal.time_constant_s": 1 / 300}
 LATE = {"drive.delay_s": 5e-4, "nominal.delay_s": 5e-4}
 # An amplifier gives 0.8 A a volt; 4.5 steps of a converter of 16 bits and ±10 V.
-OFF_ZERO = {
-    "drive.dac_offset_V": 0.5,
-    "nominal.offset_error_A": 0.8 * (1e-3 + 0.5 + 4.5 * 20 / 2**16),
-}
+OFF_ZERO = {"drive.dac_offset_V": 0.5, "nominal.offset_error_A": 0.8 * (1e-3 + 0.5 + 4.5 * 20 / 2**16)}
 
 
 def supply(volts):

@@ -63,11 +63,7 @@ def test_the_summary_is_numpy_s_over_the_completed_rows_of_each_law():
         "range_95": [low, high],
     }
     lost = made(2, {"max_abs_error_rad": np.ones(2)}, {}, lost=(0, 1))
-    assert summary(lost)["pd"]["max_abs_error_rad"] == {
-        "median": None,
-        "median_95": None,
-        "range_95": None,
-    }
+    assert summary(lost)["pd"]["max_abs_error_rad"] == {"median": None, "median_95": None, "range_95": None}
 
 
 def test_an_interval_is_that_of_many_resamples():

@@ -8,12 +8,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 from pydantic import ValidationError
 
-from spheretwin.trajectories.rounding import (
-    Corners,
-    least_acceleration,
-    no_corners,
-    rounded,
-)
+from spheretwin.trajectories.rounding import Corners, least_acceleration, no_corners, rounded
 from spheretwin.trajectories.shapes import Nutation, Sinusoid, Steps, Tilt
 
 FINE = 1e-4

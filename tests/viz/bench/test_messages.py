@@ -54,10 +54,7 @@ def nearly(draw, handles):
     three, middle = st.lists(st.floats(), min_size=3, max_size=3), st.just([0.5, 0.5])
     scene = {"name": name, "modifier": st.none()}
     fields = {
-        "GuiUpdateMessage": {
-            "uuid": name,
-            "updates": st.fixed_dictionaries({"value": ANYTHING}),
-        },
+        "GuiUpdateMessage": {"uuid": name, "updates": st.fixed_dictionaries({"value": ANYTHING})},
         "CommandTriggerMessage": {"uuid": name},
         "GuiFormSubmitMessage": {"uuid": name},
         "SceneNodeClickMessage": {"instance_index": st.integers(-99, 99) | st.none()}

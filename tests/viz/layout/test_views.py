@@ -34,12 +34,7 @@ RUNS = {
     ),
     "failed": (
         "sinusoid",
-        {
-            "controller.law": "pd",
-            "disturbance.load": 2.0,
-            "plant.modelling_error": 0.2,
-            "duration": 2.0,
-        },
+        {"controller.law": "pd", "disturbance.load": 2.0, "plant.modelling_error": 0.2, "duration": 2.0},
     ),
 }
 

@@ -105,8 +105,5 @@ def _panel_line(entity, mappings, layout, path):
     scalars = by_target["Scalars:scalars"]
     kind = (layout.get((path, "VisualizerInstruction:visualizer_type")) or [[""]])[-1][0]
     return PanelLine(
-        entity,
-        scalars["source_component"],
-        scalars["selector"].removeprefix(".").removesuffix("[]"),
-        kind,
+        entity, scalars["source_component"], scalars["selector"].removeprefix(".").removesuffix("[]"), kind
     )

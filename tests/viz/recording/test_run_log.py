@@ -12,10 +12,7 @@ from spheretwin.models.telemetry.table import Table
 TICKS = 200
 TICK_s = 0.01
 
-SIGNALS = (
-    Signal("t_s", "s", 1, "time"),
-    Signal("allocation_scale", "1", 1, "share"),
-)
+SIGNALS = (Signal("t_s", "s", 1, "time"), Signal("allocation_scale", "1", 1, "share"))
 
 
 def rows(t_s, scale):

@@ -311,8 +311,7 @@ def test_the_shadow_receives_what_was_sent_and_measured(machine):
 
 
 @pytest.mark.parametrize(
-    ("answer", "message"),
-    [(None, "received 0 texts"), (b"hello", "received .* texts that are no frame")],
+    ("answer", "message"), [(None, "received 0 texts"), (b"hello", "received .* texts that are no frame")]
 )
 def test_without_a_first_measurement_nothing_is_driven(answer, message):
     script = Script(lambda content: script.plan(answer) if answer else None)

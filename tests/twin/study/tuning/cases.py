@@ -77,9 +77,5 @@ def study(folder: Path, objectives=("exact",), gains=(), seeds=1, **optimise) ->
     )
 
 
-TWO = {
-    "objectives": ("miss", "slowness"),
-    "gains": (gain(), gain("damping", 5.0, 500.0)),
-    "seeds": 3,
-}
+TWO = {"objectives": ("miss", "slowness"), "gains": (gain(), gain("damping", 5.0, 500.0)), "seeds": 3}
 """Two objectives, each of its own gain."""
