@@ -30,6 +30,7 @@ JITTER, LARGE_JITTER = 0.05, 0.5
 BEYOND_RANGE = 1.2  # sensors have offsets, ends of a range are soft
 BEYOND_LIMIT = 5.0
 ABSURD = 1e6  # rad or A: squares of larger numbers may overflow
+MOST_PERIODS = 1e8  # from the first row to the last, with gaps: a day at 1 kHz
 AT_LIMIT, OVER_LIMIT, MOST_AT_LIMIT = 0.99, 1.01, 0.01
 
 
@@ -97,6 +98,8 @@ class Evidence:
             _rising(self.log.t_s, values) for values in (self.log.angle_rad, self.log.current_A)
         )
         if len(currents[0]) < 2 or max(np.abs(angles[1]).max(), np.abs(currents[1]).max()) > ABSURD:
+            return None
+        if not angles[0][-1] - angles[0][0] < MOST_PERIODS * self.period_s:
             return None
         gaps = [gap for t_s in (angles[0], currents[0]) for gap in _gaps(t_s)]
         zero_order_hold = self.log.currents == COMMANDED
@@ -182,7 +185,7 @@ def _jitter(evidence: Evidence) -> Iterator[Stated]:
         steps = np.diff(t_s)
         steps = steps[steps > 0]
         regular = steps[steps <= GAP_PERIODS * np.median(steps)] if len(steps) else steps
-        jitter = float(np.std(regular) / np.median(steps)) if len(regular) else 0.0
+        jitter = float(np.std(regular / np.median(steps))) if len(regular) else 0.0
         if jitter > JITTER:
             severity = ERROR if jitter > LARGE_JITTER else WARNING
             where = f"{name}: intervals scatter by {jitter:.2g} of the period"

@@ -174,6 +174,14 @@ def test_gaps_are_found_and_nothing_is_computed_across_them():
     assert list(errors(without(np.s_[600:800]))) == ["gaps"]
 
 
+@pytest.mark.parametrize("late_s", [1e12, 1e19, 1e300, 1.7e308])
+def test_a_time_that_no_clock_has_is_a_gap_and_no_other_error(late_s):
+    t_s = np.arange(1200) * 1e-3
+    t_s[-1] = late_s
+    found = machine.check(machine.Log(t_s, RANDOM.normal(size=(1200, 18)), RANDOM.normal(size=(1200, 3))))
+    assert "gaps" in {finding.name for finding in found.findings if finding.severity == "error"}
+
+
 def every(step):
     log = multisine()
     return machine.Log(log.t_s[::step], log.current_A[::step], log.angle_rad[::step])
