@@ -62,6 +62,19 @@ def test_the_prototype_s_threshold_and_ticks():
     assert (given.threshold_A, given.ticks) == (0.3, 9)
 
 
+def test_each_group_has_the_model_current_of_its_own_coils():
+    R, L = np.linspace(5.7, 8.3, COUNT), np.linspace(4e-4, 2e-2, COUNT)
+    nominal = PROTOTYPE._replace(resistance_ohm=tuple(R), inductance_H=tuple(L))
+    watcher = made(nominal)
+    np.testing.assert_allclose(watcher.decay, np.exp(-PERIOD_S * R / L), rtol=1e-15)
+    np.testing.assert_allclose(watcher.reach_A, PROTOTYPE.swing_V / R, rtol=1e-15)
+    alone = [
+        derived_ticks(PROTOTYPE._replace(resistance_ohm=ohm, inductance_H=henry))
+        for ohm, henry in zip(R, L, strict=True)
+    ]
+    assert watcher.ticks == max(alone) > min(alone)
+
+
 def test_the_sheet_of_the_prototype_s_drive_is_its_static_error_and_swing():
     fields = {name.removeprefix("drive."): value for name, value in PROTOTYPE_DRIVE.items()}
     fields |= {"resistance_ohm": 1.3, "inductance_H": 0.9e-3, "current_limit_A": 8.0, **THERMAL}
