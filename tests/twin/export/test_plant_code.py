@@ -100,9 +100,8 @@ HEAT = {
     "drive.resistance_ohm": np.linspace(1.0, 1.6, 18).tolist(),
     "drive.inductance_H": np.linspace(9e-4, 6e-4, 18).tolist(),
     "drive.thermal_resistance_K_W": np.linspace(3.0, 5.0, 18).tolist(),
-    "drive.heat_capacity_J_K": np.linspace(
-        0.1, 0.15, 18
-    ).tolist(),  # so that a winding is hotter by 1 K after some ticks
+    # So that each winding is hotter by half a kelvin after some ticks.
+    "drive.heat_capacity_J_K": np.linspace(0.1, 0.07, 18).tolist(),
     "drive.shutdown_degC": 300.0,
     "controller.law": "pd",
 }
