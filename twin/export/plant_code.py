@@ -106,9 +106,16 @@ class PlantCode(NamedTuple):
             "ST_STATE_BOUNDS": self.states,
             "ST_INPUT_BOUNDS": self.commands,
         }
+        # Fixed parameters are the last ones.
+        fixed = sum(len(one.values) for one in self.parameters if one.fixed)
         return header(
-            constant(name, [(one.least, one.largest) for one in ones for _ in one.values], "double")
-            for name, ones in rows.items()
+            [
+                *definitions({"ST_FIXED_PARAMETERS": fixed}),
+                *(
+                    constant(name, [(one.least, one.largest) for one in ones for _ in one.values], "double")
+                    for name, ones in rows.items()
+                ),
+            ]
         )
 
     def table_header(self) -> str:

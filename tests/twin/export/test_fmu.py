@@ -241,6 +241,7 @@ def test_declared_bounds_are_enforced_and_a_refused_set_changes_nothing(instance
     described = fmpy.read_model_description(str(files[instance.fmi, "co-simulation"]))
     settable = [one for one in described.modelVariables if one.causality in ("input", "parameter")]
     names = [one.name for one in settable]
+    instance.fmu.reset()  # fixed parameters can be set before the start alone
     before = instance.get(*names)
     for one in settable:
         least, largest = float(one.min), float(one.max)
@@ -251,6 +252,20 @@ def test_declared_bounds_are_enforced_and_a_refused_set_changes_nothing(instance
                 instance.call("setReal", "setFloat64", both, [0.5, value])
     np.testing.assert_array_equal(instance.get(*names), before)
     instance.step(0.0)
+
+
+@needs_c_compiler
+def test_fixed_parameters_are_set_before_the_start_alone(instance, files):
+    described = fmpy.read_model_description(str(files[instance.fmi, "co-simulation"]))
+    fixed = [one for one in described.modelVariables if one.variability == "fixed"]
+    assert [one.name for one in fixed] == ["step_s", "thermal_period_s"]
+    for one in fixed:
+        with pytest.raises(fmpy.fmi1.FMICallException, match="error"):
+            instance.set(one.name, float(one.start))
+    instance.fmu.reset()
+    for one in fixed:
+        instance.set(one.name, 2e-4)
+    np.testing.assert_array_equal(instance.get(*(one.name for one in fixed)), 2e-4)
 
 
 @needs_c_compiler

@@ -112,7 +112,7 @@ static double *st_settable(st_snapshot *now, int started, unsigned at, const dou
         *bounds = ST_INPUT_BOUNDS[at - ST_FIRST_INPUT];
         return &now->input[at - ST_FIRST_INPUT];
     }
-    if (at >= ST_FIRST_PARAMETER && at < ST_VALUES) {
+    if (at >= ST_FIRST_PARAMETER && at < ST_VALUES - (started ? ST_FIXED_PARAMETERS : 0)) {
         *bounds = ST_PARAMETER_BOUNDS[at - ST_FIRST_PARAMETER];
         return (double *)&now->parameters + (at - ST_FIRST_PARAMETER);
     }
@@ -131,7 +131,7 @@ int st_fmu_set(st_fmu *fmu, const unsigned *references, size_t count, const doub
         const double *bounds = NULL;
         double *number = st_settable(&changed, fmu->started, references[i], &bounds);
         if (!number) {
-            st_fmu_report(fmu, "set: expected an input, a parameter or, before the start, a state");
+            st_fmu_report(fmu, "set: expected an input, a tunable parameter or, before the start, a state or a fixed parameter");
             return ST_FMU_ERROR;
         }
         if (!(bounds[0] <= values[i] && values[i] <= bounds[1])) {
