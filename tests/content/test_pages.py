@@ -1,5 +1,6 @@
 """Approved content of pages of studies, tunings, cross-check and magnetics, of constructed results."""
 
+import shutil
 from functools import partial
 from pathlib import Path
 from unittest.mock import patch
@@ -8,6 +9,7 @@ import numpy as np
 
 from spheretwin.cli import crosscheck as crosscheck_verb
 from spheretwin.crosscheck import suite
+from spheretwin.models.actuator import TORQUE_CURVE_PATH
 from spheretwin.models.design import curve_check, field_check, torque_map
 from spheretwin.study import report, statistics
 from spheretwin.study.statistics import Rows
@@ -132,6 +134,8 @@ def magnetics_pages() -> str:
         magnetics.write_check(folder, field_verdict(), "spheretwin magnetics check --poses 15", "svg")
         magnetics.write_map(folder, survey(), workspace_verdict(), "spheretwin magnetics map", "svg")
 
+    written, csv = scratch("magnetics_curve") / "curve.csv", scratch("magnetics_curve") / "bench.csv"
+    shutil.copy(TORQUE_CURVE_PATH, csv)
     with (
         patch.object(field_check, "judge", lambda *_: field_verdict()),
         patch.multiple(torque_map, survey=lambda *_: survey(), judge=lambda *_: workspace_verdict()),
@@ -139,8 +143,11 @@ def magnetics_pages() -> str:
     ):
         parts = [
             ("check",), ("check", "--json"), ("map", "--need", "2"), ("map", "--json"), ("curve", "--json"),
+            ("curve",), ("curve", "--out", written), ("curve", "--csv", csv),
+            ("curve", "--csv", csv, "--json"),
         ]  # fmt: skip
         outputs = [command("magnetics", *part) for part in parts]
+        assert written.read_text() == computed_curve().csv
     return "\n".join([folder_text(write, scratch("magnetics")), *outputs])
 
 

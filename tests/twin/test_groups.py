@@ -5,8 +5,6 @@ import re
 import numpy as np
 import pytest
 
-from spheretwin import cli
-from spheretwin.analysis.recorded_run import read
 from spheretwin.models import actuator as actuators
 from spheretwin.models.magnetics import torque_matrix
 from spheretwin.simulation import simulate
@@ -63,13 +61,3 @@ def test_a_run_tracks_with_the_groups_there_are(model, groups, engine, allocatio
         # A product of 3 x 24 numbers, summed in another order.
         np.testing.assert_allclose(G @ table["current_A"][row], table["torque_Nm"][row], rtol=0, atol=1e-13)
     assert np.abs(table["error_rad"][-1]).max() < 0.5 * np.abs(table["error_rad"][0]).max()
-
-
-def test_a_run_is_written_recorded_and_replayed(model, groups, tmp_path, capsys):
-    again, run = tmp_path / "again.parquet", simulate("nutation", {"plant.mjcf": str(model), "duration": 0.1})
-    for name in ("run.rrd", "run.parquet"):
-        first = run.save(tmp_path / name)
-        assert read(first).table["current_A"].shape == (100, groups)
-    assert cli.main(["simulate", "--replay", str(first), "--telemetry", str(again)]) == 0
-    assert first.read_bytes() == again.read_bytes()
-    assert capsys.readouterr().err == ""

@@ -3,9 +3,7 @@
 import numpy as np
 import pytest
 
-import spheretwin as st
 from spheretwin import scenario as scenarios
-from spheretwin.cli import main
 from spheretwin.linear import linearise
 from spheretwin.models.lagrangian import inertia_matrix
 from tests.twin.passive_cases import ENGINES, FREE, STILL, session, table
@@ -126,14 +124,6 @@ def test_another_level_keeps_the_deflections_and_switching_off_drops_them():
         assert "presliding_rad" not in {signal.name for signal in run.advance(10).signals}
         run.set("plant.stiction.on", True)
         assert np.abs(run.advance(1)["presliding_rad"]).max() < 1e-5
-
-
-@pytest.mark.uncompiled
-def test_a_run_with_both_is_replayed_to_the_same_bytes(tmp_path):
-    first, second = tmp_path / "first.parquet", tmp_path / "second.parquet"
-    st.simulate("tilt", BOTH | {"duration": 0.03}).save(first)
-    assert main(["simulate", "--replay", str(first), "--telemetry", str(second)]) == 0
-    assert first.read_bytes() == second.read_bytes()
 
 
 def test_the_linear_model_has_the_spring_and_the_torque_of_the_cable(actuator):

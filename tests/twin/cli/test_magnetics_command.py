@@ -5,28 +5,11 @@ import sys
 import pytest
 
 from spheretwin import cli
-from spheretwin.models import actuator as actuators
-from spheretwin.models import torque_curve
 from spheretwin.models.base.extras import install_command
 from spheretwin.models.design import curve_check, field_check, torque_map
-from spheretwin.models.torque_curve import TorqueCurve
 from spheretwin.viz.pages import magnetics, markdown
 from tests.content.verdicts import computed_curve, field_verdict, judged_curve, survey, workspace_verdict
 from tests.twin.cli.calls import call, refusal
-
-
-@pytest.fixture
-def user_csv(tmp_path):
-    """Coarse data of another magnet, as from a bench."""
-
-    def write(scale):
-        curve, path = actuators.load().torque_curve, tmp_path / "bench.csv"
-        rows = [*range(0, 120, 4), *range(120, 721, 20)]
-        scaled = TorqueCurve(curve.phi_rad[rows], scale * curve.torque_Nm_per_A[rows])
-        path.write_text(torque_curve.to_csv(scaled, ["bench"]))
-        return path
-
-    return write
 
 
 @pytest.fixture
@@ -59,47 +42,6 @@ def broken(*arguments):
 
 
 # The JSON and the tables of constructed results are the content of magnetics_pages.
-
-
-@pytest.mark.usefixtures("constructed")
-def test_a_user_s_curve_has_no_bounds(user_csv):
-    path, judged = user_csv(0.93), judged_curve()
-    warning = "spheretwin: warning: too few samples\n"
-    table = call("magnetics", "curve", "--csv", path)
-    assert (table.code, table.err) == (cli.DONE, warning)
-    assert "leave-one-out" in table.out
-    result = call("magnetics", "curve", "--csv", path, "--json")
-    assert (result.code, result.err) == (cli.DONE, warning)
-    difference, scale, scaled = judged.geometry
-    assert result.json == {
-        "path": str(path),
-        "rows": 61,
-        **judged.peak._asdict(),
-        "leave_one_out": judged.leave_one_out._asdict(),
-        "geometry": {
-            "difference": difference._asdict(),
-            "scale": scale,
-            "difference_after_scaling": scaled._asdict(),
-        },
-        "lookup_error": judged.lookup_error,
-        "checks": [],
-        "warnings": judged.warnings,
-    }
-
-
-@pytest.mark.usefixtures("constructed")
-def test_a_computed_curve_is_written_or_printed(tmp_path):
-    path, csv = tmp_path / "curve.csv", computed_curve().csv
-    written = broken("curve", "--out", path)
-    assert path.read_text() == csv
-    assert "1 of 2 checks hold" in written.out
-    assert f"written  {path}" in written.out
-    printed = broken("curve")
-    assert printed.out == csv
-    same, peak, message = printed.err.splitlines()
-    assert same.endswith("torque_curve.csv: the curve is the same")
-    assert peak == "peak 0.01250 N·m/A at 9.50°; a doubled mesh moves it by 1e-05 of itself"
-    assert message == "spheretwin: magnetics curve: broken: lookup"
 
 
 @pytest.mark.parametrize(
