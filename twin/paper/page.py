@@ -14,6 +14,7 @@ from spheretwin.models.telemetry.status import Status
 from spheretwin.paper.experiment import Array, Case, Experiment, Finding, Outcome, Outcomes, Section
 from spheretwin.paper.runner import CaseSummary, Plan, PlanResult, command_line, summarise
 from spheretwin.study.agreement import BOUND
+from spheretwin.study.statistics import finite_ends
 from spheretwin.viz.pages import markdown as pieces
 from spheretwin.viz.pages.markdown import Drawing, save_text, write_page
 
@@ -165,7 +166,7 @@ ERRORS: dict[str, Callable[[Outcome], Any]] = {
     "rms_error": lambda outcome: outcome.rms_error,
     "tail_rms_error": lambda outcome: outcome.tail_rms_error,
 }
-"""Errors of each hinge; the JSON has their median, and lowest and highest, over the seeds."""
+"""Errors of each hinge; the JSON has their median, its interval, and lowest and highest, over the seeds."""
 
 EFFORT = {"rms_torque_Nm": "rms_torque_range_Nm", "current_variation_A_s": "current_variation_range_A_s"}
 """Metrics of the effort; the JSON has their median, and lowest and highest, over the seeds."""
@@ -212,6 +213,7 @@ def _errors(outcomes: Sequence[Outcome]) -> dict[str, Any]:
     for name, error in ERRORS.items():
         values = np.array([error(outcome) for outcome in outcomes])
         fields[f"{name}_rad"] = np.median(values, axis=0).tolist()
+        fields[f"{name}_median_95_rad"] = [finite_ends(of_hinge) for of_hinge in values.T]
         fields[f"{name}_range_rad"] = np.stack([values.min(axis=0), values.max(axis=0)], axis=1).tolist()
     return fields
 

@@ -285,6 +285,11 @@ def interval(values: ArrayLike, share: float = 0.5, draws: int | None = None) ->
     return float(low), float(high)
 
 
+def finite_ends(values: ArrayLike) -> list[float | None]:
+    """Interval of the median for JSON: None for an end that the draws do not give."""
+    return [end if np.isfinite(end) else None for end in interval(values)]
+
+
 def quantile_text(
     values: ArrayLike, text: Callable[[float], str], share: float = 0.5, draws: int | None = None
 ) -> str:
@@ -349,5 +354,4 @@ def _spread(values: NDArray[np.float64]) -> dict[str, Any]:
     if not len(numbers):
         return {"median": None, "median_95": None, "range_95": None}
     low, median, high = np.percentile(numbers, LEVELS).tolist()
-    ends = [end if np.isfinite(end) else None for end in interval(numbers)]
-    return {"median": median, "median_95": ends, "range_95": [low, high]}
+    return {"median": median, "median_95": finite_ends(numbers), "range_95": [low, high]}

@@ -19,3 +19,10 @@ def test_status_is_what_should_not_have_been():
 def test_a_spread_in_degrees_has_no_range_if_it_is_none():
     assert spread_deg(np.radians([0.25, 0.25]), digits=2) == "0.25"
     assert spread_deg([np.nan, 1.0]) == "–"
+
+
+def test_a_row_has_the_interval_of_its_median_if_the_seeds_are_enough():
+    for errors, ends in ((0.1, 0.2, 0.3), [None, None]), ((1, 2, 3, 4, 5, 6), [1.0, 6.0]):
+        outcomes = list(map(outcome, errors))
+        (entry,) = rows(make_plan(experiment(NOISY), len(errors)), {NOISY.name: outcomes})
+        assert entry["max_abs_error_median_95_rad"] == [ends] * 3
