@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spheretwin.machine.diagnosis import FEWEST_WINDOWS, MOST_UNEXPLAINED, Diagnosis
-from spheretwin.machine.log import COMMANDED, Log
+from spheretwin.machine.log import COMMANDED, LARGEST, Log
 from spheretwin.machine.torque_balance import TorqueBalance
 from spheretwin.models.base.errors import InputError, did_you_mean
 from spheretwin.models.telemetry.joint_states import ANGLE_NAMES
@@ -29,7 +29,6 @@ MOST_LOST, LONGEST_GAP_s = 0.01, 0.1
 JITTER, LARGE_JITTER = 0.05, 0.5
 BEYOND_RANGE = 1.2  # sensors have offsets, ends of a range are soft
 BEYOND_LIMIT = 5.0
-ABSURD = 1e6  # rad or A: squares of larger numbers may overflow
 MOST_PERIODS = 1e8  # from the first row to the last, with gaps: a day at 1 kHz
 AT_LIMIT, OVER_LIMIT, MOST_AT_LIMIT = 0.99, 1.01, 0.01
 
@@ -97,7 +96,7 @@ class Evidence:
         angles, currents = (
             _rising(self.log.t_s, values) for values in (self.log.angle_rad, self.log.current_A)
         )
-        if len(currents[0]) < 2 or max(np.abs(angles[1]).max(), np.abs(currents[1]).max()) > ABSURD:
+        if len(currents[0]) < 2 or max(np.abs(angles[1]).max(), np.abs(currents[1]).max()) > LARGEST:
             return None
         if not angles[0][-1] - angles[0][0] < MOST_PERIODS * self.period_s:
             return None

@@ -94,6 +94,28 @@ class Log:
 
 _COLUMNS = ("t_s", "current_A", "angle_rad")
 
+LATEST_s, LARGEST = 1e12, 1e6
+"""Largest time, and largest angle or current, rad or A: squares of larger numbers may overflow."""
+
+
+def check_numbers(log: Log) -> None:
+    """Refuse numbers that no machine has; NaN is a missing angle or current.
+
+    Raises
+    ------
+    InputError
+        A time is not finite, or a number is too large.
+    """
+    for column in _COLUMNS:
+        values, largest = getattr(log, column), LATEST_s if column == "t_s" else LARGEST
+        is_missing = np.isnan(values) & (column != "t_s")
+        if not np.all(is_usable := is_missing | (np.abs(values) <= largest)):
+            row = int(np.argwhere(~is_usable)[0, 0])
+            raise InputError(
+                f"log {log.name}: expected numbers from {-largest:g} to {largest:g} as {column}, received"
+                f" {values[~is_usable][0]:g} in row {row}"
+            )
+
 
 def joined(logs: Sequence[Log]) -> Log:
     """Return logs that follow each other as one, with the name and the conditions of the first.

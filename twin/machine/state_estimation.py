@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from spheretwin.electronics.logged_currents import mean_currents
-from spheretwin.machine.log import MEASURED, Log, joined
+from spheretwin.machine.log import MEASURED, Log, check_numbers, joined
 from spheretwin.machine.model import EDGE_SHARE, Model, model_of
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.coil_group import of_each_group
@@ -116,6 +116,7 @@ class Shadow:
         InputError
             Another number of groups, or times that do not rise.
         """
+        check_numbers(log)
         if log.current_A.shape[1] != self.model.groups:
             raise InputError(
                 f"shadow of {log.name}: expected {self.model.groups} group currents, received"

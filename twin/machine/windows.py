@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spheretwin.electronics.logged_currents import mean_currents
-from spheretwin.machine.log import MEASURED, Log
+from spheretwin.machine.log import MEASURED, Log, check_numbers
 from spheretwin.machine.model import EDGE_SHARE
 from spheretwin.machine.parameters import Machine, Parameter, Setup, sensor_angles
 from spheretwin.machine.state_estimation import Shadow, hold_last_value
@@ -109,7 +109,10 @@ def windows_of(log: Log, machine: Machine, window_s: float) -> list[Window]:
     InputError
         No part of the log without gaps is as long as a window, or a window has too few rows.
     """
+    check_numbers(log)
     period_s = float(np.median(np.diff(log.t_s)))
+    if period_s <= 0:
+        raise InputError(f"log {log.name}: expected rising times, received a period of {period_s:g} s")
     rows = round(window_s / period_s)
     if rows < 10:
         raise InputError(

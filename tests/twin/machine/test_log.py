@@ -4,6 +4,8 @@ import numpy as np
 import pytest
 
 from spheretwin.machine import Log
+from spheretwin.machine.log import check_numbers
+from spheretwin.models.base.errors import InputError
 
 TIMES = np.arange(5) * 1e-3
 CURRENTS = np.arange(90.0).reshape(5, 18)
@@ -39,3 +41,13 @@ def test_rows_are_a_log_with_the_same_conditions():
         {"plant.payload_kg": 0.1},
         ("gaps",),
     )
+
+
+@pytest.mark.parametrize("column", ["t_s", "current_A", "angle_rad"])
+@pytest.mark.parametrize("value", [np.inf, -np.inf, 1e308, -1e19])
+def test_numbers_that_no_machine_has_are_refused_by_name(column, value):
+    columns = {"t_s": np.arange(3.0), "current_A": np.full((3, 18), np.nan), "angle_rad": np.zeros((3, 3))}
+    check_numbers(Log(**columns))
+    columns[column].reshape(3, -1)[1, -1] = value
+    with pytest.raises(InputError, match=rf"as {column}, received {value:g} in row 1".replace("+", r"\+")):
+        check_numbers(Log(**columns))
