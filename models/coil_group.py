@@ -41,6 +41,8 @@ HEAT = {
 }
 """Bounds of the thermal data of stator and rotor that a model file may state."""
 
+THERMAL_UNITS = ("_per_K", "_J_K", "_K_W", "_degC")
+
 
 @dataclass(frozen=True)
 class CoilGroup:
@@ -119,12 +121,13 @@ def _index(model: mujoco.MjModel, name: str) -> int:
 
 
 def _check_names(model: mujoco.MjModel) -> None:
-    """Check that no number has a name like those of the groups, which would be ignored."""
-    known = [PREFIX + name for name in (*ELECTRICAL, LIMIT, *THERMAL)]
+    """Check that no number has a name like those of groups or of thermal data, which would be ignored."""
+    known = [*(PREFIX + name for name in (*ELECTRICAL, LIMIT, *THERMAL)), *HEAT]
     for name in (model.numeric(number).name for number in range(model.nnumeric)):
-        if name.startswith(PREFIX) and name not in known:
+        is_of_the_machine = name.startswith(PREFIX) or name.endswith(THERMAL_UNITS)
+        if is_of_the_machine and name not in known:
             raise InputError(
-                f"model: expected custom numbers of the groups among {', '.join(known)}, received {name}"
+                f"model: expected electrical and thermal data among {', '.join(known)}, received {name}"
                 f"{did_you_mean(name, known)}"
             )
 

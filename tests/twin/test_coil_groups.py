@@ -117,6 +117,10 @@ def test_the_record_of_a_run_gives_the_same_values_again(tmp_path):
         ({"group_inductance_H": [9e-4] * 17 + [-1.0]}, "group_inductance_H from 1e-09 to 1e.09, received -1"),
         ({"group_heat_capacity_J_K": 0.0}, "group_heat_capacity_J_K from 0.001 to 1e.06, received 0"),
         ({"group_heat_capacity": 60.0}, "received group_heat_capacity; did you mean group_heat_capacity_J_K"),
+        (
+            {"stator_capacity_J_K": 900.0},
+            "did you mean stator_heat_capacity_J_K",
+        ),
         ({"coil_turns": [320.0] * 18}, "expected one number coil_turns, received 18"),
     ],
 )
