@@ -98,7 +98,7 @@ def _append(memory: bytearray, value: Any) -> None:
             _append(memory, part)
         _pad(memory, alignment)
     elif isinstance(value, bool | np.bool_):
-        memory.append(value)
+        memory.append(bool(value))
     else:
         _pad(memory, 8)
         memory += _words(value).tobytes()
@@ -109,7 +109,10 @@ def _words(value: Any) -> NDArray[Any]:
     if isinstance(value, np.ndarray):  # without the two objects that count its references
         place = [0, 0, value.size, value.itemsize, value.ctypes.data]
         return np.array([*place, *value.shape, *value.strides], np.int64)
-    return np.array(0 if value is None else value, np.int64 if isinstance(value, int | None) else np.float64)
+    word = np.asarray(0 if value is None else value)
+    if word.dtype not in (np.int64, np.float64):
+        raise TypeError(f"expected a tuple of arrays and numbers of eight bytes, received {value!r}")
+    return word
 
 
 def _alignment(value: Any) -> int:

@@ -212,15 +212,23 @@ def test_a_copied_model_is_owned_by_python():
 
 @needs_compiled_functions
 def test_compiled_code_reads_a_tuple_from_memory():
+    """Numbers of each kind, next to nested tuples of numbers that need no alignment."""
     pair = Pair(np.arange(3.0), np.arange(4.0))
+    value = True, (False, np.True_), pair, 7.5, None, ((True, np.int64(3)), ()), np.ones((2, 5), np.bool_)
 
-    @numba.cfunc(types.float64(types.CPointer(numba.typeof((pair, 7.5, 3)))), **NO_ALLOCATION)
+    @numba.cfunc(types.float64(types.CPointer(numba.typeof(value))), **NO_ALLOCATION)
     def read(memory):
-        (first, second), number, count = memory[0]
-        return first[2] + 10 * second[3] + 100 * number + 1000 * count
+        content = memory[0]
+        numbers = content[2].first[2] + 10 * content[2].second[3] + 100 * content[3] + 1000 * content[5][0][1]
+        logical = (
+            content[0] + 2 * content[1][0] + 4 * content[1][1] + 8 * content[5][0][0] + 16 * content[6][1, 4]
+        )
+        return numbers + 1e5 * logical + 1e7 * content[6].shape[1]
 
-    memory = addresses.in_memory((pair, 7.5, 3))
-    assert read.ctypes(ctypes.c_void_p(memory.ctypes.data)) == 2 + 30 + 750 + 3000
+    memory = addresses.in_memory(value)
+    assert read.ctypes(ctypes.c_void_p(memory.ctypes.data)) == 2 + 30 + 750 + 3000 + 29e5 + 5e7
+    with pytest.raises(TypeError, match="numbers of eight bytes"):
+        addresses.in_memory((np.float32(1.0),))
 
 
 @needs_compiled_functions
