@@ -100,7 +100,7 @@ def _write_scenario(bench_state: BenchState, file: str) -> Callable[[], str]:
     def write() -> str:
         (path,) = bench_state.folder.claim(file)
         try:
-            with whole_file(path) as temporary:
+            with whole_file(path, ".toml") as temporary:
                 temporary.write_text(as_toml(settings), encoding="utf-8")
         finally:
             release([path])

@@ -132,6 +132,13 @@ def test_no_empty_file_is_left_of_what_was_refused(tmp_path):
         for recording, refused in ((tmp_path / "a", "a separate path"), (tmp_path / "no" / "b", "writable")):
             paths = {"recording": str(recording), "telemetry": str(tmp_path / "a")}
             assert refused in said(bench, "record", **paths)
+        for verb, names, end in (
+            ("record", {"telemetry": "run.csv"}, ".parquet"),
+            ("record", {"recording": "run.mcap"}, ".rrd"),
+            ("save", {"file": "mine.json"}, ".toml"),
+        ):
+            paths = {name: str(tmp_path / file) for name, file in names.items()}
+            assert f"a name that ends in {end}" in said(bench, verb, **paths)
         done(bench, "record", telemetry=str(tmp_path / "run.parquet"))
         assert "expected keep before" in said(bench, "record", recording=str(tmp_path / "b.rrd"))
         bench.advance(10)
