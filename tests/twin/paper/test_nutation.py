@@ -7,10 +7,8 @@ from spheretwin.models.telemetry.status import Status
 from spheretwin.paper import nutation
 from spheretwin.paper.experiment import Outcomes
 from spheretwin.paper.laws import COMPARED_LAWS
-from spheretwin.paper.nutation import SAMPLE_s, WINDOW_s, reduce
 from spheretwin.paper.page import padded
 from spheretwin.paper.runner import make_plan, run_plan, scenario_of
-from spheretwin.simulation import simulate
 
 
 @pytest.fixture(scope="module")
@@ -23,19 +21,6 @@ def test_it_is_the_paper_s_condition():
         scenario = scenario_of(case, None)
         assert (scenario.trajectory.shape, scenario.duration) == ("nutation", 5.0)
         assert (scenario.plant.modelling_error, scenario.disturbance.load) == (0.2, 2.0)
-
-
-def test_windows_contain_the_largest_error_and_the_trajectory_every_tenth_tick():
-    case = nutation.case(COMPARED_LAWS[2])
-    run = simulate(scenario_of(case._replace(fields={**case.fields, "duration": 0.38}), None))
-    data = reduce(run)
-    error = np.abs(run.telemetry["error_rad"])
-    assert data.windows_rad.shape == (7, 3)  # of 50 ticks each; the rest is less than a window
-    np.testing.assert_array_equal(data.windows_rad[2], error[100:150].max(axis=0))
-    np.testing.assert_array_equal(data.trajectory.q_rad, run.telemetry["q_rad"][::10])
-    np.testing.assert_array_equal(data.largest_after(0.3), error[300:350].max(axis=0))
-    assert np.isnan(data.largest_after(1.0)).all()
-    assert (WINDOW_s, SAMPLE_s) == (0.05, 0.01)
 
 
 def test_the_order_of_the_paper_is_reproduced(outcomes):

@@ -8,7 +8,6 @@ from spheretwin.control.laws.pid import BANDWIDTH_rad_s
 from spheretwin.paper import tilt
 from spheretwin.paper.runner import make_plan, run_plan
 from spheretwin.paper.tilt_cases import BY_LAW, CHANGES, TILT_LAWS, printed
-from spheretwin.simulation import simulate
 from spheretwin.viz.theme import LAW_COLOURS, LAW_MARKS
 
 COMPILES = pytest.mark.release("compiles a loop for 12 s; content of figure 11 has its tables")
@@ -89,12 +88,3 @@ def test_reached_is_by_the_median():
     errors = ([0.1, 0.126, 9.0], [1.0]), ([0.127], [0.1]), ([0.127], [0.127])  # 1.05 times 0.12 is the bound
     said = [tilt.reached(BY_LAW["afsm"], *map(np.radians, each)) for each in errors]
     assert said == ["yes", "by the true error", "no"]
-
-
-def test_windows_contain_the_largest_error_of_each():
-    run = simulate(scenarios.load("tilt", {"duration": 0.095, "hardware": "electronics"}))
-    windows = tilt.reduce(run)
-    error = np.abs(run.telemetry["q_measured_rad"] - run.telemetry["q_ref_rad"])
-    assert windows.shape == (4, 2)  # of 20 ticks each; the rest is less than a window
-    np.testing.assert_array_equal(windows[1], error[20:40, :2].max(axis=0))
-    assert pytest.approx(0.02) == tilt.WINDOW_s
