@@ -103,14 +103,15 @@ def compare(mjcf: Path, actuator: Actuator) -> CoilDriven:
 
 
 def fitting_scale(mjcf: Path, actuator: Actuator) -> Scale:
-    """Return a scale of the currents under which the complete plant stays within its range."""
+    """Return a scale of currents and loads under which the complete plant stays within its range."""
     scale = scale_of(actuator)
     for _ in range(MOST_HALVINGS):
         states = by_complete_plant(mjcf, scale, "lagrangian", COMPLETE_STEPS_s[0])
         away = np.abs(states[:, :3] - scale.middle_rad) / (0.9 * scale.half_rad)
         if np.all(away < 1):  # False for NaN
             break
-        scale = scale._replace(current=0.5 * scale.current)
+        less = {name: 0.5 * getattr(scale, name) for name in ("current", "torque", "payload")}
+        scale = scale._replace(**less)
     return scale
 
 
@@ -145,7 +146,7 @@ def integrate(mjcf: Path, actuator: Actuator, scale: Scale) -> Array:
 
     start = np.concatenate([scale.pose_rad(START_rad), scale.rates_rad_s(START_rad_s)])
     # The torque curve is a spline: its third derivative jumps, which no method of order eight likes better.
-    tolerances = {"rtol": 1e-9, "atol": 1e-11}
+    tolerances = {"rtol": 1e-11, "atol": 1e-13}
     solved = solve("coil-driven reference", flow, (0, DURATION_s), start, t_eval=_samples_s(), **tolerances)
     states: Array = solved.y.T
     return states

@@ -32,7 +32,7 @@ FIELDS: dict[str, Any] = {
 }
 
 FIGURES = {"rms error": "rms_error_rad", "variation of the commands": "current_variation_A_s"}
-BOUND = 0.02
+BOUND = 0.05
 """Relative difference of the medians of a figure."""
 
 
