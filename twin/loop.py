@@ -250,12 +250,13 @@ def dispatch(
     if not COMPILES:
         step = step_that_writes(law) if is_user_law(law) else law.step
         return Functions(step, allocate, estimate or 0, ())
-    callbacks = [
+    callbacks = (
         None if is_python_law(law) else _law_callback(law, check_bounds),
         compiled_callback(allocations.SIGNATURE, allocate),
         compiled_callback(estimators.SIGNATURE, estimate) if estimate else None,
-    ]
-    return Functions(*(callback.address if callback else 0 for callback in callbacks), tuple(callbacks))
+    )
+    of_law, of_allocation, of_estimator = (callback.address if callback else 0 for callback in callbacks)
+    return Functions(of_law, of_allocation, of_estimator, callbacks)
 
 
 def _law_callback(law: Law, check_bounds: bool) -> Any:

@@ -141,7 +141,7 @@ class Runtime:
         )
         if COMPILES and is_python_law(law):
             self._python_law = _PYTHON_LAW(self._call_law(step_that_writes(law)))
-            address = ctypes.cast(self._python_law, ctypes.c_void_p).value
+            address = ctypes.cast(self._python_law, ctypes.c_void_p).value or 0
             self._controller = self._controller._replace(python_law=address)
         self._connection = Connection(external, self._controller, self._plant, self._scratch)
 

@@ -74,7 +74,6 @@ def compiled_stages(
         Columns of the run: its channels are among them.
     """
     parts: dict[str, Any] = {"controller": controller, "sensors": sensors, "plant": plant}
-    own = plant.rotor.q, plant.rotor.qdot, plant.current, plant.draws, plant.current_sensors
     memory: list[Any] = []
 
     def stage(signature: Any, function: Callable[..., Any], part: Any) -> tuple[Any, Any]:
@@ -96,7 +95,11 @@ def compiled_stages(
             sequence([function for function, _ in writers]),
             sequence([data for _, data in writers]),
             np.array([first[name] for name in logged.values()], np.intp),
-            *own,
+            plant.rotor.q,
+            plant.rotor.qdot,
+            plant.current,
+            plant.draws,
+            plant.current_sensors,
         ),
         memory,
     )
