@@ -51,6 +51,7 @@ REST_rad_s = 1e-3 * START_rad_s  # what is called rest
 VISCOUS_s = 2.0  # of coasting under viscous friction alone
 
 OURS, MUJOCO = "our stage", "MuJoCo"
+HALVES = {OURS: 2, MUJOCO: 1}  # parts of a step in which friction acts
 _EPSILON = float(np.finfo(np.float64).eps)
 
 
@@ -257,7 +258,7 @@ def _viscous(way: str, move: Mover, hinge: Hinge) -> Check:
     }
     why = {
         OURS: "half a step leaves 1/(1 + x + x²/2) of the rate, x = viscous h/2J, which is exp(-x) times"
-        " exp(x³/6) at most; and rounding, 2e-16 a step",
+        " exp(x³/6) at most; and rounding, 2e-16 in each half of a step",
         MUJOCO: "rounding, 2e-16 a step, and truncation of RK4, x⁵/120 a step at x = viscous h/J",
     }
     return Check(
@@ -266,7 +267,7 @@ def _viscous(way: str, move: Mover, hinge: Hinge) -> Check:
         " MuJoCo, damping) alone: rate, with the exact decay",
         states=count,
         value=float(np.max(np.abs(move(hinge, START_rad_s, np.zeros(count)).qdot_rad_s - exact))),
-        bound=truncation[way] + count * _EPSILON * START_rad_s,
+        bound=truncation[way] + HALVES[way] * count * _EPSILON * START_rad_s,
         why=why[way],
         unit="rad/s",
     )

@@ -245,8 +245,8 @@ MUJOCO_STOPS = {"stopping time, MuJoCo", "stopping angle, MuJoCo"}
 def test_another_constraint_breaks_its_rows(monkeypatch, actuator, field, share, rows):
     right = runs._with_bearing
 
-    def other(original, hinge):
-        changed = right(original, hinge)
+    def other(original, actuator, hinge):
+        changed = right(original, actuator, hinge)
         getattr(changed.bare, field)[runs.GAMMA] *= share
         return changed
 
