@@ -1,7 +1,9 @@
 """Mutual inductance: against Maxwell's formula, the flux of magpylib's field, and symmetries."""
 
 from dataclasses import replace
+from itertools import product
 
+import magpylib
 import numpy as np
 import pytest
 from scipy.special import ellipe, ellipk
@@ -9,6 +11,7 @@ from scipy.special import ellipe, ellipk
 from spheretwin.models import inductance
 from spheretwin.models.actuator import load
 from spheretwin.models.inductance import coil_pair, mutual_inductance
+from tests.models.design.quadrature import winding_loops, winding_section
 
 MU0 = 4e-7 * np.pi
 ACTUATOR = load()
@@ -16,28 +19,15 @@ COIL = ACTUATOR.coil
 GROUP_H = ACTUATOR.group.inductance_H
 
 
-def sections(radial, axial):
-    """Points (radius, distance from the joint centre) and shares of a winding section, by Gauss's rule."""
-    x, wx = np.polynomial.legendre.leggauss(radial)
-    y, wy = np.polynomial.legendre.leggauss(axial)
-    radius = COIL.inner_radius_m + (COIL.outer_radius_m - COIL.inner_radius_m) * (x + 1) / 2
-    height = COIL.distance_m + COIL.length_m * y / 2
-    return [
-        (r, z, wr * wz / 4)
-        for r, wr in zip(radius, wx, strict=True)
-        for z, wz in zip(height, wy, strict=True)
-    ]
-
-
 def test_opposite_coils_are_maxwells_coaxial_loops():
     """J. C. Maxwell, A Treatise on Electricity and Magnetism, art. 701: complete elliptic integrals."""
     total = 0.0
-    for a, first, share in sections(6, 8):
-        for b, second, other in sections(6, 8):
-            squared = 4 * a * b / ((a + b) ** 2 + (first + second) ** 2)
-            k = np.sqrt(squared)
-            loops = MU0 * np.sqrt(a * b) * ((2 / k - k) * ellipk(squared) - 2 / k * ellipe(squared))
-            total += share * other * loops
+    points = winding_section(COIL, 6, 8)
+    for (a, first, share), (b, second, other) in product(points, points):
+        squared = 4 * a * b / ((a + b) ** 2 + (first + second) ** 2)
+        k = np.sqrt(squared)
+        loops = MU0 * np.sqrt(a * b) * ((2 / k - k) * ellipk(squared) - 2 / k * ellipe(squared))
+        total += share * other * loops
     # Both currents run about outward axes, which are opposite: the flux of one is against the other.
     expected = -(COIL.turns**2) * total
     assert coil_pair(COIL, np.pi) == pytest.approx(expected, rel=1e-6)
@@ -46,24 +36,19 @@ def test_opposite_coils_are_maxwells_coaxial_loops():
 @pytest.mark.parametrize("degrees", [26.42, 30.0, 60.0, 90.0, 127.6])
 def test_inclined_coils_have_the_flux_of_magpylibs_field(degrees):
     """The field of loops, integrated over the areas of the turns of the other coil."""
-    magpylib = pytest.importorskip("magpylib")
-    turns = sections(5, 10)
     angle = np.radians(degrees)
     axis, side = np.array([np.sin(angle), 0, np.cos(angle)]), np.array([np.cos(angle), 0, -np.sin(angle)])
     up = np.array([0.0, 1.0, 0.0])
     x, weight = np.polynomial.legendre.leggauss(8)
     azimuth = 2 * np.pi * np.arange(24) / 24
     points, areas = [], []
-    for radius, height, share in sections(4, 6):
+    for radius, height, share in winding_section(COIL, 4, 6):
         for rho, w in zip(radius * (x + 1) / 2, weight * radius / 2, strict=True):
             for psi in azimuth:
                 points.append(height * axis + rho * (np.cos(psi) * side + np.sin(psi) * up))
                 areas.append(share * w * rho * 2 * np.pi / len(azimuth))
-    loops = [
-        magpylib.current.Circle(diameter=2 * r, current=share, position=(0, 0, z)) for r, z, share in turns
-    ]
-    field = magpylib.getB(loops, np.array(points), sumup=True)
-    expected = COIL.turns**2 * np.array(areas) @ (field @ axis)
+    field = magpylib.getB(winding_loops(COIL, 5, 10), np.array(points), sumup=True)
+    expected = COIL.turns * np.array(areas) @ (field @ axis)
     # The coarser points of either method at coils that are 0.5 mm apart.
     assert coil_pair(COIL, angle) == pytest.approx(expected, rel=2e-4)
 
@@ -93,8 +78,7 @@ def test_matrix_is_symmetric_without_diagonal_and_with_positive_energy():
 
 
 def test_group_is_the_sum_over_its_coils_in_any_order():
-    matrix = mutual_inductance(ACTUATOR)
-    axes = ACTUATOR.group_axes
+    matrix, axes = mutual_inductance(ACTUATOR), ACTUATOR.group_axes
     for j, k in ((0, 1), (3, 9), (5, 17)):
         angle = np.arccos(axes[j] @ axes[k])
         expected = 2 * coil_pair(COIL, angle) + 2 * coil_pair(COIL, np.pi - angle)
@@ -107,10 +91,8 @@ def test_inductance_grows_with_the_square_of_turns_and_with_size():
     lengths = ("inner_radius_m", "outer_radius_m", "length_m", "distance_m")
     large = replace(COIL, **{name: 3 * getattr(COIL, name) for name in lengths})
     pair = coil_pair(COIL, np.radians(30))
-    assert coil_pair(replace(COIL, turns=2 * COIL.turns), np.radians(30)) == pytest.approx(
-        4 * pair, rel=1e-12
-    )
-    assert coil_pair(large, np.radians(30)) == pytest.approx(3 * pair, rel=1e-12)
+    for coil, factor in ((replace(COIL, turns=2 * COIL.turns), 4), (large, 3)):
+        assert coil_pair(coil, np.radians(30)) == pytest.approx(factor * pair, rel=1e-12)
 
 
 @pytest.mark.release("0.7 s; the other tests compare with exact inductances")

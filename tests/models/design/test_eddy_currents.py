@@ -5,26 +5,13 @@ import numpy as np
 import pytest
 
 from spheretwin.models.design.eddy_currents import ALUMINIUM_S_m, eddy_viscous_bound_Nm_s, face_field_T_per_A
-
-
-def loops(coil, current_A=1.0, across=8, along=20):
-    """One coil on the z axis as current loops, at the midpoints of its section."""
-    radii = (
-        coil.inner_radius_m + (coil.outer_radius_m - coil.inner_radius_m) * (np.arange(across) + 0.5) / across
-    )
-    heights = coil.distance_m + coil.length_m * ((np.arange(along) + 0.5) / along - 0.5)
-    share = coil.turns * current_A / (across * along)
-    return [
-        magpylib.current.Circle(current=share, diameter=2 * r, position=(0, 0, z))
-        for r in radii
-        for z in heights
-    ]
+from tests.models.design.quadrature import winding_loops
 
 
 def test_the_field_at_the_face_is_that_of_the_loops(actuator):
     coil = actuator.coil
     face = np.array([[0.0, 0.0, coil.distance_m - coil.length_m / 2]])
-    field = magpylib.getB(loops(coil, across=40, along=200), face, sumup=True)
+    field = magpylib.getB(winding_loops(coil, 40, 200), face, sumup=True)
     # Midpoints of 200 layers: the next power of a layer's height over the bore, (0.125 / 3)²/24.
     assert abs(field.ravel()[2]) == pytest.approx(face_field_T_per_A(actuator), rel=1e-3)
     assert face_field_T_per_A(actuator) == pytest.approx(7.7e-3, rel=0.01)
@@ -35,7 +22,7 @@ def test_the_bound_exceeds_the_dissipation_without_return_paths(actuator):
     coil, radius = actuator.coil, actuator.coil.distance_m - actuator.coil.length_m / 2
     cosine, weight = np.polynomial.legendre.leggauss(400)
     points = radius * np.column_stack([np.sqrt(1 - cosine**2), np.zeros(400), cosine])
-    field = magpylib.getB(loops(coil), points * (1 - 1e-3), sumup=True)
+    field = magpylib.getB(winding_loops(coil, 8, 20), points * (1 - 1e-3), sumup=True)
     normal = np.einsum("ij,ij->i", field, points) / radius
     # Coils of independent currents add their squares. The mean squared speed is 2/3 of the largest.
     integral = 2 * np.pi * radius**2 * np.sum(weight * normal**2)

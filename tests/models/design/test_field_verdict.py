@@ -9,7 +9,7 @@ from spheretwin.models.base.checks import broken
 from spheretwin.models.design import direct_summation
 from spheretwin.models.design import field_check as field_verdict
 from spheretwin.models.torque_curve import TorqueCurve
-from tests.models.design.quadrature import sum_coarsely
+from tests.models.design.quadrature import COARSE
 
 pytestmark = pytest.mark.release(
     "sums over all windings for 0.7 to 7.5 s; the content design_direct_sums has their values"
@@ -18,8 +18,9 @@ pytestmark = pytest.mark.release(
 
 @pytest.fixture
 def coarse(monkeypatch):
-    """Fewer points in the windings."""
-    sum_coarsely(monkeypatch)
+    """Fewer points in the windings, and one machine with scatter instead of three."""
+    monkeypatch.setattr(direct_summation, "STANDARD", COARSE)
+    monkeypatch.setattr(field_verdict, "SCATTER_POSES", 1)
 
 
 def test_the_shipped_actuator_passes(actuator, monkeypatch):

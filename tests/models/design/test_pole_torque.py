@@ -17,6 +17,7 @@ from spheretwin.models.base.errors import InputError
 from spheretwin.models.design import pole_torque
 from spheretwin.models.design.pole_torque import Mesh, MeshConvergence, compute_curve
 from spheretwin.models.torque_curve import TorqueCurve
+from tests.models.design.quadrature import winding_loops
 
 COARSE = Mesh(along=16, around=96, across=8)
 
@@ -138,27 +139,11 @@ def magpylib_magnet(magnet: Magnet, degrees: float) -> magpylib.magnet.Cylinder:
     )
 
 
-def magpylib_loops(coil: CoilGeometry, across: int, along: int) -> list[magpylib.current.Circle]:
-    """The winding as loops at the Gauss points of its section, one ampere times their share of the turns."""
-    u, share_u = np.polynomial.legendre.leggauss(across)
-    v, share_v = np.polynomial.legendre.leggauss(along)
-    radii = 0.5 * (coil.outer_radius_m + coil.inner_radius_m)
-    radii = radii + 0.5 * (coil.outer_radius_m - coil.inner_radius_m) * u
-    heights = coil.distance_m + 0.5 * coil.length_m * v
-    return [
-        magpylib.current.Circle(
-            diameter=2 * radius, current=0.25 * share_u[i] * share_v[k] * coil.turns, position=(0, 0, height)
-        )
-        for i, radius in enumerate(radii)
-        for k, height in enumerate(heights)
-    ]
-
-
 # Measured: 1e-4 at 12 x 24 loops, 1e-5 at 40 x 100 (20 s). Near 5 degrees, where a flat magnet's rim lies
 # within the winding, this quadrature of an infinite field needs the finer loops to come below 1e-3.
 @pytest.mark.parametrize("degrees", [1.0, 2.5, 10.75, 22.0, 40.0, 100.0])
 def test_magnet_pushes_back_on_the_winding(flat, coil, degrees):
-    winding = magpylib.Collection(magpylib_loops(coil, 12, 24))
+    winding = magpylib.Collection(winding_loops(coil, 12, 24))
     _, torque = magpylib.getFT(magpylib_magnet(flat, degrees), winding, meshing=180, pivot=(0, 0, 0))
     # Action = reaction: about +y the coil turns with the angle, the pole against it.
     expected = torque_at(flat, coil, [degrees])[0]
@@ -171,7 +156,7 @@ def test_magnet_pushes_back_on_the_winding(flat, coil, degrees):
 def sphere_torque(magnet: Magnet, coil: CoilGeometry, degrees) -> np.ndarray:
     """Torque on a homogeneously magnetised sphere about the back's middle: that of a dipole, exactly."""
     moment = magnet.remanence_T / mu_0 * 4 / 3 * np.pi * magnet.radius_m**3
-    winding = magpylib.Collection(magpylib_loops(coil, 16, 16))
+    winding = magpylib.Collection(winding_loops(coil, 16, 16))
 
     def alignment(phi):
         axis = np.column_stack([np.sin(phi), np.zeros_like(phi), np.cos(phi)])

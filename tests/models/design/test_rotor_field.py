@@ -13,9 +13,10 @@ from spheretwin.models import torque_field
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.design import rotor_field
 from spheretwin.models.torque_field import TorqueField, directions
-from spheretwin.scenario.reading import FOLDER
+from tests.models import poses
+from tests.models.design.quadrature import winding_section
 
-SECOND = (FOLDER / "ventusff" / "actuator.xml").read_text()
+SECOND = poses.SECOND.read_text()
 POLES = re.compile(
     r"(?s)            <frame euler=\"0 0 0\">\n              <frame euler=\"0 -46.4.*"
     r"(?=            <site name=\"shaft_tip)"
@@ -39,13 +40,9 @@ def test_a_sphere_at_the_centre_is_a_dipole(tmp_path):
     computed = rotor_field.compute(path, 6.0, 6)
     coil = actuators.read_coil(mujoco.MjModel.from_xml_path(str(path)))
     moment = 1.2 / (4e-7 * np.pi) * 4 / 3 * np.pi * radius**3
-    rho, weight_rho = np.polynomial.legendre.leggauss(40)
-    rho = coil.inner_radius_m + (coil.outer_radius_m - coil.inner_radius_m) * (rho + 1) / 2
-    z, weight_z = np.polynomial.legendre.leggauss(40)
-    z = coil.distance_m + coil.length_m * z / 2
+    rho, z, share = np.transpose(winding_section(coil, 40, 40))
     # A turn of radius rho at height z links µ0 m rho² / 2 r³ of a dipole along its axis.
-    turn = 4e-7 * np.pi * moment * rho[:, None] ** 2 / (2 * np.hypot(rho[:, None], z) ** 3)
-    linked = coil.turns * np.sum(np.outer(weight_rho, weight_z) / 4 * turn)
+    linked = coil.turns * share @ (4e-7 * np.pi * moment * rho**2 / (2 * np.hypot(rho, z) ** 3))
     axes = directions(31, 60)
     expected = -linked * np.cross(axes, [0.0, 0.0, 1.0])  # -n x grad(linked n.z)
     np.testing.assert_allclose(computed.field.torque_Nm_per_A, expected, rtol=0, atol=1e-9 * linked)
