@@ -5,7 +5,8 @@ import re
 from spheretwin import scenario as scenarios
 from spheretwin.session import Session
 from tests.content.content import command, content_test, scratch
-from tests.twin.cli.test_model_warnings import DEPRECATED, FLAGS, FLEX, GEOMETRY, OPTION, edited
+from tests.models.model_files import edited
+from tests.twin.cli.test_model_warnings import DEPRECATED, FLAGS, FLEX, GEOMETRY, OPTION
 
 GRAVITY = "plant.gravity_m_s2"
 
@@ -35,25 +36,25 @@ GRID = (
 
 
 def model_warnings():
-    path = scratch("model_warnings") / "mine.xml"
+    folder = scratch("model_warnings")
 
     def of_session(edits, overrides):
-        path.write_text(edited(*edits), encoding="utf-8")
-        with Session(scenarios.load("hold", {"plant.mjcf": str(path), **overrides})) as session:
+        changes = {"plant.mjcf": str(edited(folder, *edits)), **overrides}
+        with Session(scenarios.load("hold", changes)) as session:
             return session.warnings()
 
     cases = [([edit], {}) for edit in GEOMETRY] + [(GEOMETRY, {})] + CASES_OF_OPTIONS
     cases += [([edit], {"plant.engine": "mujoco"}) for edit in (DEPRECATED, FLEX)]
     lines = [f"{edits} {overrides}: {of_session(edits, overrides)}" for edits, overrides in cases]
     # A run has the warnings of its session among its figures, and prints nothing else; other verbs print it.
-    short = f"simulate hold --duration 0.003 --controller.law pd --plant.mjcf {path}"
+    short = f"simulate hold --duration 0.003 --controller.law pd --plant.mjcf {edited(folder)}"
     for edits in ([GEOMETRY[2], option("0.0005", "0.001")], [], [DEPRECATED], [FLEX]):
-        path.write_text(edited(*edits), encoding="utf-8")
+        edited(folder, *edits)
         printed = command(*short.split(), "--plant.initial-rad", "0.2", "-0.1", "0.3")
         lines += [line for line in printed.splitlines() if not line.startswith("|")]
-    path.write_text(edited(DEPRECATED), encoding="utf-8")
+    path = edited(folder, DEPRECATED)
     lines.append(command("magnetics", "map", "--largest-tilt", "0", "--mjcf", path).partition("stderr:")[2])
-    path.write_text(edited(("</worldbody>", GRID)), encoding="utf-8")
+    edited(folder, ("</worldbody>", GRID))
     lines.append(command(*short.split()))
     return re.sub(r"line \d{2,}", "line N", "\n".join(lines))
 

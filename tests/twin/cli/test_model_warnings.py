@@ -2,17 +2,11 @@
 
 import re
 
-import pytest
-
 from spheretwin import scenario as scenarios
-from spheretwin.models import actuator as actuators
 from spheretwin.session import Session
+from tests.models.model_files import edited
 from tests.twin.cli.calls import call, refusal
 
-# A copy finds its meshes where they are.
-TEXT = actuators.MJCF_PATH.read_text(encoding="utf-8").replace(
-    'meshdir="assets"', f'meshdir="{actuators.FOLDER / "assets"}"'
-)
 OPTION = '<option integrator="RK4" timestep="0.0005">'
 FLAGS = '<flag autoreset="disable" contact="disable"/>'
 GEOMETRY = [
@@ -27,25 +21,8 @@ FLEX = (
 )
 
 
-def edited(*edits):
-    text = TEXT
-    for old, new in edits:
-        assert old in text
-        text = text.replace(old, new)
-    return text
-
-
-@pytest.fixture
-def written(tmp_path):
-    def write(*edits):
-        (path := tmp_path / "mine.xml").write_text(edited(*edits), encoding="utf-8")
-        return path
-
-    return write
-
-
-def test_a_change_during_the_run_is_told_from_then_on(written):
-    path = written((OPTION, OPTION.replace(">", ' gravity="0 0 -1.62">')))
+def test_a_change_during_the_run_is_told_from_then_on(tmp_path):
+    path = edited(tmp_path, (OPTION, OPTION.replace(">", ' gravity="0 0 -1.62">')))
     with Session(scenarios.load("hold", {"plant.mjcf": str(path)})) as session:
         assert session.warnings() == []
         session.set("plant.gravity_m_s2", 9.81)
@@ -55,22 +32,29 @@ def test_a_change_during_the_run_is_told_from_then_on(written):
         assert len(session.warnings()) == 2
 
 
-def test_weightlessness_is_no_negative_zero(written):
+def test_weightlessness_is_no_negative_zero(tmp_path):
     # It is in the record of the run.
     for edit in ((FLAGS, '<flag gravity="disable"/>'), (OPTION, OPTION.replace(">", ' gravity="0 0 0">'))):
-        with Session(scenarios.load("hold", {"plant.mjcf": str(written(edit))})) as session:
+        with Session(scenarios.load("hold", {"plant.mjcf": str(edited(tmp_path, edit))})) as session:
             assert str(session.scenario.plant.gravity_m_s2) == "0.0"
 
 
-def test_the_engine_prints_nothing_of_its_own(written, capfd, tmp_path):
+def test_the_engine_prints_nothing_of_its_own(capfd, tmp_path):
     """Its Python package raises a warning at each of three compilations, in several lines."""
     for edit in (DEPRECATED, FLEX):
         record = ["--record", tmp_path / "run.rrd"]  # which reads meshes by a compilation of its own
         run = call(
-            "simulate", "hold", "--duration", "0.003", "--plant.mjcf", written(edit), *record, "--json"
+            "simulate",
+            "hold",
+            "--duration",
+            "0.003",
+            "--plant.mjcf",
+            edited(tmp_path, edit),
+            *record,
+            "--json",
         )
         assert run.err == ""
         assert "\n" not in run.json["warnings"][0]
     grid = '<flexcomp name="cloth" type="grid" count="3 3 1" spacing="0.05 0.05 0.05" dim="2" mass="0.1"/>'
-    refusal("simulate", "hold", "--plant.mjcf", written(("</worldbody>", f"{grid}</worldbody>")))
+    refusal("simulate", "hold", "--plant.mjcf", edited(tmp_path, ("</worldbody>", f"{grid}</worldbody>")))
     assert capfd.readouterr() == ("", "")

@@ -12,7 +12,7 @@ from spheretwin.viz.layout.layout import VIEWS
 from spheretwin.viz.layout.view import STYLES, VALUES, VIEW_NAMES, View
 from spheretwin.viz.recording import plots
 from spheretwin.viz.recording.recorder import Recorder
-from tests.viz.recording.panels import layouts, panels
+from tests.viz.recording.panels import layouts
 
 OPEN = {"target": "coil.00", "mode": "open", "start_s": 0.05, "detection": True}
 
@@ -108,14 +108,18 @@ def fields(path):
     return results
 
 
-def test_what_draws_a_signal_finds_its_values_and_its_looks(path):
-    there = fields(path)
-    taken = [
+def drawn(path):
+    """Entity and mapping of each component of each visualizer."""
+    return [
         (f"/{entity.partition('/overrides/')[2].partition('/visualizers')[0]}", each)
         for (entity, name), values in layouts(path)[-1].items()
         for mappings in values
         for each in (mappings if name == "VisualizerInstruction:component_map" else [])
     ]
+
+
+def test_what_draws_a_signal_finds_its_values_and_its_looks(path):
+    there, taken = fields(path), drawn(path)
     assert len(taken) > 30
     missing = [
         (entity, each)
@@ -132,7 +136,8 @@ def test_every_signal_of_a_law_is_in_a_plot(name, tmp_path):
     with Session(scenarios.load(scenario, fields)) as session:
         own = {signal.name for signal in session.law.signals}
     assert own
-    assert own <= {line.name for panel in panels(path) for line in panel.lines}
+    selectors = {each["selector"] for _, each in drawn(path) if each["target"] == "Scalars:scalars"}
+    assert {f".{name}[]" for name in own} <= selectors
 
 
 def test_the_names_of_views_are_those_of_the_registry():

@@ -2,7 +2,6 @@
 
 import numpy as np
 import pyarrow as pa
-from rerun.chunk import RrdReader
 
 from spheretwin import scenario as scenarios
 from spheretwin.provenance import facts_of
@@ -10,6 +9,7 @@ from spheretwin.session import Session
 from spheretwin.simulation import follow
 from spheretwin.viz.layout.view import TELEMETRY, TIMELINE
 from spheretwin.viz.recording.recorder import Recorder
+from tests.viz.recording.panels import reader
 
 
 def session_and_facts(name="hold", **changes):
@@ -27,7 +27,7 @@ def recorded(path, name="hold", **changes):
 
 def batches(path, entity, component, **of):
     """Batches of an entity that have a component."""
-    for chunk in RrdReader(path).stream().filter(content=f"/{entity}", **of):
+    for chunk in reader(path).stream().filter(content=f"/{entity}", **of):
         batch = chunk.to_record_batch()
         if component in batch.schema.names:
             yield batch
@@ -47,10 +47,10 @@ def timed(path, entity, component):
     return [(t_ns // 1_000_000, values) for t_ns, values in sorted(rows, key=lambda row: row[0])]
 
 
-def telemetry_of(path, signal):
-    """Times in ns and values (n, size) of a signal of the telemetry."""
+def telemetry_of(path, signal, entity=TELEMETRY):
+    """Times in ns and values (n, size) of a signal of the telemetry, or of its envelope."""
     times, values = [], []
-    for batch in batches(path, TELEMETRY, "values_0", has_timeline=TIMELINE):
+    for batch in batches(path, entity, "values_0", has_timeline=TIMELINE):
         times.append(np.asarray(batch.column(TIMELINE).cast(pa.int64())))
         column = batch.column("values_0").flatten().field(signal)
         values.append(np.asarray(column.flatten()).reshape(len(batch), -1))

@@ -22,7 +22,8 @@ from spheretwin.viz.layout.plots import Plots
 from spheretwin.viz.layout.view import ENVELOPE, EVENTS, TELEMETRY, View
 from spheretwin.viz.recording.live import RECORDING
 from tests.browser import Browser, needs_a_browser
-from tests.viz.recording.panels import columns, rows
+from tests.viz.recording.panels import columns
+from tests.viz.recording.recordings import telemetry_of
 from tests.waiting import wait_for
 
 CHANGES = {"plant.engine": "lagrangian", "duration": 1.5, "plant.modelling_error": 0.2}
@@ -95,7 +96,7 @@ def test_a_viewer_gets_the_envelope_of_every_tick_and_every_event(tmp_path, head
         path.write_bytes(viewer.read())
     starts = np.arange(0, len(headless), 40)  # 25 bins a second of 1000 rows
     for name in ("q_rad", "torque_command_Nm", "sliding_s"):
-        t_ns, drawn = rows(path, ENVELOPE, "values_0", name)
+        t_ns, drawn = telemetry_of(path, name, ENVELOPE)
         np.testing.assert_array_equal(t_ns // 1_000_000, [*starts, len(headless) - 1])
         low, _, high = np.split(drawn, 3, axis=1)
         for shown, bound in ((low, np.minimum), (high, np.maximum)):

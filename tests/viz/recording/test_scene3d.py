@@ -16,6 +16,7 @@ from spheretwin.viz.recording.recorder import Recorder
 from spheretwin.viz.recording.scene3d import Ending, MovingActuator, Torques, Traces
 from spheretwin.viz.scene.entities import TRACES, METRES_PER_Nm, shaft_tip
 from spheretwin.viz.scene.meshes import FAILURE, FAILURE_TEXT, TORQUES
+from tests.models.model_files import edited
 from tests.viz.recording.recordings import recorded, session_and_facts, static, timed
 
 PAYLOAD_kg = 0.1
@@ -82,10 +83,7 @@ def test_arrows_of_gravity_are_what_the_engine_finds_for_the_payload(loaded):
 
 
 def test_gravity_of_the_model_s_own_along_another_line_pulls_along_it(tmp_path, actuator):
-    text = actuators.MJCF_PATH.read_text(encoding="utf-8")
-    text = text.replace('meshdir="assets"', f'meshdir="{actuators.FOLDER / "assets"}"')
-    mine = tmp_path / "mine.xml"
-    mine.write_text(text.replace("<option ", '<option gravity="3 -2 -5" '), encoding="utf-8")
+    mine = edited(tmp_path, ("<option ", '<option gravity="3 -2 -5" '))
     session, facts = session_and_facts()
     facts = dataclasses.replace(facts, mjcf=mine, gravity_m_s2=None, payload_kg=PAYLOAD_kg)
     rows = Table(session.signals, np.zeros((1, width(session.signals))))

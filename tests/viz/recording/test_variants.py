@@ -13,6 +13,7 @@ from spheretwin.viz import theme
 from spheretwin.viz.layout.view import TELEMETRY
 from spheretwin.viz.recording.recorder import Recorder
 from spheretwin.viz.scene import meshes as scene
+from tests.models.model_files import edited
 from tests.viz.recording.recordings import session_and_facts, static, telemetry_of, timed
 
 LAYER = 'count="12" euler="0 0 30"'
@@ -23,11 +24,7 @@ ROWS = 40
 def variant(request, tmp_path, monkeypatch):
     """Facts, actuator and signals of a stator with other layers of coils."""
     in_a_layer, groups = request.param
-    text = actuators.MJCF_PATH.read_text(encoding="utf-8")
-    assert text.count(LAYER) == 3
-    text = text.replace(LAYER, f'count="{in_a_layer}" euler="0 0 {360 / in_a_layer}"')
-    text = text.replace('meshdir="assets"', f'meshdir="{actuators.FOLDER / "assets"}"')
-    (path := tmp_path / "variant.xml").write_text(text, encoding="utf-8")
+    path = edited(tmp_path, (LAYER, f'count="{in_a_layer}" euler="0 0 {360 / in_a_layer}"'))
     labels = tuple(f"group {j}" for j in range(groups))
     monkeypatch.setattr(actuators, "GROUPS", labels, raising=False)
     actuator = actuators.from_model(mjcf.read(path).described, torque_curve.read(actuators.TORQUE_CURVE_PATH))

@@ -16,6 +16,7 @@ from spheretwin.models.kinematics import rotation
 from spheretwin.viz import theme
 from spheretwin.viz.scene.entities import body_quaternions, coil_texture, current_scale, shaft_tip, size_of
 from spheretwin.viz.scene.meshes import SECTIONS, WORLD, read_meshes
+from tests.models.model_files import edited
 
 poses = st.tuples(*[st.floats(-1.4, 1.4)] * 2, st.floats(-40, 40)).map(lambda q: np.array([q]))
 
@@ -35,27 +36,14 @@ def test_shaft_tip_is_the_model_s(actuator, q):
     np.testing.assert_allclose(shaft_tip(q, actuator)[0], expected, atol=1e-15)
 
 
+SITE = '<site name="shaft_tip" class="marker" pos="0 0 0.12"/>'
 OFF_AXIS = '<site name="shaft_tip" class="marker" pos="0.021 -0.013 0.11"/>'
-TEXT = actuators.MJCF_PATH.read_text(encoding="utf-8").replace(
-    'meshdir="assets"', f'meshdir="{actuators.FOLDER / "assets"}"'
-)
-
-
-def edited(path, *edits):
-    """Model file of the shipped one with pieces of its text in the place of others."""
-    text = TEXT
-    for old, new in edits:
-        assert old in text, old
-        text = text.replace(old, new)
-    path.write_text(text, encoding="utf-8")
-    return path
 
 
 @pytest.fixture(scope="module")
 def off_axis(tmp_path_factory):
     """A model whose shaft ends beside the γ axis, as the engine has it and as an actuator."""
-    path = tmp_path_factory.mktemp("model") / "bent.xml"
-    edited(path, ('<site name="shaft_tip" class="marker" pos="0 0 0.12"/>', OFF_AXIS))
+    path = edited(tmp_path_factory.mktemp("model"), (SITE, OFF_AXIS))
     model = mujoco.MjModel.from_xml_path(str(path))
     return model, mujoco.MjData(model), actuators.load(path)
 
@@ -101,7 +89,7 @@ UPPER, LOWER, MIDDLE = (
     ids=["shipped", "in another order", "not all", "some twice"],
 )
 def test_each_drawn_coil_looks_up_the_pixel_of_its_group(tmp_path, edits):
-    path = edited(tmp_path / "mine.xml", *edits)
+    path = edited(tmp_path, *edits)
     model, meshes = actuators.load(path), read_meshes(path)
     texture = coil_texture(meshes, model)
     vertices = positions(meshes.coils)
@@ -207,8 +195,7 @@ TOOL = """
 
 
 def test_meshes_without_names_have_those_of_their_files_and_move_with_what_carries_them(tmp_path):
-    site = '<site name="shaft_tip" class="marker" pos="0 0 0.12"/>'
-    path = edited(tmp_path / "mine.xml", (site, site + TOOL))
+    path = edited(tmp_path, (SITE, SITE + TOOL))
     model = mujoco.MjModel.from_xml_path(str(path))
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
