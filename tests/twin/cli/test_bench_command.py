@@ -72,7 +72,7 @@ def redirection(file):
 
 
 @pytest.mark.parametrize("flags", [[], ["--no-browser", "--hold-after", "7"]], ids=["browser", "none"])
-def test_a_browser_is_opened_at_the_printed_address_unless_it_is_not_to(monkeypatch, flags):
+def test_a_browser_is_opened_at_the_printed_address_unless_it_is_not_to(monkeypatch, tmp_path, flags):
     opened, silences = [], []
 
     def operators(*silence_s):
@@ -82,9 +82,10 @@ def test_a_browser_is_opened_at_the_printed_address_unless_it_is_not_to(monkeypa
     monkeypatch.setattr(bench, "Operators", operators)
     monkeypatch.setattr(Page, "show", lambda page, ended: None)
     monkeypatch.setattr(bench.webbrowser, "open", lambda file: opened.append(redirection(file)))
+    monkeypatch.setattr(Path, "home", lambda: tmp_path)
     code, out, err = call(*BENCH, "--port", "0", *flags)
     address = re.fullmatch(r"bench: (http://127\.0\.0\.1:\d+/\?token=[\w-]+) \(Ctrl-C ends it\)\n", out)[1]
-    assert not list(Path.home().glob("bench-*.html"))
+    assert list(tmp_path.iterdir()) == []
     assert opened == ([] if flags else [(address, 0o600)])
     assert silences == [(7.0 if flags else 2.0,)]
     assert (code, err) == (cli.DONE, "bench: preparing hold\n")

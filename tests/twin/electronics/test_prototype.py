@@ -197,10 +197,13 @@ class Copy:
 
     def estimate(self):
         if self.state is None:
-            self.state = np.array([self.handed, np.zeros(3)])
+            self.state, self.last_angle = np.array([self.handed, np.zeros(3)]), self.handed
         ahead = self.state[0] + PERIOD_S * self.state[1]
         error = self.handed - ahead
-        self.state = np.array([ahead + self.gain[0] * error, self.state[1] + self.gain[1] * error])
+        jumped = np.abs(self.handed - self.last_angle) > max(0.2, 200 * PERIOD_S)
+        angle = np.where(jumped, self.handed, ahead + self.gain[0] * error)
+        rate = self.state[1] + np.where(jumped, 0.0, self.gain[1] * error)
+        self.state, self.last_angle = np.array([angle, rate]), self.handed.copy()
 
     def volts_asked(self, command):
         codes = np.clip(np.round(command / TRANSCONDUCTANCE_A_V * 2**16 / 20), -(2**15), 2**15 - 1)
