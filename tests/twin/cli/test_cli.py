@@ -106,9 +106,10 @@ def test_reader_that_leaves_is_no_error():
 
 # What comes with an extra, and what takes long to import though a run needs nothing of it.
 NOT_FOR_A_RUN = (
-    "matplotlib magpylib manifold3d trimesh ray optuna pinocchio control scipy.ndimage scipy.linalg rerun"
-    " viser websockets spheretwin.paper spheretwin.study spheretwin.analysis spheretwin.crosscheck"
-    " spheretwin.bench spheretwin.viz.bench spheretwin.viz.recording spheretwin.viz.comparison"
+    "matplotlib magpylib manifold3d trimesh ray optuna pinocchio control scipy.ndimage scipy.signal"
+    " scipy.linalg rerun viser websockets spheretwin.paper spheretwin.study spheretwin.analysis"
+    " spheretwin.crosscheck spheretwin.bench spheretwin.viz.bench spheretwin.viz.recording"
+    " spheretwin.viz.comparison"
 )
 
 # Prints the modules that one run imports, and the entries of the compile cache that it compiles or loads.

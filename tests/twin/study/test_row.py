@@ -13,6 +13,7 @@ from spheretwin.metrics import METRICS
 from spheretwin.models import actuator as actuators
 from spheretwin.models.telemetry.table import read_parquet
 from spheretwin.run import figures_of
+from spheretwin.scenario import writing
 from spheretwin.scenario.hardware import HARDWARE
 from spheretwin.simulation import simulate
 from spheretwin.study.grid import Grid
@@ -57,6 +58,10 @@ def mine(tmp_path):
     path = tmp_path / "mine.py"
     path.write_text(LAW)
     return path
+
+
+def toml(chosen):
+    return "\n".join(writing._table(chosen.model_dump(mode="json", exclude_none=True), ""))
 
 
 def scenarios(chosen):
@@ -203,7 +208,7 @@ def test_a_row_alone_and_its_printed_command_give_the_same_figures(tmp_path, cap
     fields = {"metrics": [*METRICS, f"{mine}:pull"], **chosen}
     source = tmp_path / "study.toml"
     a_study = loads(**fields)
-    source.write_text(_toml(json.loads(a_study.model_dump_json(exclude_none=True))))
+    source.write_text(toml(a_study))
     assert load(str(source)).model_dump() == a_study.model_dump()
     for row in run_rows(a_study, tmp_path)[-2:]:
         assert cli.main(["sweep", str(source), "--row", row["key"], "--json"]) == cli.DONE
@@ -234,7 +239,7 @@ def test_the_command_of_a_law_has_no_gain_of_the_scenario_s(tmp_path, capsys):
 def test_a_refused_row_alone_tells_why_and_its_command_is_refused_alike(capsys, tmp_path):
     source = tmp_path / "study.toml"
     axis = values("plant.payload_kg", 0.0, -1.0)
-    source.write_text(_toml(json.loads(study(axis).model_dump_json(exclude_none=True))))
+    source.write_text(toml(study(axis)))
     key = Grid(study(axis))[1].key
     assert cli.main(["sweep", str(source), "--row", key, "--json"]) == cli.FAILED
     alone = json.loads(capsys.readouterr().out)
@@ -242,19 +247,6 @@ def test_a_refused_row_alone_tells_why_and_its_command_is_refused_alike(capsys, 
     _, *words = shlex.split(alone["command"])
     assert cli.main(words) == cli.BAD_INPUT
     assert capsys.readouterr().err.strip().removeprefix("spheretwin: ") == alone["error"]
-
-
-def _toml(fields):
-    """Fields as TOML, in which JSON's values are what they are but for tables."""
-    return "".join(f"{name} = {_inline(value)}\n" for name, value in fields.items())
-
-
-def _inline(value):
-    if isinstance(value, dict):
-        return "{" + ", ".join(f'"{name}" = {_inline(each)}' for name, each in value.items()) + "}"
-    if isinstance(value, list):
-        return "[" + ", ".join(map(_inline, value)) + "]"
-    return json.dumps(value)
 
 
 def test_each_row_has_the_model_file_of_its_scenario(tmp_path):

@@ -100,56 +100,34 @@ def test_a_rate_has_two_digits_or_is_whole(speed, text):
     assert progress._Rate("rows").render(SimpleNamespace(speed=speed)).plain == text
 
 
-class Bars:
-    """Bars that keep the state of their one task."""
-
-    def __init__(self, *more, transient=False):
-        self.state = {}
-
-    def __enter__(self):
-        return self
-
-    def __exit__(self, *_):
-        pass
-
-    def start(self):
-        pass
-
-    stop = start
-
-    def add_task(self, description, **fields):
-        self.state = {"description": description, **fields}
-
-    def update(self, task, **fields):
-        advance = fields.pop("advance", 0)
-        self.state |= {
-            **fields,
-            "completed": fields.get("completed", self.state.get("completed", 0) + advance),
-        }
-
-
 @pytest.fixture
-def bars(monkeypatch):
-    bars = Bars()
-    monkeypatch.setattr(progress, "_bars", lambda *more, transient=False: bars)
-    return bars
+def state(monkeypatch):
+    """Description, total and completed steps of the task of the latest bars, and its own fields."""
+    made, bars = [], progress._bars
+    monkeypatch.setattr(
+        progress, "_bars", lambda *more, **given: made.append(bars(*more, **given)) or made[-1]
+    )
+
+    def of_task():
+        (task,) = made[-1].tasks
+        return task.description, task.total, task.completed, task.fields
+
+    return of_task
 
 
-def test_rows_of_earlier_runs_are_counted_but_are_no_start(bars):
+def test_rows_of_earlier_runs_are_counted_but_are_no_start(state):
     with counted("short") as done:
-        assert bars.state == {"description": "short: getting ready", "total": None}
+        assert state() == ("short: getting ready", None, 0, {})
         for finished, name in ((2, "short: getting ready"), (3, "short"), (4, "short")):
             done(finished, 4)
-            assert bars.state == {"description": name, "total": 4, "completed": finished}
+            assert state() == (name, 4, finished, {})
 
 
-def test_a_run_is_named_alone_once_it_has_begun(bars):
+def test_a_run_is_named_alone_once_it_has_begun(state):
     with Progress("hold", 100) as bar:
         bar.write(Chunk(t_s=np.array([])))
-        assert bars.state == {
-            "description": "hold: getting ready", "total": 100, "simulated_s": 0.0,
-        }  # fmt: skip
+        assert state() == ("hold: getting ready", 100, 0, {"simulated_s": 0.0})
         bar.write(Chunk(t_s=np.arange(20) / 50))
-        assert bars.state == {"description": "hold", "total": 100, "simulated_s": 0.38, "completed": 20}
+        assert state() == ("hold", 100, 20, {"simulated_s": 0.38})
         bar.finish("interrupted")
-        assert (bars.state["description"], bars.state["completed"]) == ("hold: interrupted", 20)
+        assert state()[:3] == ("hold: interrupted", 100, 20)
