@@ -173,20 +173,20 @@ class Runtime:
     @cached_property
     def loop(self) -> Callable[[loops.Inputs, NDArray[np.float64]], tuple[int, int]]:
         """Loop of the components, a function of inputs and rows; the first access compiles it."""
-        stages = compiled_stages(self._controller, self._sensors, self._plant, self.signals)
+        stages, memory = compiled_stages(self._controller, self._sensors, self._plant, self.signals)
         parts = (
             self._functions.law,
             self._functions.allocate,
             self._functions.estimate,
             self._controller,
-            stages.stages,
+            stages,
             self.row_width - width(self.law.signals),
             self._scratch,
             self._connection.external,
         )
         entry = for_types_of(loops.loop, NO_INPUTS, *parts, np.empty((0, self.row_width)))
 
-        def run(inputs: loops.Inputs, log: NDArray[np.float64], _: object = stages.memory) -> tuple[int, int]:
+        def run(inputs: loops.Inputs, log: NDArray[np.float64], _: object = memory) -> tuple[int, int]:
             return entry(inputs, *parts, log)
 
         return run

@@ -53,17 +53,23 @@ class Stages(NamedTuple):
     current_sensors: CurrentSensors
 
 
-class CompiledStages(NamedTuple):
-    """Stages, and the memory that they have addresses of."""
+class Stage(NamedTuple):
+    """A stage, and the memory that its address of data refers to."""
 
-    stages: Stages
-    memory: list[Any]
+    function: Any
+    data: Any
+    memory: Any
+
+
+def plant_stage(plant: Plant) -> Stage:
+    """Compile the stage of a plant, which `advance_at` calls."""
+    return _stage(_ADVANCE, _advance, plant)
 
 
 def compiled_stages(
     controller: Controller, sensors: Sensors, plant: Plant, signals: tuple[Signal, ...]
-) -> CompiledStages:
-    """Compile the stages of a run.
+) -> tuple[Stages, list[Stage]]:
+    """Compile the stages of a run; return them and what must exist as long as they are called.
 
     Parameters
     ----------
@@ -74,35 +80,35 @@ def compiled_stages(
         Columns of the run: its channels are among them.
     """
     parts: dict[str, Any] = {"controller": controller, "sensors": sensors, "plant": plant}
-    memory: list[Any] = []
-
-    def stage(signature: Any, function: Callable[..., Any], part: Any) -> tuple[Any, Any]:
-        if not COMPILES:
-            return function, (part,)
-        memory.append(in_memory(part))
-        return stage_address(signature, function, part), memory[-1].ctypes.data
-
     first = offsets(signals)
     logged = {channel: name for channel in CHANNELS if (name := channel.signals(1)[0].name) in first}
     writers = [
-        stage(_WRITE, _writer(channel), tuple(parts[name] for name in channel.parts)) for channel in logged
+        _stage(_WRITE, _writer(channel), tuple(parts[name] for name in channel.parts)) for channel in logged
     ]
+    sensing, advancing = _stage(_SENSE, _sense, sensors), plant_stage(plant)
     sequence: Callable[[list[Any]], Any] = (lambda values: np.array(values, np.intp)) if COMPILES else list
-    return CompiledStages(
-        Stages(
-            *stage(_SENSE, _sense, sensors),
-            *stage(_ADVANCE, _advance, plant),
-            sequence([function for function, _ in writers]),
-            sequence([data for _, data in writers]),
-            np.array([first[name] for name in logged.values()], np.intp),
-            plant.rotor.q,
-            plant.rotor.qdot,
-            plant.current,
-            plant.draws,
-            plant.current_sensors,
-        ),
-        memory,
+    stages = Stages(
+        sensing.function,
+        sensing.data,
+        advancing.function,
+        advancing.data,
+        sequence([writer.function for writer in writers]),
+        sequence([writer.data for writer in writers]),
+        np.array([first[name] for name in logged.values()], np.intp),
+        plant.rotor.q,
+        plant.rotor.qdot,
+        plant.current,
+        plant.draws,
+        plant.current_sensors,
     )
+    return stages, [sensing, advancing, *writers]
+
+
+def _stage(signature: Any, function: Callable[..., Any], part: Any) -> Stage:
+    if not COMPILES:
+        return Stage(function, (part,), None)
+    memory = in_memory(part)
+    return Stage(stage_address(signature, function, part), memory.ctypes.data, memory)
 
 
 def _sense(sensors: Any, q: Array, qdot: Array, noise: Array, measurement: Array) -> bool:

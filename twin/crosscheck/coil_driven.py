@@ -34,8 +34,9 @@ from spheretwin.models.actuator import Actuator
 from spheretwin.models.base.checks import Check
 from spheretwin.models.base.compiled import compiled
 from spheretwin.models.mjcf import read
-from spheretwin.plant.plant_tick import GOING, PlantOutput, plant_tick
+from spheretwin.plant.plant_tick import GOING, PlantOutput
 from spheretwin.shared_buffers import shared_buffers
+from spheretwin.stages import advance_at, plant_stage
 
 Array = NDArray[np.float64]
 
@@ -239,22 +240,38 @@ def drive_plant(
     plant = assembly.plant_of(scenario, begun.files, stepped, shared_buffers(scenario, groups))
     states = np.full((len(disturbance) // every + 1, 6), np.nan)
     states[0] = [*section.initial_rad, *section.initial_rad_s]
-    output = PlantOutput(np.empty(groups), np.empty(groups), np.empty(3))
-    _drive(plant, commands(groups), disturbance, output, every, states)
+    stage, output = plant_stage(plant), PlantOutput(np.empty(groups), np.empty(groups), np.empty(3))
+    motion = stepped.q, stepped.qdot
+    _drive(stage.function, stage.data, motion, commands(groups), disturbance, output, every, states)
     return states
 
 
 @compiled
 def _drive(
-    plant: Any, commands: Array, disturbance: Array, delivered: Any, every: int, states: Array
+    advance: Any,
+    plant: Any,
+    motion: tuple[Array, Array],
+    commands: Array,
+    disturbance: Array,
+    delivered: PlantOutput,
+    every: int,
+    states: Array,
 ) -> None:
     for tick in range(commands.shape[0]):
-        if plant_tick(plant, commands[tick], disturbance[tick], delivered) != GOING:
+        status = advance_at(advance)(
+            plant,
+            commands[tick],
+            disturbance[tick],
+            delivered.current,
+            delivered.mean_current,
+            delivered.torque_S,
+        )
+        if status != GOING:
             return
         if (tick + 1) % every == 0:
             row = states[(tick + 1) // every]
             for i in range(3):
-                row[i], row[3 + i] = plant.rotor.q[i], plant.rotor.qdot[i]
+                row[i], row[3 + i] = motion[0][i], motion[1][i]
 
 
 _DRIVEN = (
