@@ -20,6 +20,7 @@ from spheretwin.viz.quantities import (
     QUANTITIES,
     TIP_DISTANCE,
     QuantityRows,
+    angle_between,
 )
 
 SIGNALS = (
@@ -47,6 +48,20 @@ def test_the_error_angle_is_that_of_the_rotation_between_both_poses(rows):
     expected = np.degrees((desired.inv() * actual).magnitude())
     # Both take the angle from quaternions with an error of some 1e-16; near a half turn SciPy's has 1e-14.
     np.testing.assert_allclose(ERROR_ANGLE.values(rows)[:, 0], expected, rtol=1e-12)
+
+
+@pytest.mark.parametrize("angle", [0.0, 1e-12, 1e-6, 0.1, 3.0, np.pi])
+def test_a_turn_about_one_axis_is_its_own_error_to_the_last_digits(angle):
+    for axis in range(3):
+        turned = np.zeros((1, 3))
+        turned[0, axis] = angle
+        # Of quaternions of size 1, some units in the last place of 1; near π the sine is flat.
+        assert angle_between(turned, np.zeros((1, 3)))[0] == pytest.approx(angle, abs=1e-15, rel=1e-7)
+
+
+def test_a_whole_turn_is_no_error(rows):
+    q = rows.table["q_rad"]
+    np.testing.assert_allclose(angle_between(q + [0, 0, 2 * np.pi], q), 0, atol=1e-14)
 
 
 def test_tip_distance_is_that_of_both_rotations(rows, actuator):

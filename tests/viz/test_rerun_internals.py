@@ -76,27 +76,6 @@ def test_a_layout_is_sent_by_the_method_that_is_overridden(recording):
     assert "log_time" not in names, "the rows of a layout have clock times again"
 
 
-def test_changes_replace_values_of_an_encoded_layout(tmp_path):
-    view = rrb.TimeSeriesView(origin="/value", name="first")
-    layout = EncodedLayout(view)
-    renamed = rrb.archetypes.ViewBlueprint.from_fields(display_name="second")
-    layout.changed({view.blueprint_path(): renamed}).save("spheretwin-test", tmp_path / "changed.rbl")
-    layout.save("spheretwin-test", tmp_path / "unchanged.rbl")
-    assert titles(tmp_path / "changed.rbl", view) == [["second"]]
-    assert titles(tmp_path / "unchanged.rbl", view) == [["first"]]
-
-
-def titles(path, view):
-    reader = RrdReader(path)
-    (layout,) = reader.blueprints()
-    return [
-        title
-        for chunk in reader.stream(store=layout)
-        if chunk.entity_path == f"/{view.blueprint_path()}"
-        for title in chunk.to_record_batch().column("ViewBlueprint:display_name").to_pylist()
-    ]
-
-
 def test_encoded_values_are_those_of_a_log(tmp_path):
     encoder, points = LogEncoder(), rr.Points3D([[1, 2, 3], [4, 5, 6]], colors=[255, 0, 0])
     encoder.log("points", points, static=True)

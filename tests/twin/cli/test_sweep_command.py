@@ -8,7 +8,7 @@ from spheretwin import cli
 from spheretwin.cli import sweep
 from spheretwin.models.base.errors import SpheretwinError
 from spheretwin.models.base.extras import install_command
-from spheretwin.study import agreement, report
+from spheretwin.study import report
 from spheretwin.study.grid import Grid
 from spheretwin.study.runner import run as run_study
 from spheretwin.study.study import load as load_study
@@ -78,17 +78,6 @@ def test_without_matplotlib_there_is_a_table_and_a_word(source, tmp_path, monkey
     assert result.code == cli.DONE
     assert f"no report was written: {install_command('plots')}" in result.err
     assert {path.name for path in (tmp_path / "out").iterdir()} == {"journal.jsonl", "table.parquet"}
-
-
-def test_plants_that_differ_are_told_in_one_line(source, tmp_path, monkeypatch):
-    message = "study short: expected row 0 to be the same on both plants"
-
-    def differ(*_):
-        raise SpheretwinError(message)
-
-    monkeypatch.setattr(agreement, "check", differ)
-    result = call("sweep", source, "--out", tmp_path / "out")
-    assert (result.code, result.err) == (cli.FAILED, f"spheretwin: {message}\n")
 
 
 @pytest.mark.parametrize(

@@ -82,15 +82,6 @@ def test_inl_is_smooth_keeps_to_its_bound_and_turns_no_code_back():
     assert min(largest) > 0.1
 
 
-def test_inl_is_its_sum_of_sines():
-    made = dac(PROTOTYPE, GAIN_A_V, 1, 5)
-    p = np.arccos((CODES + 2**15) / (2**16 - 1) * 2 - 1)
-    sines = np.sin(p) * sum(made.inl_lsb[0, n] * np.sin((n + 1) * p) for n in range(3))
-    volts = made.lsb_V * (CODES * made.gain[0] + sines) + made.offset_V[0]
-    # Some roundings of 8 A; the recurrence has those of 4 LSB alone.
-    np.testing.assert_allclose(curve(made, 0), GAIN_A_V * volts, rtol=0, atol=1e-14)
-
-
 def test_a_command_may_be_converted_in_place_and_no_number_stays_none_in_its_channel():
     made, command = dac(PROTOTYPE, GAIN_A_V, 3, 0), np.array([1.0, np.nan, 7.0])
     expected = converted(made, command)

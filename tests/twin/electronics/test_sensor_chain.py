@@ -1,14 +1,16 @@
-"""The whole way in: ideal bits, a plain copy of the chain, and numbers of every kind at every input."""
+"""The whole way in: ideal bits, and numbers of every kind at every input.
+
+The plain copy of the chain is in test_prototype.py.
+"""
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from spheretwin.electronics.random_streams import noise_table, stream_key, width_of
+from spheretwin.electronics.random_streams import noise_table, width_of
 from spheretwin.electronics.sensor_chain import SensorsSection, noise_streams, sense, sensor_chain
 from spheretwin.scenario.hardware import PROTOTYPE_SENSORS
-from tests.twin.electronics.slow_residual import residual_of
 from tests.twin.plant.allocations import allocates_nothing
 
 NO_NOISE = np.empty(0)
@@ -86,56 +88,6 @@ def test_rates_are_the_true_ones_and_what_was_handed_over_is_kept():
     rates = np.array([1.0, -2.0, 3.0])
     sense(sensors, np.array([0.1, 0.2, 0.3]), rates, np.zeros(2), measurement)
     np.testing.assert_array_equal(measurement[1], rates)
-
-
-def slow_chain(section, seed, q):
-    """The chain of α, β and γ in NumPy, all ticks at once."""
-    track, converter = section.potentiometer, section.adc
-    draws = noise_table(seed, 0, len(q), (("sensors.adc noise", 2 * converter.oversampling),))
-    draws = draws.reshape(len(q), converter.oversampling, 2)
-    turned = q + np.array(section.angle_offset_rad)
-    angles = np.empty_like(q)
-    slope = track.supply_V / track.electrical_angle_rad
-    noise = np.sqrt((slope * track.noise_rad) ** 2 + converter.noise_V**2)
-    for channel in range(2):
-        end = track.electrical_angle_rad / 2
-        angle = np.clip(turned[:, channel], -end, end)
-        stream = np.random.default_rng([seed, stream_key("sensors.potentiometer"), channel])
-        residual = residual_of(stream.uniform(0, 2 * np.pi, 4))
-        angle = angle + track.nonlinearity_rad * residual(2 * np.pi * angle / track.electrical_angle_rad)
-        volts = np.clip(slope * angle, -track.supply_V / 2, track.supply_V / 2)
-        volts = volts[:, None] + noise * draws[:, :, channel]
-        shares = np.random.default_rng([seed, stream_key("sensors.adc"), channel]).uniform(-1, 1, 2)
-        volts = (1 + converter.gain_error * shares[1]) * volts + converter.offset_V * shares[0]
-        if converter.bits:
-            step = 2 * converter.range_V / 2**converter.bits
-            last = 2 ** (converter.bits - 1)
-            volts = np.clip(np.round(volts / step), -last, last - 1) * step
-        angles[:, channel] = volts.mean(axis=1) / slope
-    counts = section.encoder.counts
-    angles[:, 2] = turned[:, 2]
-    if counts:
-        angles[:, 2] = np.round(turned[:, 2] * counts / (2 * np.pi)) * 2 * np.pi / counts
-    return angles
-
-
-@pytest.mark.parametrize(
-    "more",
-    [
-        {},
-        {"sensors.adc.oversampling": 10},
-        {"sensors.potentiometer.nonlinearity_rad": 0.26, "sensors.adc.bits": 8},
-        {"sensors.potentiometer.electrical_angle_rad": 1.5, "sensors.adc.oversampling": 3},
-        {"sensors.adc.bits": 0, "sensors.encoder.counts": 0},
-        {"sensors.potentiometer.noise_rad": 0.0, "sensors.adc.noise_V": 0.0, "sensors.adc.oversampling": 5},
-    ],
-)
-@pytest.mark.parametrize("seed", [0, 123])
-def test_the_chain_is_its_plain_copy(more, seed):
-    section = prototype(**more).model_copy(update={"angle_offset_rad": (0.01, -0.02, 0.03)})
-    q = poses(2000, seed)
-    # Rounding: 1e-16 of 500 rad in γ, and of 2.5 V over 1 V/rad; a code that it flips would be 1e-5 off.
-    np.testing.assert_allclose(measured(section, seed, q), slow_chain(section, seed, q), rtol=0, atol=1e-12)
 
 
 ANY = st.floats()

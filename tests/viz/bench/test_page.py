@@ -129,31 +129,25 @@ def test_without_an_operator_the_pages_explain_how_to_take_over(browser):
 
 
 @pytest.mark.release("browser, 3 to 12 s; test_server.py and test_messages.py have the protocol without one")
-def test_a_reloaded_single_page_operates(browser, monkeypatch):
-    monkeypatch.setattr("spheretwin.viz.bench.page.FRESH_S", UNLIMITED_S)  # a busy machine opens it slowly
+@pytest.mark.parametrize("fresh_s", [UNLIMITED_S, 0.5])  # a busy machine opens it slowly
+def test_a_single_page_operates_only_if_it_was_just_opened(browser, monkeypatch, fresh_s):
+    monkeypatch.setattr("spheretwin.viz.bench.page.FRESH_S", fresh_s)
     bench = fake.Bench(operator="page 7", watching=("page 0",))
     with fake.shown(bench) as page:
         tab = opened(browser, page)
         at_rest(page, tab, 2 * FRAMES_A_SETTING)
         assert bench.commands() == []
         bench.now.operator = None
-        assert told(bench, 1) == [("ask", {})]
-        assert bench.now.operator == "page 0"
-        tab.close()
-
-
-@pytest.mark.release("browser, 3 to 12 s; test_server.py and test_messages.py have the protocol without one")
-def test_a_single_watching_page_does_not_operate(browser, monkeypatch):
-    monkeypatch.setattr("spheretwin.viz.bench.page.FRESH_S", 0.5)
-    bench = fake.Bench(operator="page 7", watching=("page 0",))
-    with fake.shown(bench) as page:
-        tab = opened(browser, page)
-        at_rest(page, tab, 2 * FRAMES_A_SETTING)
-        bench.now.operator = None
-        tab.wait_for("document.body.innerText.includes('Take over')")
-        looked = page._frame + FRAMES_A_SETTING  # one look at the pages, at least, is among so many frames
-        wait_for(lambda: page._frame > looked)
-        assert bench.commands() == []
+        if fresh_s == UNLIMITED_S:
+            assert told(bench, 1) == [("ask", {})]
+            assert bench.now.operator == "page 0"
+        else:
+            tab.wait_for("document.body.innerText.includes('Take over')")
+            looked = (
+                page._frame + FRAMES_A_SETTING
+            )  # one look at the pages, at least, is among so many frames
+            wait_for(lambda: page._frame > looked)
+            assert bench.commands() == []
         tab.close()
 
 

@@ -30,12 +30,6 @@ def test_bodies_turn_hinge_by_hinge(q):
         np.testing.assert_allclose(matrix, rotation(q[0] * hinges), atol=1e-14)
 
 
-@given(q=poses)
-def test_shaft_tip_is_the_model_s(actuator, q):
-    expected = rotation(q[0]) @ actuator.shaft_tip_m
-    np.testing.assert_allclose(shaft_tip(q, actuator)[0], expected, atol=1e-15)
-
-
 SITE = '<site name="shaft_tip" class="marker" pos="0 0 0.12"/>'
 OFF_AXIS = '<site name="shaft_tip" class="marker" pos="0.021 -0.013 0.11"/>'
 
