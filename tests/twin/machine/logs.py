@@ -27,14 +27,11 @@ def run(scenario="hold", hardware="electronics", changes=()):
     return st.simulate(scenario, {"hardware": hardware, "plant.engine": ENGINES[hardware], **dict(changes)})
 
 
+@cache
 def multisine(hardware="electronics"):
     """Log of a multisine on three axes."""
-    return log_of(_multisine(hardware))
-
-
-@cache
-def _multisine(hardware):
-    return st.simulate("hold", {"hardware": hardware, "plant.engine": ENGINES[hardware], **MULTISINE})
+    changes = {"hardware": hardware, "plant.engine": ENGINES[hardware], **MULTISINE}
+    return log_of(st.simulate("hold", changes))
 
 
 def log_of(run):

@@ -35,13 +35,7 @@ def test_angles_come_back_from_raw_numbers(scale, offset, sign, names, unit, tim
         {
             "time": {"column": "t", "unit": time_unit},
             "angles": {"columns": names, "unit": unit, "scale": scale, "offset": offset, "sign": sign},
-            "currents": {
-                "columns": ["i*"],
-                "unit": "mA",
-                "kind": "measured",
-                "sign": [1, -1],
-                "offset": [1.0],
-            },
+            "currents": CURRENTS | {"unit": "mA", "kind": "measured", "sign": [1, -1], "offset": [1.0]},
         }
     ).log(file, "a.csv")
     # The offset costs digits: of a raw number of 1e5, 1.5e-11 are lost.
@@ -56,13 +50,7 @@ def test_angles_come_back_from_raw_numbers(scale, offset, sign, names, unit, tim
 @settings(max_examples=40)
 def test_a_counter_that_starts_again_is_continuous(wrap, phase):
     counts = np.arange(40) * np.trunc(0.45 * wrap * phase)  # less than half a turn between two rows
-    file = {
-        "t_s": np.arange(40.0),
-        "a": np.zeros(40),
-        "b": np.zeros(40),
-        "c": counts % wrap,
-        "i0": np.zeros(40),
-    }
+    file = dict.fromkeys(("a", "b", "i0"), np.zeros(40)) | {"t_s": np.arange(40.0), "c": counts % wrap}
     angles = {**ANGLES, "unit": "turn", "scale": [1.0, 1.0, 1 / wrap], "wrap": [0, 0, wrap]}
     log = columns.of_fields({"angles": angles, "currents": CURRENTS}).log(file, "a")
     assert log.angle_rad[:, 2] == pytest.approx(math.tau * counts / wrap, abs=1e-9)

@@ -87,10 +87,8 @@ def test_a_lost_current_is_that_before(log, model):
     current[500:503, 4] = np.nan
     previous = log.current_A.copy()
     previous[500:503, 4] = previous[499, 4]
-    lost = shadow(Log(log.t_s, current, log.angle_rad), model)
-    assert np.array_equal(
-        lost.telemetry.values, shadow(Log(log.t_s, previous, log.angle_rad), model).telemetry.values
-    )
+    lost, held = (shadow(Log(log.t_s, given, log.angle_rad), model) for given in (current, previous))
+    assert np.array_equal(lost.telemetry.values, held.telemetry.values)
 
 
 def test_an_offset_is_estimated_if_wanted(log, model):
@@ -100,17 +98,15 @@ def test_an_offset_is_estimated_if_wanted(log, model):
 
 
 def test_a_known_offset_is_subtracted(log, model):
-    moved = shadow(
-        Log(log.t_s, log.current_A, log.angle_rad + 0.01), model._replace(offset_rad=np.full(3, 0.01))
-    )
+    shifted = Log(log.t_s, log.current_A, log.angle_rad + 0.01)
+    moved = shadow(shifted, model._replace(offset_rad=np.full(3, 0.01)))
     expected = shadow(log, model).telemetry["q_estimated_rad"]
     assert np.allclose(moved.telemetry["q_estimated_rad"], expected, rtol=0, atol=1e-9)
 
 
 def test_conditions_of_a_log_are_fields_of_its_scenario(log):
     loaded = Log(log.t_s, log.current_A, log.angle_rad, conditions={"plant.payload_kg": 0.05})
-    assert shadow(loaded, SCENARIO, NOMINAL).log_likelihood == pytest.approx(
-        shadow(log, SCENARIO, {**KNOWN, "plant.payload_kg": 0.05}).log_likelihood, rel=0, abs=0
-    )
+    expected = shadow(log, SCENARIO, {**KNOWN, "plant.payload_kg": 0.05})
+    assert shadow(loaded, SCENARIO, NOMINAL).log_likelihood == expected.log_likelihood
     with pytest.raises(InputError, match="name or file of a scenario for a log with conditions"):
         shadow(loaded, st.load(SCENARIO, NOMINAL))

@@ -48,6 +48,14 @@ def test_each_changed_character_and_each_cut_is_refused_by_name(path):
                 read_twin(path)
 
 
+def test_only_an_accepted_result_is_written_and_only_this_format_is_read(path):
+    with pytest.raises(InputError, match="expected an accepted identification"):
+        write_twin(path, RESULT._replace(accepted=False, reasons=("why",)), "hold", {}, [LOG])
+    path.write_text("format = 2")
+    with pytest.raises(InputError, match=r"expected format = 1 and a table \[fields\], received format 2"):
+        read_twin(path)
+
+
 def test_line_breaks_of_another_system_are_no_change(path):
     text = path.read_text()
     path.write_bytes(b"\xef\xbb\xbf" + text.rstrip("\n").replace("\n", "\r\n").encode())

@@ -57,15 +57,12 @@ def test_errors_of_identified_values_are_no_structure(log):
 
 def test_bins_hold_every_row_with_the_mean_and_rms_of_their_residuals(log):
     result = validate(log, SCENARIO, {**KNOWN, "plant.coulomb_Nm": [0.0, 2e-3, 2e-3]})
-    for hinge, chi2 in result.hinge_chi2.items():
+    for hinge in result.hinge_chi2:
         angles = [one for one in result.bins if (one.hinge, one.by) == (hinge, "angle_rad")]
         # The encoder is used where its count changes.
         counts = np.count_nonzero(np.diff(log.angle_rad[: 14 * 200 + 1, 2]))
         assert sum(one.rows for one in angles) == (counts if hinge == "gamma" else 14 * 200)
         assert all(first.high == second.low for first, second in pairwise(angles))
-        mean_square = np.average([one.rms_rad**2 for one in angles], weights=[one.rows for one in angles])
-        assert chi2 > 0
-        assert mean_square > 0
         assert all(abs(one.mean_rad) <= one.rms_rad for one in angles)
     # Missing friction about α: against the motion, so by rate from one sign to the other.
     rates = [one for one in result.bins if (one.hinge, one.by) == ("alpha", "rate_rad_s")]

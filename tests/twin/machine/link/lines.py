@@ -11,13 +11,23 @@ from spheretwin.machine.link.codec import Codec
 from spheretwin.machine.link.limits import CoilHeat, Limits
 
 GROUPS, PERIOD_s = 18, 1e-3
-OWN = frame_format.load("spheretwin")
+OWN, LIMITS = frame_format.load("spheretwin"), Limits(current_A=8.0)
 
 
-class Line:
-    """One end of a connection between two threads."""
+class Transport:
+    """What the connections of tests have in common."""
 
     datagrams, foreign, is_closed = True, 0, False
+
+    def accept(self):
+        pass
+
+    def close(self):
+        pass
+
+
+class Line(Transport):
+    """One end of a connection between two threads."""
 
     def __init__(self, sink=None, source=None):
         self.sink, self.source = sink or queue.Queue(), source or queue.Queue()
@@ -35,17 +45,9 @@ class Line:
         except queue.Empty:
             return b""
 
-    def accept(self):
-        pass
 
-    def close(self):
-        pass
-
-
-class Script:
+class Script(Transport):
     """Connection whose deliveries are planned, with the clock that they move."""
-
-    datagrams, foreign, is_closed = True, 0, False
 
     def __init__(self, answer=None):
         self.t_s, self.sent, self.planned, self.answer = 0.0, [], [], answer
@@ -71,12 +73,6 @@ class Script:
         self.t_s = max(end_s, np.nextafter(self.t_s, np.inf))  # a clock that is asked again has moved
         return b""
 
-    def accept(self):
-        pass
-
-    def close(self):
-        pass
-
 
 def machine_channel(transport, frames=OWN):
     """The channel of a machine."""
@@ -100,7 +96,7 @@ def command(sequence, current=1.0, flags=1):
     return COMMAND.encode(values)
 
 
-def heat(limits=None):
+def heat(limits=LIMITS):
     drive = ResolvedDrive.model_construct(
         resistance_ohm=1.3,
         resistance_per_K=0.0,
@@ -108,4 +104,4 @@ def heat(limits=None):
         thermal_resistance_K_W=4.0,
         ambient_degC=20.0,
     )
-    return CoilHeat(drive, limits or Limits(current_A=8.0), PERIOD_s)
+    return CoilHeat(drive, limits, PERIOD_s)

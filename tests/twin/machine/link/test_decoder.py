@@ -17,12 +17,6 @@ def counts(**expected):
     return dataclasses.replace(Counts(), **expected)
 
 
-def decoded_sequences(*sequences):
-    decoder = Decoder(MEASUREMENT, datagrams=True)
-    accepted = [frame["sequence"] for number in sequences for frame in decoder.feed(measurement(number))]
-    return accepted, decoder.counts
-
-
 @pytest.mark.parametrize(
     ("sequences", "accepted", "expected"),
     [
@@ -38,7 +32,9 @@ def decoded_sequences(*sequences):
     ],
 )
 def test_frames_are_counted_by_their_sequence_numbers(sequences, accepted, expected):
-    assert decoded_sequences(*sequences) == (accepted, expected)
+    decoder = Decoder(MEASUREMENT, datagrams=True)
+    frames = [frame for number in sequences for frame in decoder.feed(measurement(number))]
+    assert ([frame["sequence"] for frame in frames], decoder.counts) == (accepted, expected)
 
 
 @given(st.permutations(range(20)), st.lists(st.integers(0, 19), max_size=10))

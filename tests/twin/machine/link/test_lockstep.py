@@ -9,13 +9,12 @@ import pytest
 from spheretwin import scenario as scenarios
 from spheretwin.external import Measurement
 from spheretwin.machine.link import frame_format
-from spheretwin.machine.link.channel import Channel
 from spheretwin.machine.link.controller_scenario import controller_scenario, left_out
-from spheretwin.machine.link.limits import Limits
 from spheretwin.machine.link.machine_link import Link, LinkSettings
 from spheretwin.machine.link.machine_server import MachineServer
 from spheretwin.session import Session
-from tests.twin.machine.link.lines import GROUPS, Line, PERIOD_s, heat
+from tests.twin.machine.link import lines
+from tests.twin.machine.link.lines import GROUPS, LIMITS, Line, PERIOD_s
 from tests.waiting import UNLIMITED_S
 
 TICKS = 60
@@ -30,15 +29,14 @@ class Run:
             self.simulated = session.advance(ticks)
         line, frames = line or Line(), frame_format.load(frame)
         end = line.other_end()
-        channel = Channel(damage(end) if damage else end, frames.measurement, frames.command, GROUPS)
+        channel = lines.machine_channel(damage(end) if damage else end, frames)
         server = MachineServer(channel, "a test", GROUPS, PERIOD_s, idle_s=1e6)
         thread = threading.Thread(target=self.serve, args=(scenario, server, ticks), daemon=True)
         thread.start()
-        limits = Limits(current_A=8.0)
         unlimited = {"timeout_s": UNLIMITED_S, "connect_s": UNLIMITED_S}
         settings = LinkSettings(armed=True, ramp_s=0.0, lockstep=True, **unlimited)
-        channel = Channel(line, frames.command, frames.measurement, GROUPS)
-        self.link = Link(channel, "a test", settings, limits, heat(), PERIOD_s, now=now or time.monotonic)
+        channel, coils = lines.controller_channel(line, frames), lines.heat()
+        self.link = Link(channel, "a test", settings, LIMITS, coils, PERIOD_s, now=now or time.monotonic)
         with self.link.session(scenario) as session:
             self.controller = session.advance(ticks)
             self.status = session.status

@@ -8,17 +8,9 @@ from spheretwin.machine.link.frame_format import Flags
 from spheretwin.machine.link.limits import Limits
 from spheretwin.machine.link.machine_link import Link, LinkSettings
 from spheretwin.models.base.errors import SpheretwinError
-from tests.twin.machine.link.lines import (
-    COMMAND,
-    GROUPS,
-    PERIOD_s,
-    Script,
-    controller_channel,
-    heat,
-    measurement,
-)
+from tests.twin.machine.link import lines
+from tests.twin.machine.link.lines import COMMAND, GROUPS, LIMITS, PERIOD_s, Script, measurement
 
-LIMITS = Limits(current_A=8.0)
 ONES = np.ones(GROUPS)
 
 
@@ -45,9 +37,9 @@ def machine():
 
 def linked(machine, *, limits=LIMITS, shadow=None, report=None, stop_requested=lambda: False, **settings):
     given = {"armed": True, "ramp_s": 0.0, "timeout_s": 3.5e-3, **settings}
-    channel = controller_channel(machine.script, report=report)
+    channel = lines.controller_channel(machine.script, report=report)
     link = Link(
-        channel, "test", LinkSettings(**given), limits, heat(limits), PERIOD_s,
+        channel, "test", LinkSettings(**given), limits, lines.heat(limits), PERIOD_s,
         shadow=shadow, stop_requested=stop_requested, now=machine.script.now,
     )  # fmt: skip
     link.connect()
@@ -92,15 +84,15 @@ def test_a_healthy_machine_is_driven(machine, lockstep):
 
 
 def test_without_arming_nothing_rises_and_frames_are_shown(machine):
-    lines = []
-    link = linked(machine, armed=False, report=lines.append)
+    shown = []
+    link = linked(machine, armed=False, report=shown.append)
     assert link.authority == 0.0
     reasons(link, 20)
     assert link.authority == 0.0
     assert all(command["flags"] == 0 for command in machine.commands)
-    assert sum(line.startswith("sent 162 bytes a5 c3") for line in lines) == 3
-    assert sum(line.startswith("received 222 bytes a5 5a") for line in lines) == 3
-    assert "angle [0 0 0]" in lines[1]
+    assert sum(line.startswith("sent 162 bytes a5 c3") for line in shown) == 3
+    assert sum(line.startswith("received 222 bytes a5 5a") for line in shown) == 3
+    assert "angle [0 0 0]" in shown[1]
 
 
 def test_the_share_of_the_commands_rises_from_0(machine):
@@ -149,7 +141,7 @@ def test_a_machine_without_a_thermometer_has_an_estimate(machine):
     # 6 A in 1.3 ohm heat 60 J/K by 46.8 W: 20 K above the ambient with a loss of 1 W per 4 K are
     # reached after t = -4·60 ln(1 - 20/(4·46.8)) s.
     limits = Limits(current_A=8.0, temperature_degC=40.0)
-    coil = heat(limits)
+    coil = lines.heat(limits)
     hot = next(tick for tick in range(30_000) if coil.advance(6 * ONES) > 40.0)
     exact_s = -240.0 * np.log(1 - 20.0 / (4 * 1.3 * 6.0**2))
     assert hot * PERIOD_s == pytest.approx(exact_s, abs=2 * PERIOD_s)  # the first tick beyond it
@@ -316,7 +308,8 @@ def test_the_shadow_receives_what_was_sent_and_measured(machine):
 def test_without_a_first_measurement_nothing_is_driven(answer, message):
     script = Script(lambda content: script.plan(answer) if answer else None)
     settings = LinkSettings(armed=True, connect_s=1.0)
-    link = Link(controller_channel(script), "x", settings, LIMITS, heat(), PERIOD_s, now=script.now)
+    channel, coils = lines.controller_channel(script), lines.heat()
+    link = Link(channel, "x", settings, LIMITS, coils, PERIOD_s, now=script.now)
     with pytest.raises(SpheretwinError, match=f"expected a measurement within 1 s, {message}"):
         link.connect()
     assert all(COMMAND.decode(content)["flags"] == Flags.HELLO for content in script.sent)

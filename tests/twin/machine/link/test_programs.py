@@ -9,10 +9,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from spheretwin import cli, simulation
+from spheretwin import cli, machine, simulation
 from spheretwin.bench import Bench
 from spheretwin.models.telemetry.table import read_parquet
 from tests.requirements import C_COMPILER, needs_c_compiler, needs_posix
+from tests.twin.passive_cases import STILL
 from tests.waiting import UNLIMITED_S
 
 HERE, ROOT = Path(__file__).parent, Path(__file__).parents[4]
@@ -47,24 +48,19 @@ def firmware(tmp_path_factory):
     return run
 
 
-SAME_PLANT = {
-    "controller.law": "pid",
-    "estimator.kind": "kalman",
-    "plant.modelling_error": 0.0,
-    "plant.modelling_torque_Nm": [0.0, 0.0, 0.0],
-    "disturbance.load": 0.0,
-    "disturbance.random_bound_Nm": 0.0,
-}
-
-
 LOOPS = pytest.mark.release("compiles a loop of its own for 10 s; a run without arming has the firmware, too")
 
 
-def driven(firmware, capsys, *flags):
+def connected(firmware, verb, *flags):
+    """Exit code of a verb that drives the firmware in lockstep."""
     with firmware() as port:
-        common = ["drive", "sinusoid", "--controller.law", "pid", "--estimator.kind", "kalman", "--json"]
-        link = ["--machine", f"udp://:{port}", "--frame", str(HERE / "firmware.toml"), "--lockstep"]
-        code = cli.main([*common, *link, "--timeout-ms", str(1000 * UNLIMITED_S), *flags])
+        common = [verb, "sinusoid", "--controller.law", "pid", "--estimator.kind", "kalman", "--lockstep"]
+        link = ["--machine", f"udp://:{port}", "--frame", str(HERE / "firmware.toml")]
+        return cli.main([*common, *link, "--timeout-ms", str(1000 * UNLIMITED_S), *flags])
+
+
+def driven(firmware, capsys, *flags):
+    code = connected(firmware, "drive", "--json", *flags)
     return code, json.loads(capsys.readouterr().out)
 
 
@@ -75,7 +71,8 @@ def test_an_independent_firmware_tracks_as_the_twin_does(firmware, capsys, tmp_p
     files = [text for name, path in paths.items() for text in (f"--{name}", str(path))]
     code, result = driven(firmware, capsys, "--arm", "--ramp-s", "0", "--duration", "2", *files)
     assert (code, result["status"]) == (0, "completed")
-    twin = simulation.simulate("sinusoid", {**SAME_PLANT, "duration": 2.0})
+    same = STILL | {"controller.law": "pid", "estimator.kind": "kalman", "duration": 2.0}
+    twin = simulation.simulate("sinusoid", same)
     # They differ by the firmware's friction (1e-4 N·m·s: about 1 % of the torque), by its sampling of the
     # currents and by its rounding of angles to 1 µrad: 2 % was measured.
     for name in ("max_abs_error_rad", "rms_error_rad"):
@@ -84,19 +81,10 @@ def test_an_independent_firmware_tracks_as_the_twin_does(firmware, capsys, tmp_p
     # The motion itself differs by no more than a part of these errors of 3 mrad.
     np.testing.assert_allclose(telemetry["q_rad"], twin.telemetry["q_rad"], atol=2e-4)
     assert "a machine at udp://" in metadata["journal"]
-    log, _ = _log(paths["log"])
-    np.testing.assert_array_equal(log["angle_rad"], telemetry["q_rad"])
-    np.testing.assert_array_equal(log["current_A"], telemetry["current_command_A"])
-    assert cli.main(["simulate", "--replay", str(paths["telemetry"])]) == 2
-    assert "expected a run of the twin alone, received one with a machine at udp" in capsys.readouterr().err
-
-
-def _log(path):
-    from pyarrow import parquet
-
-    table = parquet.read_table(path)
-    columns = {name: np.array(table[name].to_pylist()) for name in table.column_names}
-    return columns, table.schema.metadata
+    angles = {"columns": [f"angle_rad_{hinge}" for hinge in range(3)]}
+    log = machine.read(paths["log"], {"angles": angles, "currents": {"columns": ["current_A_*"]}})
+    np.testing.assert_array_equal(log.angle_rad, telemetry["q_rad"])
+    np.testing.assert_array_equal(log.current_A, telemetry["current_command_A"])
 
 
 @pytest.mark.uncompiled
@@ -126,11 +114,7 @@ def test_the_bench_drives_the_firmware(firmware, monkeypatch):
 
     monkeypatch.setattr(Bench, "begin", lambda bench: None)  # no thread with the pace of the clock
     monkeypatch.setattr(Page, "show", press)
-    words = ["bench", "sinusoid", "--controller.law", "pid", "--estimator.kind", "kalman"]
-    with firmware() as port:
-        link = ["--machine", f"udp://:{port}", "--frame", str(HERE / "firmware.toml"), "--lockstep", "--arm"]
-        limits = ["--timeout-ms", str(1000 * UNLIMITED_S), "--ramp-s", "0", "--port", "0", "--no-browser"]
-        assert cli.main([*words, *link, *limits]) == 0
+    assert connected(firmware, "bench", "--arm", "--ramp-s", "0", "--port", "0", "--no-browser") == 0
     driven, stopped = states
     assert np.abs(driven.q_rad).max() > 0.1
     assert driven.error_mrad < 10.0
@@ -176,11 +160,11 @@ def test_the_example_of_a_controller_tracks(tmp_path, capsys):
     command = [sys.executable, "-m", "spheretwin", "machine", "sinusoid", "--listen", "udp://:0", "--json"]
     with subprocess.Popen(
         [*command, "--duration", "1"], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=tmp_path
-    ) as machine:
-        port = machine.stderr.readline().strip().rpartition(":")[2]
+    ) as twin:
+        port = twin.stderr.readline().strip().rpartition(":")[2]
         done = subprocess.run([program, "127.0.0.1", port, CURVE, "1"], capture_output=True, text=True)
-        out, err = machine.communicate()
-    assert (done.returncode, machine.returncode) == (0, 0), done.stderr + err
+        out, err = twin.communicate()
+    assert (done.returncode, twin.returncode) == (0, 0), done.stderr + err
     result = json.loads(out)
     assert result["status"] == "completed"
     # Our own law of the same gains has 6.3 mrad at most under the same load; the start is that of a rotor
