@@ -2,7 +2,6 @@
 
 import re
 from dataclasses import replace
-from pathlib import Path
 
 import mujoco
 import numpy as np
@@ -18,7 +17,6 @@ TEXT = actuators.MJCF_PATH.read_text()
 FRONT = '<numeric name="pole_front_radius_m" data="0.05"/>'
 SITE = "\n        <site"
 RING = '<replicate count="12" euler="0 0 30">'
-RING_OF_EIGHT = '<replicate count="8" euler="0 0 45">'
 
 
 def test_counts_axes_and_polarity_are_the_paper_s(actuator):
@@ -44,7 +42,8 @@ def test_arrays_are_frozen(actuator):
 
 
 def test_groups_are_as_many_as_the_file_has_and_at_least_three(tmp_path):
-    assert actuators.load(edited(tmp_path, (RING + SITE, RING_OF_EIGHT + SITE))).groups.shape == (16, 2)
+    path = edited(tmp_path, (RING + SITE, '<replicate count="8" euler="0 0 45">' + SITE))
+    assert actuators.load(path).groups.shape == (16, 2)
     tilted = re.findall(r"(?s)<replicate count=.12. euler=.0 0 30.>\s*<frame.*?</replicate>", TEXT)
     few = [(layer, "") for layer in tilted]
     path = edited(tmp_path, *few, (RING + SITE, '<replicate count="4" euler="0 0 90">' + SITE))
@@ -111,12 +110,6 @@ def test_a_run_takes_every_drive_that_a_model_may_have(tmp_path, limit, resistan
     path = edited(tmp_path, *((f'data="{old}"', f'data="{new}"') for old, new in drive.items()))
     scenario = scenarios.load("hold", {"plant.mjcf": str(path), "duration": 0.003})
     assert simulate(scenario).status == "completed"
-
-
-def test_an_invalid_path_is_refused():
-    with pytest.raises(InputError, match="expected an MJCF file") as caught:
-        actuators.load(Path("x" * 20_000))
-    assert len(str(caught.value)) < 1000
 
 
 def test_files_that_have_not_changed_are_one_actuator(tmp_path):

@@ -8,16 +8,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from spheretwin.models import actuator as actuators
+from spheretwin.models import magnetics
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.design.direct_summation import direct_torque_matrix
 from spheretwin.models.design.workspace import pose
-from spheretwin.models.magnetics import (
-    fill_torque_matrix,
-    pole_lines,
-    scratch_of,
-    torque_matrix,
-    torque_model,
-)
 from spheretwin.models.scatter import Scatter, no_scatter, part_errors, scattered_model, summed_torque_matrix
 from tests.models.design.quadrature import COARSE
 from tests.models.poses import work_around_a_closed_path
@@ -34,7 +28,7 @@ def scatter(rng, gain=0.0, angle_rad=0.0, distance_m=0.0):
 def compiled(q, actuator, errors):
     model = scattered_model(actuator, errors)
     G = np.empty((3, len(actuator.groups)))
-    fill_torque_matrix(q, model, G, scratch_of(model))
+    magnetics.fill_torque_matrix(q, model, G, magnetics.scratch_of(model))
     return G
 
 
@@ -46,7 +40,7 @@ def poses(rng, count):
 def test_without_errors_both_sums_are_the_nominal_matrix():
     rng = np.random.default_rng(0)
     for q in poses(rng, 10):
-        nominal = torque_matrix(q, ACTUATOR)
+        nominal = magnetics.torque_matrix(q, ACTUATOR)
         # The spline of the summed matrix and the look-up differ by 2e-7 of the peak for each of 8 lines.
         scale = 1e-6 * np.abs(nominal).max()
         np.testing.assert_allclose(compiled(q, ACTUATOR, no_scatter(ACTUATOR)), nominal, rtol=0, atol=1e-15)
@@ -97,7 +91,7 @@ def test_one_moved_pole_and_one_moved_coil_are_where_their_errors_say():
     exact = direct_torque_matrix(q, ACTUATOR, COARSE, errors)
     nominal = direct_torque_matrix(q, ACTUATOR, COARSE)
     change = exact - nominal
-    model = compiled(q, ACTUATOR, errors) - torque_matrix(q, ACTUATOR)
+    model = compiled(q, ACTUATOR, errors) - magnetics.torque_matrix(q, ACTUATOR)
     # The change is about a tenth of the matrix; its second-order rest is a few percent of it.
     assert np.abs(change).max() > 0.03 * np.abs(nominal).max()
     np.testing.assert_allclose(model, change, rtol=0, atol=0.06 * np.abs(change).max())
@@ -115,13 +109,13 @@ def test_constant_currents_do_no_work_around_a_closed_path():
 def test_a_pole_alone_has_a_line_of_its_own():
     rng = np.random.default_rng(4)
     alone = replace(ACTUATOR, pole_axes=ACTUATOR.pole_axes[:5], pole_polarity=ACTUATOR.pole_polarity[:5])
-    lines = pole_lines(alone.pole_axes)
+    lines = magnetics.pole_lines(alone.pole_axes)
     assert sorted(pole for line in lines for pole in line if pole >= 0) == list(range(5))
     errors = Scatter(part_errors(rng.uniform(-0.1, 0.1, (5, 4)) * [1, 0, 0, 0]), no_scatter(ACTUATOR).coils)
     q = np.array([0.1, 0.4, -0.3])
     summed = summed_torque_matrix(q, alone, errors)
     np.testing.assert_allclose(compiled(q, alone, errors), summed, rtol=0, atol=1e-4 * np.abs(summed).max())
-    assert len(torque_model(alone).line_weights) == len(lines)
+    assert len(magnetics.torque_model(alone).line_weights) == len(lines)
 
 
 def test_a_curve_without_sensitivities_refuses_errors_of_distance():

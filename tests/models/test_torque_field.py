@@ -10,18 +10,10 @@ from scipy.interpolate import CubicSpline
 
 from spheretwin.export.plant_code import magnetic_tables
 from spheretwin.models import actuator as actuators
-from spheretwin.models import torque_field
+from spheretwin.models import magnetics, torque_field
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.inductance import mutual_inductance
 from spheretwin.models.kinematics import rotation
-from spheretwin.models.magnetics import (
-    disagreements,
-    fill_torque_matrix,
-    scaled,
-    scratch_of,
-    torque_matrix,
-    torque_model,
-)
 from spheretwin.models.mjcf import contents_digest
 from spheretwin.models.scatter import no_scatter, scattered_model, summed_torque_matrix
 from spheretwin.models.torque_curve import TorqueCurve
@@ -60,7 +52,7 @@ def second():
 def test_the_shipped_actuator_is_the_same_as_a_curve_and_as_a_field(actuator):
     as_field = replace(actuator, torque_data=field_of_curve(actuator, 181, 360))
     for q in random_poses(100):
-        difference = torque_matrix(q, as_field) - torque_matrix(q, actuator)
+        difference = magnetics.torque_matrix(q, as_field) - magnetics.torque_matrix(q, actuator)
         assert np.abs(difference).max() < 1e-4 * actuator.torque_curve.peak_Nm_per_A
 
 
@@ -124,7 +116,7 @@ def test_the_matrix_sums_coils_by_the_groups_and_directions_of_the_model_file(se
         of_coils = second.torque_data.torque(second.coil_axes @ rotation(q)) @ rotation(q).T
         expected = (second.coil_direction[:, None] * of_coils)[second.groups].sum(axis=1).T
         # The same polynomials, summed in another order: rounding of torques of 0.02 N·m/A.
-        assert_allclose(torque_matrix(q, second), expected, rtol=0, atol=1e-16 * 32)
+        assert_allclose(magnetics.torque_matrix(q, second), expected, rtol=0, atol=1e-16 * 32)
 
 
 def test_inductances_follow_the_directions_of_the_currents(second):
@@ -138,9 +130,13 @@ def test_inductances_follow_the_directions_of_the_currents(second):
 
 
 def test_a_scaled_model_has_scaled_torques(second):
-    model, q, G = scaled(torque_model(second), 1.2), np.array([0.1, 0.2, 0.3]), np.empty((3, 8))
-    fill_torque_matrix(q, model, G, scratch_of(model))
-    assert_allclose(G, 1.2 * torque_matrix(q, second), rtol=0, atol=1e-16)  # rounding
+    model, q, G = (
+        magnetics.scaled(magnetics.torque_model(second), 1.2),
+        np.array([0.1, 0.2, 0.3]),
+        np.empty((3, 8)),
+    )
+    magnetics.fill_torque_matrix(q, model, G, magnetics.scratch_of(model))
+    assert_allclose(G, 1.2 * magnetics.torque_matrix(q, second), rtol=0, atol=1e-16)  # rounding
 
 
 def test_scatter_of_coils_is_exact_and_of_poles_is_refused(second):
@@ -151,9 +147,9 @@ def test_scatter_of_coils_is_exact_and_of_poles_is_refused(second):
     scatter, G = errors._replace(coils=coils), np.empty((3, 8))
     model = scattered_model(second, scatter)
     for q in random_poses(5):
-        fill_torque_matrix(q, model, G, scratch_of(model))
+        magnetics.fill_torque_matrix(q, model, G, magnetics.scratch_of(model))
         assert_allclose(G, summed_torque_matrix(q, second, scatter), rtol=0, atol=1e-15)
-        assert np.abs(G - torque_matrix(q, second)).max() > 1e-4
+        assert np.abs(G - magnetics.torque_matrix(q, second)).max() > 1e-4
     poles = errors.poles._replace(gain=np.full(8, 0.01))
     for wrong in (
         errors._replace(poles=poles),
@@ -177,10 +173,10 @@ def test_a_file_is_read_back_in_any_order(tmp_path, second):
 
 def test_the_coil_of_a_computed_field_is_compared_with_the_model(tmp_path, second):
     field = replace(second.torque_data, computed_for={"coil turns": 300.0, "coil distance_m": 0.037})
-    assert disagreements(replace(second, torque_data=field)) == [
+    assert magnetics.disagreements(replace(second, torque_data=field)) == [
         "torque field torque_field.csv was computed for coil turns 300, the model has 400"
     ]
-    assert disagreements(second) == []
+    assert magnetics.disagreements(second) == []
 
 
 def written(tmp_path, *replacements):
@@ -202,7 +198,7 @@ def test_a_group_may_have_one_coil(tmp_path):
     assert actuator.groups.shape == (16, 1)
     q = np.array([0.1, -0.2, 0.4])
     of_coils = actuator.torque_data.torque(actuator.coil_axes @ rotation(q)) @ rotation(q).T
-    assert_allclose(torque_matrix(q, actuator), of_coils.T, rtol=0, atol=1e-16)
+    assert_allclose(magnetics.torque_matrix(q, actuator), of_coils.T, rtol=0, atol=1e-16)
 
 
 def test_a_torque_curve_needs_opposite_coils(tmp_path, second):
@@ -228,4 +224,4 @@ def test_an_export_names_the_kind_of_torque_that_it_needs(second):
     with pytest.raises(
         InputError, match="expected an actuator with a torque curve, received one with a torque field"
     ):
-        magnetic_tables(torque_model(second))
+        magnetic_tables(magnetics.torque_model(second))

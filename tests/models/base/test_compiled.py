@@ -154,13 +154,8 @@ def test_machine_code_is_loaded_without_all_that_can_be_compiled(package):
     assert python(run, **environment_of(package)).strip() == "False"
 
 
-def truncate(content):
-    return content[: len(content) // 2]
-
-
-def overwrite(content):
-    middle = len(content) // 2
-    return content[:middle] + b"garbage in the midst of machine code" + content[middle + 36 :]
+def double(x):
+    return 2 * x
 
 
 def of_content(content):
@@ -169,8 +164,8 @@ def of_content(content):
 
 
 DAMAGES = {
-    "truncated": truncate,
-    "overwritten": overwrite,
+    "truncated": lambda content: content[: len(content) // 2],
+    "overwritten": lambda content: content[:200] + b"garbage in the midst of machine code" + content[236:],
     "empty": lambda _: b"",
     "nonsense": lambda _: b"nonsense",
     "no pair": of_content(5),
@@ -182,9 +177,6 @@ DAMAGES = {
 @pytest.mark.parametrize("damage", DAMAGES.values(), ids=DAMAGES)
 def test_entry_that_cannot_be_used_is_made_again(tmp_path, monkeypatch, damage):
     monkeypatch.setattr(cache, "cache_folder", lambda: tmp_path)
-
-    def double(x):
-        return 2 * x
 
     def hits():
         """Compile or load the function, as another process would."""
@@ -208,9 +200,6 @@ SIGNATURE = types.float64(types.float64)
 
 
 def test_callback_is_compiled_once_for_a_function_and_a_signature():
-    def double(x):
-        return 2 * x
-
     callback = compiled.compiled_callback(SIGNATURE, double)
     assert callback.ctypes(2.0) == 4.0
     assert compiled.compiled_callback(SIGNATURE, double) is callback
@@ -221,20 +210,17 @@ def test_callback_is_compiled_once_for_a_function_and_a_signature():
 
 
 def test_callback_lives_no_longer_than_its_function():
-    def double(x):
-        return 2 * x
+    def triple(x):
+        return 3 * x
 
-    compiled.compiled_callback(SIGNATURE, double)
-    alive = weakref.ref(double)
-    del double
+    compiled.compiled_callback(SIGNATURE, triple)
+    alive = weakref.ref(triple)
+    del triple
     gc.collect()
     assert alive() is None
 
 
 def test_uncompiled_is_the_plain_function():
-    def double(x):
-        return 2 * x
-
     assert compiled.uncompiled(numba.njit(double)) is double
     assert compiled.uncompiled(double) is double
 

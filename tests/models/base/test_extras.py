@@ -56,11 +56,8 @@ def test_missing_packages_are_those_of_the_extra(extra, monkeypatch):
     monkeypatch.setattr(extras, "_is_installed", lambda name: False)
     names = extras.missing_packages(extra)
     assert names
-    required = [
-        line
-        for line in distribution("spheretwin").requires
-        if f'extra == "{extra}"' in line.replace("'", '"')
-    ]
+    lines = [line.replace("'", '"') for line in distribution("spheretwin").requires]
+    required = [line for line in lines if f'extra == "{extra}"' in line]
     assert len(names) == len(required)
     assert all(line.startswith(name) for name, line in zip(names, required, strict=True))
 
@@ -68,7 +65,5 @@ def test_missing_packages_are_those_of_the_extra(extra, monkeypatch):
 def test_the_error_names_package_extra_and_command():
     error = extras.missing("bench", "viser", "bench")
     assert isinstance(error, InputError)
-    assert (
-        str(error)
-        == f"bench: expected viser, which the extra bench installs: {extras.install_command('bench')}"
-    )
+    command = extras.install_command("bench")
+    assert str(error) == f"bench: expected viser, which the extra bench installs: {command}"

@@ -4,16 +4,12 @@ import errno
 import os
 import stat
 
-import numpy as np
 import pytest
 
 from spheretwin.models.base.errors import InputError, SpheretwinError, without_breaks
 from spheretwin.models.base.files import OutputFile, check_writable, regular_file, whole_file
-from spheretwin.models.telemetry.parquet import PART_ROWS, TelemetryFile
-from spheretwin.models.telemetry.signals import common_signals, width
-from spheretwin.models.telemetry.table import Table
-
-SIGNALS = common_signals(18)
+from spheretwin.models.telemetry.parquet import PART_ROWS
+from tests.models.telemetry.streams import streamed, table
 
 
 def test_file_appears_when_the_block_ends(tmp_path):
@@ -142,9 +138,7 @@ def test_a_name_too_long_to_be_hidden_is_found_before_work_begins(tmp_path):
 def test_the_longest_name_leaves_room_for_the_parts_of_a_run(tmp_path):
     name = "n" * (LONGEST - len(".parquet")) + ".parquet"
     check_writable(path := tmp_path / name, ".parquet")
-    file = TelemetryFile(path, SIGNALS, {})
-    file.write(Table(SIGNALS, np.zeros((PART_ROWS + 1, width(SIGNALS)))))
-    file.close({})
+    streamed(path, table(PART_ROWS + 1), PART_ROWS + 1).close({})
     assert os.listdir(tmp_path) == [name]
 
 

@@ -6,23 +6,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
+from spheretwin.models.base import vectors
 from spheretwin.models.base.compiled import allocation_free, uncompiled
-from spheretwin.models.base.vectors import (
-    WIDTH,
-    cubic,
-    entry,
-    like,
-    limited,
-    load,
-    side,
-    store,
-    total,
-    vector,
-    within,
-)
 
 NUMBERS = st.floats(-1e6, 1e6)
-FOURS = arrays(np.float64, WIDTH, elements=NUMBERS)
+FOURS = arrays(np.float64, vectors.WIDTH, elements=NUMBERS)
 TABLE = np.random.default_rng(5).normal(size=(9, 4))
 
 # Fused or rounded each: the two differ by less than four roundings of the largest term.
@@ -31,62 +19,62 @@ ROUNDING = 4 * np.finfo(float).eps
 
 @allocation_free
 def combine(a, b, number, result):
-    x, y = load(a, 0), load(b, 0)
-    store(number + x * y - number * (y - number), result, 0)
+    x, y = vectors.load(a, 0), vectors.load(b, 0)
+    vectors.store(number + x * y - number * (y - number), result, 0)
 
 
 @allocation_free
 def move(source, first, target, at):
-    store(load(source, first), target, at)
+    vectors.store(vectors.load(source, first), target, at)
 
 
 @allocation_free
 def fill_sides(x, result):
-    store(side(load(x, 0)), result, 0)
+    vectors.store(vectors.side(vectors.load(x, 0)), result, 0)
 
 
 @allocation_free
 def limit(x, low, high, result):
-    store(limited(load(x, 0), low, high), result, 0)
+    vectors.store(vectors.limited(vectors.load(x, 0), low, high), result, 0)
 
 
 @allocation_free
 def round_down(x, result):
-    store(np.floor(load(x, 0)), result, 0)
+    vectors.store(np.floor(vectors.load(x, 0)), result, 0)
 
 
 @allocation_free
 def check_range(x, low, high, result):
-    result[0] = within(load(x, 0), low, high)
+    result[0] = vectors.within(vectors.load(x, 0), low, high)
 
 
 @allocation_free
 def take_apart(x, result):
-    made = vector(x[3], x[2], x[1], x[0])
-    store(entry(made, 0), result, 2)
-    store(total(made), result, 0)
+    made = vectors.vector(x[3], x[2], x[1], x[0])
+    vectors.store(vectors.entry(made, 0), result, 2)
+    vectors.store(vectors.total(made), result, 0)
 
 
 @allocation_free
 def look_up(place, result):
-    store(cubic(TABLE, load(place, 0)), result, 0)
+    vectors.store(vectors.cubic(TABLE, vectors.load(place, 0)), result, 0)
 
 
 @allocation_free
 def look_up_each(place, result):
     for i in range(place.shape[0]):
-        result[i] = cubic(TABLE, place[i])
+        result[i] = vectors.cubic(TABLE, place[i])
 
 
 @allocation_free
 def take_like(x, values, first, numbers, four):
-    store(like(load(x, 0), values, first), four, 0)
-    numbers[0] = like(x[0], values, first)
+    vectors.store(vectors.like(vectors.load(x, 0), values, first), four, 0)
+    numbers[0] = vectors.like(x[0], values, first)
 
 
 def made(function, *arguments, size=1.0):
     """Four numbers that a compiled function and its plain Python write into their last argument."""
-    result, plain = np.full((2, WIDTH), np.nan)
+    result, plain = np.full((2, vectors.WIDTH), np.nan)
     function(*arguments, result)
     uncompiled(function)(*arguments, plain)
     np.testing.assert_allclose(plain, result, rtol=0, atol=ROUNDING * size)
@@ -117,7 +105,7 @@ def test_limited_entries_are_those_of_numpy(x, ends):
 def test_entries_are_within_a_range_if_all_of_them_are(x, ends):
     assert made(check_range, x, *ends)[0] == np.all((ends[0] <= x) & (x <= ends[1]))
     assert made(check_range, x, x.min(), x.max())[0] == 1
-    for entry_outside in range(WIDTH):
+    for entry_outside in range(vectors.WIDTH):
         for value in (np.nan, np.inf, -np.inf, 2e6):
             changed = x.copy()
             changed[entry_outside] = value
@@ -142,7 +130,7 @@ def test_a_side_has_the_sign_of_its_entry():
     np.testing.assert_array_equal(made(fill_sides, x), [-1, 1, -1, 1])
 
 
-@given(arrays(np.float64, WIDTH, elements=st.floats(0, 9, exclude_max=True)))
+@given(arrays(np.float64, vectors.WIDTH, elements=st.floats(0, 9, exclude_max=True)))
 def test_cubics_are_the_same_for_four_and_for_each(place):
     size = 4 * np.abs(TABLE).sum(1).max()
     four = made(look_up, place, size=size)
@@ -154,7 +142,7 @@ def test_cubics_are_the_same_for_four_and_for_each(place):
 
 @pytest.mark.parametrize("function", [take_like, uncompiled(take_like)])
 def test_like_returns_a_number_for_a_number_and_four_for_a_vector(function):
-    number, four = np.zeros(1), np.zeros(WIDTH)
-    function(np.zeros(WIDTH), np.arange(9.0), 5, number, four)
+    number, four = np.zeros(1), np.zeros(vectors.WIDTH)
+    function(np.zeros(vectors.WIDTH), np.arange(9.0), 5, number, four)
     assert number[0] == 5
     assert four.tolist() == [5, 6, 7, 8]

@@ -54,8 +54,7 @@ def test_a_computed_curve_is_bounded(computed):
     assert mesh.value == computed.doubled_mesh.peak
     assert lookup.value == computed.lookup_error
     # What is written is what was computed, to the twelve decimals of the file.
-    path = Path("mine.csv")
-    again = torque_curve.parse(path, computed.csv.encode())
+    again = torque_curve.parse(Path("mine.csv"), computed.csv.encode())
     np.testing.assert_allclose(again.torque_Nm_per_A, computed.curve.torque_Nm_per_A, rtol=0, atol=5.1e-13)
 
 

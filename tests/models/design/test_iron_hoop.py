@@ -64,10 +64,8 @@ def test_large_permeability_is_the_image_in_a_sphere():
     def charge(psi):
         return np.polynomial.legendre.Legendre.basis(degree)(np.cos(psi))
 
-    with_iron, bare = (
-        harmonics(sphere(charge), Iron(np.pi, INNER, permeability), 1.0, 12)[degree]
-        for permeability in (1e6, 1.0)
-    )
+    irons = (Iron(np.pi, INNER, permeability) for permeability in (1e6, 1.0))
+    with_iron, bare = (harmonics(sphere(charge), iron, 1.0, 12)[degree] for iron in irons)
     # Measured: 1.4e-4; 5e-6 with 32 elements.
     assert with_iron / bare == pytest.approx(1 - (OUTER / FRONT) ** (2 * degree + 1), rel=1e-3)
 

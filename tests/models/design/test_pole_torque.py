@@ -61,9 +61,12 @@ def torque_at(magnet: Magnet, coil: CoilGeometry, degrees, mesh: Mesh | None = N
 # The computation
 
 
-@pytest.mark.release(
+SLOW = pytest.mark.release(
     "recomputes fields for 0.7 to 4 s; the other tests of this file compare the same integral with exact ones"
 )
+
+
+@SLOW
 @pytest.mark.parametrize("front_radius_m", [0.05, 0.0])
 def test_doubled_mesh_changes_little(magnet, coil, front_radius_m):
     pole = replace(magnet, front_radius_m=front_radius_m)
@@ -185,9 +188,7 @@ def test_a_flat_magnet_on_iron_is_twice_as_long(flat, coil):
     assert on_iron.computed_for is None
 
 
-@pytest.mark.release(
-    "recomputes fields for 0.7 to 4 s; the other tests of this file compare the same integral with exact ones"
-)
+@SLOW
 def test_iron_behind_the_shipped_pole_adds_what_the_readme_says(magnet, coil, shipped):
     # The image holds in front of the plane, to which the coil's inner rim comes down at 27 degrees.
     near, angle = coil.distance_m - 0.5 * coil.length_m, np.radians([27.0, 27.01])
@@ -248,11 +249,10 @@ def test_sensitivities_to_distance_predict_a_curve_of_another_distance(magnet, c
         ("coil", (magnet, replace(coil, distance_m=coil.distance_m + step_m))),
     ):
         exact = compute_curve(*moved, phi, COARSE).torque_Nm_per_A
-        change = {
-            name: shipped.distance_sensitivity[f"{part} {name}"] * step_m for name in ("gain", "stretch")
-        }
-        cosine = np.cos(phi) + change["stretch"] * (1 - np.cos(phi))
-        predicted = (1 + change["gain"]) * shipped.over_sine(cosine) * np.sin(phi)
+        sensitivity = shipped.distance_sensitivity
+        gain, stretch = (sensitivity[f"{part} {name}"] * step_m for name in ("gain", "stretch"))
+        cosine = np.cos(phi) + stretch * (1 - np.cos(phi))
+        predicted = (1 + gain) * shipped.over_sine(cosine) * np.sin(phi)
         # 1.4e-3 of the peak is the rest of the fit for 0.1 mm; the change itself is 2e-2.
         np.testing.assert_allclose(predicted, exact, rtol=0, atol=2e-3 * peak)
         assert np.abs(exact - shipped.spline(phi)).max() > 1.5e-2 * peak

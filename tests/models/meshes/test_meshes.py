@@ -1,6 +1,7 @@
 """The drawn parts: remade from the numbers, closed, clear of each other; and the scene that shows them."""
 
 from dataclasses import replace
+from itertools import pairwise
 
 import mujoco
 import numpy as np
@@ -10,11 +11,9 @@ import trimesh
 from spheretwin.models import actuator as actuators
 from spheretwin.models import mjcf
 from spheretwin.models.meshes import mesh_files, rotor, stator
-from spheretwin.models.meshes import mesh_files as assets
 from spheretwin.models.meshes.solids import SMALL_SECTIONS, along
 
 NAMES = ("stator", "outer_ring", "inner_ring", "ball", "hoop", "shaft", "pole", "coil")
-ROTOR = ("ball", "hoop", "shaft", "poles")
 ASSETS = actuators.FOLDER / "assets"
 
 # The OBJ files hold a tenth of a micrometre.
@@ -23,7 +22,7 @@ ROUNDING_M = 1e-7
 
 @pytest.fixture(scope="module")
 def made(actuator):
-    return assets.meshes(actuator)
+    return mesh_files.meshes(actuator)
 
 
 @pytest.fixture(scope="module")
@@ -53,12 +52,8 @@ def scene():
     return mujoco.MjModel.from_xml_path(str(actuators.FOLDER / "scene.xml"))
 
 
-def radii_of(points):
+def radii(points):
     return np.linalg.norm(points, axis=1)
-
-
-def radii(mesh):
-    return radii_of(mesh.vertices)
 
 
 def placements(tilt_deg, direction, spin):
@@ -95,7 +90,7 @@ def test_the_files_are_what_the_numbers_make(name, made, committed):
 
 @pytest.mark.release("0.8 s; changes with the mesh library")
 def test_writing_twice_gives_the_same_bytes(tmp_path, actuator):
-    first, second = (assets.write(tmp_path / folder, actuator) for folder in ("first", "second"))
+    first, second = (mesh_files.write(tmp_path / folder, actuator) for folder in ("first", "second"))
     assert sorted(path.stem for path in first) == sorted(NAMES)
     for a, b in zip(first, second, strict=True):
         assert a.read_bytes() == b.read_bytes()
@@ -109,9 +104,7 @@ def test_the_meshes_are_those_the_mjcf_draws(made):
 @pytest.mark.parametrize("name", NAMES)
 def test_each_mesh_is_one_closed_solid(name, committed):
     mesh = committed[name]
-    assert mesh.is_watertight
-    assert mesh.is_volume
-    assert mesh.body_count == 1
+    assert (mesh.is_watertight, mesh.is_volume, mesh.body_count) == (True, True, 1)
 
 
 def test_the_meshes_stay_small(committed):
@@ -157,7 +150,7 @@ def test_the_drawn_pole_is_the_modelled_one(committed, actuator):
     corners = mesh.vertices + np.array([0.0, 0.0, magnet.distance_m])
     front = corners[corners[:, 2] > magnet.rim_m - ROUNDING_M]
     assert len(front) > 4 * SMALL_SECTIONS
-    np.testing.assert_allclose(radii_of(front), rotor.ball_radius(actuator), atol=2 * ROUNDING_M)
+    np.testing.assert_allclose(radii(front), rotor.ball_radius(actuator), atol=2 * ROUNDING_M)
     assert front[:, 2].min() == pytest.approx(magnet.rim_m, abs=2 * ROUNDING_M)
 
 
@@ -168,7 +161,7 @@ def test_another_front_is_drawn_as_it_is_modelled(actuator, front_radius_m):
     # Five chords from rim to middle cut a deep cap by up to half a percent of the pole.
     assert solid.volume() == pytest.approx(CHORDS * magnet.volume_m3, rel=6e-3)
     corners = solid.to_mesh64().vert_properties[:, :3]
-    farthest = radii_of(corners + [0.0, 0.0, magnet.distance_m]).max()
+    farthest = radii(corners + [0.0, 0.0, magnet.distance_m]).max()
     assert farthest == pytest.approx(magnet.reach_m, abs=ROUNDING_M)
 
 
@@ -184,16 +177,15 @@ def test_the_coil_has_the_size_of_its_site(committed, actuator):
 def test_the_air_gap_is_free(committed, actuator):
     ball, gap = rotor.ball_radius(actuator), actuator.coil.distance_m - actuator.coil.length_m / 2
     assert gap - ball == pytest.approx(0.5e-3)
-    assert radii(committed["ball"]).max() == pytest.approx(ball, abs=2 * ROUNDING_M)
-    assert radii(committed["hoop"]).max() < ball
-    shaft = committed["shaft"]
-    spider = np.linalg.norm(shaft.vertices[:, :2], axis=1) > rotor.PAYLOAD_FLANGE_RADIUS_M + ROUNDING_M
+    assert radii(committed["ball"].vertices).max() == pytest.approx(ball, abs=2 * ROUNDING_M)
+    assert radii(committed["hoop"].vertices).max() < ball
+    shaft, still = committed["shaft"].vertices, committed["stator"].vertices
+    spider = radii(shaft[:, :2]) > rotor.PAYLOAD_FLANGE_RADIUS_M + ROUNDING_M
     assert radii(shaft)[spider].max() < ball
-    still = committed["stator"]
     # Inside the gap's sphere there is only the passive joint: the neck, and the fork within the hoop.
-    within = still.vertices[radii(still) < gap]
-    fork = np.linalg.norm(within, axis=1) < rotor.HOOP_INNER_RADIUS_M
-    neck = np.linalg.norm(within[:, :2], axis=1) < stator.NECK_RADIUS_M + ROUNDING_M
+    within = still[radii(still) < gap]
+    fork = radii(within) < rotor.HOOP_INNER_RADIUS_M
+    neck = radii(within[:, :2]) < stator.NECK_RADIUS_M + ROUNDING_M
     assert np.all(fork | neck)
 
 
@@ -214,10 +206,8 @@ def test_no_drawn_pole_stands_in_a_drawn_winding(solids, turn_deg):
 
 
 def test_parts_are_clear_of_each_other_at_rest(solids):
-    assert overlap_m3(solids["coils"], solids["stator"]) == 0.0
-    assert overlap_m3(solids["inner_ring"], solids["outer_ring"]) == 0.0
-    assert overlap_m3(solids["outer_ring"], solids["stator"]) == 0.0
-    assert overlap_m3(solids["shaft"], solids["inner_ring"]) == 0.0
+    chain = ("coils", "stator", "outer_ring", "inner_ring", "shaft")
+    assert [overlap_m3(solids[a], solids[b]) for a, b in pairwise(chain)] == [0.0] * 4
 
 
 # The upper coils are no obstacle of the shaft: the MJCF places them where one beyond 46 degrees must pass.
@@ -265,6 +255,5 @@ def test_the_scene_changes_nothing_but_the_looks(scene):
     for field in ("body_mass", "body_inertia", "jnt_range", "site_pos"):
         np.testing.assert_array_equal(getattr(scene, field), getattr(alone, field))
     assert scene.ngeom == alone.ngeom + 1
-    assert scene.opt.timestep == alone.opt.timestep
-    assert scene.opt.integrator == alone.opt.integrator
-    assert scene.opt.disableflags == alone.opt.disableflags
+    for field in ("timestep", "integrator", "disableflags"):
+        assert getattr(scene.opt, field) == getattr(alone.opt, field)

@@ -16,14 +16,10 @@ import pytest
 from spheretwin.models.base.errors import SpheretwinError
 from spheretwin.models.telemetry.parquet import join
 from spheretwin.models.telemetry.partial_files import list_of
-from spheretwin.models.telemetry.signals import common_signals
 from spheretwin.models.telemetry.table import read_parquet
-from tests.models.telemetry.streams import GAIN, PART_ROWS, parts_beside, streamed, table
+from tests.models.telemetry.streams import GAIN, PART_ROWS, SIGNALS, parts_beside, streamed, table
 
 pytestmark = pytest.mark.usefixtures("short_parts")
-
-SIGNALS = common_signals(18)
-
 
 STREAM = """
 import sys

@@ -40,9 +40,8 @@ def test_numbers_come_back(path):
 
 def test_messages_are_little_endian_cdr_with_their_schema(path):
     with path.open("rb") as file:
-        schema, channel, message = next(
-            iter(make_reader(file).iter_messages(topics=["/currents"], reverse=True))
-        )
+        messages = make_reader(file).iter_messages(topics=["/currents"], reverse=True)
+        schema, channel, message = next(iter(messages))
     assert (schema.name, schema.encoding, channel.message_encoding) == (TYPE, "ros2msg", "cdr")
     assert schema.data.decode() == DEFINITION
     assert message.log_time == 12345678901234
@@ -71,14 +70,11 @@ def test_big_endian_messages_are_read(tmp_path):
     assert metadata == {}
 
 
-@pytest.mark.parametrize("damage", ["cut", "text", "missing"])
-def test_a_file_that_cannot_be_read_is_refused(path, damage):
-    content = path.read_bytes()
-    path.write_bytes({"cut": content[: len(content) // 2], "text": b"t_s,a\n", "missing": b""}[damage])
-    if damage == "missing":
-        path.unlink()
-    with pytest.raises(InputError, match=r"MCAP .*run\.mcap: expected"):
-        joint_states.read(path)
+def test_a_file_that_cannot_be_read_is_refused(path):
+    for damage in (lambda: path.write_bytes(b"t_s,a\n"), path.unlink):
+        damage()
+        with pytest.raises(InputError, match=r"MCAP .*run\.mcap: expected"):
+            joint_states.read(path)
 
 
 def test_times_before_zero_are_refused(tmp_path):
@@ -114,9 +110,7 @@ def test_a_damaged_file_of_another_program_is_no_other_error(path, compression, 
             columns = joint_states.read(path)[0]
         except InputError:
             continue
-        same = columns.keys() == numbers.keys() and all(
-            np.array_equal(columns[name], numbers[name]) for name in numbers
-        )
-        changed += not same
+        changed += columns.keys() != numbers.keys()
+        changed += not all(np.array_equal(columns.get(name), numbers[name]) for name in numbers)
     if chunked:  # without chunks its writer computes no checksum of the data
         assert not changed

@@ -9,13 +9,11 @@ from spheretwin.models.base.errors import SpheretwinError
 from spheretwin.models.telemetry import parquet as telemetry_file
 from spheretwin.models.telemetry.checksums import write_parquet
 from spheretwin.models.telemetry.parquet import TelemetryFile, join
-from spheretwin.models.telemetry.signals import Signal, common_signals
+from spheretwin.models.telemetry.signals import Signal
 from spheretwin.models.telemetry.table import PARQUET_FORMAT, read_parquet
-from tests.models.telemetry.streams import FACTS, GAIN, PART_ROWS, parts_beside, streamed, table
+from tests.models.telemetry.streams import FACTS, GAIN, PART_ROWS, SIGNALS, parts_beside, streamed, table
 
 pytestmark = pytest.mark.usefixtures("short_parts")
-
-SIGNALS = common_signals(18)
 
 SLIP = Signal("slip", "m", 1, "another law's own")
 

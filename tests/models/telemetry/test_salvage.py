@@ -9,13 +9,10 @@ import pytest
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.telemetry import partial_files as telemetry_parts
 from spheretwin.models.telemetry.parquet import join
-from spheretwin.models.telemetry.signals import common_signals
 from spheretwin.models.telemetry.table import read_parquet
-from tests.models.telemetry.streams import FACTS, GAIN, parts_beside, streamed, table
+from tests.models.telemetry.streams import FACTS, GAIN, SIGNALS, parts_beside, streamed, table
 
 pytestmark = pytest.mark.usefixtures("short_parts")
-
-SIGNALS = common_signals(18)
 
 
 def test_parts_are_joined_under_the_first_one_s_facts(tmp_path):
