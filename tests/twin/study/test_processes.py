@@ -1,7 +1,6 @@
-"""Studies in processes of their own: killed, interrupted, out of room, two at once; no row is lost."""
+"""Studies in processes of their own: killed and interrupted; no row is lost."""
 
 import json
-import resource
 import signal
 import subprocess
 import sys
@@ -88,24 +87,4 @@ def test_a_signal_loses_no_finished_row(tmp_path, command, whole, capfd, number,
         assert (report["rows"], report["of"], len(rows_of(folder))) == (finished, len(LOADS), finished)
         assert f"interrupted after {finished} of 60 rows; the same command continues from there" in err
         assert "Traceback" not in err
-    assert gone_on_with(command, folder, whole, capfd)["resumed"] == finished
-
-
-@SAME_IN_LESS
-def test_where_files_may_not_grow_the_study_ends_in_one_line_and_loses_nothing(
-    tmp_path, command, whole, capfd
-):
-    # As a full disk, for one process: no file of it may be longer than this.
-    def limited():
-        signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
-        resource.setrlimit(resource.RLIMIT_FSIZE, (4000, 4000))
-
-    folder = tmp_path / "out"
-    done = subprocess.run(command, capture_output=True, text=True, preexec_fn=limited)
-    assert done.returncode == cli.FAILED
-    assert done.stderr.startswith("spheretwin: study: ")
-    assert done.stderr.endswith("could not be written, File too large; the rows before are kept\n")
-    assert done.stderr.count("\n") == 1
-    finished = journal_lines(folder) - 1
-    assert 2 < finished < len(LOADS)
     assert gone_on_with(command, folder, whole, capfd)["resumed"] == finished

@@ -7,7 +7,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from rerun.chunk import RrdReader
 
 from spheretwin import cli
 from spheretwin.analysis import comparison
@@ -20,7 +19,20 @@ from spheretwin.viz.comparison.merged_recording import EDGE
 from spheretwin.viz.layout.extents import number
 from spheretwin.viz.quantities import COMPARED_QUANTITIES
 from tests.twin.analysis.runs import written
-from tests.viz.comparison.merged import Merged
+from tests.viz.recording.panels import columns, layouts, series
+
+
+class Merged:
+    """Entities of a merged recording, its numbers by entity and field, and its text."""
+
+    def __init__(self, path):
+        self.path, self._read = path, columns(path)
+        self.entities = {entity for entity, _ in self._read[0]}
+        ((self.text,),) = self._read[0]["/runs", "TextDocument:text"][0].to_pylist()
+
+    def series(self, name):
+        entity, _, field = name.partition(":")
+        return series(self._read, entity, "values_0" if field else "Scalars:scalars", field)
 
 
 @pytest.fixture(scope="module")
@@ -43,11 +55,13 @@ def merged(files, tmp_path_factory):
 
 def has_every_row(merged, run, entity):
     """True if the telemetry below an entity has each row of a run at its own time, in whole nanoseconds."""
-    return all(
-        np.array_equal(merged.t_ns(f"{entity}:{signal.name}"), np.round(run.table["t_s"] * 1e9))
-        and merged.values(f"{entity}:{signal.name}").tobytes() == run.table[signal.name].tobytes()
-        for signal in run.table.signals
-    )
+    for signal in run.table.signals:
+        t_ns, values = merged.series(f"{entity}:{signal.name}")
+        if values.tobytes() != run.table[signal.name].tobytes() or np.any(
+            t_ns != np.round(run.table["t_s"] * 1e9)
+        ):
+            return False
+    return True
 
 
 def test_every_signal_and_line_of_every_run_is_there(files, merged):
@@ -57,33 +71,17 @@ def test_every_signal_and_line_of_every_run_is_there(files, merged):
         for quantity in COMPARED_QUANTITIES:
             entity = f"/run_{place}_{name}/compare/{quantity.name}"
             if entity in merged.entities:
-                assert np.array_equal(merged.t_ns(entity), np.round(run.table["t_s"] * 1e9))
-        error = merged.values(f"/run_{place}_{name}/compare/error_β_mrad")[:, 0]
+                assert np.array_equal(merged.series(entity)[0], np.round(run.table["t_s"] * 1e9))
+        error = merged.series(f"/run_{place}_{name}/compare/error_β_mrad")[1][:, 0]
         assert np.array_equal(error, 1e3 * run.table["error_rad"][:, 1])
-
-
-def layout_of(merged):
-    """Rows of the layout's components, by entity and component."""
-    reader = RrdReader(merged.path)
-    for chunk in reader.stream(store=reader.blueprints()[0]):
-        batch = chunk.to_record_batch()
-        for name in batch.schema.names:
-            if ":" in name:
-                for value in batch.column(name).to_pylist():
-                    yield chunk.entity_path, name, value
 
 
 def limits(merged, entity):
     """Range of the plot that contains an entity."""
-    ranges, queries = {}, {}
-    for part, name, value in layout_of(merged):
-        view = part.rpartition("/")[0]
-        if name == "ScalarAxis:range":
-            ranges[view] = value[0]
-        if name == "ViewContents:query":
-            queries[view] = value
-    (view,) = (view for view, query in queries.items() if entity in query)
-    return ranges[view]
+    (layout,) = layouts(merged.path)
+    queries = {part: rows[0] for (part, name), rows in layout.items() if name == "ViewContents:query"}
+    (view,) = (part.removesuffix("/ViewContents") for part, query in queries.items() if entity in query)
+    return layout[f"{view}/ScalarAxis", "ScalarAxis:range"][0][0]
 
 
 def test_the_end_of_a_failed_run_is_a_cross_within_every_plot_and_stated(files, merged):
@@ -93,31 +91,30 @@ def test_the_end_of_a_failed_run_is_a_cross_within_every_plot_and_stated(files, 
     assert {entity.split("/")[1] for entity in ends} == {"run_3_failed"}
     assert len(ends) == len([entity for entity in merged.entities if "/run_3_failed/compare/" in entity])
     for entity in ends:
-        assert list(merged.t_ns(entity)) == [round(run.table["t_s"][-1] * 1e9)]
-        line = merged.values(entity.replace("/end/", "/compare/"))
+        assert list(merged.series(entity)[0]) == [round(run.table["t_s"][-1] * 1e9)]
+        line = merged.series(entity.replace("/end/", "/compare/"))[1]
         low, high = limits(merged, entity)
         edge = EDGE * (high - low)
-        assert merged.values(entity)[0, 0] == pytest.approx(np.clip(line[-1, 0], low + edge, high - edge))
+        assert merged.series(entity)[1][0, 0] == pytest.approx(np.clip(line[-1, 0], low + edge, high - edge))
     end_s, _, reason = events(run)[-1]
     assert f"**left workspace at {end_s:.3f} s**: {reason}" in merged.text
 
 
 def test_a_failed_run_does_not_flatten_the_others_and_the_text_states_its_values(merged):
     low, high = limits(merged, "/run_2_slow/compare/error_α_mrad")
-    complete = merged.values("/run_2_slow/compare/error_α_mrad")
+    complete = merged.series("/run_2_slow/compare/error_α_mrad")[1]
     settled = complete[len(complete) // 2 :]
     assert low <= settled.min() <= settled.max() <= high
     assert high - low < np.ptp(complete) / 4  # the transient is not within
-    of_failed = merged.values("/run_3_failed/compare/error_α_mrad")
+    of_failed = merged.series("/run_3_failed/compare/error_α_mrad")[1]
     farthest = of_failed[np.argmax(np.abs(of_failed))][0]
     assert abs(farthest) > 2 * max(abs(low), abs(high))
     assert re.search(rf"^- α error \(mrad\): .*run 3 reaches {number(farthest)} \(", merged.text, re.M)
 
 
 def test_titles_of_plots_with_values_outside_say_so(merged):
-    titles = [
-        value[0] for _, name, value in layout_of(merged) if name == "ViewBlueprint:display_name" and value
-    ]
+    (layout,) = layouts(merged.path)
+    titles = [rows[0][0] for (_, name), rows in layout.items() if name == "ViewBlueprint:display_name"]
     cut = {title.removesuffix(", cut").partition(" [")[0] for title in titles if title.endswith(", cut")}
     assert "α error" in cut
     assert cut == set(re.findall(r"^- ([^,\n]*) \([^)\n]*\): run", merged.text, re.MULTILINE))

@@ -17,10 +17,11 @@ def reader(path):
         return RrdReader(path)
 
 
-def columns(path, store=None):
+def columns(path, store=None, **of):
     """Values of every component, by entity and component, and times in ns by entity and component."""
     values, times = {}, {}
-    for chunk in reader(path).stream(store=store):
+    stream = reader(path).stream(store=store)
+    for chunk in stream.filter(**of) if of else stream:
         batch = chunk.to_record_batch()
         for name in batch.schema.names:
             if name == TIMELINE or name.startswith("rerun.controls"):
@@ -30,6 +31,17 @@ def columns(path, store=None):
             if TIMELINE in batch.schema.names:
                 times.setdefault(key, []).append(np.asarray(batch.column(TIMELINE).cast(pa.int64())))
     return values, times
+
+
+def series(read, entity, component, field=None):
+    """Times in ns and values (n, size) of a component of columns that were read, in the order of time."""
+    values, times = (of[f"/{entity.removeprefix('/')}", component] for of in read)
+    parts = [column.flatten().field(field) if field else column for column in values]
+    t_ns = np.concatenate(times)
+    order = np.argsort(t_ns, kind="stable")
+    return t_ns[order], np.concatenate([np.asarray(part.flatten()).reshape(len(part), -1) for part in parts])[
+        order
+    ]
 
 
 def layouts(path):

@@ -1,6 +1,5 @@
 """Runs that are recorded, and what is read of them."""
 
-import numpy as np
 import pyarrow as pa
 
 from spheretwin import scenario as scenarios
@@ -9,7 +8,7 @@ from spheretwin.session import Session
 from spheretwin.simulation import follow
 from spheretwin.viz.layout.view import TELEMETRY, TIMELINE
 from spheretwin.viz.recording.recorder import Recorder
-from tests.viz.recording.panels import reader
+from tests.viz.recording.panels import columns, reader, series
 
 
 def session_and_facts(name="hold", **changes):
@@ -49,10 +48,10 @@ def timed(path, entity, component):
 
 def telemetry_of(path, signal, entity=TELEMETRY):
     """Times in ns and values (n, size) of a signal of the telemetry, or of its envelope."""
-    times, values = [], []
-    for batch in batches(path, entity, "values_0", has_timeline=TIMELINE):
-        times.append(np.asarray(batch.column(TIMELINE).cast(pa.int64())))
-        column = batch.column("values_0").flatten().field(signal)
-        values.append(np.asarray(column.flatten()).reshape(len(batch), -1))
-    order = np.argsort(np.concatenate(times), kind="stable")
-    return np.concatenate(times)[order], np.concatenate(values)[order]
+    return series(columns(path, content=f"/{entity}"), entity, "values_0", signal)
+
+
+def opened(path, name="hold", rate_Hz=None, **changes):
+    """A session of a tenth of a second, and its recorder."""
+    session, facts = session_and_facts(name, **changes)
+    return session, Recorder(session.actuator, session.signals, facts, path=path, rate_Hz=rate_Hz)

@@ -19,14 +19,14 @@ from spheretwin.viz.layout.view import EVENTS, SCENARIO, SUMMARY, TELEMETRY
 from spheretwin.viz.recording.reader import read
 from spheretwin.viz.recording.recorder import FEWEST_ROWS, Recorder
 from spheretwin.viz.recording.stream import PENDING_CHUNKS
-from tests.viz.recording.recordings import recorded, session_and_facts, static, telemetry_of, timed
+from tests.viz.recording.recordings import opened, recorded, session_and_facts, static, telemetry_of, timed
 from tests.waiting import wait_for
 
 
 def test_every_signal_is_recorded_bit_for_bit(tmp_path):
-    session, facts = session_and_facts("nutation", duration=2.3)
+    session, recorder = opened(path := tmp_path / "run.rrd", "nutation", duration=2.3)
     table = session.advance(2300)
-    with Recorder(session.actuator, session.signals, facts, path=(path := tmp_path / "run.rrd")) as recorder:
+    with recorder:
         for first in range(0, 2300, 230):
             recorder.write(table.rows(first, first + 230))
     assert rr.strict_mode()  # without it Rerun turns a mistake into a warning and drops the data
@@ -57,26 +57,13 @@ def test_signals_that_a_law_brings_on_the_way_change_no_component(tmp_path):
     np.testing.assert_array_equal(logged, np.arange(300) // 100 == 1)
 
 
-def test_run_that_raises_still_leaves_a_readable_recording(tmp_path):
-    path = tmp_path / "run.rrd"
-    session, facts = session_and_facts()
+@pytest.mark.parametrize("rate_Hz", [None, 60.0])
+def test_a_recording_of_a_run_that_raises_has_its_last_rows(tmp_path, rate_Hz):
+    chunks = []
+    session, recorder = opened(path := tmp_path / "run.rrd", "nutation", rate_Hz, duration=0.2)
 
     def interrupted():
-        with Recorder(session.actuator, session.signals, facts, path=path) as recorder:
-            follow(session, session.scenario.ticks, [recorder])
-            raise KeyboardInterrupt
-
-    with pytest.raises(KeyboardInterrupt):
-        interrupted()
-    assert len(telemetry_of(path, "q_rad")[0]) == 100
-
-
-def test_a_decimated_recording_of_a_run_that_raises_has_its_last_rows(tmp_path):
-    path, chunks = tmp_path / "run.rrd", []
-    session, facts = session_and_facts("nutation", duration=0.2)
-
-    def interrupted():
-        with Recorder(session.actuator, session.signals, facts, path=path, rate_Hz=60.0) as recorder:
+        with recorder:
             for _ in range(4):
                 chunks.append(session.advance(50))
                 recorder.write(chunks[-1])
@@ -89,7 +76,7 @@ def test_a_decimated_recording_of_a_run_that_raises_has_its_last_rows(tmp_path):
     assert times[-1] == 199_000_000
     np.testing.assert_array_equal(recorded_q_rad[-1], q_rad[-1])
     np.testing.assert_array_equal(recorded_q_rad.max(axis=0), q_rad.max(axis=0))
-    assert len(times) < 100
+    assert len(times) < 100 if rate_Hz else len(times) == 200
 
 
 def busy(recorder):
@@ -100,9 +87,9 @@ def busy(recorder):
 
 
 def test_run_waits_for_a_recorder_that_is_behind(tmp_path):
-    session, facts = session_and_facts()
+    session, recorder = opened(tmp_path / "run.rrd")
     rows = Table(session.signals, np.zeros((FEWEST_ROWS, width(session.signals))))
-    with Recorder(session.actuator, session.signals, facts, path=tmp_path / "run.rrd") as recorder:
+    with recorder:
         done, written = busy(recorder), []
 
         def write_all():

@@ -16,20 +16,17 @@ from spheretwin.models.telemetry.signals import width
 from spheretwin.models.telemetry.table import Table
 from spheretwin.simulation import follow
 from spheretwin.viz.recording import recorder as recording
-from spheretwin.viz.recording.recorder import Recorder
 from spheretwin.viz.recording.stream import PENDING_CHUNKS
-from tests.viz.recording.recordings import recorded, session_and_facts, telemetry_of
+from tests.viz.recording.recordings import opened, recorded, telemetry_of
 
 
-def test_unwritable_path_is_bad_input(tmp_path, actuator):
-    session, facts = session_and_facts()
+def test_unwritable_path_is_bad_input(tmp_path):
     with pytest.raises(InputError, match="writable"):
-        Recorder(actuator, session.signals, facts, path=tmp_path / "missing" / "run.rrd")
+        opened(tmp_path / "missing" / "run.rrd")
 
 
 def test_a_fault_while_recording_keeps_no_run_waiting_and_is_raised(tmp_path):
-    session, facts = session_and_facts()
-    recorder = Recorder(session.actuator, session.signals, facts, path=tmp_path / "run.rrd")
+    session, recorder = opened(tmp_path / "run.rrd")
     for _ in range(3 * PENDING_CHUNKS):
         recorder.write(Table(session.signals, np.full((2, width(session.signals)), np.nan)))
     with pytest.raises(SpheretwinError, match=r"recording: .*run\.rrd could not be completed") as raised:
@@ -39,8 +36,7 @@ def test_a_fault_while_recording_keeps_no_run_waiting_and_is_raised(tmp_path):
 
 
 def test_a_folder_at_the_path_is_reported_with_the_place_of_the_recording(tmp_path):
-    session, facts = session_and_facts()
-    recorder = Recorder(session.actuator, session.signals, facts, path=tmp_path / "run.rrd")
+    session, recorder = opened(tmp_path / "run.rrd")
     follow(session, session.scenario.ticks, [recorder])
     (tmp_path / "run.rrd").mkdir()
     with pytest.raises(SpheretwinError, match=r"run\.rrd could not be written, ") as raised:
@@ -51,8 +47,7 @@ def test_a_folder_at_the_path_is_reported_with_the_place_of_the_recording(tmp_pa
 
 
 def test_a_partial_recording_has_every_row_that_was_written(tmp_path):
-    session, facts = session_and_facts()
-    recorder = Recorder(session.actuator, session.signals, facts, path=tmp_path / "run.rrd")
+    session, recorder = opened(tmp_path / "run.rrd")
     recorder.write(session.advance(37))
     part = recorder.partial()
     (copy := tmp_path / "copy.rrd").write_bytes(part.path.read_bytes())
@@ -61,8 +56,8 @@ def test_a_partial_recording_has_every_row_that_was_written(tmp_path):
 
 
 def test_closing_twice_is_closing_once(tmp_path):
-    session, facts = session_and_facts()
-    with Recorder(session.actuator, session.signals, facts, path=tmp_path / "run.rrd") as recorder:
+    session, recorder = opened(tmp_path / "run.rrd")
+    with recorder:
         follow(session, session.scenario.ticks, [recorder])
         recorder.close()
     assert os.listdir(tmp_path) == ["run.rrd"]
@@ -79,20 +74,19 @@ def test_a_file_that_cannot_be_opened_again_leaves_nothing(tmp_path, monkeypatch
     def out_of_handles():
         raise OSError(24, "Too many open files")
 
-    session, facts = session_and_facts()
     monkeypatch.setattr(os, "pipe", out_of_handles)
     with pytest.raises(InputError, match="Too many open files"):
-        Recorder(session.actuator, session.signals, facts, path=tmp_path / "run.rrd")
+        opened(tmp_path / "run.rrd")
     assert os.listdir(tmp_path) == []
 
 
 def test_two_recorders_of_one_path_leave_the_last_whole(tmp_path):
     path = tmp_path / "run.rrd"
     (mine := tmp_path / "run.rrd.part").write_text("mine")
-    session, facts = session_and_facts()
-    longer_session, longer = session_and_facts(duration=0.2)
-    with Recorder(session.actuator, session.signals, facts, path=path) as first:
-        with Recorder(session.actuator, session.signals, longer, path=path) as second:
+    session, first = opened(path)
+    with first:
+        longer_session, second = opened(path, duration=0.2)
+        with second:
             follow(longer_session, 200, [second])
             assert not path.exists()
         assert len(telemetry_of(path, "q_rad")[0]) == 200
@@ -124,9 +118,8 @@ def broken_model(folder):
 
 def test_mesh_that_cannot_be_read_is_bad_input_before_the_run(tmp_path):
     (folder := tmp_path / "model").mkdir()
-    session, facts = session_and_facts(**{"plant.mjcf": str(broken_model(folder))})
     with pytest.raises(InputError, match=r"model .*broken\.xml: .*stator") as raised:
-        Recorder(session.actuator, session.signals, facts, path=tmp_path / "run.rrd")
+        opened(tmp_path / "run.rrd", **{"plant.mjcf": str(broken_model(folder))})
     assert "\n" not in f"{raised.value}"
     assert os.listdir(tmp_path) == ["model"]
 

@@ -17,7 +17,7 @@ from spheretwin.viz.recording.scene3d import Ending, MovingActuator, Torques, Tr
 from spheretwin.viz.scene.entities import TRACES, METRES_PER_Nm, shaft_tip
 from spheretwin.viz.scene.meshes import FAILURE, FAILURE_TEXT, TORQUES
 from tests.models.model_files import edited
-from tests.viz.recording.recordings import recorded, session_and_facts, static, timed
+from tests.viz.recording.recordings import opened, recorded, session_and_facts, static, timed
 
 PAYLOAD_kg = 0.1
 
@@ -27,9 +27,9 @@ def loaded(tmp_path_factory):
     """A run with a payload under load, recorded in chunks."""
     path = tmp_path_factory.mktemp("moving") / "run.rrd"
     changes = {"duration": 2.2, "plant.payload_kg": PAYLOAD_kg, "disturbance.load": 1.0}
-    session, facts = session_and_facts("sinusoid", **changes)
+    session, recorder = opened(path, "sinusoid", **changes)
     telemetry = session.advance(2200)
-    with Recorder(session.actuator, session.signals, facts, path=path) as recorder:
+    with recorder:
         for first, last in pairwise((0, 1, *range(98, 2200, 97), 2200)):
             recorder.write(telemetry.rows(first, last))
         recorder.finish("completed")
@@ -106,12 +106,12 @@ def mark(path):
 
 @pytest.mark.parametrize("lost", [np.nan, 1e7, 1e99, np.inf])
 def test_a_run_that_diverged_is_marked_at_its_last_pose(tmp_path, actuator, lost):
-    (session, facts), path = session_and_facts(), tmp_path / "run.rrd"
+    session, recorder = opened(path := tmp_path / "run.rrd")
     rows = session.advance(40)
     last = rows["q_rad"][30].copy()
     rows["q_rad"][31:] = lost
     rows["torque_Nm"][31:] = lost
-    with Recorder(session.actuator, session.signals, facts, path=path) as recorder:
+    with recorder:
         recorder.write(Table(session.signals, rows.values[:35].copy()))
         recorder.write(Table(session.signals, rows.values[35:].copy()))
         recorder.finish("diverged")

@@ -8,15 +8,14 @@ from spheretwin.simulation import follow
 from spheretwin.viz.recording import plots, stream
 from spheretwin.viz.recording.currents import CoilCurrents
 from spheretwin.viz.recording.plots import PlotData
-from spheretwin.viz.recording.recorder import Recorder
-from tests.viz.recording.recordings import session_and_facts
+from tests.viz.recording.recordings import opened
 
 
 def size_and_raw(path, duration_s, rate_Hz):
     """Bytes of a recording, and of the numbers of all of its run's rows."""
-    session, facts = session_and_facts("sinusoid", duration=duration_s)
+    session, recorder = opened(path, "sinusoid", rate_Hz, duration=duration_s)
     ticks = session.initial_scenario.ticks
-    with session, Recorder(session.actuator, session.signals, facts, path=path, rate_Hz=rate_Hz) as recorder:
+    with session, recorder:
         follow(session, ticks, [recorder])
     return np.array([path.stat().st_size, ticks * width(session.signals) * np.float64().itemsize])
 

@@ -130,8 +130,3 @@ def test_without_optuna_the_extra_is_named(tmp_path, monkeypatch):
     message = "expected optuna to look for gains, which the extra tune installs: "
     with pytest.raises(InputError, match=message):
         tune(study(tmp_path, **TWO), tmp_path / "out", trials=4)
-
-
-def test_nothing_but_a_tuning_needs_optuna():
-    script = "import sys, spheretwin.cli; print(sorted({'optuna', 'sqlalchemy'} & set(sys.modules)))"
-    assert subprocess.check_output([sys.executable, "-c", script], text=True).strip() == "[]"
