@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import cache
-from inspect import signature
 from typing import Any, NamedTuple
 
 from numpy.typing import NDArray
@@ -36,9 +35,10 @@ class Channel(NamedTuple):
     `sensors` and `plant`."""
 
     @property
-    def parts(self) -> list[str]:
+    def parts(self) -> tuple[str, ...]:
         """Names of the parts that it reads."""
-        return list(signature(uncompiled(self.write)).parameters)[1:]
+        code = uncompiled(self.write).__code__
+        return code.co_varnames[1 : code.co_argcount]
 
 
 @cache

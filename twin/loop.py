@@ -178,7 +178,9 @@ def loop(
         if status == FAILSAFE and watchdog.reason[0] == 0:
             trip(watchdog, _TEMPERATURE)
         for channel in range(stages.columns.shape[0]):
-            write_at(stages.writers[channel])(stages.parts[channel], row[stages.columns[channel] :])
+            write_at(stages.writers[channel])(
+                stages.parts[channel], stages.second_parts[channel], row[stages.columns[channel] :]
+            )
         if not all_finite(row):  # the state cannot be continued either
             return tick, DIVERGED
         if status == FAILSAFE and watchdog.on:

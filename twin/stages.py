@@ -27,7 +27,7 @@ Array = NDArray[np.float64]
 _ROW, _ROWS = types.float64[::1], types.float64[:, ::1]
 _SENSE = types.boolean(types.intp, _ROW, _ROW, _ROW, _ROWS)
 _ADVANCE = types.int64(types.intp, _ROW, _ROW, _ROW, _ROW, _ROW)
-_WRITE = types.void(types.intp, _ROW)
+_WRITE = types.void(types.intp, types.intp, _ROW)
 
 sense_at, advance_at, write_at = function_at(_SENSE), function_at(_ADVANCE), function_at(_WRITE)
 
@@ -43,8 +43,9 @@ class Stages(NamedTuple):
     sensors: Any
     advance: Any  # (plant, command, disturbance, current, mean current, torque): code of a status
     plant: Any
-    writers: Any  # (parts, row), one for each channel of the run
+    writers: Any  # (part, second part, row), one for each channel of the run
     parts: Any  # data of the writers
+    second_parts: Any
     columns: NDArray[np.intp]  # first columns of these channels
     q: Array  # (3,) rad
     qdot: Array  # (3,) rad/s
@@ -63,13 +64,14 @@ class Stage(NamedTuple):
 
 def plant_stage(plant: Plant) -> Stage:
     """Compile the stage of a plant, which `advance_at` calls."""
-    return _stage(_ADVANCE, _advance, plant)
+    memory, data = _data(plant)
+    return Stage(_function(_ADVANCE, _advance, plant), data, memory)
 
 
 def compiled_stages(
     controller: Controller, sensors: Sensors, plant: Plant, signals: tuple[Signal, ...]
-) -> tuple[Stages, list[Stage]]:
-    """Compile the stages of a run; return them and what must exist as long as they are called.
+) -> tuple[Stages, list[Any]]:
+    """Compile the stages of a run; return them and the memory that they have addresses of.
 
     Parameters
     ----------
@@ -80,20 +82,24 @@ def compiled_stages(
         Columns of the run: its channels are among them.
     """
     parts: dict[str, Any] = {"controller": controller, "sensors": sensors, "plant": plant}
+    memories, data = {}, {}
+    for name, part in parts.items():
+        memories[name], data[name] = _data(part)
     first = offsets(signals)
     logged = {channel: name for channel in CHANNELS if (name := channel.signals(1)[0].name) in first}
+    reads = [channel.parts for channel in logged]
     writers = [
-        _stage(_WRITE, _writer(channel), tuple(parts[name] for name in channel.parts)) for channel in logged
+        _function(_WRITE, _writer(channel), *(parts[name] for name in channel.parts)) for channel in logged
     ]
-    sensing, advancing = _stage(_SENSE, _sense, sensors), plant_stage(plant)
     sequence: Callable[[list[Any]], Any] = (lambda values: np.array(values, np.intp)) if COMPILES else list
     stages = Stages(
-        sensing.function,
-        sensing.data,
-        advancing.function,
-        advancing.data,
-        sequence([writer.function for writer in writers]),
-        sequence([writer.data for writer in writers]),
+        _function(_SENSE, _sense, sensors),
+        data["sensors"],
+        _function(_ADVANCE, _advance, plant),
+        data["plant"],
+        sequence(writers),
+        sequence([data[names[0]] for names in reads]),
+        sequence([data[names[-1]] for names in reads]),
         np.array([first[name] for name in logged.values()], np.intp),
         plant.rotor.q,
         plant.rotor.qdot,
@@ -101,14 +107,17 @@ def compiled_stages(
         plant.draws,
         plant.current_sensors,
     )
-    return stages, [sensing, advancing, *writers]
+    return stages, list(memories.values())
 
 
-def _stage(signature: Any, function: Callable[..., Any], part: Any) -> Stage:
-    if not COMPILES:
-        return Stage(function, (part,), None)
-    memory = in_memory(part)
-    return Stage(stage_address(signature, function, part), memory.ctypes.data, memory)
+def _function(signature: Any, function: Callable[..., Any], *parts: Any) -> Any:
+    return stage_address(signature, function, *parts) if COMPILES else function
+
+
+def _data(part: Any) -> tuple[Any, Any]:
+    """Return the memory of a part, and what a stage gets of it."""
+    memory = in_memory(part) if COMPILES else (part,)
+    return memory, memory.ctypes.data if isinstance(memory, np.ndarray) else memory
 
 
 def _sense(sensors: Any, q: Array, qdot: Array, noise: Array, measurement: Array) -> bool:
@@ -125,10 +134,10 @@ def _advance(
 def _writer(channel: Channel) -> Callable[..., None]:
     write = channel.write
 
-    def of_one(parts: Any, row: Array) -> None:
-        write(row, parts[0][0])
+    def of_one(part: Any, _: Any, row: Array) -> None:
+        write(row, part[0])
 
-    def of_two(parts: Any, row: Array) -> None:
-        write(row, parts[0][0], parts[0][1])
+    def of_two(part: Any, second: Any, row: Array) -> None:
+        write(row, part[0], second[0])
 
     return of_two if len(channel.parts) == 2 else of_one

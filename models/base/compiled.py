@@ -137,23 +137,24 @@ def compiled_callback(signature: Any, function: Callable[..., Any], *, check_bou
     return callbacks[key]
 
 
-def stage_address(signature: Any, function: Callable[..., Any], value: Any) -> int:
-    """Compile a function of the tuple at an address, as `allocation_free` does; return its own address.
+def stage_address(signature: Any, function: Callable[..., Any], *values: Any) -> int:
+    """Compile a function of the tuples at some addresses, as `allocation_free` does; return its own address.
 
     Its callers are compiled once for all types of tuples.
 
     Parameters
     ----------
     signature : numba signature
-        With an address as the first argument.
+        With the addresses as its first arguments.
     function : callable
-        Plain function; reads the tuple as entry 0 of its first argument.
-    value : tuple
-        Of arrays and numbers; the function gets the address of a copy by `in_memory`.
+        Plain function; reads a tuple as entry 0 of its argument.
+    *values : tuples
+        Of arrays and numbers; the function gets the addresses of copies by `in_memory`.
     """
-    key = function, fingerprint_of_types((value,))
+    key = function, fingerprint_of_types(values)
     if key not in _ENTRIES:
-        own = signature.return_type(types.CPointer(numba.typeof(value)), *signature.args[1:])
+        addresses = (types.CPointer(numba.typeof(value)) for value in values)
+        own = signature.return_type(*addresses, *signature.args[len(values) :])
         options = {"nopython": True, **_OPTIONS, **NO_ALLOCATION}
         _ENTRIES[key] = c_callback(own, function, options, False, TupleCompiler)
     return int(_ENTRIES[key].address)

@@ -11,6 +11,7 @@ compiled alone and get the address of their data. Consequence: they read invalid
 
 from __future__ import annotations
 
+import struct
 from collections.abc import Callable
 from typing import Any
 
@@ -93,33 +94,38 @@ def in_memory(value: Any) -> NDArray[np.uint8]:
 def _append(memory: bytearray, value: Any) -> None:
     """Append a value at the next address that has its alignment."""
     if isinstance(value, tuple):
-        _pad(memory, alignment := _alignment(value))
+        aligned = _is_aligned(value)
+        if aligned:
+            _pad(memory)
         for part in value:
             _append(memory, part)
-        _pad(memory, alignment)
+        if aligned:
+            _pad(memory)
     elif isinstance(value, bool | np.bool_):
         memory.append(bool(value))
     else:
-        _pad(memory, 8)
-        memory += _words(value).tobytes()
+        _pad(memory)
+        memory += _words(value)
 
 
-def _words(value: Any) -> NDArray[Any]:
+def _words(value: Any) -> bytes:
     """Return what compiled code has of an array, a number or None, in words of eight bytes."""
     if isinstance(value, np.ndarray):  # without the two objects that count its references
-        place = [0, 0, value.size, value.itemsize, value.ctypes.data]
-        return np.array([*place, *value.shape, *value.strides], np.int64)
-    word = np.asarray(0 if value is None else value)
-    if word.dtype not in (np.int64, np.float64):
-        raise TypeError(f"expected a tuple of arrays and numbers of eight bytes, received {value!r}")
-    return word
+        place = 0, 0, value.size, value.itemsize, value.ctypes.data, *value.shape, *value.strides
+        return struct.pack(f"={len(place)}q", *place)
+    if isinstance(value, float):
+        return struct.pack("=d", value)
+    if isinstance(value, int | np.int64 | None):
+        return struct.pack("=q", value or 0)
+    raise TypeError(f"expected a tuple of arrays and numbers of eight bytes, received {value!r}")
 
 
-def _alignment(value: Any) -> int:
-    parts = value if isinstance(value, tuple) else ()
-    least = 1 if isinstance(value, tuple | bool | np.bool_) else 8
-    return max([least, *map(_alignment, parts)])
+def _is_aligned(value: Any) -> bool:
+    """True for all but logical values and tuples of nothing else."""
+    return (
+        any(map(_is_aligned, value)) if isinstance(value, tuple) else not isinstance(value, bool | np.bool_)
+    )
 
 
-def _pad(memory: bytearray, alignment: int) -> None:
-    memory += bytes(-len(memory) % alignment)
+def _pad(memory: bytearray) -> None:
+    memory += bytes(-len(memory) % 8)
