@@ -7,10 +7,11 @@ from spheretwin import scenario as scenarios
 from spheretwin.control.law import Law
 from spheretwin.models.telemetry.parquet import TelemetryFile
 from spheretwin.models.telemetry.signals import Signal
+from spheretwin.plant import plant_tick
 from spheretwin.provenance import record_of
 from spheretwin.session import Session
 
-SHIPPED, ENGINES = ("pd", "adaptive_fuzzy", "afsm"), ("mujoco", "lagrangian")
+SHIPPED, ENGINES = ("pd", "adaptive_fuzzy", "afsm"), tuple(plant_tick.ENGINES)
 RANDOM = {"disturbance.random_bound_Nm": 0.05}
 WORN = {"plant.coulomb_Nm": [0.004, 0.003, 0.002], "plant.viscous_Nm_s": [1e-4, 1e-4, 2e-4]}
 SENSED = {"detector.detect": True}

@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from spheretwin.models.kinematics import rate_jacobian, rotation, rotor_rate_jacobian
+from spheretwin.models.kinematics import rate_jacobian
 from spheretwin.models.magnetics import torque_matrix
 from tests.twin.passive_cases import ASKEW, ENGINES, FREE, PAYLOAD_KG, STILL, table
+from tests.twin.plant.motions import kinetic_J, order, potential_J
 
 # --- the true torque
 
@@ -23,9 +24,8 @@ def test_torque_is_that_of_the_currents_times_their_gains(engine, actuator):
     for row in range(0, 600, 7):
         G = torque_matrix(middle[row], actuator)
         # The same 18 products and sums in another order, of torques below 1 N·m.
-        np.testing.assert_allclose(
-            run["torque_Nm"][row], G @ (GAIN * run["current_A"][row]), rtol=0, atol=1e-14
-        )
+        expected = G @ (GAIN * run["current_A"][row])
+        np.testing.assert_allclose(run["torque_Nm"][row], expected, rtol=0, atol=1e-14)
     bare = torque_matrix(middle[300], actuator) @ run["current_A"][300]
     assert np.abs(bare - run["torque_Nm"][300]).max() > 1e-3
 
@@ -72,22 +72,12 @@ def test_both_engines_agree_on_a_loop_with_friction_payload_and_gravity(name):
     one, other = (table(3000, name, changes | {"plant.engine": engine}) for engine in ENGINES)
     assert len(one) == 3000
     # Both take the same RK4 steps of the same equations: they differ by rounding, which PD does not amplify.
-    np.testing.assert_allclose(one["q_rad"], other["q_rad"], rtol=0, atol=1e-11)
-    np.testing.assert_allclose(one["qdot_rad_s"], other["qdot_rad_s"], rtol=0, atol=1e-10)
-    np.testing.assert_allclose(one["friction_Nm"], other["friction_Nm"], rtol=0, atol=1e-11)
-    np.testing.assert_allclose(one["current_A"], other["current_A"], rtol=0, atol=1e-9)
+    bounds = {"q_rad": 1e-11, "qdot_rad_s": 1e-10, "friction_Nm": 1e-11, "current_A": 1e-9}
+    for column, bound in bounds.items():
+        np.testing.assert_allclose(one[column], other[column], rtol=0, atol=bound)
 
 
 # --- energy
-
-
-def energy_J(q, qdot, actuator, modelling_error):
-    """Rotor by its body rates, payload by its velocity and height: not by any matrix of the Lagrangian."""
-    w_SR_R, w_SR_S = rotor_rate_jacobian(q) @ qdot, rate_jacobian(q) @ qdot
-    arm = rotation(q) @ actuator.payload_mount_m
-    velocity = np.cross(w_SR_S, arm)
-    kinetic = (1 + modelling_error) * w_SR_R @ (actuator.inertia * w_SR_R) + PAYLOAD_KG * velocity @ velocity
-    return 0.5 * kinetic + PAYLOAD_KG * 9.81 * arm[2]
 
 
 def works_J(run, step_s, unmodelled_Nm):
@@ -111,13 +101,12 @@ def unbalanced_J(engine, step_s, actuator, changes):
     """Energy over 0.4 s that the works do not account for, and the works."""
     changes = changes | {"plant.engine": engine, "plant.step_s": step_s, "controller.period_s": step_s}
     run = table(round(0.4 / step_s) + 1, changes=LOADED | changes | {"plant.modelling_error": 0.2})
-    ends = [energy_J(run["q_rad"][i], run["qdot_rad_s"][i], actuator, 0.2) for i in (0, -1)]
+    ends = [
+        kinetic_J(q, qdot, actuator, PAYLOAD_KG, 0.2) + potential_J(q, actuator, PAYLOAD_KG)
+        for q, qdot in zip(run["q_rad"][[0, -1]], run["qdot_rad_s"][[0, -1]], strict=True)
+    ]
     work_J = works_J(run, step_s, np.array(LOADED["plant.modelling_torque_Nm"]))
     return abs(ends[1] - ends[0] - sum(work_J.values())), work_J
-
-
-def order_of(steps, left_J):
-    return np.polyfit(np.log(steps), np.log(left_J), 1)[0]
 
 
 @pytest.mark.parametrize("engine", ENGINES)
@@ -126,7 +115,7 @@ def test_energy_is_kept_by_the_rows_of_the_telemetry_alone(engine, actuator):
     # left is the error of the Runge-Kutta steps, of fourth order.
     steps = np.array([8e-3, 4e-3, 2e-3])
     left_J = [unbalanced_J(engine, step_s, actuator, FRICTIONLESS)[0] for step_s in steps]
-    assert 3.7 < order_of(steps, left_J) < 4.3, left_J
+    assert 3.7 < order(steps, left_J) < 4.3, left_J
     left_J, work_J = unbalanced_J(engine, 5e-4, actuator, FRICTIONLESS)
     # Measured 1e-14 J of some 20 mJ that go in and out; any of the works left out would be seen.
     assert left_J < 1e-13
@@ -138,5 +127,5 @@ def test_friction_takes_the_energy_that_its_rows_say_to_second_order(engine, act
     # The mean of friction over a step times the way: its halves act on rates that differ.
     steps = np.array([2e-3, 1e-3, 5e-4])
     left_J = [unbalanced_J(engine, step_s, actuator, {})[0] for step_s in steps]
-    assert 1.8 < order_of(steps, left_J) < 2.2, left_J
+    assert 1.8 < order(steps, left_J) < 2.2, left_J
     assert left_J[-1] < 1e-3 * abs(unbalanced_J(engine, 5e-4, actuator, {})[1]["friction"])

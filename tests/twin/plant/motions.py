@@ -3,6 +3,7 @@
 import numpy as np
 
 from spheretwin.models.base.compiled import compiled
+from spheretwin.models.kinematics import rate_jacobian, rotation, rotor_rate_jacobian
 from spheretwin.plant.bristle_friction import apply_bristles, begin_bristles
 from spheretwin.plant.friction import friction, slow_down
 from spheretwin.plant.plant_tick import step_rotor
@@ -50,6 +51,26 @@ def steps(rotor, bristles, resistance, torque, start, rates, every=1):
     q, qdot, bearing = np.zeros((3, -(-len(torque) // every), 3))
     moving(rotor.start(start, rates), bristles, resistance, torque, q, qdot, bearing, every)
     return q, qdot, bearing
+
+
+def kinetic_J(q, qdot, actuator, payload_kg, modelling_error=0.0):
+    """Rotor by its body rates and point mass by its velocity, not by any matrix of the Lagrangian."""
+    w_SR_R, w_SR_S = rotor_rate_jacobian(q) @ qdot, rate_jacobian(q) @ qdot
+    velocity = np.cross(w_SR_S, rotation(q) @ actuator.payload_mount_m)
+    rotor = (1 + modelling_error) * w_SR_R @ (actuator.inertia * w_SR_R)
+    return 0.5 * (rotor + payload_kg * velocity @ velocity)
+
+
+def potential_J(q, actuator, payload_kg, gravity_m_s2=9.81):
+    return payload_kg * gravity_m_s2 * (rotation(q) @ actuator.payload_mount_m)[2]
+
+
+def gradient(function, at, h=1e-3):
+    """Central differences of fourth order; the last index is that of the argument."""
+    steps = h * np.eye(len(at))
+    near = np.array([function(at + d) - function(at - d) for d in steps])
+    far = np.array([function(at + 2 * d) - function(at - 2 * d) for d in steps])
+    return np.moveaxis((8 * near - far) / (12 * h), 0, -1)
 
 
 def order(steps, errors):

@@ -33,14 +33,10 @@ def elements(actuator, stiction=STICTION, cable=NO_CABLE, coulomb=COULOMB, step_
     return bristle_friction(stiction, coulomb, cable, actuator.inertia, step_s)
 
 
-def lagrangian(actuator, step_s=STEP_s):
-    return LagrangianRotor(actuator, step_s)
-
-
 def spin(actuator, torque, step_s=STEP_s, stiction=STICTION, cable=NO_CABLE, rate=0.0, viscous_Nm_s=0.0):
     """Angles, rates and torque of the bearing of the third hinge alone, upright, with the inertia J3."""
     bristles = elements(actuator, stiction, cable, step_s=step_s)
-    rotor, torque_q, rates = lagrangian(actuator, step_s), on_gamma(torque), on_gamma(rate)
+    rotor, torque_q, rates = LagrangianRotor(actuator, step_s), on_gamma(torque), on_gamma(rate)
     result = motion(rotor, bristles, torque_q, UPRIGHT, rates, viscous_Nm_s)
     assert not np.any([part[:, :2] for part in result])
     return [part[:, 2] for part in result]
@@ -104,7 +100,7 @@ def test_presliding_has_a_closed_hysteresis_loop(actuator):
     falling = q[steps : 2 * steps]
     expected = top - 2 * masing(0.5 * (load[steps - 1] - load[steps : 2 * steps]))
     np.testing.assert_allclose(falling, expected, **close)
-    np.testing.assert_allclose(q[steps : 2 * steps], q[3 * steps :], **close)
+    np.testing.assert_allclose(falling, q[3 * steps :], **close)
     area = np.abs(np.trapezoid(load[2 * steps - 1 :], q[2 * steps - 1 :]))
     # The first slider slips over twice the part of the amplitude beyond half of the range, there and back.
     slip = 4 * (top - 0.5 * PRESLIDING_rad)
@@ -114,10 +110,8 @@ def test_presliding_has_a_closed_hysteresis_loop(actuator):
 
 def test_a_cable_has_hysteresis_of_its_own_level(actuator):
     level, range_rad, amplitude = 1e-3, 0.02, 0.1
-    cable, plant = (
-        CableSection(hysteresis_Nm=(0.0, 0.0, level), hysteresis_rad=range_rad),
-        lagrangian(actuator),
-    )
+    cable = CableSection(hysteresis_Nm=(0.0, 0.0, level), hysteresis_rad=range_rad)
+    plant = LagrangianRotor(actuator, STEP_s)
     bristles = elements(actuator, StictionSection(), cable)
     swing = level * 1.2 * np.sin(2 * np.pi * 0.5 * STEP_s * np.arange(round(6 / STEP_s)))
     q, _, bearing = motion(plant, bristles, on_gamma(swing))
@@ -249,7 +243,7 @@ def test_any_stiffness_is_stable_and_comes_to_rest(actuator, presliding_rad, h):
     stiction = STICTION.model_copy(update={"presliding_rad": presliding_rad})
     bristles = elements(actuator, stiction, step_s=h)
     rates = np.array([0.5, -0.3, 0.4])
-    q, qdot, _ = motion(lagrangian(actuator, h), bristles, np.zeros((round(6 / h), 3)), TILTED, rates)
+    q, qdot, _ = motion(LagrangianRotor(actuator, h), bristles, np.zeros((round(6 / h), 3)), TILTED, rates)
     assert np.abs(qdot).max() < 0.8
     assert np.abs(qdot[-100:]).max() < 1e-9
     assert np.ptp(q[-100:], axis=0).max() < 1e-11
@@ -272,7 +266,7 @@ def test_smooth_slip_is_of_second_order(actuator):
         count = round(duration / h)
         t_s = h * (np.arange(count + 1) + 0.5)
         load = np.array([5e-3, -4e-3, 6e-3]) * np.sin(20 * t_s)[:, None]
-        q, qdot, _ = motion(lagrangian(actuator, h), bristles, load, TILTED, rates, 1e-3)
+        q, qdot, _ = motion(LagrangianRotor(actuator, h), bristles, load, TILTED, rates, 1e-3)
         assert np.all(qdot * np.sign(rates) > 0.1)
         return np.concatenate([q[-1], qdot[-1]])
 

@@ -40,9 +40,8 @@ def test_viscous_friction_is_an_exponential_decay(actuator):
     # Half a step is off by x³/6 of the rate, x = decay h/2; summed up, by (decay h)²/24e at 1/decay.
     np.testing.assert_array_less(errors, (decay * step_sizes) ** 2 * rate / (24 * np.e))
     assert errors[-1] < 8e-7  # rad/s, at 0.5 ms
-    assert 1.98 < order(step_sizes, errors) < 2.02, (
-        errors
-    )  # the next power of the step adds a share of decay h
+    # The next power of the step adds a share of decay h.
+    assert 1.98 < order(step_sizes, errors) < 2.02, errors
 
 
 def decades(lowest, highest):

@@ -5,22 +5,14 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from spheretwin.models import actuator as actuators
-from spheretwin.models import mjcf
-from spheretwin.models.base.errors import InputError
-from spheretwin.models.kinematics import rate_jacobian, rotation, rotor_rate_jacobian
-from spheretwin.models.lagrangian import (
-    acceleration,
-    coriolis_matrix,
-    coupling_torques,
-    gravity_torque,
-    inertia_matrix,
-)
+from spheretwin.models import lagrangian, mjcf
+from spheretwin.models.lagrangian import acceleration, coriolis_matrix, gravity_torque, inertia_matrix
 from spheretwin.plant import lagrangian_rotor
 from spheretwin.plant import plant_tick as stepping
 from spheretwin.plant.lagrangian_rotor import LagrangianRotor
 from spheretwin.plant.mujoco_rotor import MujocoRotor
 from tests.twin.plant.allocations import allocates_nothing
-from tests.twin.plant.motions import order
+from tests.twin.plant.motions import gradient, kinetic_J, order, potential_J
 
 STEP_S, PAYLOAD_KG = 5e-4, 0.05
 
@@ -32,38 +24,19 @@ def states(count, seed=1):
         yield q, generator.uniform(-5, 5, 3), generator.uniform(-50, 50, 3)
 
 
-def potential(q, actuator, gravity_m_s2=9.81):
-    return PAYLOAD_KG * gravity_m_s2 * (rotation(q) @ actuator.payload_mount_m)[2]
-
-
-def kinetic(q, qdot, actuator):
-    """Rotor and point mass apart: the mass by its velocity, not by any inertia."""
-    w_SR_R, w_SR_S = rotor_rate_jacobian(q) @ qdot, rate_jacobian(q) @ qdot
-    velocity = np.cross(w_SR_S, rotation(q) @ actuator.payload_mount_m)
-    return 0.5 * w_SR_R @ (actuator.inertia * w_SR_R) + 0.5 * PAYLOAD_KG * velocity @ velocity
-
-
-def gradient(function, at, h=1e-4):
-    """Central differences of fourth order."""
-    steps = h * np.eye(len(at))
-    near = np.array([function(at + d) - function(at - d) for d in steps])
-    far = np.array([function(at + 2 * d) - function(at - 2 * d) for d in steps])
-    return (8 * near - far) / (12 * h)
-
-
 def test_the_inertia_matrix_has_the_kinetic_energy_of_rotor_and_payload(actuator):
     """Its Coriolis matrix belongs to it: tests/models/test_lagrangian.py."""
     rotor = LagrangianRotor(actuator, STEP_S, payload_kg=PAYLOAD_KG)
     for q, qdot, _ in states(20):
         energy = 0.5 * qdot @ inertia_matrix(q, rotor.inertia) @ qdot
-        assert energy == pytest.approx(kinetic(q, qdot, actuator), rel=1e-12)
+        assert energy == pytest.approx(kinetic_J(q, qdot, actuator, PAYLOAD_KG), rel=1e-12)
 
 
 @pytest.mark.parametrize("gravity_m_s2", [9.81, 1.62, 0.0, -9.81])
 def test_payload_weighs_what_gravity_makes_of_it(actuator, gravity_m_s2):
     rotor = LagrangianRotor(actuator, STEP_S, payload_kg=PAYLOAD_KG, gravity_m_s2=gravity_m_s2)
     for q, _, _ in states(20):
-        expected = gradient(lambda pose: potential(pose, actuator, gravity_m_s2), q)
+        expected = gradient(lambda pose: potential_J(pose, actuator, PAYLOAD_KG, gravity_m_s2), q)
         np.testing.assert_allclose(gravity_torque(q, rotor.weight_moment), expected, atol=1e-12)
     earth = LagrangianRotor(actuator, STEP_S, payload_kg=PAYLOAD_KG)
     np.testing.assert_array_equal(rotor.inertia, earth.inertia)
@@ -84,7 +57,7 @@ def test_acceleration_solves_the_equation_of_motion(actuator):
 
 def test_coupling_torques_are_the_paper_s():
     q, qdot, qddot, J = np.array([0.0, np.pi / 6, 0.4]), np.array([1.0, 2.0, 3.0]), np.full(3, 10.0), 2.0
-    inertial, coriolis = coupling_torques(q, qdot, qddot, J)
+    inertial, coriolis = lagrangian.coupling_torques(q, qdot, qddot, J)
     np.testing.assert_allclose(inertial, [10, 0, 10])  # (6), (9)
     np.testing.assert_allclose(coriolis, np.sqrt(3) * np.array([6, -3, 2]))  # (7), (8), (10)
 
@@ -137,8 +110,3 @@ def test_start_does_not_hold_on_to_its_arguments(actuator):
     plant = LagrangianRotor(actuator, STEP_S).start(pose, np.array([1.0, 0.0, 0.0]))
     lagrangian_rotor.step(plant)
     np.testing.assert_array_equal(pose, 0)
-
-
-def test_only_runge_kutta_is_known(actuator):
-    with pytest.raises(InputError, match="expected the integrator RK4, received Euler"):
-        LagrangianRotor(actuator, STEP_S, "Euler")

@@ -38,12 +38,9 @@ SECTION = thermal()
 
 def heat_of(period_s, section=SECTION):
     coils = {"supply_V": 24.0, "resistance_ohm": 1.3, "inductance_H": 9e-4, "current_limit_A": 8.0}
-    coils |= {
-        "resistance_per_K": 0.0,
-        "heat_capacity_J_K": WINDING_J_K,
-        "thermal_resistance_K_W": WINDING_K_W,
-    }
-    chain = drive_chain(ResolvedDrive(ambient_degC=AMBIENT_degC, **coils), period_s, 1, GROUPS, 0)
+    heat = {"heat_capacity_J_K": WINDING_J_K, "thermal_resistance_K_W": WINDING_K_W}
+    drive = ResolvedDrive(resistance_per_K=0.0, ambient_degC=AMBIENT_degC, **coils, **heat)
+    chain = drive_chain(drive, period_s, 1, GROUPS, 0)
     return chain.coil, magnet_heat(section, chain, AMBIENT_degC, WINDING_J_K)
 
 
@@ -126,16 +123,10 @@ def test_hot_magnets_give_less_torque_for_the_same_currents():
     assert hot["rotor_temperature_degC"][-1] == pytest.approx(60.0, abs=0.01)
 
 
-def test_a_snapshot_continues_the_temperatures():
+def test_a_change_of_the_plant_keeps_the_temperatures():
     with Session(scenarios.load("nutation", PROTOTYPE)) as session:
-        session.advance(20)
-        state = session.snapshot()
-        rest = session.advance(20)
-        session.restore(state)
-        assert session.advance(20).values.tobytes() == rest.values.tobytes()
-        stator = rest["stator_temperature_degC"]
+        stator = session.advance(40)["stator_temperature_degC"]
         assert np.all(np.diff(stator) > 0)
-        # A change of the plant keeps the temperatures.
         session.set("plant.payload_kg", 0.01)
         assert 0 <= session.advance(1)["stator_temperature_degC"][0] - stator[-1] < 1e-3
 

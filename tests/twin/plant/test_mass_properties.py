@@ -57,11 +57,6 @@ def upright(chain):
     return full(equations(chain, (0.0,) * 3, (0.0,) * 3)[0])
 
 
-def rotor_of(changes):
-    config = initial_config(scenarios.load("hold", changes), None, None)
-    return assembly.rotor_of(config.scenario, config.files)
-
-
 @pytest.mark.parametrize("engine", ["mujoco", "lagrangian"])
 @pytest.mark.parametrize(
     ("fields", "general", "skewed"),
@@ -80,9 +75,8 @@ def test_the_plant_has_general_parts_only_if_it_needs_them(engine, fields, gener
 def test_inertia_of_the_rotor_upright_is_the_sum_of_its_parts(actuator, shipped):
     centre, (xy, xz, yz) = np.array([1e-3, -2e-3, 5e-4]), (1e-4, -5e-5, 2e-5)
     outer, inner = (4e-4, 2e-4, 3e-4), (2e-4, 3e-4, 2e-4)
-    section = MassSection(
-        centre_m=tuple(centre), products_kg_m2=(xy, xz, yz), ring_inertia_kg_m2=(outer, inner)
-    )
+    parts = {"products_kg_m2": (xy, xz, yz), "ring_inertia_kg_m2": (outer, inner)}
+    section = MassSection(centre_m=tuple(centre), **parts)
     expected = 1.2 * np.diag(actuator.inertia) + [[0, xy, xz], [xy, 0, yz], [xz, yz, 0]]
     expected += 1.6 * (centre @ centre * np.eye(3) - np.outer(centre, centre))
     expected[0, 0] += outer[0] + inner[0]
@@ -159,11 +153,10 @@ def test_closed_loops_on_both_engines_agree(stiction):
     }
     smooth = {"controller.law": "pd", "disturbance.load": 0.5, "duration": 1.0} | bearings
     changes = smooth | FIELDS
-    runs = [
-        simulate(scenarios.load("nutation", changes | {"plant.engine": engine}))
+    first, second = (
+        simulate(scenarios.load("nutation", changes | {"plant.engine": engine})).telemetry["q_rad"]
         for engine in ("mujoco", "lagrangian")
-    ]
-    first, second = (run.telemetry["q_rad"] for run in runs)
+    )
     # As in the cross-check.
     np.testing.assert_allclose(second, first, rtol=0, atol=1e-9)
     ideal = simulate(scenarios.load("nutation", smooth)).telemetry["q_rad"]
@@ -233,9 +226,8 @@ def test_static_friction_gains_no_energy_on_a_general_joint(shipped):
 def test_a_ring_needs_a_body(tmp_path):
     start, stop = (models.TEXT.index(f'<body name="{name}">') for name in ("inner_ring", "rotor"))
     merged = models.TEXT[:start] + models.TEXT[stop:].replace("</body>", "", 1)
-    (path := tmp_path / "merged.xml").write_text(
-        merged.replace('<joint name="gamma"', models.BETA + '<joint name="gamma"'), encoding="utf-8"
-    )
+    merged = merged.replace('<joint name="gamma"', models.BETA + '<joint name="gamma"')
+    (path := tmp_path / "merged.xml").write_text(merged, encoding="utf-8")
     assert mujoco.MjModel.from_xml_path(str(path)).nv == 3
     ring = {"plant.mass.ring_inertia_kg_m2": [[0.0] * 3, [1e-4] * 3], "plant.mjcf": str(path)}
     with pytest.raises(InputError, match="received one without a ring at hinge beta"):
@@ -246,7 +238,9 @@ def test_a_payload_off_the_axis_is_computed_by_the_equations_of_motion(tmp_path)
     edits = (('<body name="payload" pos="0 0 0.10">', '<body name="payload" pos="0.01 0.02 0.10">'),)
     (path := tmp_path / "aside.xml").write_text(models.edited(edits), encoding="utf-8")
     changes = {"plant.mjcf": str(path), "plant.payload_kg": 0.05}
-    rotors = [rotor_of(changes | {"plant.engine": engine}) for engine in ("mujoco", "lagrangian")]
+    engines = (scenarios.load("hold", changes | {"plant.engine": name}) for name in ("mujoco", "lagrangian"))
+    configs = [initial_config(scenario, None, None) for scenario in engines]
+    rotors = [assembly.rotor_of(config.scenario, config.files) for config in configs]
     assert_same_steps(*rotors, ([0.4, -0.3, 0.2], [1.0, 2.0, -3.0]))
 
 

@@ -26,8 +26,6 @@ STEP_S = 5e-4
 POSE, RATES = np.array([0.1, -0.05, 0.2]), np.array([0.2, 0.3, -0.5])
 TORQUE_Q = np.array([0.03, -0.01, 0.08])
 
-each_case = pytest.mark.parametrize("case", models.CASES.values(), ids=models.CASES)
-
 
 @pytest.fixture
 def written(tmp_path):
@@ -78,7 +76,7 @@ CONSTANT = np.tile(TORQUE_Q, (400, 1))
 
 # No tolerance: bodies, geoms and sites that do nothing take part in no sum, so the steps are the same
 # operations on the same numbers, the solver's with its warm start too.
-@each_case
+@pytest.mark.parametrize("case", models.CASES.values(), ids=models.CASES)
 def test_a_piece_of_physics_acts_as_in_the_stock_engine_and_is_named(written, case):
     path, without = written(case.edits), written(case.without)
     actuators.load(path)
@@ -213,11 +211,6 @@ def test_what_moves_nothing_changes_nothing(written, edits):
     np.testing.assert_array_equal(ours(path, CONSTANT), stock(actuators.MJCF_PATH, CONSTANT))
     assert mjcf.beyond_a_free_rotor(mjcf.read(path).loaded) == []
     assert simulate(scenario_of(path, duration=0.01)).status == "completed"
-
-
-def test_a_missing_mesh_that_is_only_drawn_moves_nothing(written):
-    path = written((("ball.obj", "nowhere.obj"),))
-    np.testing.assert_array_equal(ours(path, CONSTANT), stock(actuators.MJCF_PATH, CONSTANT))
 
 
 def test_what_moves_nothing_costs_nothing():

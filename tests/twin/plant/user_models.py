@@ -190,6 +190,7 @@ TUPLE = '<custom><tuple name="t"><element objtype="{}" objname="{}"/></tuple></c
 
 IDLE = {
     "no flags": ((FLAGS, ""),),
+    "missing mesh that is only drawn": (("ball.obj", "nowhere.obj"),),
     "no options": ((OPTION + 'timestep="0.0005">', "<option>"),),
     "keyframes": at_the_end('<keyframe><key name="tilted" qpos="0.1 0.2 0.3" qvel="1 2 3"/></keyframe>'),
     "tuple of a site": at_the_end(TUPLE.format("site", "shaft_tip")),
