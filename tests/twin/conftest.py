@@ -2,26 +2,17 @@
 
 import pytest
 
-from spheretwin.models import actuator as actuators
+from tests.models.model_files import edited
 from tests.twin.disturbance_cases import TORQUES
 
 
 @pytest.fixture(scope="session")
 def sticky(tmp_path_factory):
     """A model of the user's, in which the engine's solver is cut off at each step: where it began shows."""
-    text = actuators.MJCF_PATH.read_text()
-    for before, after in [
-        ('<option integrator="RK4"', '<option integrator="RK4" solver="Newton" iterations="1"'),
-        *[
-            (f'<joint name="{hinge}"', f'<joint frictionloss="0.5" name="{hinge}"')
-            for hinge in ("alpha", "beta", "gamma")
-        ],
-    ]:
-        assert text.count(before) == 1
-        text = text.replace(before, after)
-    path = tmp_path_factory.mktemp("model") / "sticky.xml"
-    path.write_text(text.replace('meshdir="', f'meshdir="{actuators.MJCF_PATH.parent}/'))
-    return str(path)
+    solver = ('<option integrator="RK4"', '<option integrator="RK4" solver="Newton" iterations="1"')
+    hinges = ((f'name="{name}"', f'frictionloss="0.5" name="{name}"') for name in ("alpha", "beta", "gamma"))
+    joints = ((f"<joint {before}", f"<joint {after}") for before, after in hinges)
+    return str(edited(tmp_path_factory.mktemp("model"), solver, *joints))
 
 
 @pytest.fixture

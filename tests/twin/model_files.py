@@ -3,18 +3,17 @@
 import re
 
 from spheretwin.models import actuator as actuators
+from tests.models.model_files import edited
+
+TEXT = actuators.MJCF_PATH.read_text()
 
 
 def model_file(folder, **numbers):
     """Write the shipped model with other or more numbers, each a number or a list; return its path."""
-    text = actuators.MJCF_PATH.read_text()
+    edits = []
     for name, value in numbers.items():
         data = " ".join(map(repr, value)) if isinstance(value, list) else value
         line = f'<numeric name="{name}" data="{data}"/>'
-        text, count = re.subn(rf'<numeric name="{name}" data="[^"]*"/>', line, text)
-        if not count:
-            text = text.replace("<custom>", f"<custom>{line}")
-    (path := folder / "mine.xml").write_text(
-        text.replace('meshdir="assets"', f'meshdir="{actuators.FOLDER}/assets"')
-    )
-    return str(path)
+        shipped = re.search(rf'<numeric name="{name}" data="[^"]*"/>', TEXT)
+        edits.append((shipped[0], line) if shipped else ("<custom>", f"<custom>{line}"))
+    return str(edited(folder, *edits))

@@ -61,13 +61,9 @@ def test_a_shorted_group_decays_with_its_own_time_constant(tmp_path):
 
 def test_each_group_heats_by_its_own_loss_and_thermal_data(tmp_path):
     capacity_J_K, thermal_K_W = np.linspace(0.1, 0.3, GROUPS), np.linspace(5.0, 2.0, GROUPS)
-    path = model_file(
-        tmp_path,
-        **NUMBERS,
-        group_heat_capacity_J_K=capacity_J_K.tolist(),
-        group_thermal_resistance_K_W=thermal_K_W.tolist(),
-        group_resistance_per_K=0.0,
-    )
+    thermal = {"heat_capacity_J_K": capacity_J_K, "thermal_resistance_K_W": thermal_K_W}
+    numbers = {f"group_{name}": values.tolist() for name, values in thermal.items()}
+    path = model_file(tmp_path, **NUMBERS, **numbers, group_resistance_per_K=0.0)
     chain = chain_of(resolved(path, hardware="electronics", drive__bandwidth_rad_s=1e9).drive)
     chain.amplifier.offset_A[:] = 0.0
     command, current, ticks = np.full(GROUPS, 0.5), np.full(GROUPS, 0.5), 100
@@ -117,10 +113,7 @@ def test_the_record_of_a_run_gives_the_same_values_again(tmp_path):
         ({"group_inductance_H": [9e-4] * 17 + [-1.0]}, "group_inductance_H from 1e-09 to 1e.09, received -1"),
         ({"group_heat_capacity_J_K": 0.0}, "group_heat_capacity_J_K from 0.001 to 1e.06, received 0"),
         ({"group_heat_capacity": 60.0}, "received group_heat_capacity; did you mean group_heat_capacity_J_K"),
-        (
-            {"stator_capacity_J_K": 900.0},
-            "did you mean stator_heat_capacity_J_K",
-        ),
+        ({"stator_capacity_J_K": 900.0}, "did you mean stator_heat_capacity_J_K"),
         ({"coil_turns": [320.0] * 18}, "expected one number coil_turns, received 18"),
     ],
 )

@@ -1,6 +1,7 @@
 """Extreme values at the edges of the package: each call is refused by a typed error or gives finite numbers.
 
-The draws have fixed seeds. `tests/twin/export/test_fuzz_exports.py` has the compiled edges of exports.
+The draws have fixed seeds. `tests/twin/export/test_fuzz_exports.py` has the compiled edges of exports, and
+`tests/twin/machine/link/test_frames.py` the bytes of frames.
 """
 
 import numpy as np
@@ -9,9 +10,6 @@ import pytest
 from spheretwin import plant
 from spheretwin import scenario as scenarios
 from spheretwin.envs import TwinVectorEnv
-from spheretwin.machine.link import frame_format
-from spheretwin.machine.link.codec import Codec
-from spheretwin.machine.link.decoder import Decoder
 from spheretwin.models.base.errors import InputError
 from spheretwin.session import Session
 
@@ -104,9 +102,8 @@ def test_a_step_of_the_plant_is_refused_or_finite():
         changed = parameters
         if draws.chance(0.3):
             name = draws.one_of(tuple(FIELDS))
-            changed = parameters._replace(
-                **{name: draws.array(FIELDS[name]) if FIELDS[name] else draws.number()}
-            )
+            value = draws.array(FIELDS[name]) if FIELDS[name] else draws.number()
+            changed = parameters._replace(**{name: value})
         q, qdot, currents, disturbance = (draws.array(size) for size in (3, 3, 18, 3))
         dt = draws.number() if draws.chance(0.3) else 5e-4
         given = [values.copy() for values in (q, qdot, currents, disturbance)]
@@ -125,10 +122,7 @@ def test_many_plants_refuse_or_advance():
     for _ in range(150):
         plants = plant.Plants([parameters] * 3)
         q, qdot, currents, disturbance = (draws.vector(size) for size in (3, 3, 18, 3))
-        dt, steps = (
-            (draws.value() if draws.chance(0.2) else 5e-4),
-            (draws.value() if draws.chance(0.2) else 2),
-        )
+        dt, steps = (draws.value() if draws.chance(0.2) else usual for usual in (5e-4, 2))
         before = plants.q_rad, plants.qdot_rad_s
         if not attempted(plants.set_state, q, qdot)[0]:
             np.testing.assert_array_equal((plants.q_rad, plants.qdot_rad_s), before)
@@ -191,25 +185,3 @@ def test_an_environment_refuses_or_goes_on_with_finite_numbers(actions):
             steps += 1
             assert all(np.isfinite(numbers).all() for numbers in result[:2])
     assert steps > 50
-
-
-@pytest.mark.parametrize("name", frame_format.shipped())
-@pytest.mark.parametrize("datagrams", [False, True])
-def test_frames_of_any_bytes_raise_nothing_and_count(name, datagrams):
-    draws, codec = Draws(5), Codec(frame_format.load(name).measurement, 18)
-    decoder, fed = Decoder(codec, datagrams=datagrams), 0
-    for sequence in range(400):
-        fields = {"sequence": sequence, "time": draws.number(), "angle": [draws.number() for _ in range(3)]}
-        content = bytearray(codec.encode(fields | {"rate": [draws.number() for _ in range(3)]}))
-        kind = draws.one_of(("whole", "flipped", "cut", "noise"))
-        if kind == "flipped":
-            content[int(draws.generator.integers(len(content)))] ^= 1 << int(draws.generator.integers(8))
-        elif kind == "cut":
-            del content[int(draws.generator.integers(len(content))) :]
-        elif kind == "noise":
-            content = bytearray(draws.generator.bytes(int(draws.generator.integers(200))))
-        frames = decoder.feed(bytes(content))
-        fed += len(frames)
-        assert all(np.shape(frame["angle"]) == (3,) for frame in frames)
-    assert decoder.counts.accepted == fed > 40
-    assert decoder.counts.corrupt > 20

@@ -8,6 +8,7 @@ import pytest
 from spheretwin.models import actuator as actuators
 from spheretwin.models.magnetics import torque_matrix
 from spheretwin.simulation import simulate
+from tests.models.model_files import edited
 
 MIDDLE_RING = re.compile(
     r'(?s)<replicate count="12" euler="0 0 30">\s*<site name="coil_middle".*?</replicate>'
@@ -22,12 +23,9 @@ def groups(request):
 @pytest.fixture
 def model(tmp_path, groups):
     """The shipped actuator without its middle ring of coils, or with twice as many in it."""
-    text = actuators.MJCF_PATH.read_text()
-    ring = MIDDLE_RING.search(text)[0].replace('count="12" euler="0 0 30"', 'count="24" euler="0 0 15"')
-    text = MIDDLE_RING.sub(ring if groups == 24 else "", text)
-    path = tmp_path / f"groups_{groups}.xml"
-    path.write_text(text.replace('meshdir="assets"', f'meshdir="{actuators.FOLDER / "assets"}"'))
-    return path
+    ring = MIDDLE_RING.search(actuators.MJCF_PATH.read_text())[0]
+    double = ring.replace('count="12" euler="0 0 30"', 'count="24" euler="0 0 15"')
+    return edited(tmp_path, (ring, double if groups == 24 else ""))
 
 
 def test_the_matrix_has_a_column_for_each_group(model, groups):

@@ -11,6 +11,7 @@ from spheretwin.models.base.errors import InputError
 from spheretwin.models.telemetry.run_record import Change
 from spheretwin.session import Session
 from spheretwin.simulation import follow
+from tests.models.model_files import edited
 from tests.twin.session_cases import plain_law, write_curve
 
 GAMMA = '<joint name="gamma" axis="0 0 1"/>'
@@ -19,10 +20,7 @@ GAMMA = '<joint name="gamma" axis="0 0 1"/>'
 @pytest.mark.parametrize("chunk", [1, 7, 400])
 def test_the_length_of_a_chunk_does_not_decide_where_an_engine_s_warning_ends_a_run(tmp_path, chunk):
     """A hinge so stiff that the engine counts a bad acceleration within the first tick."""
-    meshes = f'meshdir="{actuators.FOLDER / "assets"}"'
-    stiff = GAMMA.replace("/>", ' stiffness="1e9" springref="90"/>')
-    text = actuators.MJCF_PATH.read_text().replace('meshdir="assets"', meshes).replace(GAMMA, stiff)
-    (path := tmp_path / "stiff.xml").write_text(text)
+    path = edited(tmp_path, (GAMMA, GAMMA.replace("/>", ' stiffness="1e9" springref="90"/>')))
     changes = {"plant.mjcf": str(path), "plant.step_s": 1e-7, "controller.period_s": 1e-7}
     session = Session(scenarios.load("hold", changes))
     rows = 0

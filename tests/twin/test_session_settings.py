@@ -9,17 +9,7 @@ from spheretwin.inputs import BLOCK_TICKS
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.telemetry.run_record import Change
 from spheretwin.models.telemetry.signals import common_signals
-from tests.twin.session_cases import (
-    ENGINES,
-    OWN,
-    REFUSED,
-    SENSED,
-    WORN,
-    compiled_law,
-    rows,
-    same_future,
-    session,
-)
+from tests.twin import session_cases as cases
 
 SIGNALS = [signal.name for signal in common_signals(18)]
 
@@ -47,19 +37,19 @@ KINDS = [
     ("plant.coulomb_Nm", [0.004, 0.004, 0.004], {}),
 ]
 OF_KINDS = [
-    *((engine, *row) for engine in ENGINES for row in KINDS),
-    ("mujoco", "sensors.angle_offset_rad", [0.0, 0.01, 0.0], SENSED),
+    *((engine, *row) for engine in cases.ENGINES for row in KINDS),
+    ("mujoco", "sensors.angle_offset_rad", [0.0, 0.01, 0.0], cases.SENSED),
 ]
 
 
 @pytest.mark.parametrize(("engine", "name", "value", "base"), OF_KINDS, ids=map(str, range(len(OF_KINDS))))
 def test_a_change_acts_from_its_tick_on_and_not_before(engine, name, value, base):
     at, changes = 40 if base is LIMITED else 340, {"plant.engine": engine, "disturbance.load": 1.0} | base
-    unchanged, changed = session(**changes), session(**changes)
+    unchanged, changed = cases.session(**changes), cases.session(**changes)
     before = changed.advance(at)
     changed.set(name, value)
     after, expected = changed.advance(60), unchanged.advance(at + 60)
-    assert rows(before) == rows(expected.rows(0, at))
+    assert cases.rows(before) == cases.rows(expected.rows(0, at))
     assert after["t_s"][0] == expected["t_s"][at]
     # Where the rotor is is what was before; what acts on it from this tick on, or the next, is not.
     np.testing.assert_array_equal(after["q_rad"][0], expected["q_rad"][at])
@@ -68,11 +58,11 @@ def test_a_change_acts_from_its_tick_on_and_not_before(engine, name, value, base
     assert changed.journal == (Change(at, name, value),)
 
 
-@pytest.mark.parametrize("kind", OWN)
+@pytest.mark.parametrize("kind", cases.OWN)
 def test_a_law_object_may_replace_a_shipped_one_and_back(kind):
-    changed = session(name="hold")
+    changed = cases.session(name="hold")
     changed.advance(100)
-    changed.set("controller.law", OWN[kind]())
+    changed.set("controller.law", cases.OWN[kind]())
     table = changed.advance(50)
     np.testing.assert_array_equal(table["calls"], np.arange(1, 51))
     assert changed.scenario.controller.law == "mine"
@@ -87,26 +77,29 @@ def test_a_law_object_may_replace_a_shipped_one_and_back(kind):
 
 @pytest.mark.parametrize(
     ("law", "changes"),
-    [(compiled_law(), {"name": "hold"}), *((None, {"plant.engine": engine} | WORN) for engine in ENGINES)],
-    ids=["law with a memory", *ENGINES],
+    [
+        (cases.compiled_law(), {"name": "hold"}),
+        *((None, {"plant.engine": engine} | cases.WORN) for engine in cases.ENGINES),
+    ],
+    ids=["law with a memory", *cases.ENGINES],
 )
 def test_a_limit_that_is_never_met_may_move_without_a_trace(law, changes):
     """What a law has made of its parameters belongs to it as its memory does; so if it is set once more."""
-    unchanged, changed = session(law, **changes), session(law, **changes)
+    unchanged, changed = cases.session(law, **changes), cases.session(law, **changes)
     for _ in range(4):
         changed.advance(150)
         changed.set("drive.current_limit_A", 7.0 + changed.tick / 1e3)
         changed.set("controller.law", law or "afsm")
     expected = unchanged.advance(1000)
     assert np.abs(expected["current_command_A"]).max() < 7.0
-    assert rows(changed.advance(400)) == rows(expected.rows(600, 1000))
+    assert cases.rows(changed.advance(400)) == cases.rows(expected.rows(600, 1000))
 
 
 def test_a_change_of_the_plant_keeps_the_solver_s_warm_start(sticky):
-    unchanged, changed = session(**{"plant.mjcf": sticky}), session(**{"plant.mjcf": sticky})
+    unchanged, changed = cases.session(**{"plant.mjcf": sticky}), cases.session(**{"plant.mjcf": sticky})
     changed.advance(150)
     changed.set("plant.group_gain", [1.0] * 18)  # what it is when not given
-    assert rows(changed.advance(200)) == rows(unchanged.advance(350).rows(150, 350))
+    assert cases.rows(changed.advance(200)) == cases.rows(unchanged.advance(350).rows(150, 350))
 
 
 SAME = [
@@ -120,26 +113,26 @@ SAME = [
 ]  # fmt: skip
 
 
-@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("engine", cases.ENGINES)
 def test_a_change_to_what_is_changes_no_bit(engine, sticky):
     offset = (0.01, -0.02, 0.005) if engine == "mujoco" else (0.0, 0.0, 0.0)
-    model = {"plant.mjcf": sticky, **SENSED} if engine == "mujoco" else {}
+    model = {"plant.mjcf": sticky, **cases.SENSED} if engine == "mujoco" else {}
     changes = {"plant.engine": engine, "disturbance.load": 1.0, "sensors.angle_offset_rad": offset}
-    changes |= model | WORN
+    changes |= model | cases.WORN
     same = [*SAME, ("sensors.angle_offset_rad", offset)]
-    unchanged, changed = session(**changes), session(**changes)
+    unchanged, changed = cases.session(**changes), cases.session(**changes)
     table = [changed.advance(130)]
     for name, value in same:
         changed.set(name, value)
         table.append(changed.advance(47))
-    assert b"".join(map(rows, table)) == rows(unchanged.advance(130 + 47 * len(same)))
+    assert b"".join(map(cases.rows, table)) == cases.rows(unchanged.advance(130 + 47 * len(same)))
     assert [change.name for change in changed.journal] == [name for name, _ in same]
     assert changed.scenario == unchanged.scenario
 
 
 @pytest.mark.parametrize("at", [1, 500, BLOCK_TICKS, BLOCK_TICKS + 1])
 def test_a_change_of_the_disturbance_does_not_touch_the_random_stream(at):
-    unchanged, changed = session(), session()
+    unchanged, changed = cases.session(), cases.session()
     changed.advance(at)
     changed.set("disturbance.load", 2.0)
     after = changed.advance(2 * BLOCK_TICKS)["disturbance_Nm"]
@@ -151,23 +144,23 @@ def test_a_change_of_the_disturbance_does_not_touch_the_random_stream(at):
     np.testing.assert_array_equal(after, expected)
 
 
-@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("engine", cases.ENGINES)
 def test_a_change_that_is_none_is_refused_and_nothing_changes(engine):
-    changed, unchanged = session(**{"plant.engine": engine}), session(**{"plant.engine": engine})
+    changed, unchanged = cases.session(**{"plant.engine": engine}), cases.session(**{"plant.engine": engine})
     for each in (changed, unchanged):
         each.advance(120)
         each.set("disturbance.load", 1.0)
-    for name, value in REFUSED:
+    for name, value in cases.REFUSED:
         if (engine, value) != ("mujoco", "Euler"):
             with pytest.raises(InputError):
                 changed.set(name, value)
-    assert same_future(changed, unchanged)
+    assert cases.same_future(changed, unchanged)
     assert changed.law.name == "afsm"
 
 
 def test_the_journal_keeps_the_value_that_was_given_then():
     gains = [1.0] * 18
-    changed = session()
+    changed = cases.session()
     changed.set("plant.group_gain", gains)
     gains[0] = 0.0
     changed.set("trajectory", shape := {"shape": "hold", "angle_rad": np.array([0.1, 0.0, 0.0])})

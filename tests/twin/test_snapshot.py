@@ -10,41 +10,30 @@ import pytest
 
 from spheretwin.inputs import BLOCK_TICKS
 from spheretwin.models.base.errors import InputError
-from tests.twin.session_cases import (
-    COMPLETE,
-    ENGINES,
-    OWN,
-    SENSED,
-    SHIPPED,
-    WORN,
-    plain_law,
-    rows,
-    same_future,
-    session,
-)
+from tests.twin import session_cases as cases
 
 
-@pytest.mark.parametrize("engine", ENGINES)
-@pytest.mark.parametrize("law", SHIPPED)
+@pytest.mark.parametrize("engine", cases.ENGINES)
+@pytest.mark.parametrize("law", cases.SHIPPED)
 @pytest.mark.parametrize("at", [0, 1, 437, BLOCK_TICKS, BLOCK_TICKS + 1])
 def test_a_restored_session_goes_on_bit_for_bit(law, engine, at):
-    changes = {"controller.law": law, "plant.engine": engine} | WORN | COMPLETE[engine]
-    original = session(**changes)
+    changes = {"controller.law": law, "plant.engine": engine} | cases.WORN | cases.COMPLETE[engine]
+    original = cases.session(**changes)
     original.advance(at)
     taken = original.snapshot()
-    expected = rows(original.advance(BLOCK_TICKS + 100))
+    expected = cases.rows(original.advance(BLOCK_TICKS + 100))
     original.restore(taken)  # in place
     assert original.tick == at
-    assert rows(original.advance(BLOCK_TICKS + 100)) == expected
-    other = session(name="hold", **{"controller.law": "pd"})  # nothing of it may remain
+    assert cases.rows(original.advance(BLOCK_TICKS + 100)) == expected
+    other = cases.session(name="hold", **{"controller.law": "pd"})  # nothing of it may remain
     other.advance(77)
     other.restore(pickle.loads(pickle.dumps(taken)))
-    assert rows(other.advance(BLOCK_TICKS + 100)) == expected
+    assert cases.rows(other.advance(BLOCK_TICKS + 100)) == expected
     assert other.initial_scenario == original.initial_scenario
 
 
 def test_a_snapshot_is_not_moved_by_what_the_session_does_next():
-    original = session(**WORN)
+    original = cases.session(**cases.WORN)
     original.advance(50)
     taken = original.snapshot()
     before = pickle.dumps(taken)
@@ -62,27 +51,27 @@ def restored(original, other):
     return other
 
 
-@pytest.mark.parametrize("kind", OWN)
+@pytest.mark.parametrize("kind", cases.OWN)
 def test_a_user_s_law_is_restored_with_its_memory_and_its_parameters(kind):
-    original, other = (session(OWN[kind](), name="hold") for _ in range(2))
+    original, other = (cases.session(cases.OWN[kind](), name="hold") for _ in range(2))
     original.advance(120)
-    assert same_future(original, restored(original, other), 300)
+    assert cases.same_future(original, restored(original, other), 300)
     assert other.advance(1)["calls"][0] == 421
 
 
 def test_the_solver_s_warm_start_is_restored(sticky):
-    original, other = (session(**{"plant.mjcf": sticky}) for _ in range(2))
+    original, other = (cases.session(**{"plant.mjcf": sticky}) for _ in range(2))
     original.advance(237)
     restored(original, other)
     # Equal rows alone do not show it: on some processors the solver reaches the same bits from any start.
     one, another = (each._runtime._rotor.rotor.data.qacc_warmstart for each in (original, other))
     assert np.any(one)
     assert np.array_equal(one, another)
-    assert same_future(original, other)
+    assert cases.same_future(original, other)
 
 
 def test_a_session_that_was_changed_is_restored():
-    original = session(**SENSED)
+    original = cases.session(**cases.SENSED)
     original.advance(200)
     for name, value in [
         ("disturbance.load", 1.5), ("plant.payload_kg", 0.05), ("controller.law", "adaptive_fuzzy"),
@@ -91,7 +80,7 @@ def test_a_session_that_was_changed_is_restored():
     ]:  # fmt: skip
         original.set(name, value)
         original.advance(30)
-    assert same_future(original, restored(original, session()), 1000)
+    assert cases.same_future(original, restored(original, cases.session()), 1000)
 
 
 CONTINUED = """
@@ -110,25 +99,25 @@ sys.stdout.buffer.write(other.advance(1100).values.tobytes())
 )
 def test_another_process_goes_on_bit_for_bit(model, sticky):
     changes = {"plant.mjcf": sticky} if model == "sticky" else {"plant.engine": model}
-    original = session(**changes | WORN)
+    original = cases.session(**changes | cases.WORN)
     original.advance(613)
     original.set("disturbance.load", 1.0)
     taken = pickle.dumps(original.snapshot())
     done = subprocess.run([sys.executable, "-c", CONTINUED], input=taken, stdout=subprocess.PIPE, check=True)
-    assert done.stdout == rows(original.advance(1100))
+    assert done.stdout == cases.rows(original.advance(1100))
 
 
 def test_a_snapshot_under_a_law_that_is_missing_is_refused_and_nothing_changes():
-    mine = session(plain_law(), name="hold")
+    mine = cases.session(cases.plain_law(), name="hold")
     mine.advance(10)
     taken = mine.snapshot()
-    for law in (None, plain_law("yours")):
-        other, untouched = session(law, name="hold"), session(law, name="hold")
+    for law in (None, cases.plain_law("yours")):
+        other, untouched = cases.session(law, name="hold"), cases.session(law, name="hold")
         other.advance(5)
         untouched.advance(5)
         with pytest.raises(InputError, match="received one under mine"):
             other.restore(taken)
-        assert same_future(other, untouched)
+        assert cases.same_future(other, untouched)
 
 
 def test_every_part_s_numbers_are_counted_before_anything_is_restored():
@@ -137,10 +126,10 @@ def test_every_part_s_numbers_are_counted_before_anything_is_restored():
         "hardware": "electronics", "detector.detect": True,
         "fault": [{"target": "adc", "mode": "delay", "value": 2e-3, "start_s": 1.0}],
     }  # fmt: skip
-    mine = session(**changes)
+    mine = cases.session(**changes)
     mine.advance(20)
     taken = mine.snapshot()
-    expected = rows(mine.advance(20))
+    expected = cases.rows(mine.advance(20))
     mine.restore(taken)
     machine = taken.runtime
     wrong = [
@@ -161,4 +150,4 @@ def test_every_part_s_numbers_are_counted_before_anything_is_restored():
     ):
         with pytest.raises(InputError, match=part):
             mine.restore(dataclasses.replace(taken, runtime=state))
-    assert rows(mine.advance(20)) == expected
+    assert cases.rows(mine.advance(20)) == expected

@@ -10,10 +10,8 @@ from spheretwin.crosscheck.scale import scale_of
 from spheretwin.models import actuator as actuators
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.magnetics import torque_matrix
-from spheretwin.plant.plant_step import step
-from spheretwin.scenario.reading import FOLDER
-
-SECOND = FOLDER / "ventusff" / "actuator.xml"
+from tests.models.poses import SECOND
+from tests.twin.plant.test_plants import assert_equal, one_by_one, together
 
 
 def test_both_engines_track_and_agree():
@@ -40,27 +38,18 @@ def test_plants_in_lanes_move_as_alone():
     field = parameters[0].magnetics.field
     weaker = parameters[0].magnetics._replace(field=0.5 * field)
     parameters[3] = parameters[3]._replace(magnetics=weaker)
+    ranges = ((0.6, 3), (5, 3), (1, 8), (1e-3, 3))
     rng = np.random.default_rng(0)
-    q, qdot = rng.uniform(-0.6, 0.6, (20, 3)), rng.uniform(-5, 5, (20, 3))
-    currents, disturbance = rng.uniform(-1, 1, (20, 8)), rng.uniform(-1e-3, 1e-3, (20, 3))
-    plants = plant.Plants(parameters)
-    plants.set_state(q, qdot)
-    plants.step(currents, disturbance, 5e-4, 20)
-    for number, one in enumerate(parameters):
-        state = plant.State(q[number], qdot[number])
-        for _ in range(20):
-            state = step(state, currents[number], disturbance[number], one, 5e-4)
-        # Sine and cosine differ by some 1e-16, accelerations are up to 1e3 rad/s².
-        np.testing.assert_allclose(plants.q_rad[number], state.q_rad, rtol=0, atol=1e-13)
-        np.testing.assert_allclose(plants.qdot_rad_s[number], state.qdot_rad_s, rtol=0, atol=1e-11)
+    case = [rng.uniform(-largest, largest, (20, width)) for largest, width in ranges]
+    # Accelerations are up to 1e3 rad/s².
+    assert_equal(together(parameters, *case, 20), one_by_one(parameters, *case, 20))
 
 
 def test_plants_of_different_kinds_are_refused_in_one_line():
     one = plant.parameters("ventusff")
     smaller = one.magnetics._replace(field=one.magnetics.field[:-2])
-    with pytest.raises(
-        InputError, match=r"expected torque fields of 16 coils and \(39, 75, 3\) coefficients"
-    ):
+    message = r"expected torque fields of 16 coils and \(39, 75, 3\) coefficients"
+    with pytest.raises(InputError, match=message):
         plant.Plants([one, one._replace(magnetics=smaller)])
     with pytest.raises(InputError, match="expected 0 pole lines and 8 groups, received 8 and 18"):
         plant.Plants([one, plant.parameters("tilt")])

@@ -11,12 +11,7 @@ from spheretwin.models import actuator as actuators
 from spheretwin.models import mjcf
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.joint_chain import equations, read_chain
-from spheretwin.plant.bristle_friction import (
-    StictionSection,
-    apply_bristles,
-    begin_bristles,
-    bristle_friction,
-)
+from spheretwin.plant import bristle_friction as bearing
 from spheretwin.plant.cable import CableSection
 from spheretwin.plant.friction import friction, slow_down
 from spheretwin.plant.lagrangian_rotor import LagrangianRotor
@@ -198,8 +193,8 @@ def test_friction_gains_no_energy_on_a_general_joint(shipped):
 
 def test_static_friction_gains_no_energy_on_a_general_joint(shipped):
     chain = chain_of(shipped, MassSection(**EVERYTHING), gravity_m_s2=0.0)
-    section = StictionSection(on=True)
-    stage = bristle_friction(section, (5e-3,) * 3, CableSection(), np.full(3, 2e-3), STEP_s, chain)
+    section = bearing.StictionSection(on=True)
+    stage = bearing.bristle_friction(section, (5e-3,) * 3, CableSection(), np.full(3, 2e-3), STEP_s, chain)
     q, torque = np.array([0.3, -0.4, 0.5]), np.zeros(3)
     M = full(equations(chain, tuple(q), (0.0,) * 3)[0])
     qdot = np.array([0.2, -0.1, 0.15])
@@ -213,10 +208,10 @@ def test_static_friction_gains_no_energy_on_a_general_joint(shipped):
         start_q, start_qdot = q.copy(), qdot.copy()
         middle = np.array([0.3, -0.4, 0.5])
         torque[:] = 0.0
-        begin_bristles(stage, middle, q, qdot, torque)
+        bearing.begin_bristles(stage, middle, q, qdot, torque)
         qdot += STEP_s * np.linalg.solve(M, torque)
         q += 0.5 * STEP_s * (qdot + start_qdot)
-        apply_bristles(stage, middle, start_qdot, start_qdot, q, qdot)
+        bearing.apply_bristles(stage, middle, start_qdot, start_qdot, q, qdot)
         assert energy() <= last + 1e-12 * start
         last = energy()
         assert np.abs(q - start_q).max() < 1e-3

@@ -88,6 +88,17 @@ def test_every_frame_with_one_wrong_bit_is_refused(codec):
 
 @pytest.mark.parametrize("name", CODECS)
 @pytest.mark.parametrize("datagrams", [True, False])
+@given(angle=st.tuples(*[st.floats()] * 3), cut=st.floats(0, 1))
+def test_a_frame_of_any_numbers_is_read_and_a_part_of_it_is_not(name, datagrams, angle, cut):
+    codec, decoder = CODECS[name], Decoder(CODECS[name], datagrams=datagrams)
+    frame = codec.encode({"sequence": 1, "time": angle[0], "angle": angle, "rate": angle})
+    shapes = [np.shape(each["angle"]) for each in decoder.feed(frame)]
+    assert shapes == [(3,)] or (shapes == [] and not np.all(np.abs(angle) < 1e30))
+    assert decoder.feed(frame[: int(cut * (len(frame) - 2))]) == []
+
+
+@pytest.mark.parametrize("name", CODECS)
+@pytest.mark.parametrize("datagrams", [True, False])
 @given(content=st.binary(max_size=400), chunk=st.integers(1, 400))
 def test_no_bytes_raise(name, datagrams, content, chunk):
     decoder = Decoder(CODECS[name], datagrams=datagrams)
