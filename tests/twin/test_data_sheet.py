@@ -102,10 +102,6 @@ def controller(changes):
         return numbers(session._runtime._controller)
 
 
-def same_controller(one, other):
-    assert [place for place in one if one[place] != other[place]] == []
-
-
 @pytest.fixture(scope="module")
 def whole():
     return controller(WHOLE)
@@ -119,9 +115,10 @@ def test_the_list_of_what_is_true_is_complete():
 
 @pytest.mark.parametrize("dotted", TRUTH)
 def test_a_change_of_the_truth_does_not_reach_the_controller(dotted, whole):
-    other = WHOLE | {dotted: TRUTH[dotted]}
-    assert resolved(**other).nominal == resolved(**WHOLE).nominal
-    same_controller(controller(other), whole)
+    changes = WHOLE | {dotted: TRUTH[dotted]}
+    assert resolved(**changes).nominal == resolved(**WHOLE).nominal
+    other = controller(changes)
+    assert [place for place in whole if whole[place] != other[place]] == []
 
 
 @pytest.mark.parametrize("hardware", ["ideal", "electronics"])
@@ -238,10 +235,8 @@ def test_a_curve_that_was_resolved_does_not_follow_a_later_one(fields, half):
 def test_only_the_nominal_curve_has_a_shipped_file_by_name(tmp_path, half):
     """A file of the user's named so is found beside the scenario that names it."""
     (tmp_path / "shipped").write_text(Path(half).read_text())
-    text = (tmp_path / "s.toml").write_text
-    text(
-        '[trajectory]\nshape = "hold"\n[plant]\ntorque_curve = "shipped"\n[nominal]\ntorque_curve = "shipped"'
-    )
+    sections = "".join(f'[{name}]\ntorque_curve = "shipped"\n' for name in ("plant", "nominal"))
+    (tmp_path / "s.toml").write_text(f'[trajectory]\nshape = "hold"\n{sections}')
     read = scenarios.load(str(tmp_path / "s.toml"))
     assert (read.plant.torque_curve, read.nominal.torque_curve) == (str(tmp_path / "shipped"), "shipped")
 
@@ -276,17 +271,19 @@ def overwriting(G, torque_S, limit, current, scratch):
     return share
 
 
-@pytest.mark.parametrize(
-    "changes",
-    [{}, WHOLE, {"detector.detect": True, "controller.law": "afsm_eso"}],
-    ids=["plain", "whole", "eso"],
-)
+ESO = {"detector.detect": True, "controller.law": "afsm_eso"}
+
+
+@pytest.mark.parametrize("changes", [{}, WHOLE, ESO], ids=["plain", "whole", "eso"])
 def test_an_allocation_that_overwrites_its_arguments_changes_no_byte(changes, monkeypatch):
     scenario = scenarios.load("hold", {"duration": 0.2, **changes})
     plain = simulate(scenario).telemetry
     assert np.abs(plain["torque_Nm"]).max() > 1e-3
     monkeypatch.setitem(ALLOCATIONS, "least_norm", overwriting)
     assert simulate(scenario).telemetry.values.tobytes() == plain.values.tobytes()
+
+
+WHOLE_LOOP = pytest.mark.release("2.5 s; the ideal loop takes 0.1 s")
 
 
 def springy(t, reference, measurement, parameters, state, torque):
@@ -303,12 +300,7 @@ def careless(t, reference, measurement, parameters, state, torque):
 
 @pytest.mark.parametrize(
     "whole",
-    [
-        False,
-        pytest.param(
-            True, marks=[pytest.mark.uncompiled, pytest.mark.release("2.5 s; the ideal loop takes 0.1 s")]
-        ),
-    ],
+    [False, pytest.param(True, marks=[pytest.mark.uncompiled, WHOLE_LOOP])],
 )
 def test_a_law_that_overwrites_its_arguments_changes_no_byte(whole):
     parts = {name: value for name, value in WHOLE.items() if name != "controller.law"}

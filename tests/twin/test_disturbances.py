@@ -3,17 +3,8 @@
 import numpy as np
 import pytest
 
+from spheretwin import disturbances
 from spheretwin import scenario as scenarios
-from spheretwin.disturbances import (
-    ConstantDisturbance,
-    Disturbance,
-    Draws,
-    RandomDisturbance,
-    SinusoidalDisturbance,
-    StepDisturbance,
-    TableDisturbance,
-    term_draws,
-)
 from spheretwin.models.base.errors import InputError
 from spheretwin.session import Session
 from tests.twin.disturbance_cases import PERIOD, TORQUES, sampled
@@ -22,17 +13,19 @@ from tests.twin.disturbance_cases import PERIOD, TORQUES, sampled
 @pytest.mark.parametrize(("envelope", "sign"), [("decaying", -1), ("growing", 1)])
 def test_random_torque_is_equation_56(envelope, sign):
     """One factor for all axes, uniform from -1 to 1."""
-    draws, t = term_draws(3, 0, 2000, 2), PERIOD * np.arange(2000)
+    draws, t = disturbances.term_draws(3, 0, 2000, 2), PERIOD * np.arange(2000)
     shape = np.stack([np.cos(np.pi * t), -np.sin(np.pi * t), np.exp(sign * np.pi * t)], axis=1)
     expected = (2 * draws[:, None] - 1) * shape
-    paper = Disturbance(random_bound_Nm=0.05, gamma_envelope=envelope).sample(t, Draws(draws, None))
+    paper = disturbances.Disturbance(random_bound_Nm=0.05, gamma_envelope=envelope).sample(
+        t, disturbances.Draws(draws, None)
+    )
     np.testing.assert_allclose(paper, 0.05 * expected, rtol=1e-12, atol=1e-16)
-    term = RandomDisturbance(bound_Nm=(0.05, 0.02, 0.01), gamma_envelope=envelope)
+    term = disturbances.RandomDisturbance(bound_Nm=(0.05, 0.02, 0.01), gamma_envelope=envelope)
     np.testing.assert_allclose(sampled(term, 0, 2000), [0.05, 0.02, 0.01] * expected, rtol=1e-12, atol=1e-16)
 
 
 def test_draws_of_a_term_are_uniform_and_independent():
-    draws = 2 * term_draws(3, 0, 100_000, 2) - 1
+    draws = 2 * disturbances.term_draws(3, 0, 100_000, 2) - 1
     # Mean 0 with variance 1/3, and its estimate with variance (1/5 - 1/9) / n: four standard deviations.
     assert np.abs(draws).max() <= 1
     assert abs(draws.mean()) < 4 * np.sqrt(1 / 3 / 100_000)
@@ -43,31 +36,31 @@ def test_draws_of_a_term_are_uniform_and_independent():
 def test_draws_count_by_tick_for_any_seed():
     far = 10**15
     for seed in (0, 2**200):
-        whole = term_draws(seed, far, 20, 0)
-        assert whole[7:9].tobytes() == term_draws(seed, far + 7, 2, 0).tobytes()
-        assert not np.any(whole == term_draws(seed, far, 20, 1))
+        whole = disturbances.term_draws(seed, far, 20, 0)
+        assert whole[7:9].tobytes() == disturbances.term_draws(seed, far + 7, 2, 0).tobytes()
+        assert not np.any(whole == disturbances.term_draws(seed, far, 20, 1))
         assert len(np.unique(whole)) == 20
 
 
 def test_growing_random_torque_of_bound_zero_is_none():
     """At 300 s the envelope is infinite."""
-    torque = Disturbance(load=1.0, gamma_envelope="growing").sample(
-        np.array([300.0]), Draws(np.ones(1), None)
-    )
+    growing = disturbances.Disturbance(load=1.0, gamma_envelope="growing")
+    torque = growing.sample(np.array([300.0]), disturbances.Draws(np.ones(1), None))
     np.testing.assert_array_equal(torque, [[0.05, 0.05, 0.05]])
 
 
 def test_constant_and_steps_hold_on_each_axis_by_itself():
-    np.testing.assert_array_equal(
-        sampled(ConstantDisturbance(torque_Nm=(1.0, 2.0, 3.0)), 7, 3), [[1, 2, 3]] * 3
+    constant = disturbances.ConstantDisturbance(torque_Nm=(1.0, 2.0, 3.0))
+    np.testing.assert_array_equal(sampled(constant, 7, 3), [[1, 2, 3]] * 3)
+    steps = disturbances.StepDisturbance(
+        times_s=(0.002, 0.004), torques_Nm=((1.0, 0.0, -1.0), (0.0, 5.0, 0.0))
     )
-    steps = StepDisturbance(times_s=(0.002, 0.004), torques_Nm=((1.0, 0.0, -1.0), (0.0, 5.0, 0.0)))
     expected = [[0, 0, 0], [0, 0, 0], [1, 0, -1], [1, 0, -1], [0, 5, 0], [0, 5, 0]]
     np.testing.assert_array_equal(sampled(steps, 0, 6), expected)
 
 
 def test_sinusoidal_swings_on_each_axis_by_itself():
-    term = SinusoidalDisturbance(
+    term = disturbances.SinusoidalDisturbance(
         amplitude_Nm=(0.1, 0.2, 0.3), frequency_Hz=(1.0, 2.0, 0.0), phase_rad=(0.0, np.pi / 2, np.pi / 6)
     )
     quarters = term.sample(np.array([0.0, 0.25, 0.5, 0.75, 1.0]), None)
@@ -77,23 +70,21 @@ def test_sinusoidal_swings_on_each_axis_by_itself():
 
 def test_table_goes_by_its_rows(torques):
     t = np.array([0.0, 0.5, 1.0, 1.5, 1.75, 2.0, 50.0])
-    linear = TableDisturbance(file=torques).sample(t, None)
+    linear = disturbances.TableDisturbance(file=torques).sample(t, None)
     rows = [[0.1, 0, 0], [0.3, -0.2, 0], [0, 0, 0.4]]
     first, second, last = rows
     expected = [first, first, [0.2, -0.1, 0], second, [0.15, -0.1, 0.2], last, last]
     np.testing.assert_allclose(linear, expected, atol=1e-16)
-    steps = TableDisturbance(file=torques, between="held").sample(t, None)
+    steps = disturbances.TableDisturbance(file=torques, between="held").sample(t, None)
     np.testing.assert_array_equal(steps, np.array(rows)[[0, 0, 0, 1, 1, 2, 2]])
 
 
 def test_bad_table_is_refused_on_one_line(tmp_path, torques):
     (tmp_path / "torques.csv").write_text(TORQUES.replace("0.3", "2000"))
     with pytest.raises(InputError) as refusal:
-        TableDisturbance(file=torques)
-    expected = (
-        f"disturbance {torques}: line 3: expected a number from -1000 to 1000 as alpha_Nm, received '2000'"
-    )
-    assert str(refusal.value) == expected
+        disturbances.TableDisturbance(file=torques)
+    expected = "line 3: expected a number from -1000 to 1000 as alpha_Nm, received '2000'"
+    assert str(refusal.value) == f"disturbance {torques}: {expected}"
 
 
 FILE = """
@@ -123,10 +114,12 @@ def test_terms_of_a_scenario_file_add(tmp_path):
     rows = Session(scenarios.load(str(tmp_path / "mine.toml"))).advance(100)
     t = rows["t_s"]
     paper = np.random.default_rng(5).random(1000)[:100]  # the stream of a whole block
-    expected = 0.05 + Disturbance(random_bound_Nm=0.01).sample(t, Draws(paper, lambda place: paper))
+    expected = 0.05 + disturbances.Disturbance(random_bound_Nm=0.01).sample(
+        t, disturbances.Draws(paper, lambda place: paper)
+    )
     expected[:, 0] += np.where((t >= 0.02) & (t < 0.05), 0.01, 0.0)
     expected[:, 1] += np.where(t >= 0.05, 0.02, 0.0)
-    u = 2 * term_draws(5, 0, 100, 1) - 1
+    u = 2 * disturbances.term_draws(5, 0, 100, 1) - 1
     expected[:, 0] += 0.01 * u * np.cos(np.pi * t)
     expected[:, 1] -= 0.02 * u * np.sin(np.pi * t)
     expected[:, 2] += t

@@ -86,11 +86,8 @@ def test_the_descriptor_that_signals_wake_is_the_one_of_before():
 @pytest.mark.parametrize("chunk", [1, 10, 50])
 def test_files_that_begin_later_have_the_rows_and_the_log_from_then_on(tmp_path, monkeypatch, chunk):
     """Faults, events and changes before and at the first tick, and at the edges of chunks, come once."""
-    starts_s, ends_s, times_s = (
-        (0.005, 0.019, 0.02, 0.03),
-        (0.01, 0.02, 0.029, 0.049),
-        (0.019, 0.02, 0.039, 0.04),
-    )
+    starts_s, ends_s = (0.005, 0.019, 0.02, 0.03), (0.01, 0.02, 0.029, 0.049)
+    times_s = (0.019, 0.02, 0.039, 0.04)
     faults = [
         {"target": f"coil.{i:02d}", "mode": "open", "start_s": start_s, "end_s": end_s}
         for i, (start_s, end_s) in enumerate(zip(starts_s, ends_s, strict=True))

@@ -105,7 +105,6 @@ def test_a_regulator_designed_on_the_linear_model_reaches_the_pose():
 @pytest.mark.parametrize("result", [None, ModuleType("control")], ids=["nothing", "a folder of its name"])
 def test_where_it_is_not_to_be_had_it_is_told_in_one_line(result, monkeypatch):
     monkeypatch.setitem(sys.modules, "control", result)
-    with pytest.raises(
-        InputError, match="expected python-control for kind control, which the extra control installs"
-    ):
+    message = "expected python-control for kind control, which the extra control installs"
+    with pytest.raises(InputError, match=message):
         linearise(scenario.load("hold"), kind="control")
