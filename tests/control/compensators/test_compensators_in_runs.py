@@ -110,18 +110,6 @@ def test_a_change_beside_it_moves_no_bit():
         assert changed.advance(67).values.tobytes() == unchanged.advance(100).rows(33, 100).values.tobytes()
 
 
-FILE = """
-from spheretwin.control.law import Law
-from spheretwin.control.law_components.parameters import LawParameters
-
-class Mine(LawParameters):
-    governor: float = 3.0
-
-    def build(self, known):
-        return Law("mine", lambda *_: None, [], [])
-"""
-
-
 @pytest.mark.parametrize("mine", LAWS)
 def test_it_is_set_around_a_law_of_a_user_s_too(mine):
     with Session(tilt(), mine) as session:

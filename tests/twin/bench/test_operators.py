@@ -78,22 +78,3 @@ def test_a_free_rotor_stays_free_when_the_operator_is_gone(shared, clock, mode):
     clock.now += 2 * GONE_s
     shared.advance(1)
     assert (shared.state().mode, shared.state().operator) == ("off", None)
-
-
-def test_the_twin_holds_some_time_after_its_operator_has_left_unless_somebody_takes_over(shared, clock):
-    for client in ("a", "b"):
-        say(shared, "hello", client)
-    say(shared, "jog", "a", rates_rad_s=[0, 0, 1])
-    say(shared, "leave", "a")
-    for still, mode in ((0.9 * GONE_s, "jog"), (0.2 * GONE_s, "hold")):
-        clock.now += still
-        say(shared, "beat", "b")
-        assert shared.state().mode == mode
-    say(shared, "ask", "b")
-    say(shared, "jog", "b", rates_rad_s=[0, 0, 1])
-    say(shared, "ask", "c")
-    say(shared, "leave", "b")
-    for _ in range(4):
-        clock.now += 0.5 * GONE_s
-        say(shared, "beat", "c")
-    assert (shared.state().operator, shared.state().mode) == ("c", "jog")

@@ -9,10 +9,7 @@ from spheretwin.bench import Bench
 from spheretwin.cli.bench import read, settings_of, shape_settings, written
 from spheretwin.models.base.errors import InputError
 from spheretwin.scenario.reading import described_fields, shipped
-
-
-def setting(name, scenario):
-    return next(each for each in settings_of(described_fields(scenario)) if each.name == name)
+from tests.control.test_user_law import FILE
 
 
 @pytest.mark.parametrize("name", shipped())
@@ -31,9 +28,9 @@ def test_what_is_shown_of_a_field_is_read_as_what_it_is(name, hardware):
 
 def test_the_gains_are_those_of_the_law_that_is_in_force():
     scenario = scenarios.load("hold", {"controller.law": "pid", "controller.integral": 3.0})
-    names = {each.name for each in settings_of(described_fields(scenario))}
-    assert "controller.surface_slope" not in names
-    integral = setting("controller.integral", scenario)
+    results = {each.name: each for each in settings_of(described_fields(scenario))}
+    assert "controller.surface_slope" not in results
+    integral = results["controller.integral"]
     assert integral.text == "3 3 3" != integral.default
 
 
@@ -87,27 +84,11 @@ def test_a_shape_with_a_list_of_tables_is_offered_as_it_is():
 
 def test_a_law_of_a_persons_own_is_offered_with_its_own_bounds_and_defaults(tmp_path):
     """A gain of the same name as a shipped law's has its own meaning, bounds and default."""
-    (tmp_path / "mine.py").write_text(OWN)
-    law = f"{tmp_path / 'mine.py'}:Mine"
+    (tmp_path / "mine.py").write_text(FILE)
+    law = f"{tmp_path / 'mine.py'}:Feedback"
     with Bench(scenarios.load("hold", {"plant.engine": "lagrangian", "controller.law": law})) as bench:
         results = {each.name: each for each in settings_of(bench.fields())}
     assert results["controller.law"].text == law
     stiffness = results["controller.stiffness"]
-    assert (stiffness.text, stiffness.default) == ("3 3 3", "3 3 3")
-    assert stiffness.meaning == "my own, > 0, ≤ 1e+09"
-
-
-OWN = """
-from pydantic import Field
-from spheretwin.control.law import Law
-from spheretwin.control.law_components.parameters import LawParameters, PositiveEach, each
-
-def step(t, reference, measurement, parameters, state, torque):
-    torque[:] = 0.0
-
-class Mine(LawParameters):
-    stiffness: PositiveEach = Field(each(3.0), description="my own")
-
-    def build(self, known):
-        return Law("mine", step, [*self.stiffness], [])
-"""
+    assert (stiffness.text, stiffness.default) == ("0.5 0.5 0.5", "0.5 0.5 0.5")
+    assert stiffness.meaning == "of the error, N·m, > 0, ≤ 1e+09"

@@ -3,7 +3,6 @@
 import os
 import re
 import signal
-import socket
 import stat
 import subprocess
 import sys
@@ -23,15 +22,6 @@ from spheretwin.viz.bench.page import Page
 from tests.twin.cli.calls import call, refusal, started
 
 BENCH = ("bench", "hold", "--plant.engine", "lagrangian")
-
-
-def test_a_port_in_use_is_told_in_one_line():
-    with socket.socket() as taken:
-        taken.bind(("127.0.0.1", 0))
-        taken.listen()
-        port = taken.getsockname()[1]
-        message = refusal(*BENCH, "--no-browser", "--port", port)
-    assert message.startswith(f"bench: expected a free port, received {port}")
 
 
 def test_ctrl_c_ends_it_and_what_was_recorded_is_kept(tmp_path):
@@ -85,7 +75,7 @@ def test_a_browser_is_opened_at_the_printed_address_unless_it_is_not_to(monkeypa
     monkeypatch.setattr(Path, "home", lambda: tmp_path)
     code, out, err = call(*BENCH, "--port", "0", *flags)
     address = re.fullmatch(r"bench: (http://127\.0\.0\.1:\d+/\?token=[\w-]+) \(Ctrl-C ends it\)\n", out)[1]
-    assert list(tmp_path.iterdir()) == []
+    assert {path.name for path in tmp_path.iterdir()} <= {".cache"}  # compiled loops
     assert opened == ([] if flags else [(address, 0o600)])
     assert silences == [(7.0 if flags else 2.0,)]
     assert (code, err) == (cli.DONE, "bench: preparing hold\n")

@@ -1,4 +1,4 @@
-"""Common functions of the verbs: JSON, warnings, broken bounds, signals; ends of the command."""
+"""Common functions of the verbs: JSON, signals, ends; warnings and broken bounds are content."""
 
 import io
 import json
@@ -21,7 +21,7 @@ class Peak(NamedTuple):
     others: tuple[float, ...]
 
 
-GOOD, BAD = Check("first", "a", 1, 1.0, 2.0, "reason"), Check("second", "b", 1, 3.0, 2.0, "reason")
+GOOD = Check("first", "a", 1, 1.0, 2.0, "reason")
 
 
 def test_figures_have_json_types(capsys):
@@ -35,18 +35,6 @@ def test_figures_have_json_types(capsys):
         "rows": [GOOD.row(), {"a": None}],
         "text": "é",
     }
-
-
-def test_broken_checks_are_named_on_stderr(capsys):
-    assert common.report_broken("crosscheck", [GOOD])
-    assert capsys.readouterr() == ("", "")
-    assert not common.report_broken("crosscheck", [GOOD, BAD, BAD])
-    assert capsys.readouterr() == ("", "spheretwin: crosscheck: broken: second; second\n")
-
-
-def test_a_warning_is_a_line_on_stderr(capsys):
-    common.warn(line for line in ("a", "b"))
-    assert capsys.readouterr() == ("", "spheretwin: warning: a\nspheretwin: warning: b\n")
 
 
 def test_the_effect_of_a_second_signal_is_explained_once_and_only_after_the_first(monkeypatch, capfd):

@@ -112,7 +112,3 @@ def test_a_value_is_taken_up_to_the_ends_of_its_range(received, capsys, command,
     for text in invalid:
         assert cli.main([*command.split(), f"{flag}={text}"]) == cli.BAD_INPUT
         assert text in capsys.readouterr().err
-
-
-def test_own_metrics_can_be_repeated(received):
-    assert received("simulate", "hold", "--metric", "a:b", "--metric", "c:d")["metric"] == ["a:b", "c:d"]

@@ -12,7 +12,6 @@ from tests.twin.cli.calls import call, refusal
 
 FUNCTIONS = {
     "largest": "return abs(run.telemetry['error_rad']).max(axis=0)",
-    "first_half": "return len(run.telemetry) / run.scenario.ticks",
     "columns": "return [signal.name for signal in run.telemetry.signals]",
     "loud": "return print('looking') or 1",
 }
@@ -50,13 +49,6 @@ def simulated(file, *names, more=("hold", "--duration", "0.05")):
     return call(
         "simulate", *more, "--json", *(text for name in names for text in ("--metric", f"{file}:{name}"))
     )
-
-
-def test_functions_stand_among_the_figures(file):
-    result = simulated(file, "largest", "first_half")
-    assert result.code == 0
-    assert result.json["largest"] == result.json["max_abs_error_rad"]
-    assert result.json["first_half"] == 1.0
 
 
 @pytest.mark.parametrize("name", WITHOUT_FIGURE)

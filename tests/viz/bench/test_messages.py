@@ -16,7 +16,7 @@ from websockets.exceptions import ConnectionClosed
 from spheretwin.viz.bench import server
 from spheretwin.viz.bench.connections import CONTROL, MOST_MESSAGES_PER_S, MOST_WAITING
 from spheretwin.viz.bench.event_handlers import LATEST_INTERVAL_S
-from spheretwin.viz.bench.viser_internals import moved_thing
+from spheretwin.viz.bench.viser_internals import MESSAGES, moved_thing
 from tests.viz.bench.clients import CAMERA, changed, handle_of, is_alive, page_socket, socket_to
 from tests.waiting import wait_for
 
@@ -32,16 +32,14 @@ ANYTHING = st.recursive(
 KINDS = st.sampled_from(
     [
         *["GuiUpdateMessage"] * 6,
-        "ViewerCameraMessage",
-        "CommandTriggerMessage",
-        "SceneNodeClickMessage",
-        "SceneNodeDragMessage",
-        "TransformControlsUpdateMessage",
-        "GuiFormSubmitMessage",
-        "ShareUrlRequest",
-        "FileTransferStartUpload",
-        "RunJavascriptMessage",
-        "GuiCloseModalMessage",
+        *(form.__struct_config__.tag for form in MESSAGES),
+        *(
+            "CommandTriggerMessage",
+            "TransformControlsUpdateMessage",
+            "GuiFormSubmitMessage",
+            "ShareUrlRequest",
+        ),
+        *("FileTransferStartUpload", "RunJavascriptMessage", "GuiCloseModalMessage"),
     ]
 )
 

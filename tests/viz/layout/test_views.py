@@ -4,15 +4,13 @@ import pytest
 from rerun.chunk import RrdReader
 
 from spheretwin import scenario as scenarios
-from spheretwin.provenance import facts_of
 from spheretwin.session import Session
-from spheretwin.simulation import follow
 from spheretwin.viz.layout import layout as blueprints
 from spheretwin.viz.layout.layout import VIEWS
 from spheretwin.viz.layout.view import STYLES, VALUES, VIEW_NAMES, View
 from spheretwin.viz.recording import plots
-from spheretwin.viz.recording.recorder import Recorder
 from tests.viz.recording.panels import layouts
+from tests.viz.recording.recordings import recorded
 
 OPEN = {"target": "coil.00", "mode": "open", "start_s": 0.05, "detection": True}
 
@@ -39,19 +37,11 @@ RUNS = {
 }
 
 
-def recorded(path, name, fields, view="overview"):
-    """Recording of a brief run."""
-    fields = {"duration": 0.3, "plant.engine": "lagrangian", **fields}
-    with Session(scenarios.load(name, fields)) as session:
-        facts = facts_of(session.initial_scenario)
-        with Recorder(session.actuator, session.signals, facts, path=path, shown=view) as recorder:
-            follow(session, session.initial_scenario.ticks, [recorder])
-    return path
-
-
 @pytest.fixture(scope="module", params=RUNS)
 def path(request, tmp_path_factory):
-    return recorded(tmp_path_factory.mktemp("views") / f"{request.param}.rrd", *RUNS[request.param])
+    path, (name, fields) = tmp_path_factory.mktemp("views") / f"{request.param}.rrd", RUNS[request.param]
+    recorded(path, name, **{"duration": 0.3, **fields})
+    return path
 
 
 def contents(layout):
@@ -132,7 +122,7 @@ def test_what_draws_a_signal_finds_its_values_and_its_looks(path):
 @pytest.mark.parametrize("name", ["afsm", "pid", "observer"])
 def test_every_signal_of_a_law_is_in_a_plot(name, tmp_path):
     scenario, fields = RUNS[name]
-    path = recorded(tmp_path / "run.rrd", scenario, {**fields, "duration": 0.02})
+    recorded(path := tmp_path / "run.rrd", scenario, **fields, duration=0.02)
     with Session(scenarios.load(scenario, fields)) as session:
         own = {signal.name for signal in session.law.signals}
     assert own
@@ -149,7 +139,7 @@ def test_a_recording_that_takes_long_is_laid_out_before_its_end_with_its_chosen_
     view, tmp_path, monkeypatch
 ):
     monkeypatch.setattr(plots, "OPENED_AFTER_s", 0.0)
-    path = recorded(tmp_path / "run.rrd", "hold", {"duration": 0.05}, view)
+    recorded(path := tmp_path / "run.rrd", duration=0.05, shown=view)
     opening, whole = layouts(path)
     names = container_names(whole)
     active = [

@@ -17,10 +17,17 @@ def session_and_facts(name="hold", **changes):
     return session, facts_of(session.initial_scenario)
 
 
+def opened(path, name="hold", rate_Hz=None, shown="overview", **changes):
+    """A session of a tenth of a second, and its recorder."""
+    session, facts = session_and_facts(name, **changes)
+    recorder = Recorder(session.actuator, session.signals, facts, path=path, rate_Hz=rate_Hz, shown=shown)
+    return session, recorder
+
+
 def recorded(path, name="hold", **changes):
     """Status of a run that was recorded."""
-    session, facts = session_and_facts(name, **changes)
-    with session, Recorder(session.actuator, session.signals, facts, path=path) as recorder:
+    session, recorder = opened(path, name, **changes)
+    with session, recorder:
         return follow(session, session.initial_scenario.ticks, [recorder])
 
 
@@ -49,9 +56,3 @@ def timed(path, entity, component):
 def telemetry_of(path, signal, entity=TELEMETRY):
     """Times in ns and values (n, size) of a signal of the telemetry, or of its envelope."""
     return series(columns(path, content=f"/{entity}"), entity, "values_0", signal)
-
-
-def opened(path, name="hold", rate_Hz=None, **changes):
-    """A session of a tenth of a second, and its recorder."""
-    session, facts = session_and_facts(name, **changes)
-    return session, Recorder(session.actuator, session.signals, facts, path=path, rate_Hz=rate_Hz)
