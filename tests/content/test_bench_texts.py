@@ -15,7 +15,7 @@ from spheretwin.session import Session
 from spheretwin.trajectories import SHAPES
 from tests.content.content import content_test, scratch
 from tests.content.values import array, lines, plain, tree
-from tests.twin.bench.cases import QUIET, bench
+from tests.twin.bench.cases import QUIET, Clock, bench
 
 VARIABLE = {"missed", "missed_share", "realtime_factor"}
 """Entries of a status that depend on the clock."""
@@ -107,15 +107,6 @@ def a_script_of_commands():
     lines += [f"{signal.name}: {array(table[signal.name])}" for signal in table.signals]
     lines += [(folder / "saved.toml").read_text(encoding="utf-8"), f"journal {metadata.get('journal')}"]
     return "\n".join(lines)
-
-
-class Clock:
-    """Clock of a test."""
-
-    now = 0.0
-
-    def __call__(self):
-        return self.now
 
 
 def a_script_of_operators():

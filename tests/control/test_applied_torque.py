@@ -13,6 +13,7 @@ from spheretwin.models.magnetics import torque_matrix
 from spheretwin.models.telemetry.signals import ANGLES, Signal
 from spheretwin.session import Session
 from spheretwin.simulation import simulate
+from tests.control.compensators.cases import response
 
 PERIOD_S = 1e-3
 BELIEVED = (Signal("believed_Nm", "N·m", 3, "torque of the last period, as believed", ANGLES),)
@@ -27,20 +28,8 @@ def test_mean_current_is_that_of_the_delayed_and_lagged_command(delay, lag_s):
     mine = applied_torque(True, 2, PERIOD_S, delay * PERIOD_S, (2e-4, lag_s))  # the second group is measured
     G, pose = np.zeros((3, 2)), np.zeros(3)
 
-    def command(t):
-        tick = int(np.floor(t / PERIOD_S - delay + 1e-9))
-        return commands[tick] if tick >= 0 else 0.0
-
-    def current(t):  # the exact response, switch by switch
-        if lag_s == 0:
-            return command(t)
-        total = 0.0
-        for tick, value in enumerate(commands):
-            begun = (tick + delay) * PERIOD_S
-            step = value - (commands[tick - 1] if tick else 0.0)
-            if t > begun:
-                total += step * -np.expm1(-(t - begun) / lag_s)
-        return total
+    def current(t):
+        return response(commands, (np.arange(len(commands)) + delay) * PERIOD_S, lag_s, t)
 
     for tick in range(len(commands)):
         estimate_applied_torque(mine, pose, G, np.repeat(commands[tick], 2))

@@ -5,8 +5,9 @@ import numpy as np
 from spheretwin import cli
 from spheretwin import scenario as scenarios
 from spheretwin.bench import Bench
-from spheretwin.models.telemetry.signals import common_signals, width
-from spheretwin.models.telemetry.table import Table, read_parquet
+from spheretwin.models.telemetry.signals import common_signals
+from spheretwin.models.telemetry.table import read_parquet
+from tests.viz.tables import table_of
 
 GROUPS = 18
 
@@ -30,6 +31,15 @@ MODES = {
     "jog": {"rates_rad_s": [0.05, -0.1, 0.3]},
     "manual": {"group": 5, "current_A": 0.1},
 }
+
+
+class Clock:
+    """Clock of a test."""
+
+    now = 0.0
+
+    def __call__(self):
+        return self.now
 
 
 def bench(name="sinusoid", **changes):
@@ -73,8 +83,4 @@ def same_when_replayed(path):
 
 def table(first, last, more=()):
     """Rows of the ticks of a run at rest, with the signals that all runs have, and more."""
-    signals = (*common_signals(GROUPS), *more)
-    rows = Table(signals, np.zeros((last - first, width(signals))))
-    rows["t_s"][:] = 1e-3 * np.arange(first, last)
-    rows["allocation_scale"][:] = 1.0
-    return rows
+    return table_of((*common_signals(GROUPS), *more), 1e-3 * np.arange(first, last), allocation_scale=1.0)

@@ -5,14 +5,7 @@ import pytest
 from spheretwin import scenario as scenarios
 from spheretwin.bench import Bench
 from spheretwin.bench.operators import GONE_s, Operators
-from tests.twin.bench.cases import FREE, done
-
-
-class Clock:
-    now = 0.0
-
-    def __call__(self):
-        return self.now
+from tests.twin.bench.cases import FREE, Clock, done
 
 
 @pytest.fixture

@@ -4,10 +4,10 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from spheretwin.models.telemetry.signals import common_signals, width
-from spheretwin.models.telemetry.table import Table
+from spheretwin.models.telemetry.signals import common_signals
 from spheretwin.viz.comparison.runs import ComparedRun, EarlyEnd
 from spheretwin.viz.quantities import Quantity, QuantityRows
+from tests.viz.tables import table_of
 
 PERIOD_s = 1e-3
 T_s = PERIOD_s * np.arange(4000)
@@ -23,9 +23,7 @@ VALUE = Quantity("value", "rad", "value", lambda rows: rows.table["q_rad"][:, :1
 
 
 def run_of(values, label="1 made: pd", law="pd", status=None, period_s=PERIOD_s, events=(), start_s=0.0):
-    signals = common_signals(18)
-    table = Table(signals, np.zeros((len(values), width(signals))))
-    table["t_s"][:] = start_s + period_s * np.arange(len(values))
+    table = table_of(common_signals(18), start_s + period_s * np.arange(len(values)))
     table["q_rad"][:, 0] = values
     end = EarlyEnd(float(table["t_s"][-1]), status, "the reason") if status else None
     rows = QuantityRows(table, table.rows(0, 1), SimpleNamespace(), 8.0)

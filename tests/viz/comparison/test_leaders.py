@@ -3,17 +3,14 @@
 import numpy as np
 import pytest
 
-from spheretwin.models.telemetry.signals import common_signals, width
-from spheretwin.models.telemetry.table import Table
+from spheretwin.models.telemetry.signals import common_signals
 from spheretwin.viz.comparison.runs import leaders
+from tests.viz.tables import table_of
 
 
 def reference(rows, period_s, rate=1.0):
-    signals = common_signals(3)
-    table = Table(signals, np.zeros((rows, width(signals))))
-    table["t_s"][:] = np.arange(rows) * period_s
-    table["q_ref_rad"][:] = np.sin(rate * table["t_s"])[:, None]
-    return table
+    t_s = np.arange(rows) * period_s
+    return table_of(common_signals(3), t_s, q_ref_rad=np.sin(rate * t_s)[:, None])
 
 
 @pytest.mark.parametrize(

@@ -5,9 +5,8 @@ from rerun.chunk import RrdReader
 
 from spheretwin import scenario as scenarios
 from spheretwin.session import Session
-from spheretwin.viz.layout import layout as blueprints
 from spheretwin.viz.layout.layout import VIEWS
-from spheretwin.viz.layout.view import STYLES, VALUES, VIEW_NAMES, View
+from spheretwin.viz.layout.view import STYLES, VALUES, VIEW_NAMES
 from spheretwin.viz.recording import plots
 from tests.viz.recording.panels import layouts
 from tests.viz.recording.recordings import recorded
@@ -152,10 +151,3 @@ def test_a_recording_that_takes_long_is_laid_out_before_its_end_with_its_chosen_
     assert set(container_names(opening).values()) & set(VIEW_NAMES) == {view}
     entities = {chunk.entity_path for chunk in RrdReader(path).stream()}
     assert all(exists(each, entities) for each in contents(opening))
-
-
-@pytest.mark.parametrize(("live", "played"), [(True, ("following", "off")), (False, ("playing", "all"))])
-def test_a_live_view_follows_the_run_and_a_recording_is_played_in_a_loop(live, played):
-    view = View(1.0, 8.0, 18, (), live=live)
-    for shown in (blueprints.layout(view), blueprints.opening_layout(view)):
-        assert (shown.time_panel.play_state, shown.time_panel.loop_mode) == played

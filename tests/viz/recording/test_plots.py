@@ -5,14 +5,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from spheretwin.models.telemetry.signals import Signal, width
+from spheretwin.models.telemetry.signals import Signal
 from spheretwin.models.telemetry.status import QUIET_S, Status
-from spheretwin.models.telemetry.table import Table
 from spheretwin.viz.decimation import FIRST_CHUNK_S, TimeBins
 from spheretwin.viz.layout.extents import SPANS, ExtentTracker, PlotChannel
 from spheretwin.viz.recording.status import LEVELS, LimitSpells
 from spheretwin.viz.recording.summary import Summary
 from tests.viz.recording.recordings import session_and_facts
+from tests.viz.tables import table_of
 
 TICK_s = 1e-3
 
@@ -90,8 +90,7 @@ def slow_spells(t_s, levels):
 
 @given(st.lists(st.tuples(st.integers(1, 290), st.integers(1, 2)), max_size=5), st.sets(st.integers(1, 299)))
 def test_times_at_a_limit_are_logged_once_for_any_chunks(limited, cuts):
-    table = Table(LIMIT_SIGNALS, np.zeros((300, width(LIMIT_SIGNALS))))
-    table["t_s"][:], table["allocation_scale"][:] = TICK_s * np.arange(300), 1.0
+    table = table_of(LIMIT_SIGNALS, TICK_s * np.arange(300), allocation_scale=1.0)
     levels = np.zeros(300, dtype=int)
     for tick, level in limited:
         levels[tick : tick + 3] = np.maximum(levels[tick : tick + 3], level)
@@ -136,9 +135,8 @@ def facts_with_faults():
 
 @given(st.sets(st.integers(1, 99)))
 def test_the_headline_names_each_fault_its_start_and_its_detection(facts_with_faults, cuts):
-    table = Table(FAULT_SIGNALS, np.zeros((100, width(FAULT_SIGNALS))))
-    table["t_s"][:], table["allocation_scale"][:] = TICK_s * np.arange(100), 1.0
-    table["time_to_detection_s"][:] = -1.0
+    at_s = TICK_s * np.arange(100)
+    table = table_of(FAULT_SIGNALS, at_s, allocation_scale=1.0, time_to_detection_s=-1.0)
     table["fault"][20:, 1], table["fault"][40:60, 0] = 2, 1
     table["time_to_detection_s"][25:, 1], table["group_out"][25:, 1] = 0.005, 2
     table["failsafe_reason"][90:] = 1

@@ -5,9 +5,9 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from spheretwin.models.telemetry.signals import Signal, width
+from spheretwin.models.telemetry.signals import Signal
 from spheretwin.models.telemetry.status import QUIET_S, Events, Status
-from spheretwin.models.telemetry.table import Table
+from tests.viz.tables import table_of
 
 TICKS = 200
 TICK_s = 0.01
@@ -15,16 +15,10 @@ TICK_s = 0.01
 SIGNALS = (Signal("t_s", "s", 1, "time"), Signal("allocation_scale", "1", 1, "share"))
 
 
-def rows(t_s, scale):
-    table = Table(SIGNALS, np.zeros((len(t_s), width(SIGNALS))))
-    table["t_s"][:], table["allocation_scale"][:] = t_s, scale
-    return table
-
-
 @pytest.mark.parametrize("status", Status)
 def test_every_status_ends_a_log(status):
     events = Events()
-    events.of(rows([0.0, 0.5], [1.0, 1.0]))
+    events.of(table_of(SIGNALS, [0.0, 0.5], allocation_scale=[1.0, 1.0]))
     assert events.end(status) == (0.5, status.level, status.text)
 
 
@@ -53,9 +47,9 @@ def test_limits_are_reported_once_for_any_chunks(limited, cuts):
     t_s, scale = TICK_s * np.arange(TICKS), np.ones(TICKS)
     for tick, value in limited:
         scale[tick] = value
-    events, results = Events(), []
+    events, results, whole = Events(), [], table_of(SIGNALS, t_s, allocation_scale=scale)
     for first, last in zip([0, *sorted(cuts)], [*sorted(cuts), TICKS], strict=True):
-        results += events.of(rows(t_s[first:last], scale[first:last]))
+        results += events.of(whole.rows(first, last))
     expected = slow_messages(t_s, scale)
     assert [t_s for t_s, _, _ in results] == [t_s for t_s, _ in expected]
     assert all(text in results[i][2] for i, (_, text) in enumerate(expected))

@@ -5,9 +5,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from spheretwin.models.telemetry.signals import Signal, width
-from spheretwin.models.telemetry.table import Table
+from spheretwin.models.telemetry.signals import Signal
 from spheretwin.viz.recording.status import StateChanges
+from tests.viz.tables import table_of
 
 SIGNALS = (
     Signal("t_s", "s", 1, "time"),
@@ -19,11 +19,8 @@ ROWS = 30
 
 
 def table(values):
-    made = Table(SIGNALS, np.zeros((len(values), width(SIGNALS))))
-    made["t_s"][:] = 0.1 * np.arange(len(values))
-    made["part"][:], made["alone"][:] = values[:, :2], values[:, 2]
-    made["current_A"][:] = np.arange(len(values))
-    return made
+    ticks = np.arange(len(values))
+    return table_of(SIGNALS, 0.1 * ticks, part=values[:, :2], alone=values[:, 2], current_A=ticks)
 
 
 def lanes(whole, cuts):
