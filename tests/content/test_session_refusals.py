@@ -21,6 +21,7 @@ from tests.content.content import content_test, refusal, scratch
 from tests.content.test_refusals import listed
 from tests.control.test_manual_currents import series_file
 from tests.control.test_user_law import FILE
+from tests.models.model_files import edited
 from tests.twin.plant import user_models
 from tests.twin.session_cases import ENGINES, REFUSED, session
 
@@ -147,7 +148,7 @@ def invalid_sessions():
         begin({"controller.law": f"{path}:{'Feedback' if name == 'governor' else name}", **given})
 
     def of_model(name):
-        (path := folder / "model.xml").write_text(user_models.edited(user_models.REFUSED[name]))
+        path = edited(folder, *user_models.REFUSED[name], name="model.xml")
         begin({"plant.mjcf": str(path)})
 
     lines = [listed(begin, SCENARIOS), listed(of_file, list(SOURCES)), listed(of_model, user_models.REFUSED)]

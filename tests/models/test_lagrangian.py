@@ -30,9 +30,7 @@ def test_coriolis_matrix_has_the_christoffel_symbols_of_the_inertia_matrix(actua
         dM = np.stack(
             [inertia_matrix(q + d, actuator.inertia) - inertia_matrix(q - d, actuator.inertia) for d in steps]
         ) / (2 * h)  # dM[k] = dM/dq_k
-        christoffel = 0.5 * (
-            np.einsum("kij->ijk", dM) + np.einsum("jik->ijk", dM) - np.einsum("ijk->ijk", dM)
-        )
+        christoffel = 0.5 * (np.einsum("kij->ijk", dM) + np.einsum("jik->ijk", dM) - dM)
         expected = christoffel @ qdot
         # Central differences of products of inertias near 2e-3: h² and rounding over h, times 50 rad/s.
         np.testing.assert_allclose(coriolis_matrix(q, qdot, actuator.inertia), expected, atol=1e-10)

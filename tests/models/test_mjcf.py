@@ -104,10 +104,8 @@ def test_an_edited_include_is_read_again(tmp_path, inner, name, middle):
 def test_text_that_moves_from_one_include_to_the_next_is_a_change(tmp_path):
     mass, size = 'mass="1.6"', 'mass="1.7"'
     first = included(tmp_path, "a.xml", "a.xml")
-    text = first.read_text().replace(
-        '<include file="a.xml"/>', '<include file="a.xml"/><!-- file="b.xml" file="c.xml" -->'
-    )
-    first.write_text(text)
+    include = '<include file="a.xml"/>'
+    first.write_text(first.read_text().replace(include, f'{include}<!-- file="b.xml" file="c.xml" -->'))
     (tmp_path / "b.xml").write_text(f"<mujoco/>{mass}{size}")
     (tmp_path / "c.xml").write_text("<mujoco/>")
     original = mjcf.read(first)
@@ -118,9 +116,8 @@ def test_text_that_moves_from_one_include_to_the_next_is_a_change(tmp_path):
 
 def test_files_that_name_each_other_are_looked_into_once(tmp_path):
     (folder := tmp_path / "parts").mkdir()
-    path = included(
-        tmp_path, "parts/rotor.xml", "parts/rotor.xml", '<!-- file="../mine.xml" file="rotor.xml" -->'
-    )
+    names = '<!-- file="../mine.xml" file="rotor.xml" -->'
+    path = included(tmp_path, "parts/rotor.xml", "parts/rotor.xml", names)
     assert inertia(path)[0] == 2.219e-3
     (folder / "loop.xml").symlink_to("loop.xml")
     (folder / "rotor.xml").write_text(f'<mujoco><!-- file="loop.xml" -->{INERTIAL}</mujoco>')

@@ -63,8 +63,7 @@ def test_with_a_torque_field_a_pole_is_drawn_as_the_cylinder_around_it(tmp_path,
 
 def test_errors_of_placement_are_to_the_east_and_to_the_north(actuator):
     """The frames do not depend on rounding: an axis next to another has a frame next to it."""
-    axes = [*actuator.coil_axes, *actuator.pole_axes]
-    for axis in axes:
+    for axis in [*actuator.coil_axes, *actuator.pole_axes]:
         east, north, up = frame_of_axis(axis).T
         assert abs(east[2]) < 1e-15
         assert north[2] > 0
@@ -73,9 +72,8 @@ def test_errors_of_placement_are_to_the_east_and_to_the_north(actuator):
         for component in range(3):
             moved = axis.copy()
             moved[component] += 1e-12
-            assert frame_of_axis(moved / (moved @ moved) ** 0.5) == pytest.approx(
-                frame_of_axis(axis), abs=1e-11
-            )
+            near = frame_of_axis(moved / (moved @ moved) ** 0.5)
+            assert near == pytest.approx(frame_of_axis(axis), abs=1e-11)
 
 
 @pytest.mark.parametrize(

@@ -56,9 +56,8 @@ def test_strengths_are_exact(seed, gain):
     (q,) = poses(rng, 1)
     summed = summed_torque_matrix(q, ACTUATOR, errors)
     # The curve beyond 90 degrees, with the other weight, is 4e-4 of its peak.
-    np.testing.assert_allclose(
-        compiled(q, ACTUATOR, errors), summed, rtol=0, atol=(1e-6 + 1e-3 * gain) * np.abs(summed).max()
-    )
+    bound = (1e-6 + 1e-3 * gain) * np.abs(summed).max()
+    np.testing.assert_allclose(compiled(q, ACTUATOR, errors), summed, rtol=0, atol=bound)
 
 
 @pytest.mark.parametrize(("angle_rad", "distance_m"), [(1e-2, 0.0), (0.0, 3e-4)])
@@ -78,9 +77,7 @@ def test_errors_of_placement_vanish_with_their_square(angle_rad, distance_m):
     assert left[0.5] / left[0.25] == pytest.approx(4.0, rel=0.15)
 
 
-@pytest.mark.release(
-    "direct sums for 1.6 s; test_errors_of_placement_vanish_with_their_square has their order"
-)
+@pytest.mark.release("direct sums for 1.6 s; test_errors_of_placement_vanish_with_their_square is in less")
 def test_one_moved_pole_and_one_moved_coil_are_where_their_errors_say():
     """The sum over displaced conductors in the field of displaced magnets, with nothing but geometry."""
     table = [np.zeros((parts, 4)) for parts in PARTS]
@@ -99,10 +96,8 @@ def test_one_moved_pole_and_one_moved_coil_are_where_their_errors_say():
 
 def test_constant_currents_do_no_work_around_a_closed_path():
     """The torque is the slope of the co-energy, for scattered parts too."""
-    errors = scatter(np.random.default_rng(2), 0.1)
-    work, power = work_around_a_closed_path(
-        lambda q: summed_torque_matrix(q, ACTUATOR, errors), PARTS[1] // 2
-    )
+    errors, groups = scatter(np.random.default_rng(2), 0.1), PARTS[1] // 2
+    work, power = work_around_a_closed_path(lambda q: summed_torque_matrix(q, ACTUATOR, errors), groups)
     assert abs(work) < 1e-4 * power
 
 

@@ -44,9 +44,7 @@ def random_axes(count, seed=0):
     return axes / np.linalg.norm(axes, axis=1, keepdims=True)
 
 
-@pytest.fixture(scope="module")
-def second():
-    return actuators.load(SECOND)
+VENTUSFF = actuators.load(SECOND)
 
 
 def test_the_shipped_actuator_is_the_same_as_a_curve_and_as_a_field(actuator):
@@ -56,8 +54,8 @@ def test_the_shipped_actuator_is_the_same_as_a_curve_and_as_a_field(actuator):
         assert np.abs(difference).max() < 1e-4 * actuator.torque_curve.peak_Nm_per_A
 
 
-def test_the_spline_is_the_product_of_periodic_cubic_splines(second):
-    samples = second.torque_data.torque_Nm_per_A
+def test_the_spline_is_the_product_of_periodic_cubic_splines():
+    samples = VENTUSFF.torque_data.torque_Nm_per_A
     beyond = np.roll(samples[-2::-1], samples.shape[1] // 2, axis=1)  # down the opposite meridian
     torus = np.concatenate([samples, beyond])
     torus = np.concatenate([torus, torus[:, :1]], axis=1)
@@ -66,7 +64,7 @@ def test_the_spline_is_the_product_of_periodic_cubic_splines(second):
     for axis in random_axes(50):
         theta, azimuth = np.arccos(axis[2]), np.arctan2(axis[1], axis[0]) % (2 * np.pi)
         expected = CubicSpline(phi, along_theta(theta), bc_type="periodic")(azimuth)
-        assert_allclose(second.torque_data.torque(axis[None])[0], expected, rtol=0, atol=1e-15)
+        assert_allclose(VENTUSFF.torque_data.torque(axis[None])[0], expected, rtol=0, atol=1e-15)
 
 
 def test_the_error_of_the_spline_falls_with_the_fourth_power_of_the_step():
@@ -78,89 +76,84 @@ def test_the_error_of_the_spline_falls_with_the_fourth_power_of_the_step():
     assert_allclose(orders, 4, atol=0.3)  # the next power at steps of 12 degrees
 
 
-def test_the_second_actuator_has_the_harmonics_of_its_firmware(second):
-    samples = second.torque_data.torque_Nm_per_A
+def test_the_second_actuator_has_the_harmonics_of_its_firmware():
+    samples = VENTUSFF.torque_data.torque_Nm_per_A
     expected = harmonics(directions(*samples.shape[:2]))
     assert_allclose(samples, expected, rtol=0, atol=1e-9)  # decimals of the file
-    assert second.torque_data.peak_Nm_per_A == pytest.approx(0.0197, abs=5e-5)
+    assert VENTUSFF.torque_data.peak_Nm_per_A == pytest.approx(0.0197, abs=5e-5)
     axes = random_axes(2000)
-    error = np.abs(second.torque_data.torque(axes) - harmonics(axes)).max()
-    assert error < 5e-5 * second.torque_data.peak_Nm_per_A  # as the head of the file says
+    error = np.abs(VENTUSFF.torque_data.torque(axes) - harmonics(axes)).max()
+    assert error < 5e-5 * VENTUSFF.torque_data.peak_Nm_per_A  # as the head of the file says
 
 
-def test_poles_of_the_sphere_are_no_seam(second):
+def test_poles_of_the_sphere_are_no_seam():
     for z in (1.0, -1.0):
         ring = np.array([[1e-9 * np.cos(a), 1e-9 * np.sin(a), z] for a in np.linspace(0, 2 * np.pi, 13)])
-        values = second.torque_data.torque(ring)
+        values = VENTUSFF.torque_data.torque(ring)
         # Slopes of some 0.1 N·m/A per radian, over 1e-9.
         assert_allclose(values, np.broadcast_to(values[0], values.shape), rtol=0, atol=1e-9)
     axes = np.array([[-1.0, 1e-17, 0.0], [-1.0, -1e-17, 0.0], [1.0, 0.0, 0.0], [1.0, -1e-17, 0.0]])
-    first, last, start, end = second.torque_data.torque(axes)
+    first, last, start, end = VENTUSFF.torque_data.torque(axes)
     assert_allclose([first, start], [last, end], rtol=0, atol=1e-15)
 
 
-def test_a_positive_current_attracts_a_north_pole(second):
+def test_a_positive_current_attracts_a_north_pole():
     """The polarities that the model file draws agree with the sign of the field."""
-    field = second.torque_data
-    for pole, polarity in zip(second.pole_axes, second.pole_polarity, strict=True):
+    field = VENTUSFF.torque_data
+    for pole, polarity in zip(VENTUSFF.pole_axes, VENTUSFF.pole_polarity, strict=True):
         for side in np.linalg.svd(pole[None])[2][1:]:
             coil = (pole + 0.1 * side) / np.hypot(1, 0.1)
             torque = field.torque(coil[None])[0]
             assert polarity * (torque @ np.cross(pole, coil)) > 0
 
 
-def test_the_matrix_sums_coils_by_the_groups_and_directions_of_the_model_file(second):
-    assert second.groups.tolist() == [[0, 4], [1, 5], [2, 6], [3, 7], [8, 9], [10, 11], [12, 13], [14, 15]]
-    assert second.coil_direction.tolist() == [1] * 4 + [-1] * 4 + [1] * 8
+def test_the_matrix_sums_coils_by_the_groups_and_directions_of_the_model_file():
+    assert VENTUSFF.groups.tolist() == [[0, 4], [1, 5], [2, 6], [3, 7], [8, 9], [10, 11], [12, 13], [14, 15]]
+    assert VENTUSFF.coil_direction.tolist() == [1] * 4 + [-1] * 4 + [1] * 8
     for q in random_poses(100):
-        of_coils = second.torque_data.torque(second.coil_axes @ rotation(q)) @ rotation(q).T
-        expected = (second.coil_direction[:, None] * of_coils)[second.groups].sum(axis=1).T
+        of_coils = VENTUSFF.torque_data.torque(VENTUSFF.coil_axes @ rotation(q)) @ rotation(q).T
+        expected = (VENTUSFF.coil_direction[:, None] * of_coils)[VENTUSFF.groups].sum(axis=1).T
         # The same polynomials, summed in another order: rounding of torques of 0.02 N·m/A.
-        assert_allclose(magnetics.torque_matrix(q, second), expected, rtol=0, atol=1e-16 * 32)
+        assert_allclose(magnetics.torque_matrix(q, VENTUSFF), expected, rtol=0, atol=1e-16 * 32)
 
 
-def test_inductances_follow_the_directions_of_the_currents(second):
-    reversed_group = second.coil_direction.copy()
+def test_inductances_follow_the_directions_of_the_currents():
+    reversed_group = VENTUSFF.coil_direction.copy()
     reversed_group[[1, 5]] *= -1
-    M, turned = (mutual_inductance(each) for each in (second, replace(second, coil_direction=reversed_group)))
+    actuators_of = (VENTUSFF, replace(VENTUSFF, coil_direction=reversed_group))
+    M, turned = map(mutual_inductance, actuators_of)
     sign = np.ones(8)
     sign[1] = -1
     assert_allclose(turned, M * np.outer(sign, sign), rtol=1e-12)
     assert np.abs(M).max() > 0
 
 
-def test_a_scaled_model_has_scaled_torques(second):
-    model, q, G = (
-        magnetics.scaled(magnetics.torque_model(second), 1.2),
-        np.array([0.1, 0.2, 0.3]),
-        np.empty((3, 8)),
-    )
+def test_a_scaled_model_has_scaled_torques():
+    q, G = np.array([0.1, 0.2, 0.3]), np.empty((3, 8))
+    model = magnetics.scaled(magnetics.torque_model(VENTUSFF), 1.2)
     magnetics.fill_torque_matrix(q, model, G, magnetics.scratch_of(model))
-    assert_allclose(G, 1.2 * magnetics.torque_matrix(q, second), rtol=0, atol=1e-16)  # rounding
+    assert_allclose(G, 1.2 * magnetics.torque_matrix(q, VENTUSFF), rtol=0, atol=1e-16)  # rounding
 
 
-def test_scatter_of_coils_is_exact_and_of_poles_is_refused(second):
-    rng, errors = np.random.default_rng(4), no_scatter(second)
-    coils = errors.coils._replace(
-        gain=rng.uniform(-0.1, 0.1, 16), angle_rad=rng.uniform(-0.02, 0.02, (16, 2))
-    )
+def test_scatter_of_coils_is_exact_and_of_poles_is_refused():
+    rng, errors = np.random.default_rng(4), no_scatter(VENTUSFF)
+    gain, angle_rad = rng.uniform(-0.1, 0.1, 16), rng.uniform(-0.02, 0.02, (16, 2))
+    coils = errors.coils._replace(gain=gain, angle_rad=angle_rad)
     scatter, G = errors._replace(coils=coils), np.empty((3, 8))
-    model = scattered_model(second, scatter)
+    model = scattered_model(VENTUSFF, scatter)
     for q in random_poses(5):
         magnetics.fill_torque_matrix(q, model, G, magnetics.scratch_of(model))
-        assert_allclose(G, summed_torque_matrix(q, second, scatter), rtol=0, atol=1e-15)
-        assert np.abs(G - magnetics.torque_matrix(q, second)).max() > 1e-4
+        assert_allclose(G, summed_torque_matrix(q, VENTUSFF, scatter), rtol=0, atol=1e-15)
+        assert np.abs(G - magnetics.torque_matrix(q, VENTUSFF)).max() > 1e-4
     poles = errors.poles._replace(gain=np.full(8, 0.01))
-    for wrong in (
-        errors._replace(poles=poles),
-        errors._replace(coils=coils._replace(distance_m=np.ones(16))),
-    ):
+    distant = errors._replace(coils=coils._replace(distance_m=np.ones(16)))
+    for wrong in (errors._replace(poles=poles), distant):
         with pytest.raises(InputError, match="errors of the coils' gain and angle alone"):
-            scattered_model(second, wrong)
+            scattered_model(VENTUSFF, wrong)
 
 
-def test_a_file_is_read_back_in_any_order(tmp_path, second):
-    field = second.torque_data
+def test_a_file_is_read_back_in_any_order(tmp_path):
+    field = VENTUSFF.torque_data
     lines = torque_field.to_csv(field, ["Where from"]).splitlines()
     rows = np.random.default_rng(0).permutation(lines[2:]).tolist()
     (path := tmp_path / "field.csv").write_text("\n".join([*lines[:2], *rows]))
@@ -171,12 +164,11 @@ def test_a_file_is_read_back_in_any_order(tmp_path, second):
     assert isinstance(torque_field.read(actuators.TORQUE_CURVE_PATH), TorqueCurve)
 
 
-def test_the_coil_of_a_computed_field_is_compared_with_the_model(tmp_path, second):
-    field = replace(second.torque_data, computed_for={"coil turns": 300.0, "coil distance_m": 0.037})
-    assert magnetics.disagreements(replace(second, torque_data=field)) == [
-        "torque field torque_field.csv was computed for coil turns 300, the model has 400"
-    ]
-    assert magnetics.disagreements(second) == []
+def test_the_coil_of_a_computed_field_is_compared_with_the_model(tmp_path):
+    field = replace(VENTUSFF.torque_data, computed_for={"coil turns": 300.0, "coil distance_m": 0.037})
+    line = "torque field torque_field.csv was computed for coil turns 300, the model has 400"
+    assert magnetics.disagreements(replace(VENTUSFF, torque_data=field)) == [line]
+    assert magnetics.disagreements(VENTUSFF) == []
 
 
 def written(tmp_path, *replacements):
@@ -201,14 +193,13 @@ def test_a_group_may_have_one_coil(tmp_path):
     assert_allclose(magnetics.torque_matrix(q, actuator), of_coils.T, rtol=0, atol=1e-16)
 
 
-def test_a_torque_curve_needs_opposite_coils(tmp_path, second):
+def test_a_torque_curve_needs_opposite_coils(tmp_path):
     path = written(tmp_path)
     with pytest.raises(InputError, match="expected groups of two opposite coils for a torque curve"):
         actuators.load(path, actuators.TORQUE_CURVE_PATH)
-    with pytest.raises(
-        InputError, match=r"expected a torque curve here, received the torque field torque_field\.csv"
-    ):
-        _ = second.torque_curve
+    message = r"expected a torque curve here, received the torque field torque_field\.csv"
+    with pytest.raises(InputError, match=message):
+        _ = VENTUSFF.torque_curve
 
 
 def test_the_torque_file_is_part_of_the_model_file(tmp_path):
@@ -220,8 +211,7 @@ def test_the_torque_file_is_part_of_the_model_file(tmp_path):
     assert actuators.load(path) is not first
 
 
-def test_an_export_names_the_kind_of_torque_that_it_needs(second):
-    with pytest.raises(
-        InputError, match="expected an actuator with a torque curve, received one with a torque field"
-    ):
-        magnetic_tables(magnetics.torque_model(second))
+def test_an_export_names_the_kind_of_torque_that_it_needs():
+    message = "expected an actuator with a torque curve, received one with a torque field"
+    with pytest.raises(InputError, match=message):
+        magnetic_tables(magnetics.torque_model(VENTUSFF))

@@ -4,10 +4,15 @@ import json
 import sys
 from importlib.metadata import distribution
 
+import numpy as np
 import pytest
 
+from spheretwin.machine.link.transports import open_transport
+from spheretwin.models import actuator as actuators
 from spheretwin.models.base import extras
 from spheretwin.models.base.errors import InputError
+from spheretwin.models.design import iron_hoop, pole_torque, rotor_field
+from tests.models.poses import SECOND
 
 
 class Installed:
@@ -60,6 +65,24 @@ def test_missing_packages_are_those_of_the_extra(extra, monkeypatch):
     required = [line for line in lines if f'extra == "{extra}"' in line]
     assert len(names) == len(required)
     assert all(line.startswith(name) for name, line in zip(names, required, strict=True))
+
+
+ACTUATOR = actuators.load()
+MISSING = [
+    ("magpylib.core", "magpylib to compute the torque curve", "magnetics",
+     lambda: pole_torque.compute_curve(ACTUATOR.magnet, ACTUATOR.coil)),
+    ("magpylib", "magpylib to compute fields", "magnetics", lambda: rotor_field.compute(SECOND)),
+    ("skfem", "scikit-fem for finite elements", "fem",
+     lambda: iron_hoop.torque_curve(ACTUATOR.magnet, ACTUATOR.coil, None, np.array([0.1]))),
+    ("serial", "pyserial", "machine", lambda: open_transport("serial:/dev/ttyS0")),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("module", "package", "extra", "call"), MISSING)
+def test_a_call_without_its_package_names_the_extra(monkeypatch, module, package, extra, call):
+    monkeypatch.setitem(sys.modules, module, None)
+    with pytest.raises(InputError, match=f"expected {package}, which the extra {extra} installs: "):
+        call()
 
 
 def test_the_error_names_package_extra_and_command():

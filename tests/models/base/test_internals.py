@@ -196,9 +196,8 @@ def test_mjdata_has_the_layout_that_its_package_declares(field, kind):
 
 def test_another_layout_of_mjdata_is_refused_before_a_plugin_is_registered(monkeypatch):
     offset = mujoco_library.data_offset
-    monkeypatch.setattr(
-        mujoco_library, "data_offset", lambda field: offset("qvel" if field == "qpos" else field)
-    )
+    wrong = {"qpos": "qvel"}
+    monkeypatch.setattr(mujoco_library, "data_offset", lambda field: offset(wrong.get(field, field)))
     with pytest.raises(EngineError, match="expected qpos at"):
         mujoco_library.register_plugin("never", (), 0, 0, {})
 

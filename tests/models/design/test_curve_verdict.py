@@ -14,9 +14,7 @@ from spheretwin.models.torque_curve import TorqueCurve
 from tests.models.design.quadrature import sample_coarsely
 from tests.models.model_files import edited
 
-pytestmark = pytest.mark.release(
-    "recomputes a torque curve for 1.4 to 1.9 s; test_pole_torque.py has its parts"
-)
+pytestmark = pytest.mark.release("recomputes a curve for 1.4 to 1.9 s; test_pole_torque.py has its parts")
 
 
 @pytest.fixture

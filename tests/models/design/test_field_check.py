@@ -79,9 +79,8 @@ def test_a_stack_s_field_tends_to_that_of_the_body(actuator):
     # At the faces of the windings and beyond: where the conductors are.
     magnet, z = actuator.magnet, np.array([0.0, 0.0, 1.0])
     angle = np.radians(np.linspace(0.5, 25.0, 12))
-    points = np.concatenate(
-        [d * np.column_stack([np.sin(angle), 0 * angle, np.cos(angle)]) for d in (0.0515, 0.053, 0.06)]
-    )
+    arc = np.column_stack([np.sin(angle), 0 * angle, np.cos(angle)])
+    points = np.concatenate([distance_m * arc for distance_m in (0.0515, 0.053, 0.06)])
     # Facets miss the circle by the square of their angle: the limit of two meshes.
     coarse, fine = (drawn_body(magnet, n, n // 4).getB(points) for n in (48, 96))
     body = fine + (fine - coarse) / 3

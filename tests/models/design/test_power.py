@@ -62,9 +62,8 @@ def turned_to(axis):
 def flux_linkage(R_SR, group, actuator):
     """Flux of the 16 magnets through the turns of one group, Wb."""
     poles = zip(actuator.pole_axes @ R_SR.T, actuator.pole_polarity, strict=True)
-    magnets = magpylib.Collection(
-        [direct_summation.pole_magnet(actuator.magnet, *pole, STACKED) for pole in poles]
-    )
+    stacks = [direct_summation.pole_magnet(actuator.magnet, *pole, STACKED) for pole in poles]
+    magnets = magpylib.Collection(stacks)
     points, area = area_of_turns(actuator.coil)
     linkage = 0.0
     for axis in actuator.coil_axes[actuator.groups[group]]:

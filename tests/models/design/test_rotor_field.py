@@ -1,7 +1,6 @@
 """Torque field of magnets: a dipole exactly, boxes against forces, images, the shipped poles, refusals."""
 
 import re
-import sys
 
 import mujoco
 import numpy as np
@@ -21,16 +20,14 @@ POLES = re.compile(
     r"(?s)            <frame euler=\"0 0 0\">\n              <frame euler=\"0 -46.4.*"
     r"(?=            <site name=\"shaft_tip)"
 )
-POLE = '<site name="pole_0" class="north" {}/>\n'
+POLE = '<site name="pole_{}" class="north" {}/>\n'
 
 
 def written(tmp_path, *poles):
     """The second actuator's coils, with other magnets."""
     assert POLES.search(SECOND)
-    text = POLES.sub(
-        "".join(POLE.format(pole).replace("pole_0", f"pole_{i}") for i, pole in enumerate(poles)), SECOND
-    )
-    (path := tmp_path / "mine.xml").write_text(text)
+    sites = "".join(POLE.format(number, pole) for number, pole in enumerate(poles))
+    (path := tmp_path / "mine.xml").write_text(POLES.sub(sites, SECOND))
     return path
 
 
@@ -81,10 +78,8 @@ def test_the_shipped_poles_have_the_torque_of_their_curve(actuator):
 
 
 def test_what_the_verb_writes_is_read_back_and_runs(tmp_path, capsys):
-    path, out = (
-        written(tmp_path, 'size="0.006 0.004" pos="0.02 0 0" zaxis="1 0 0"'),
-        tmp_path / "torque_field.csv",
-    )
+    path = written(tmp_path, 'size="0.006 0.004" pos="0.02 0 0" zaxis="1 0 0"')
+    out = tmp_path / "torque_field.csv"
     flags = ["--mjcf", str(path), "--degree", "40", "--step", "3"]
     assert cli.main(["magnetics", "field", *flags, "--out", str(out)]) == 0
     field = torque_field.read(out)
@@ -115,11 +110,3 @@ def test_bad_flags_are_refused(flags, capsys):
     error = capsys.readouterr().err
     assert error.startswith("spheretwin: command line: argument")
     assert error.count("\n") == 1
-
-
-def test_without_magpylib_the_extra_is_named(monkeypatch, tmp_path):
-    monkeypatch.setitem(sys.modules, "magpylib", None)
-    with pytest.raises(
-        InputError, match="expected magpylib to compute fields, which the extra magnetics installs"
-    ):
-        rotor_field.compute(written(tmp_path, 'type="sphere" size="0.02" pos="0 0 0"'))

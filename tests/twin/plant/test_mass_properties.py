@@ -20,6 +20,7 @@ from spheretwin.plant.mujoco_rotor import MujocoRotor
 from spheretwin.plant.plant_tick import step_rotor
 from spheretwin.session import Session
 from spheretwin.simulation import simulate
+from tests.models.model_files import edited, edited_text
 from tests.models.test_joint_chain import full
 from tests.twin.plant import user_models as models
 from tests.twin.plant.motions import STEP_s
@@ -38,14 +39,12 @@ EVERYTHING = {
 FIELDS = {f"plant.mass.{name}": value for name, value in EVERYTHING.items()}
 
 
-@pytest.fixture(scope="module")
-def shipped():
-    return mjcf.read(actuators.MJCF_PATH)
+SHIPPED = mjcf.read(actuators.MJCF_PATH)
 
 
-def chain_of(shipped, section, modelling_error=0.0, payload_kg=0.0, gravity_m_s2=9.81, seed=0):
+def chain_of(section, modelling_error=0.0, payload_kg=0.0, gravity_m_s2=9.81, seed=0):
     errors = mass_errors(section, seed)
-    return read_chain(true_model(shipped, modelling_error, payload_kg, gravity_m_s2, errors))
+    return read_chain(true_model(SHIPPED, modelling_error, payload_kg, gravity_m_s2, errors))
 
 
 def upright(chain):
@@ -67,7 +66,7 @@ def test_the_plant_has_general_parts_only_if_it_needs_them(engine, fields, gener
     assert (getattr(plant.rotor, "chain", None) is not None) == (general and engine == "lagrangian")
 
 
-def test_inertia_of_the_rotor_upright_is_the_sum_of_its_parts(actuator, shipped):
+def test_inertia_of_the_rotor_upright_is_the_sum_of_its_parts(actuator):
     centre, (xy, xz, yz) = np.array([1e-3, -2e-3, 5e-4]), (1e-4, -5e-5, 2e-5)
     outer, inner = (4e-4, 2e-4, 3e-4), (2e-4, 3e-4, 2e-4)
     parts = {"products_kg_m2": (xy, xz, yz), "ring_inertia_kg_m2": (outer, inner)}
@@ -78,13 +77,13 @@ def test_inertia_of_the_rotor_upright_is_the_sum_of_its_parts(actuator, shipped)
     expected[1, 1] += inner[1]
     # The moments of a ring about axes on which it does not turn have no effect upright. Rounding, and the
     # model's own rings of 1e-15.
-    result = upright(chain_of(shipped, section, modelling_error=0.2))
+    result = upright(chain_of(section, modelling_error=0.2))
     np.testing.assert_allclose(result, expected, rtol=0, atol=1e-14)
 
 
-def test_hinges_stand_where_the_fields_say(shipped):
+def test_hinges_stand_where_the_fields_say():
     tilt, offset = ((0.01, 0.02), (-0.01, 0.03), (0.02, -0.03)), ((1e-4, 2e-4), (-1e-4, 0.0), (3e-4, 1e-4))
-    chain = chain_of(shipped, MassSection(axis_tilt_rad=tilt, axis_offset_m=offset))
+    chain = chain_of(MassSection(axis_tilt_rad=tilt, axis_offset_m=offset))
     expected = np.array([[1, 0.01, 0.02], [-0.01, 1, 0.03], [0.02, -0.03, 1]])
     expected /= np.linalg.norm(expected, axis=1)[:, None]
     np.testing.assert_allclose(chain.axes, expected, rtol=0, atol=1e-15)
@@ -128,16 +127,14 @@ def assert_same_steps(first, second, start):
 
 
 @pytest.mark.parametrize("payload_kg", [0.0, 0.05])
-def test_engines_agree_step_by_step(actuator, shipped, payload_kg):
+def test_engines_agree_step_by_step(actuator, payload_kg):
     errors = mass_errors(MassSection(**EVERYTHING), 3)
-    engine = MujocoRotor(shipped, STEP_s, "RK4", 0.2, payload_kg, 9.81, errors)
+    engine = MujocoRotor(SHIPPED, STEP_s, "RK4", 0.2, payload_kg, 9.81, errors)
     equations_of_motion = LagrangianRotor(actuator, STEP_s, chain=read_chain(engine.model))
     assert_same_steps(engine, equations_of_motion, ([0.4, -0.3, 0.2], [1.0, 2.0, -3.0]))
 
 
-@pytest.mark.release(
-    "compiles loops of four kinds for 30 s; accelerations of both engines are compared in less"
-)
+@pytest.mark.release("compiles four loops for 30 s; accelerations of both engines are compared in less")
 @pytest.mark.parametrize("stiction", [False, True], ids=["smoothed friction", "static friction"])
 def test_closed_loops_on_both_engines_agree(stiction):
     bearings = {
@@ -174,8 +171,8 @@ def test_true_orientation_drives_the_coils():
     assert 1e-3 < np.linalg.norm(other - same) / np.linalg.norm(same) < 0.5
 
 
-def test_friction_gains_no_energy_on_a_general_joint(shipped):
-    chain = chain_of(shipped, MassSection(**EVERYTHING))
+def test_friction_gains_no_energy_on_a_general_joint():
+    chain = chain_of(MassSection(**EVERYTHING))
     generator = np.random.default_rng(2)
     for coulomb in (1e-3, 1.0, 1e3):
         stage = friction(np.full(3, coulomb), np.full(3, 1e-3), 0.01, np.full(3, 2e-3), STEP_s, chain)
@@ -191,8 +188,8 @@ def test_friction_gains_no_energy_on_a_general_joint(shipped):
             np.testing.assert_allclose(torque * STEP_s, M @ (qdot - before), rtol=0, atol=size * STEP_s)
 
 
-def test_static_friction_gains_no_energy_on_a_general_joint(shipped):
-    chain = chain_of(shipped, MassSection(**EVERYTHING), gravity_m_s2=0.0)
+def test_static_friction_gains_no_energy_on_a_general_joint():
+    chain = chain_of(MassSection(**EVERYTHING), gravity_m_s2=0.0)
     section = bearing.StictionSection(on=True)
     stage = bearing.bristle_friction(section, (5e-3,) * 3, CableSection(), np.full(3, 2e-3), STEP_s, chain)
     q, torque = np.array([0.3, -0.4, 0.5]), np.zeros(3)
@@ -219,10 +216,10 @@ def test_static_friction_gains_no_energy_on_a_general_joint(shipped):
 
 
 def test_a_ring_needs_a_body(tmp_path):
-    start, stop = (models.TEXT.index(f'<body name="{name}">') for name in ("inner_ring", "rotor"))
-    merged = models.TEXT[:start] + models.TEXT[stop:].replace("</body>", "", 1)
-    merged = merged.replace('<joint name="gamma"', models.BETA + '<joint name="gamma"')
-    (path := tmp_path / "merged.xml").write_text(merged, encoding="utf-8")
+    text, gamma = edited_text(), '<joint name="gamma"'
+    start, stop = (text.index(f'<body name="{name}">') for name in ("inner_ring", "rotor"))
+    merged = text[:start] + text[stop:].replace("</body>", "", 1)
+    (path := tmp_path / "merged.xml").write_text(merged.replace(gamma, models.BETA + gamma), encoding="utf-8")
     assert mujoco.MjModel.from_xml_path(str(path)).nv == 3
     ring = {"plant.mass.ring_inertia_kg_m2": [[0.0] * 3, [1e-4] * 3], "plant.mjcf": str(path)}
     with pytest.raises(InputError, match="received one without a ring at hinge beta"):
@@ -230,8 +227,8 @@ def test_a_ring_needs_a_body(tmp_path):
 
 
 def test_a_payload_off_the_axis_is_computed_by_the_equations_of_motion(tmp_path):
-    edits = (('<body name="payload" pos="0 0 0.10">', '<body name="payload" pos="0.01 0.02 0.10">'),)
-    (path := tmp_path / "aside.xml").write_text(models.edited(edits), encoding="utf-8")
+    aside = ('<body name="payload" pos="0 0 0.10">', '<body name="payload" pos="0.01 0.02 0.10">')
+    path = edited(tmp_path, aside)
     changes = {"plant.mjcf": str(path), "plant.payload_kg": 0.05}
     engines = (scenarios.load("hold", changes | {"plant.engine": name}) for name in ("mujoco", "lagrangian"))
     configs = [initial_config(scenario, None, None) for scenario in engines]

@@ -1,7 +1,5 @@
 """Physics that a user writes into the model acts as in the stock engine, or is refused in one line."""
 
-import itertools
-
 import mujoco
 import numba
 import numpy as np
@@ -20,6 +18,7 @@ from spheretwin.plant.mass_properties import true_model
 from spheretwin.plant.mujoco_rotor import MujocoRotor, step
 from spheretwin.session import Session
 from spheretwin.simulation import simulate
+from tests.models.model_files import edited
 from tests.twin.plant import user_models as models
 
 STEP_S = 5e-4
@@ -30,14 +29,7 @@ TORQUE_Q = np.array([0.03, -0.01, 0.08])
 @pytest.fixture
 def written(tmp_path):
     """Write a model with edits to a file of its own."""
-    count = itertools.count()
-
-    def write(edits=()):
-        path = tmp_path / f"model_{next(count)}.xml"
-        path.write_text(models.edited(edits), encoding="utf-8")
-        return path
-
-    return write
+    return lambda edits=(): edited(tmp_path, *edits, name=f"model_{len(list(tmp_path.iterdir()))}.xml")
 
 
 def stock(path, torques, pose=POSE, rates=RATES, integrator="RK4"):
@@ -118,9 +110,7 @@ def check_against_the_stock_engine(path, table, tolerance):
     np.testing.assert_allclose(table["q_rad"], expected, rtol=0, atol=tolerance)
 
 
-GENERAL_JOINT = pytest.mark.release(
-    "compiles a loop with general joints, 9 s; its steps are compared in less"
-)
+GENERAL_JOINT = pytest.mark.release("compiles a loop for 9 s; its steps are compared in less")
 
 
 @pytest.mark.parametrize(

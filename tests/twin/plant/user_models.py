@@ -2,11 +2,6 @@
 
 from typing import NamedTuple
 
-from spheretwin.models import actuator as actuators
-
-MESHES = f'meshdir="{actuators.FOLDER / "assets"}"'
-TEXT = actuators.MJCF_PATH.read_text(encoding="utf-8").replace('meshdir="assets"', MESHES)
-
 # Where a piece of physics is put in.
 COMPILER = "<compiler "
 OPTION = '<option integrator="RK4" '
@@ -26,14 +21,6 @@ RING = 'diaginertia="1.1e-15 1.1e-15 1.1e-15"/>'
 END = "</mujoco>"
 
 Edits = tuple[tuple[str, str], ...]
-
-
-def edited(edits: Edits) -> str:
-    text = TEXT
-    for old, new in edits:
-        assert old in text, old
-        text = text.replace(old, new)
-    return text
 
 
 def with_attributes(tag: str, attributes: str) -> Edits:

@@ -9,7 +9,7 @@ import sys
 import pytest
 
 from spheretwin.machine.link.transports import Stream, Udp, open_transport
-from spheretwin.models.base.errors import InputError, SpheretwinError
+from spheretwin.models.base.errors import SpheretwinError
 from tests.requirements import needs_pseudo_terminal
 from tests.waiting import UNLIMITED_S
 
@@ -110,9 +110,3 @@ def test_standard_output_is_for_frames_alone():
     )
     done = subprocess.run([sys.executable, "-c", code], input=b"emarf", capture_output=True, check=True)
     assert (done.stdout, done.stderr.strip()) == (b"frame", b"for people")
-
-
-def test_without_pyserial_the_message_names_the_extra(monkeypatch):
-    monkeypatch.setitem(sys.modules, "serial", None)
-    with pytest.raises(InputError, match="expected pyserial, which the extra machine installs: "):
-        open_transport("serial:/dev/ttyS0")
