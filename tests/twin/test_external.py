@@ -95,9 +95,7 @@ def test_none_ends_the_run_as_interrupted():
 
 
 def test_a_reason_removes_the_currents_and_ends_the_run_as_failsafe():
-    plant = Plant(
-        lambda k: (Measurement(np.zeros(3), np.zeros(3)), Reason.CURRENT if k >= 5 else Reason.NONE)
-    )
+    plant = Plant(lambda k: (at_rest(k)[0], Reason.CURRENT if k >= 5 else Reason.NONE))
     twin = session(plant)
     assert follow(twin, 200, []) == "failsafe"
     assert twin.reason == Reason.CURRENT

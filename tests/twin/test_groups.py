@@ -10,9 +10,7 @@ from spheretwin.models.magnetics import torque_matrix
 from spheretwin.simulation import simulate
 from tests.models.model_files import edited
 
-MIDDLE_RING = re.compile(
-    r'(?s)<replicate count="12" euler="0 0 30">\s*<site name="coil_middle".*?</replicate>'
-)
+RING = re.compile(r'(?s)<replicate count="12" euler="0 0 30">\s*<site name="coil_middle".*?</replicate>')
 
 
 @pytest.fixture(params=[12, 24])
@@ -23,7 +21,7 @@ def groups(request):
 @pytest.fixture
 def model(tmp_path, groups):
     """The shipped actuator without its middle ring of coils, or with twice as many in it."""
-    ring = MIDDLE_RING.search(actuators.MJCF_PATH.read_text())[0]
+    ring = RING.search(actuators.MJCF_PATH.read_text())[0]
     double = ring.replace('count="12" euler="0 0 30"', 'count="24" euler="0 0 15"')
     return edited(tmp_path, (ring, double if groups == 24 else ""))
 

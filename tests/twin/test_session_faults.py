@@ -170,9 +170,7 @@ def test_a_run_of_faults_set_on_the_way_is_replayed(tmp_path):
     ]
     recorded(path, changes, ticks=350, name="nutation", hardware="electronics")
     assert cli.main(["simulate", "--replay", str(path), "--telemetry", str(again)]) == 0
-    first, second = read_parquet(path)[0], read_parquet(again)[0]
-    assert second.signals == first.signals
-    assert second.values.tobytes() == first.values.tobytes()
-    marks = first["fault"]
+    assert again.read_bytes() == path.read_bytes()
+    marks = read_parquet(path)[0]["fault"]
     assert np.isnan(marks).any() or not marks[0].any()
     assert np.count_nonzero(np.nansum(marks, axis=1)) == 180

@@ -7,6 +7,7 @@ from spheretwin import scenario as scenarios
 from spheretwin.linear import linearise
 from spheretwin.models.lagrangian import inertia_matrix
 from tests.twin.passive_cases import ENGINES, FREE, STILL, session, table
+from tests.twin.plant.motions import kinetic_J
 
 COULOMB_Nm, BREAK_AWAY = np.array([2e-3, 3e-3, 4e-3]), 1.5
 STICTION = {"plant.stiction.on": True, "plant.coulomb_Nm": COULOMB_Nm.tolist()}
@@ -22,9 +23,7 @@ HYSTERESIS = {"plant.cable.hysteresis_Nm": [1e-3, 1e-3, 1e-3], "plant.cable.hyst
 BOTH = STICTION | CABLE | HYSTERESIS | {"plant.viscous_Nm_s": [1e-4, 1e-4, 1e-4]}
 
 
-COMPILES = pytest.mark.release(
-    "compiles loops with static friction for 19 s; test_bristle_friction.py has the elements"
-)
+COMPILES = pytest.mark.release("compiles loops for 19 s; test_bristle_friction.py has the elements")
 
 
 @COMPILES
@@ -55,10 +54,7 @@ def test_the_rows_account_for_the_energy_of_friction_and_cable(engine, actuator)
         changes = STILL | BOTH | {"plant.engine": engine, "plant.initial_rad_s": [1.0, -0.8, 2.0]}
         changes |= {"plant.step_s": step_s, "controller.period_s": step_s}
         run = table(round(0.1 / step_s) + 1, "hold", changes, FREE)
-        kinetic = [
-            0.5 * v @ inertia_matrix(q, actuator.inertia) @ v
-            for q, v in zip(run["q_rad"][[0, -1]], run["qdot_rad_s"][[0, -1]], strict=True)
-        ]
+        kinetic = [kinetic_J(run["q_rad"][i], run["qdot_rad_s"][i], actuator, 0.0) for i in (0, -1)]
         moved = np.diff(run["q_rad"], axis=0)
         work_J = [np.sum(run[name][:-1] * moved) for name in ("friction_Nm", "cable_Nm")]
         return kinetic[1] - kinetic[0] - sum(work_J), work_J, kinetic[0]

@@ -100,9 +100,8 @@ def test_order_and_signs_of_groups_are_found(case):
     currents[:, order] = log.current_A * signs
     result = errors(replace(log, current_A=currents))
     assert list(result) == ["groups"]
-    assert result["groups"].advice == (
-        f"set currents.columns to the order {order.tolist()}, currents.sign to {signs.tolist()}"
-    )
+    advice = f"set currents.columns to the order {order.tolist()}, currents.sign to {signs.tolist()}"
+    assert result["groups"].advice == advice
 
 
 def test_axes_and_groups_are_found_together(log):
@@ -164,10 +163,8 @@ def without(rows):
 
 
 def test_gaps_are_found_and_nothing_is_computed_across_them():
-    whole, parts = (
-        Evidence(log, machine_of(log, "hold")).diagnosis.unexplained
-        for log in (multisine(), without(np.s_[600:800]))
-    )
+    logs = (multisine(), without(np.s_[600:800]))
+    whole, parts = (Evidence(log, machine_of(log, "hold")).diagnosis.unexplained for log in logs)
     assert parts < 2 * whole  # 700 times if the angles are interpolated
     assert list(errors(without(np.s_[600:800]))) == ["gaps"]
 

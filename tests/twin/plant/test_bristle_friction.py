@@ -1,5 +1,7 @@
 """Static friction: rest, break-away, hysteresis, exact motions, energy, order; and hysteresis of a cable."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from hypothesis import example, given
@@ -172,48 +174,33 @@ exponent = st.floats(0, 1)
 
 
 # The iteration cycles between two branches, and then converges slowly.
-@pytest.mark.release(
-    "1.2 s; test_the_rows_account_for_the_energy_of_friction_and_cable has the balance of a run"
-)
-@example(
-    pose=np.array([0.0, 1.0, 1.0]), direction=np.array([0.0, 0.5, 1.0]),
-    deflection=[np.zeros(3), np.zeros(3), np.array([0.0, 0.125, 0.0])], ratio=3.0, range_=-6.0, damping=0.0,
-    stribeck=0.0, levels=(0.0, 0.59375, 1.0), step_=-3.0, speed=-1.75, ahead=np.zeros(3), slips=False,
-)  # fmt: skip
-@given(
-    three, three, st.lists(three, min_size=3, max_size=3), st.floats(1, 10), st.floats(-9, 0),
-    st.floats(0, 10), st.floats(-6, 3), st.tuples(exponent, exponent, exponent), st.floats(-6, -2),
-    st.floats(-3, 2), three, st.booleans(),
-)  # fmt: skip
-def test_the_elements_neither_create_energy_nor_lose_their_own_balance(
-    actuator,
-    pose,
-    direction,
-    deflection,
-    ratio,
-    range_,
-    damping,
-    stribeck,
-    levels,
-    step_,
-    speed,
-    ahead,
-    slips,
-):
-    q, h = 1.3 * pose, 10**step_
-    qdot = 10**speed * direction
-    fields = {"presliding_rad": 10**range_, "damping_ratio": damping, "stribeck_rad_s": 10**stribeck}
-    stiction = StictionSection(on=True, break_away=ratio, **fields)
+@pytest.mark.release("1.2 s; test_static_friction.py has the balance of a run")
+@example(SimpleNamespace(
+    pose=np.array([0.0, 1.0, 1.0]), direction=np.array([0.0, 0.5, 1.0]), step=-3.0, speed=-1.75,
+    deflection=[np.zeros(3), np.zeros(3), np.array([0.0, 0.125, 0.0])], ratio=3.0, presliding=-6.0,
+    damping=0.0, stribeck=0.0, levels=(0.0, 0.59375, 1.0), ahead=np.zeros(3), slips=False,
+))  # fmt: skip
+@given(st.builds(
+    SimpleNamespace, pose=three, direction=three, deflection=st.lists(three, min_size=3, max_size=3),
+    ratio=st.floats(1, 10), presliding=st.floats(-9, 0), damping=st.floats(0, 10), stribeck=st.floats(-6, 3),
+    levels=st.tuples(exponent, exponent, exponent), step=st.floats(-6, -2), speed=st.floats(-3, 2),
+    ahead=three, slips=st.booleans(),
+))  # fmt: skip
+def test_the_elements_neither_create_energy_nor_lose_their_own_balance(actuator, case):
+    q, h = 1.3 * case.pose, 10**case.step
+    qdot = 10**case.speed * case.direction
+    fields = {"presliding_rad": 10**case.presliding, "stribeck_rad_s": 10**case.stribeck}
+    stiction = StictionSection(on=True, break_away=case.ratio, damping_ratio=case.damping, **fields)
     cable = CableSection(hysteresis_Nm=(1e-3, 5e-2, 1.0), hysteresis_rad=0.3)
-    coulomb = tuple(10 ** (-6 + 6 * share) for share in levels)
+    coulomb = tuple(10 ** (-6 + 6 * share) for share in case.levels)
     bristles = bristle_friction(stiction, coulomb, cable, actuator.inertia, h)
-    bristles.deflection_rad[:] = np.array(deflection) * bristles.slip_rad[:, None]
-    if slips:
-        bristles.deflection_rad[:2] = np.sign(direction) * bristles.slip_rad[:2, None]
+    bristles.deflection_rad[:] = np.array(case.deflection) * bristles.slip_rad[:, None]
+    if case.slips:
+        bristles.deflection_rad[:2] = np.sign(case.direction) * bristles.slip_rad[:2, None]
     before = bristles.deflection_rad.copy()
     after_q, after = q + h * qdot, qdot.copy()  # of a rotor without torque, and with constant inertia
     begin_bristles(bristles, q, q, qdot, np.zeros(3))
-    apply_bristles(bristles, q, 10**speed * ahead, qdot, after_q, after)
+    apply_bristles(bristles, q, 10**case.speed * case.ahead, qdot, after_q, after)
     M = inertia_matrix(q, actuator.inertia)
 
     def energy(rates, stretched):

@@ -83,17 +83,13 @@ def test_the_end_of_the_controller_ends_the_run(real_time, script):
     assert server.ending == "the controller ended the run"
 
 
-def test_silence_ends_the_run(script):
-    server = serve(script, idle_s=2.0)
-    assert server.command(0.0, AT_REST) is None
-    assert server.ending == "no command in 2 s"
-    assert 2.0 <= script.t_s < 2.2  # a stop is checked ten times a second
-
-
-def test_a_stop_ends_the_wait():
-    server = serve(Script(), stop_requested=lambda: True)
-    assert server.command(0.0, AT_REST) is None
-    assert server.ending == "a stop was requested"
+@pytest.mark.parametrize(
+    ("stops", "ending", "at_s"), [(False, "no command in 2 s", 2.0), (True, "a stop was requested", 0.0)]
+)
+def test_silence_and_a_stop_end_the_run(script, stops, ending, at_s):
+    server = serve(script, idle_s=2.0, stop_requested=lambda: stops)
+    assert (server.command(0.0, AT_REST), server.ending) == (None, ending)
+    assert at_s <= script.t_s < at_s + 0.2  # a stop is checked ten times a second
 
 
 def test_a_closed_connection_ends_the_run_after_the_pending_commands(script, server):

@@ -48,6 +48,7 @@ def firmware(tmp_path_factory):
     return run
 
 
+ARMED = ("--arm", "--ramp-s", "0")
 LOOPS = pytest.mark.release("compiles a loop of its own for 10 s; a run without arming has the firmware, too")
 
 
@@ -69,7 +70,7 @@ def test_an_independent_firmware_tracks_as_the_twin_does(firmware, capsys, tmp_p
     """Attitude by rotation matrices, Euler equations, other steps and another interpolation."""
     paths = {name: tmp_path / f"{name}.parquet" for name in ("telemetry", "log")}
     files = [text for name, path in paths.items() for text in (f"--{name}", str(path))]
-    code, result = driven(firmware, capsys, "--arm", "--ramp-s", "0", "--duration", "2", *files)
+    code, result = driven(firmware, capsys, *ARMED, "--duration", "2", *files)
     assert (code, result["status"]) == (0, "completed")
     same = STILL | {"controller.law": "pid", "estimator.kind": "kalman", "duration": 2.0}
     twin = simulation.simulate("sinusoid", same)
@@ -114,7 +115,7 @@ def test_the_bench_drives_the_firmware(firmware, monkeypatch):
 
     monkeypatch.setattr(Bench, "begin", lambda bench: None)  # no thread with the pace of the clock
     monkeypatch.setattr(Page, "show", press)
-    assert connected(firmware, "bench", "--arm", "--ramp-s", "0", "--port", "0", "--no-browser") == 0
+    assert connected(firmware, "bench", *ARMED, "--port", "0", "--no-browser") == 0
     driven, stopped = states
     assert np.abs(driven.q_rad).max() > 0.1
     assert driven.error_mrad < 10.0
@@ -134,9 +135,7 @@ LIMITS = [
 @pytest.mark.parametrize(("flags", "reason"), LIMITS, ids=[flags[0] for flags, _ in LIMITS])
 def test_a_limit_ends_the_run_without_currents(firmware, capsys, tmp_path, flags, reason):
     path = tmp_path / "run.parquet"
-    code, result = driven(
-        firmware, capsys, "--arm", "--ramp-s", "0", "--duration", "1", "--telemetry", str(path), *flags
-    )
+    code, result = driven(firmware, capsys, *ARMED, "--duration", "1", "--telemetry", str(path), *flags)
     assert (code, result["status"], result["reason"]) == (1, "failsafe", reason)
     rows, _ = read_parquet(path)
     trip = int(np.argmax(rows["failsafe_reason"] > 0))
@@ -148,9 +147,7 @@ def test_a_limit_ends_the_run_without_currents(firmware, capsys, tmp_path, flags
 
 @LOOPS
 def test_the_limit_of_the_current_holds(firmware, capsys):
-    code, result = driven(
-        firmware, capsys, "--arm", "--ramp-s", "0", "--duration", "0.3", "--limit-current-A", "0.5"
-    )
+    code, result = driven(firmware, capsys, *ARMED, "--duration", "0.3", "--limit-current-A", "0.5")
     assert code == 0
     assert result["max_abs_current_A"] == 0.5
 
