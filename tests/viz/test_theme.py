@@ -76,19 +76,14 @@ def least_difference(colours):
 
 def roles():
     """Every colour of the theme, by its name."""
-    named = {}
-    for name, value in vars(theme).items():
-        if name.isupper() and not name.startswith("_") and name not in BODIES:
-            if name in ("LAW_COLOURS", "SPARE", "OTHER_LAW"):
-                texts = (
-                    value.values() if name == "LAW_COLOURS" else (value,) if name == "OTHER_LAW" else value
-                )
-                named |= {f"{name} {text}": rgb(text) for text in texts}
-            elif name == "AXIS_COLOURS":
-                named |= {f"axis {axis}": colour for axis, colour in zip("αβγ", value, strict=True)}
-            elif isinstance(value, tuple) and all(isinstance(entry, int) for entry in value):
-                named[name] = value
-    return named
+    named = {
+        name: value
+        for name, value in vars(theme).items()
+        if name.isupper() and name[0] != "_" and name not in BODIES and isinstance(value, tuple)
+    }
+    named = {name: value for name, value in named.items() if all(isinstance(entry, int) for entry in value)}
+    named |= {f"axis {axis}": colour for axis, colour in zip("αβγ", theme.AXIS_COLOURS, strict=True)}
+    return named | {text: rgb(text) for text in (*theme.LAW_COLOURS.values(), *theme.SPARE, theme.OTHER_LAW)}
 
 
 LAWS = [rgb(colour) for colour in theme.LAW_COLOURS.values()]

@@ -115,14 +115,9 @@ def integrated(case):
         i = state[0]
         return [(v - case.R * i - case.emf) / case.L, i, case.R * i**2, v * i]
 
-    def upper(t, state):
-        return voltage(case, state[0]) - case.highest
-
-    def lower(t, state):
-        return voltage(case, state[0]) - case.lowest
-
+    ends = [lambda t, state, end=end: voltage(case, state[0]) - end for end in (case.highest, case.lowest)]
     tolerances = {"method": "DOP853", "rtol": 1e-12, "atol": 1e-15, "max_step": case.step_s / 50}
-    solution = solve_ivp(slope, (0, case.step_s), [case.start, 0, 0, 0], events=[upper, lower], **tolerances)
+    solution = solve_ivp(slope, (0, case.step_s), [case.start, 0, 0, 0], events=ends, **tolerances)
     assert solution.success
     edges = [0.0, *sorted(np.concatenate(solution.t_events)), case.step_s]
     phases, limited = "", 0.0

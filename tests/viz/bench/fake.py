@@ -41,14 +41,16 @@ class Bench:
     actuator = actuators.load()
 
     def __init__(self, refused=(), **state):
-        self.told, self.refused = [], dict(refused)
+        self.told, self.beats, self.refused = [], [], dict(refused)
         self.now = SimpleNamespace(**STATE | state)
         self.run, self.capture = 1, {}
         self._lock = threading.Lock()
 
     def command(self, name, /, *, client=None, **arguments):
         with self._lock:
-            if name != "beat":
+            if name == "beat":
+                self.beats.append(client)
+            else:
                 self.told.append((name, client, arguments))
             if name == "hello" and self.now.operator is None:
                 self.now.operator = client

@@ -1,6 +1,7 @@
 """Where things are on a bench's page."""
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from tests.waiting import wait_for
 
@@ -32,15 +33,9 @@ def on_screen(page, tab, point_m):
     """Where a point of the picture is on the page, pixels, by the camera that the page tells of itself."""
     (client,) = page._server.get_clients().values()
     camera = client.camera
-    w, x, y, z = camera.wxyz
-    R_SC = np.array(
-        [
-            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
-        ]
+    right, down, ahead = (
+        Rotation.from_quat(camera.wxyz, scalar_first=True).inv().apply(point_m - camera.position)
     )
-    right, down, ahead = R_SC.T @ (np.array(point_m) - camera.position)
     left, top, width, height = tab.evaluate(
         "(box => [box.x, box.y, box.width, box.height])"
         "(document.querySelector('canvas[data-engine]').getBoundingClientRect())"

@@ -4,7 +4,6 @@ import contextlib
 import socket
 import threading
 import time
-from functools import partial
 
 import hypothesis
 import msgspec
@@ -196,20 +195,12 @@ def send_until_closed(visitor, messages):
 
 
 def test_the_control_channel_takes_stop_and_heartbeats_only(page, bench):
-    beats = []
-    bench.command = partial(noted, bench.command, beats)
     with control_of(page) as control:
         for message in ("beat", "beat ", "beat x", "beat 99999999999", b"stop", "halt", "beat 7", "stop"):
             control.send(message)
         wait_for(lambda: ("stop", {}) in bench.commands())
-    assert beats == ["page 7"]
+    assert bench.beats == ["page 7"]
     assert bench.commands() == [("stop", {})]
-
-
-def noted(command, beats, name, /, *, client=None, **arguments):
-    if name == "beat":
-        beats.append(client)
-    return command(name, client=client, **arguments)
 
 
 def test_a_watching_page_changes_no_value(page, bench):

@@ -1,7 +1,11 @@
 """The actuator in few triangles: closed solids of the right size, and poses that are the rotor's."""
 
+from math import prod
+
 import numpy as np
 import pytest
+import trimesh
+from scipy.spatial.transform import Rotation
 
 from spheretwin.models.kinematics import rotation
 from spheretwin.viz import theme
@@ -20,22 +24,16 @@ SINGLE = 1e-6
 MOST_TRIANGLES = 10_000
 
 
-def volume(solid):
-    """Enclosed volume, by the divergence theorem; positive where the faces look outward."""
-    a, b, c = np.moveaxis(solid.positions[solid.triangles].astype(float), 1, 0)
-    return float(np.einsum("ij,ij->", a, np.cross(b, c))) / 6
-
-
 def is_closed(solid):
     """Whether each edge, by the places of its ends, is walked once in each direction."""
-    _, place = np.unique(np.round(solid.positions, 7), axis=0, return_inverse=True)
-    corners = place.reshape(-1)[solid.triangles]
-    edges = np.concatenate([corners[:, [0, 1]], corners[:, [1, 2]], corners[:, [2, 0]]])
-    edges = edges[edges[:, 0] != edges[:, 1]]  # at the axis
-    results = {}
-    for start, end in edges.tolist():
-        results[start, end] = results.get((start, end), 0) + 1
-    return all(results.get((end, start)) == count for (start, end), count in results.items())
+    mesh = trimesh.Trimesh(np.round(solid.positions.astype(float), 7), solid.triangles)
+    mesh.update_faces(mesh.nondegenerate_faces())  # at the axis
+    return mesh.is_watertight and mesh.is_winding_consistent
+
+
+def volume(solid):
+    """Enclosed volume; positive where the faces look outward."""
+    return trimesh.Trimesh(solid.positions, solid.triangles, process=False).volume
 
 
 def polygon(sections):
@@ -87,8 +85,7 @@ def test_all_of_it_is_few_triangles(actuator):
 
 def test_quaternions_turn_z_to_each_axis(actuator):
     axes = np.concatenate([actuator.coil_axes, np.eye(3), -np.eye(3)])
-    w, x, y, z = quaternions_along(axes).T
-    turned = np.stack([2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)], axis=1)
+    turned = Rotation.from_quat(quaternions_along(axes), scalar_first=True).apply([0, 0, 1])
     assert turned == pytest.approx(axes, abs=1e-12)  # rounding
 
 
@@ -111,13 +108,8 @@ def test_each_hinge_turns_about_its_own_axis(scene, actuator):
     """Frames within frames: the product of their turns is the rotor's orientation."""
     q = np.array([0.3, -0.2, 1.0])
     scene.move(q, None, np.zeros(len(actuator.groups)), 8.0)
-    R = np.eye(3)
-    for hinge in scene._hinges:
-        w, *v = hinge.wxyz
-        v = np.array(v)
-        cross = np.array([[0, -v[2], v[1]], [v[2], 0, -v[0]], [-v[1], v[0], 0]])
-        R = R @ (np.eye(3) + 2 * w * cross + 2 * cross @ cross)
-    assert pytest.approx(rotation(q), abs=1e-12) == R
+    turns = (Rotation.from_quat(hinge.wxyz, scalar_first=True) for hinge in scene._hinges)
+    assert prod(turns, start=Rotation.identity()).as_matrix() == pytest.approx(rotation(q), abs=1e-12)
     assert not scene.handle.visible
 
 

@@ -115,16 +115,8 @@ def test_stop_waits_for_a_channel_that_is_being_opened_again(browser):
 @IN_A_BROWSER
 def test_heartbeats_state_the_page(browser):
     bench = fake.Bench()
-    beats, command = [], bench.command
-
-    def noted(name, /, *, client=None, **arguments):
-        if name == "beat":
-            beats.append(client)
-        return command(name, client=client, **arguments)
-
-    bench.command = noted
     with fake.shown(bench) as page:
         first, second = opened(browser, page), opened(browser, page)
-        wait_for(lambda: {"page 0", "page 1"} <= set(beats))
+        wait_for(lambda: {"page 0", "page 1"} <= set(bench.beats))
         first.close()
         second.close()

@@ -1,5 +1,6 @@
 """Poses of the drawn bodies against the kinematics; meshes as the model file places them."""
 
+import re
 import shutil
 from dataclasses import replace
 from pathlib import Path
@@ -218,20 +219,13 @@ def height(mjcf):
     return max(np.max(placed(piece)) for piece in read_meshes(mjcf).others.values())
 
 
-def metre_up(line):
-    """A line of an OBJ file, higher where it is a vertex."""
-    if not line.startswith("v "):
-        return line
-    _, x, y, z = line.split()
-    return f"v {x} {y} {float(z) + 1.0}"
-
-
 def test_an_edited_mesh_is_read_again(tmp_path):
     shutil.copytree(actuators.FOLDER / "assets", tmp_path / "assets")
     mjcf = Path(shutil.copy(actuators.MJCF_PATH, tmp_path / "mine.xml"))
     mesh = tmp_path / "assets" / "shaft.obj"
     before = height(mjcf)
     assert height(mjcf) == before
-    mesh.write_text("\n".join(map(metre_up, mesh.read_text().splitlines())))
+    vertex = re.compile(r"^(v \S+ \S+) (\S+)", re.MULTILINE)
+    mesh.write_text(vertex.sub(lambda found: f"{found[1]} {float(found[2]) + 1.0}", mesh.read_text()))
     # A metre up; the file's digits are cut to single precision.
     np.testing.assert_allclose(height(mjcf), before + 1.0, atol=1e-6)
