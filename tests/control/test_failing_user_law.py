@@ -179,13 +179,8 @@ def test_exceptions_of_other_threads_go_where_they_went(monkeypatch):
 @pytest.mark.release("compiles two laws again for 3 s; other tests run laws with bounds checks")
 @pytest.mark.parametrize("law", ["pd", "afsm_eso"])
 def test_bounds_checks_change_no_bit_of_a_law_that_keeps_to_its_arrays(law):
-    runs = [
-        simulate(
-            scenarios.load(
-                "sinusoid", {"duration": 0.1, "controller.law": law, "controller.check_bounds": checked}
-            )
-        )
-        for checked in (False, True)
-    ]
-    assert [run.status for run in runs] == ["completed"] * 2
-    assert runs[0].telemetry.values.tobytes() == runs[1].telemetry.values.tobytes()
+    fields = {"duration": 0.1, "controller.law": law}
+    checks = ({"controller.check_bounds": checked} for checked in (False, True))
+    one, other = (simulate(scenarios.load("sinusoid", fields | check)) for check in checks)
+    assert one.status == other.status == "completed"
+    assert one.telemetry.values.tobytes() == other.telemetry.values.tobytes()

@@ -8,20 +8,13 @@ import pytest
 
 from spheretwin.machine import read, write
 from spheretwin.models.telemetry.table import read_parquet
+from spheretwin.scenario.writing import command_words
 from spheretwin.viz.recording.live import LivePage
 from tests.twin.cli.calls import call, refusal, succeeded
 from tests.twin.machine.machine_logs import KNOWN, SCENARIO, changing_log
 from tests.viz.recording.panels import columns
 
-
-def flags(fields):
-    words = []
-    for name, value in fields.items():
-        words += [f"--{name}", *(map(str, value) if isinstance(value, list) else [str(value)])]
-    return words
-
-
-MACHINE = ["--scenario", SCENARIO, *flags(KNOWN)]
+MACHINE = ["--scenario", SCENARIO, *command_words("", KNOWN)[3:]]
 
 
 @pytest.fixture(scope="module")
@@ -167,7 +160,7 @@ def test_design_writes_a_scenario_and_its_currents(tmp_path):
     scenario, currents = tmp_path / "design.toml", tmp_path / "design.csv"
     words = ["--parameter", "plant.coulomb_Nm", "--window", "1", "--candidates", "2"]
     files = ["--out", scenario, "--currents", currents]
-    result = call("identify", "--design", SCENARIO, *words, *files, *flags(KNOWN))
+    result = call("identify", "--design", SCENARIO, *words, *files, *command_words("", KNOWN)[3:])
     assert result.code == 0
     assert "times narrower" in result.out
     run = call("simulate", scenario, "--manual.file", currents, "--json")

@@ -8,6 +8,7 @@ from spheretwin.control.laws.pid import BANDWIDTH_rad_s
 from spheretwin.paper import tilt
 from spheretwin.paper.runner import make_plan, run_plan
 from spheretwin.paper.tilt_cases import BY_LAW, CHANGES, TILT_LAWS, printed
+from spheretwin.scenario.fields import flat
 from spheretwin.viz.theme import LAW_COLOURS, LAW_MARKS
 
 COMPILES = pytest.mark.release("compiles a loop for 12 s; content of figure 11 has its tables")
@@ -32,22 +33,13 @@ def test_laws_are_the_paper_s_a_tuned_pid_and_ours():
         assert scenario.controller == type(scenario.controller)(**preset)  # printed gains are the defaults
 
 
-def differences(one, other, path=()):
-    """Fields by dotted name in which two dumps are not the same."""
-    if not (isinstance(one, dict) and isinstance(other, dict)):
-        return {".".join(path)} if one != other else set()
-    return {
-        name for key in {*one, *other} for name in differences(one.get(key), other.get(key), (*path, key))
-    }
-
-
 @pytest.mark.parametrize(
     "change", [change for change in CHANGES if not change.ideal], ids=lambda each: each.case().name
 )
 def test_a_change_is_of_one_thing_alone(change):
-    changed = scenarios.load("tilt", change.case().fields).model_dump(mode="json")
-    unchanged = scenarios.load("tilt", printed(BY_LAW[change.law]).fields).model_dump(mode="json")
-    fields = differences(changed, unchanged)
+    cases = change.case(), printed(BY_LAW[change.law])
+    changed, unchanged = (flat(scenarios.load("tilt", case.fields).model_dump(mode="json")) for case in cases)
+    fields = {name for name in changed | unchanged if changed.get(name) != unchanged.get(name)}
     sections, named = ({name.split(".")[place] for name in fields} for place in (0, 1))
     assert len(sections) == 1
     # Another estimator has other fields; an acceleration within bounds is of use where it becomes torque.

@@ -11,7 +11,8 @@ from spheretwin.study import agreement
 from spheretwin.study import table as tables
 from spheretwin.study.grid import Grid
 from spheretwin.study.row import Rows
-from spheretwin.study.runner import run
+from spheretwin.study.runner import check, run
+from spheretwin.study.study import load, shipped
 from tests.twin.study.cases import SHORT, loads, rows_of, run_rows, study, table, values
 
 
@@ -189,3 +190,9 @@ def test_a_failure_of_the_table_hides_no_other(tmp_path, monkeypatch):
         monkeypatch.setattr(module, name, Mock(side_effect=SpheretwinError(message)))
         with pytest.raises(SpheretwinError, match=message):
             run_rows(study(), tmp_path / message)
+
+
+@pytest.mark.parametrize("name", shipped())
+def test_shipped_studies_can_be_run(name):
+    chosen = load(name)
+    check(Grid(chosen), Rows(chosen))

@@ -7,12 +7,9 @@ import sys
 
 import pytest
 
-from spheretwin import scenario as scenarios
 from spheretwin.models.base.errors import InputError, SpheretwinError
-from spheretwin.outputs import Outputs
-from spheretwin.session import Session
-from spheretwin.simulation import follow
 from spheretwin.viz import rerun_internals
+from tests.viz.recording.recordings import recorded
 
 FILES = 24
 
@@ -55,10 +52,7 @@ for path in sys.argv[1:]:
 def test_no_damage_ends_the_process_or_says_more_than_a_line(tmp_path):
     """Bits, bytes, blocks, wherever they are; a damaged number may stay a number."""
     whole = tmp_path / "whole.rrd"
-    with Session(scenarios.load("hold", {"plant.engine": "lagrangian", "duration": 0.3})) as session:
-        files = Outputs(session, whole, None, live=False)
-        follow(session, session.scenario.ticks, files.sinks)
-        assert files.close() == []
+    recorded(whole, duration=0.3)
     content, draws, paths = whole.read_bytes(), random.Random(0), []
     for number in range(FILES):
         damaged = bytearray(content)
