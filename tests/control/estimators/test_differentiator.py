@@ -13,10 +13,7 @@ from spheretwin.control.estimators import differentiator
 from spheretwin.control.estimators.differentiator import BANDWIDTH, L1, L2, L3, VARIANCE, Differentiator
 from spheretwin.control.estimators.estimator import estimates
 from spheretwin.models.base.errors import InputError
-from tests.control.estimators import cases
-
-NOISE, PERIOD = cases.NOISE, cases.PERIOD
-built, on_all_axes, sampling = cases.built, cases.on_all_axes, cases.sampling
+from tests.control.estimators.cases import NOISE, PERIOD, built, on_all_axes, sampling
 
 COEFFICIENTS, POWERS = np.array([2.0, 2.12, 1.1]), np.array([2 / 3, 1 / 3, 0.0])
 

@@ -10,10 +10,7 @@ from hypothesis import strategies as st
 
 from spheretwin.control.estimators import ESTIMATORS
 from spheretwin.control.estimators.estimator import LARGEST_ANGLE_rad, Sampling, estimates
-from tests.control.estimators import cases
-
-NOISE, PERIOD = cases.NOISE, cases.PERIOD
-built, on_all_axes, sampling = cases.built, cases.on_all_axes, cases.sampling
+from tests.control.estimators.cases import NOISE, PERIOD, built, on_all_axes, sampling
 
 KINDS = [kind for kind, parameters in ESTIMATORS.items() if parameters().build(sampling()) is not None]
 EACH = pytest.mark.parametrize("kind", KINDS)

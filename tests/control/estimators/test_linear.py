@@ -9,10 +9,7 @@ from spheretwin.control.estimators import ESTIMATORS
 from spheretwin.control.estimators.estimator import estimates
 from spheretwin.control.estimators.kalman import Kalman, gains
 from spheretwin.models.base.errors import InputError
-from tests.control.estimators import cases
-
-NOISE, PERIOD = cases.NOISE, cases.PERIOD
-built, on_all_axes, sampling = cases.built, cases.on_all_axes, cases.sampling
+from tests.control.estimators.cases import NOISE, PERIOD, built, on_all_axes, sampling
 
 LINEAR = pytest.mark.parametrize("kind", ["difference", "kalman"])
 BANDWIDTHS = pytest.mark.parametrize("bandwidth", [20.0, 150.0, 1000.0])

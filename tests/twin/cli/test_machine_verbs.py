@@ -12,7 +12,7 @@ from spheretwin.scenario.writing import command_words
 from spheretwin.viz.recording.live import LivePage
 from tests.twin.cli.calls import call, refusal, succeeded
 from tests.twin.machine.machine_logs import KNOWN, SCENARIO, changing_log
-from tests.viz.recording.panels import columns
+from tests.viz.recording.panels import columns, series
 
 MACHINE = ["--scenario", SCENARIO, *command_words("", KNOWN)[3:]]
 
@@ -144,14 +144,13 @@ def test_a_live_watch_shows_windows_and_alarms(tmp_path, pages):
     result = call("watch", path, *MACHINE, "--live")
     alarms = [json.loads(line) for line in result.out.splitlines()]
     received.write_bytes(b"".join(*pages))
-    values, times = columns(received)
+    values, _ = read = columns(received)
     texts = [row[0] for part in values["/watch/alarms", "TextLog:text"] for row in part.to_pylist()]
     assert result.code == 1
     assert [text.split()[0] for text in texts] == [alarm["what"] for alarm in alarms]
     assert "sensors.angle_offset_rad.0" in texts[0]
-    assert len(np.concatenate(times["/watch/windows", "Scalars:scalars"])) == 25  # all complete ones
-    parts = values["/watch/windows", "Scalars:scalars"]
-    windows = np.array([row for part in parts for row in part.to_pylist()])
+    _, windows = series(read, "watch/windows", "Scalars:scalars")
+    assert len(windows) == 25  # all complete ones
     assert windows[:, 1].argmax() >= 23  # the sum exceeds its threshold after the change
     assert windows[:, 1].max() > 1
 

@@ -12,7 +12,7 @@ from spheretwin.machine.state_estimation import followed, signals
 from spheretwin.viz.comparison.shadow_live import ALARMS, WINDOWS, ShadowView
 from spheretwin.viz.comparison.shadow_recording import TEXT
 from spheretwin.viz.recording.live import RECORDING
-from tests.viz.recording.panels import columns
+from tests.viz.recording.panels import columns, series
 
 ROWS, BLOCK = 1500, 20
 
@@ -47,17 +47,16 @@ def received(log, folder, *, watched):
 
 
 def test_a_viewer_gets_the_first_row_of_each_frame_and_the_verdict(log, tmp_path):
-    telemetry, (values, times) = received(log, tmp_path, watched=False)
+    telemetry, read = received(log, tmp_path, watched=False)
     firsts = np.flatnonzero(np.diff(np.floor(telemetry["t_s"] * 60 + 1e-6), prepend=0))
-    key = "/plots/angle", "Scalars:scalars"
-    np.testing.assert_array_equal(np.concatenate(times[key]), np.round(1e9 * telemetry["t_s"][firsts]))
-    drawn = np.array([row for part in values[key] for row in part.to_pylist()])
+    t_ns, drawn = series(read, "plots/angle", "Scalars:scalars")
+    np.testing.assert_array_equal(t_ns, np.round(1e9 * telemetry["t_s"][firsts]))
     expected = np.hstack([telemetry["q_measured_rad"], telemetry["q_estimated_rad"]])[firsts]
     np.testing.assert_array_equal(drawn, expected)
-    rates = [row for part in values["/plots/qdot_estimated_rad_s", key[1]] for row in part.to_pylist()]
-    rates = np.array(rates, dtype=float)
+    _, rates = series(read, "plots/qdot_estimated_rad_s", "Scalars:scalars")
     assert np.all(np.isnan(rates[0]))  # of the first row nothing is known: its band would hide all others
     np.testing.assert_array_equal(rates[-1, ::3], telemetry["qdot_estimated_rad_s"][firsts[-1]])
+    values, _ = read
     assert len(values["/machine/world/rotor", "Transform3D:quaternion"]) == 2  # a second, and the rest
     assert len(values["/twin/world/rotor", "Transform3D:quaternion"]) == 2
     texts = [text for part in values[f"/{TEXT}", "TextDocument:text"] for (text,) in part.to_pylist()]
@@ -65,10 +64,10 @@ def test_a_viewer_gets_the_first_row_of_each_frame_and_the_verdict(log, tmp_path
 
 
 def test_a_watch_has_a_lane_and_its_alarms_as_text(log, tmp_path):
-    telemetry, (values, times) = received(log, tmp_path, watched=True)
-    key = f"/{WINDOWS}", "Scalars:scalars"
+    telemetry, read = received(log, tmp_path, watched=True)
+    t_ns, windows = series(read, WINDOWS, "Scalars:scalars")
     ends = np.round(1e9 * telemetry["t_s"][BLOCK - 1 :: BLOCK])
-    np.testing.assert_array_equal(np.concatenate(times[key]), ends)
-    assert all(row == [1.1, 0.2, 1.0] for part in values[key] for row in part.to_pylist())
-    alarms = values[f"/{ALARMS}", "TextLog:text"]
+    np.testing.assert_array_equal(t_ns, ends)
+    np.testing.assert_array_equal(windows, [[1.1, 0.2, 1.0]] * len(ends))
+    alarms = read[0][f"/{ALARMS}", "TextLog:text"]
     assert [text for part in alarms for (text,) in part.to_pylist()] == ["torque_scale -0.03"] * len(ends)

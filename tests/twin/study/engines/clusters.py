@@ -26,10 +26,6 @@ def run(study, folder, machines, **options):
     return runner.run(study, folder, engine="ray", address=machines.address, **options)
 
 
-def same_table(folder, wanted):
-    return (folder / "table.parquet").read_bytes() == (wanted / "table.parquet").read_bytes()
-
-
 LIMIT = 60
 LONG_STUDY = STUDY.replace("samples = 120", "samples = 100_000")  # it does not end before it is stopped
 

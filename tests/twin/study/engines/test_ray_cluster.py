@@ -8,7 +8,8 @@ from spheretwin.models.base.errors import InputError, SpheretwinError
 from spheretwin.study import journal, runner
 from spheretwin.study.engines import engine, ray_worker
 from tests.package_copy import copy_package
-from tests.twin.study.engines.clusters import LONG_STUDY, ROWS, goes_on_locally, run, same_table, started
+from tests.twin.study.cases import table
+from tests.twin.study.engines.clusters import LONG_STUDY, ROWS, goes_on_locally, run, started
 
 pytestmark = pytest.mark.release(
     "a Ray cluster for 15 to 83 s; test_ray_batches.py and test_ray_refusals.py need none"
@@ -67,7 +68,7 @@ def test_a_node_that_is_killed_half_way_loses_nothing(study, machines, wanted, t
     assert 0 < result.startup_s < result.wall_s
     lines = (tmp_path / "study" / journal.NAME).read_text().splitlines()
     assert len(lines) == 1 + ROWS  # its head, and each row once
-    assert same_table(tmp_path / "study", wanted)
+    assert table(tmp_path / "study") == table(wanted)
     (stored,) = (tmp_path / "study" / "telemetry").iterdir()
     assert stored.name == next((wanted / "telemetry").iterdir()).name
 
@@ -122,7 +123,7 @@ def test_an_address_where_nobody_answers_loses_nothing(study, machines, wanted, 
     assert (tmp_path / journal.NAME).read_bytes() == stored
     result = run(study, tmp_path, machines)
     assert (result.rows, result.resumed) == (ROWS, 20)
-    assert same_table(tmp_path, wanted)
+    assert table(tmp_path) == table(wanted)
 
 
 # The last one: it leaves no cluster.
