@@ -3,6 +3,7 @@
 import gc
 import shlex
 import weakref
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -62,10 +63,7 @@ def test_a_closed_bench_has_completed_its_files_and_holds_none_of_them(tmp_path)
 
 
 def test_an_error_of_a_file_is_reported_and_the_run_continues(tmp_path, monkeypatch):
-    def fails(self, rows):
-        raise OSError("the disk is full")
-
-    monkeypatch.setattr(TelemetryFile, "write", fails)
+    monkeypatch.setattr(TelemetryFile, "write", Mock(side_effect=OSError("the disk is full")))
     with begun() as made:
         done(made, "record", telemetry=str(tmp_path / "run.parquet"))
         assert made.advance(50) == 50

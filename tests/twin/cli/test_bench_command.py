@@ -10,6 +10,7 @@ import urllib.error
 import urllib.request
 from pathlib import Path
 from types import SimpleNamespace
+from unittest.mock import Mock
 
 import pytest
 
@@ -63,12 +64,7 @@ def redirection(file):
 
 @pytest.mark.parametrize("flags", [[], ["--no-browser", "--hold-after", "7"]], ids=["browser", "none"])
 def test_a_browser_is_opened_at_the_printed_address_unless_it_is_not_to(monkeypatch, tmp_path, flags):
-    opened, silences = [], []
-
-    def operators(*silence_s):
-        silences.append(silence_s)
-        return Operators(*silence_s)
-
+    opened, operators = [], Mock(wraps=Operators)
     monkeypatch.setattr(bench, "Operators", operators)
     monkeypatch.setattr(Page, "show", lambda page, ended: None)
     monkeypatch.setattr(bench.webbrowser, "open", lambda file: opened.append(redirection(file)))
@@ -77,7 +73,7 @@ def test_a_browser_is_opened_at_the_printed_address_unless_it_is_not_to(monkeypa
     address = re.fullmatch(r"bench: (http://127\.0\.0\.1:\d+/\?token=[\w-]+) \(Ctrl-C ends it\)\n", out)[1]
     assert {path.name for path in tmp_path.iterdir()} <= {".cache"}  # compiled loops
     assert opened == ([] if flags else [(address, 0o600)])
-    assert silences == [(7.0 if flags else 2.0,)]
+    operators.assert_called_once_with(7.0 if flags else 2.0)
     assert (code, err) == (cli.DONE, "bench: preparing hold\n")
 
 

@@ -4,6 +4,7 @@ import subprocess
 import sys
 from importlib.metadata import version
 from pathlib import Path
+from unittest.mock import patch
 
 import pytest
 from hypothesis import given, settings
@@ -77,13 +78,9 @@ refused = st.sampled_from(["--duration=-1", "--no.such.field=1"])
 
 def ended(source, *arguments):
     """Exit code, stdout and stderr of a command that may not come as far as to run."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(simulate, "Session", _not_run)
+    run = AssertionError("a run began, although an argument asks for help or is invalid")
+    with patch.object(simulate, "Session", side_effect=run):
         return call("simulate", source, *arguments)
-
-
-def _not_run(scenario):
-    raise AssertionError("a run began, although an argument asks for help or is invalid")
 
 
 # 150 examples each: some seconds.

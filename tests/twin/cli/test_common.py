@@ -7,6 +7,7 @@ import signal
 import sys
 import time
 from typing import NamedTuple
+from unittest.mock import Mock
 
 import pytest
 
@@ -59,10 +60,7 @@ def test_the_effect_of_a_second_signal_is_explained_once_and_only_after_the_firs
 
 
 def test_ctrl_c_outside_of_a_run_is_one_line_and_exit_1(monkeypatch, capsys):
-    def interrupt(options):
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr(explain, "run", interrupt)
+    monkeypatch.setattr(explain, "run", Mock(side_effect=KeyboardInterrupt))
     assert cli.main(["explain", "seed"]) == cli.FAILED == 1
     assert capsys.readouterr() == ("", "spheretwin: interrupted\n")
 

@@ -4,6 +4,7 @@ import os
 import re
 import shutil
 from dataclasses import replace
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -166,10 +167,7 @@ def test_a_result_that_cannot_be_completed_leaves_nothing(files, tmp_path, monke
     """An error after the first run is written, as a panic of Rerun's would be."""
     runs = [read(files["first"]), read(files["slow"])]
 
-    def panic(*_):
-        raise BaseException("a panic")
-
-    monkeypatch.setattr(Ghost, "begin", panic)
+    monkeypatch.setattr(Ghost, "begin", Mock(side_effect=BaseException("a panic")))
     with pytest.raises(BaseException, match="a panic"):
         comparison.merge(runs, tmp_path / "out.rrd")
     assert os.listdir(tmp_path) == []

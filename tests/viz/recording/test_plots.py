@@ -8,7 +8,6 @@ from hypothesis import strategies as st
 from spheretwin.models.telemetry.signals import Signal
 from spheretwin.models.telemetry.status import QUIET_S, Status
 from spheretwin.viz.decimation import FIRST_CHUNK_S, TimeBins
-from spheretwin.viz.layout.extents import SPANS, ExtentTracker, PlotChannel
 from spheretwin.viz.recording.status import LEVELS, LimitSpells
 from spheretwin.viz.recording.summary import Summary
 from tests.viz.recording.recordings import session_and_facts
@@ -100,20 +99,6 @@ def test_times_at_a_limit_are_logged_once_for_any_chunks(limited, cuts):
     for first, last in zip([0, *sorted(cuts)], [*sorted(cuts), 300], strict=True):
         results += spells.of(table.rows(first, last))
     assert results == slow_spells(table["t_s"], levels)
-
-
-def test_the_tracker_keeps_all_bounds_in_bounded_memory():
-    survey, generator = ExtentTracker({"a": 1, "b": 2}), np.random.default_rng(0)
-    values = generator.normal(size=(20 * SPANS, 3))
-    for first in range(0, len(values), 100):
-        part = values[first : first + 100]
-        survey.add(0.04 * np.arange(first, first + 100), part - 1, part + 1)
-    seen = survey.extents(None)
-    assert SPANS <= len(seen.t_s) <= 2 * SPANS
-    assert np.all(np.diff(seen.t_s) > 0)
-    low, high = seen.bounds(PlotChannel("b", 1))
-    assert (low, high) == (values[:, 2].min() - 1, values[:, 2].max() + 1)
-    assert ExtentTracker({"a": 1}).extents(None) is None
 
 
 FAULT_SIGNALS = (

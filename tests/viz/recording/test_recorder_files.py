@@ -5,6 +5,7 @@ import os
 import shutil
 import subprocess
 import sys
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -71,10 +72,7 @@ def test_where_a_pipe_has_no_path_rerun_writes_the_file(tmp_path, monkeypatch):
 
 
 def test_a_file_that_cannot_be_opened_again_leaves_nothing(tmp_path, monkeypatch):
-    def out_of_handles():
-        raise OSError(24, "Too many open files")
-
-    monkeypatch.setattr(os, "pipe", out_of_handles)
+    monkeypatch.setattr(os, "pipe", Mock(side_effect=OSError(24, "Too many open files")))
     with pytest.raises(InputError, match="Too many open files"):
         opened(tmp_path / "run.rrd")
     assert os.listdir(tmp_path) == []
