@@ -9,7 +9,12 @@ from scipy.optimize import brentq
 from spheretwin import scenario as scenarios
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.lagrangian import inertia_matrix
-from spheretwin.plant import bristle_friction as bearing
+from spheretwin.plant.bristle_friction import (
+    StictionSection,
+    apply_bristles,
+    begin_bristles,
+    bristle_friction,
+)
 from spheretwin.plant.cable import CableSection
 from spheretwin.plant.end_stops import EndStopsSection, end_stops
 from spheretwin.plant.friction import friction
@@ -27,8 +32,8 @@ CONTACT_rad = 0.5 - ON.travel_rad
 
 def stopped(actuator, section=ON, step_s=STEP_s):
     stops = end_stops(section, RANGE_rad, actuator.inertia, step_s)
-    nothing = bearing.StictionSection(), (0.0, 0.0, 0.0), CableSection()
-    return bearing.bristle_friction(*nothing, actuator.inertia, step_s, stops=stops)
+    nothing = StictionSection(), (0.0, 0.0, 0.0), CableSection()
+    return bristle_friction(*nothing, actuator.inertia, step_s, stops=stops)
 
 
 def spin(actuator, duration_s, rate, load=0.0, section=ON, step_s=STEP_s):
@@ -108,11 +113,11 @@ def test_a_contact_never_adds_energy_and_never_pulls(
     h, qdot = 10**step, 10**speed * direction
     section = ON.model_copy(update={"stiffness_Nm_rad": 10**stiffness, "damping_ratio": ratio})
     stops = end_stops(section, RANGE_rad, actuator.inertia, h)
-    other = bearing.StictionSection(on=sticks), (2e-3, 2e-3, 2e-3), CableSection()
-    bristles = bearing.bristle_friction(*other, actuator.inertia, h, stops=stops)
+    other = StictionSection(on=sticks), (2e-3, 2e-3, 2e-3), CableSection()
+    bristles = bristle_friction(*other, actuator.inertia, h, stops=stops)
     after_q, after = q + h * qdot, qdot.copy()  # of a rotor without torque, and with constant inertia
-    bearing.begin_bristles(bristles, q, q, qdot, np.zeros(3))
-    bearing.apply_bristles(bristles, q, qdot, qdot, after_q, after)
+    begin_bristles(bristles, q, q, qdot, np.zeros(3))
+    apply_bristles(bristles, q, qdot, qdot, after_q, after)
     M = inertia_matrix(q, actuator.inertia)
 
     def energy(rates, angles):
