@@ -36,15 +36,15 @@ def residual(track, angles):
     return volts / track.volts_per_rad - angles
 
 
-@given(FINITE)
-def test_a_track_without_residual_is_a_line_with_ends(angle):
-    volts = wiper_voltage(track_of(), angle)
-    if abs(angle) >= HALF_rad:
-        assert volts == np.copysign(2.5, angle)
+@given(FINITE | st.floats(-3, 3), st.sampled_from([HALF_rad, 0.75]), st.sampled_from([2.5, 6.0]))
+def test_a_track_without_residual_is_a_line_with_ends(angle, half_rad, half_V):
+    volts = wiper_voltage(track_of(electrical_angle_rad=2 * half_rad, supply_V=2 * half_V), angle)
+    if abs(angle) >= half_rad:
+        assert volts == np.copysign(half_V, angle)
     else:
         # One product; near the end it may round up to the supply, not beyond.
-        assert volts == pytest.approx(angle * 2.5 / HALF_rad, rel=1e-15, abs=5e-324)
-        assert abs(volts) <= 2.5
+        assert volts == pytest.approx(angle * half_V / half_rad, rel=1e-15, abs=5e-324)
+        assert abs(volts) <= half_V
 
 
 def test_ends_hold_infinity_and_nothing_makes_a_number_of_none():
@@ -57,10 +57,11 @@ def test_ends_hold_infinity_and_nothing_makes_a_number_of_none():
 
 @pytest.mark.parametrize("seed", range(20))
 def test_residual_is_four_harmonics_of_the_track_and_its_peak_is_the_stated_one(seed):
-    bound, samples = 0.01, 4096
+    bound, samples, half_rad = 0.01, 4096, HALF_rad if seed % 2 else 0.75
     # A supply far above what is reached: else the ends would cut the residual off.
-    track = track_of(seed, nonlinearity_rad=bound)._replace(half_supply_V=1e3)
-    angles = HALF_rad * (2 * np.arange(samples) / samples - 1)
+    fields = {"nonlinearity_rad": bound, "electrical_angle_rad": 2 * half_rad}
+    track = track_of(seed, **fields)._replace(half_supply_V=1e3)
+    angles = half_rad * (2 * np.arange(samples) / samples - 1)
     off = residual(track, angles)
     # Between samples a peak rises above both by at most half its curvature times (π/4096)²; the curvature is
     # at most Σ k²/k² = 4 over a peak of at least π/4.
