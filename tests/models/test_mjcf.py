@@ -219,10 +219,8 @@ PID = '<extension><plugin plugin="mujoco.pid"><instance name="pid"/></plugin></e
 FLEX = (
     '<deformable><flex name="f" dim="1" body="rotor world" vertex="0 0 0 0 0 1" element="0 1"/></deformable>'
 )
-CONSTRAINT, SPRING, DAMPER, ACTUATION = (
-    int(getattr(mujoco.mjtDisableBit, f"mjDSBL_{name}"))
-    for name in ("CONSTRAINT", "SPRING", "DAMPER", "ACTUATION")
-)
+BITS = (f"mjDSBL_{name}" for name in ("CONSTRAINT", "SPRING", "DAMPER", "ACTUATION"))
+CONSTRAINT, SPRING, DAMPER, ACTUATION = (int(getattr(mujoco.mjtDisableBit, name)) for name in BITS)
 PASSIVE = SPRING | DAMPER
 
 NEEDED = {

@@ -145,10 +145,8 @@ def test_a_run_at_the_limit_warns(still, share, lines):
 @pytest.mark.parametrize("allocation", ["least_norm", "bounded"])
 def test_a_lost_rank_is_not_reported_as_the_current_limit(allocation):
     """Two groups cannot give torque in three directions."""
-    faults = [
-        {"target": f"coil.{group:02d}", "mode": "open", "start_s": 0.05, "reported_to_controller": True}
-        for group in range(16)
-    ]
+    fault = {"mode": "open", "start_s": 0.05, "reported_to_controller": True}
+    faults = [fault | {"target": f"coil.{group:02d}"} for group in range(16)]
     run = simulate("nutation", {"duration": 0.1, "allocation": allocation, "fault": faults})
     lost = run.telemetry["allocation_scale"] == 0
     assert not lost[:50].any()

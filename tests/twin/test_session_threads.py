@@ -14,10 +14,9 @@ from tests.waiting import wait_for
 
 
 def test_runs_on_threads_are_those_made_one_after_the_other():
-    runs = [
-        {"controller.law": law, "disturbance.load": load, "seed": seed, "plant.engine": engine}
-        for law, load, seed, engine in product(SHIPPED, (0.0, 1.0, 2.0), (0, 1), ENGINES)
-    ]
+    fields = ("controller.law", "disturbance.load", "seed", "plant.engine")
+    cases = product(SHIPPED, (0.0, 1.0, 2.0), (0, 1), ENGINES)
+    runs = [dict(zip(fields, case, strict=True)) for case in cases]
 
     def made(changes):
         return rows(Session(scenario(**changes)).advance(400))

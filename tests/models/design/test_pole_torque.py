@@ -84,10 +84,8 @@ def test_is_odd_linear_and_grows_with_the_square_of_the_size():
 
 def test_a_front_of_large_radius_tends_to_a_flat_one():
     expected = torque_at(FLAT, COIL, ANGLES_DEG, COARSE)
-    apart = [
-        torque_at(replace(MAGNET, front_radius_m=radius), COIL, ANGLES_DEG, COARSE) - expected
-        for radius in (8.0, 16.0)
-    ]
+    poles = (replace(MAGNET, front_radius_m=radius) for radius in (8.0, 16.0))
+    apart = [torque_at(pole, COIL, ANGLES_DEG, COARSE) - expected for pole in poles]
     # What is ground off, radius² / 2 front radius, halves; 3 micrometres of 16 m are 3e-4 of the length.
     assert_allclose(apart[1], 0.5 * apart[0], rtol=0.02, atol=1e-7 * SHIPPED.peak_Nm_per_A)
     assert np.max(np.abs(apart[1])) < 1e-3 * SHIPPED.peak_Nm_per_A

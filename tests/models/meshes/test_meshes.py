@@ -65,10 +65,8 @@ def placements(tilt_deg, direction, spin):
     data.qpos[:] = np.arctan2(-axis[1], axis[2]), np.arcsin(axis[0]), spin
     mujoco.mj_kinematics(model, data)
     np.testing.assert_allclose(data.body("rotor").xmat.reshape(3, 3)[:, 2], axis, atol=1e-12)
-    return {
-        name: np.column_stack([data.body(name).xmat.reshape(3, 3), np.zeros(3)])
-        for name in ("outer_ring", "inner_ring", "rotor")
-    }
+    bodies = {name: data.body(name).xmat.reshape(3, 3) for name in ("outer_ring", "inner_ring", "rotor")}
+    return {name: np.column_stack([axes, np.zeros(3)]) for name, axes in bodies.items()}
 
 
 def overlap_m3(a, b):

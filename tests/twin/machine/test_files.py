@@ -142,10 +142,9 @@ def test_rerun_shows_each_number_by_name(tmp_path):
 @pytest.mark.parametrize("suffix", [".parquet", ".csv", ".mcap", ".txt"])
 def test_a_file_that_cannot_be_read_is_refused(tmp_path, suffix):
     (path := tmp_path / f"log{suffix}").write_bytes(b"\x00\x01no log")
-    with pytest.raises(InputError, match="expected"):
-        machine.read(path)
-    with pytest.raises(InputError, match="expected"):
-        machine.read(tmp_path / f"missing{suffix}")
+    for file in (path, tmp_path / f"missing{suffix}"):
+        with pytest.raises(InputError, match="expected"):
+            machine.read(file)
 
 
 def test_another_suffix_is_refused(tmp_path):
