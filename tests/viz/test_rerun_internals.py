@@ -19,6 +19,7 @@ from spheretwin.viz.rerun_internals import (
     messages,
     read_assets,
 )
+from tests.viz.recording.panels import layouts
 
 
 @pytest.fixture
@@ -74,6 +75,17 @@ def test_a_layout_is_sent_by_the_method_that_is_overridden(recording):
     names = {name for batch in batches for name in batch.schema.names}
     assert "ViewBlueprint:display_name" in names, "Blueprint._log_to_stream does not send the layout any more"
     assert "log_time" not in names, "the rows of a layout have clock times again"
+
+
+def test_changes_replace_values_of_an_encoded_layout(tmp_path):
+    view = rrb.TimeSeriesView(origin="/value", name="first")
+    layout = EncodedLayout(view)
+    renamed = rrb.archetypes.ViewBlueprint.from_fields(display_name="second")
+    layout.changed({view.blueprint_path(): renamed}).save("spheretwin-test", tmp_path / "second.rbl")
+    layout.save("spheretwin-test", tmp_path / "first.rbl")  # which has not changed
+    for title in ("first", "second"):
+        (content,) = layouts(tmp_path / f"{title}.rbl")
+        assert content[f"/{view.blueprint_path()}", "ViewBlueprint:display_name"] == [[title]]
 
 
 def test_encoded_values_are_those_of_a_log(tmp_path):
