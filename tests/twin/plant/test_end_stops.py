@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import example, given
+from hypothesis import assume, example, given
 from hypothesis import strategies as st
 from scipy.optimize import brentq
 
@@ -109,7 +109,7 @@ pose = st.floats(-1.45, 1.45)
 def test_a_contact_never_adds_energy_and_never_pulls(
     actuator, q, direction, speed, stiffness, ratio, step, sticks
 ):
-    """One step of any length; at β = 1.4 rad the inertia about α is 30 times less."""
+    """A step in which no hinge moves from stop to stop; at β = 1.4 rad α has a 30th of its inertia."""
     h, qdot = 10**step, 10**speed * direction
     section = ON.model_copy(update={"stiffness_Nm_rad": 10**stiffness, "damping_ratio": ratio})
     stops = end_stops(section, RANGE_rad, actuator.inertia, h)
@@ -118,6 +118,7 @@ def test_a_contact_never_adds_energy_and_never_pulls(
     after_q, after = q + h * qdot, qdot.copy()  # of a rotor without torque, and with constant inertia
     begin_bristles(bristles, q, q, qdot, np.zeros(3))
     apply_bristles(bristles, q, qdot, qdot, after_q, after)
+    assume(np.all(np.abs(after_q - q) < np.ptp(stops.contact_rad, axis=1)))
     M = inertia_matrix(q, actuator.inertia)
 
     def energy(rates, angles):
