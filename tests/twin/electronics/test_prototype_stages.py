@@ -95,13 +95,8 @@ def test_a_coil_too_hot_ends_the_run_safely_without_a_watchdog_too():
 
 
 def test_neutral_stages_move_no_bit():
-    neutral = {
-        "drive.delay_s": 0.0,
-        "drive.dac_bits": 0,
-        "drive.dac_offset_V": 1e-3,
-        "drive.bandwidth_rad_s": 10.0,
-    }
-    plain, named = (
-        simulate(scenarios.load("hold", {"duration": 0.1, **changes})).telemetry for changes in ({}, neutral)
-    )
+    neutral = {"delay_s": 0.0, "dac_bits": 0, "dac_offset_V": 1e-3, "bandwidth_rad_s": 10.0}
+    changes = {f"drive.{name}": value for name, value in neutral.items()}
+    both = (scenarios.load("hold", {"duration": 0.1, **each}) for each in ({}, changes))
+    plain, named = (simulate(each).telemetry for each in both)
     assert named.values.tobytes() == plain.values.tobytes()
