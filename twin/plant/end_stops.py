@@ -11,10 +11,10 @@ The first term is the discrete gradient of the energy of the spring, the second 
 takes on its way through the buffer. Both are exact for a steady rate, also in the step in which the contact
 begins, and the mean torque rises with p1, so that the solution is unique. The work of the torque is at least
 the energy that the spring gains: with a constant inertia matrix a contact never adds energy, whatever the
-step, unless a hinge moves past the other stop within it. That holds for one hinge. Where hinges couple, the matrix changes within the step in which the stop
-corrects the pose, and a step can add energy. Without damping it adds up: of 20 random throws of 8 rad/s, 20 s
-at 0.5 ms, one gained 44 %, the median 7 %. With a damping ratio of 0.05 or more none had more energy than at
-its start; single steps added up to 0.3 % of that.
+step, unless a hinge moves past the other stop within it. That holds for one hinge. Where hinges couple, the
+matrix changes within the step in which the stop corrects the pose, and a step can add energy. Without damping
+it adds up: of 20 random throws of 8 rad/s, 20 s at 0.5 ms, one gained 44 %, the median 7 %. With a damping
+ratio of 0.05 or more none had more energy than at its start; single steps added up to 0.3 % of that.
 """
 
 from __future__ import annotations
