@@ -17,7 +17,7 @@ demo: .venv/demo ## run the nutation under AFSM and leave a recording and its te
 # of a linear algebra library would wait for each other, and take twice the processor time.
 PYTEST = PYTHONDONTWRITEBYTECODE= OPENBLAS_NUM_THREADS=1 $(BIN)/pytest -rs --numprocesses auto --maxprocesses 4 --dist loadfile --no-loadscope-reorder
 
-test: compiled ## run the tests of the first suite in parallel, in six minutes
+test: compiled ## run the tests of the first suite in parallel, in five minutes
 	$(PYTEST) -m "not release"
 
 test-all: compiled ## run all tests, also those marked release
