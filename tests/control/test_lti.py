@@ -16,13 +16,13 @@ PERIOD_S, TICKS = 1e-3, 60
 generator = np.random.default_rng(5)
 
 
-def drawn(*shape):
+def uniform(*shape):
     return generator.uniform(-1, 1, shape)
 
 
 def state_space(states, inputs, outputs):
-    A, B = drawn(states, states) / max(states, 1), drawn(states, inputs)
-    return signal.StateSpace(A, B, drawn(outputs, states), drawn(outputs, inputs), dt=PERIOD_S)
+    A, B = uniform(states, states) / max(states, 1), uniform(states, inputs)
+    return signal.StateSpace(A, B, uniform(outputs, states), uniform(outputs, inputs), dt=PERIOD_S)
 
 
 def gain(matrix, dt=PERIOD_S):
@@ -32,7 +32,7 @@ def gain(matrix, dt=PERIOD_S):
     )
 
 
-REFERENCE, MEASUREMENT = drawn(TICKS, 3, 3), drawn(TICKS, 3, 3)
+REFERENCE, MEASUREMENT = uniform(TICKS, 3, 3), uniform(TICKS, 3, 3)
 ERRORS = REFERENCE - MEASUREMENT  # (ticks, row, axis)
 
 
@@ -55,7 +55,7 @@ ROUNDING = {"rtol": 0, "atol": 1e-12}
 @pytest.mark.parametrize("states", [0, 1, 5])
 @pytest.mark.parametrize("rows", [1, 2])
 def test_a_system_of_all_axes_gives_its_own_response(states, rows):
-    system = state_space(states, 3 * rows, 3) if states else gain(drawn(3, 3 * rows))
+    system = state_space(states, 3 * rows, 3) if states else gain(uniform(3, 3 * rows))
     expected = response(system, ERRORS[:, :rows].reshape(TICKS, -1))
     np.testing.assert_allclose(torques(Law.from_lti(system)), expected, **ROUNDING)
 
@@ -92,7 +92,11 @@ def test_outputs_may_be_accelerations_and_a_torque_may_be_added():
 
 def test_lists_of_polynomials_stand_side_by_side():
     """As a transfer function of several inputs and outputs has them."""
-    numerators = [[drawn(2), [0.0], [1.0]], [[0.0, 2.0], drawn(3), [0.0, 0.0]], [[1.5], drawn(1), drawn(2)]]
+    numerators = [
+        [uniform(2), [0.0], [1.0]],
+        [[0.0, 2.0], uniform(3), [0.0, 0.0]],
+        [[1.5], uniform(1), uniform(2)],
+    ]
     denominators = [[[1.0, 0.4], [1.0], [2.0]], [[1.0, -0.3], [3.0, 0.1, 0.2], [1.0, 0.5]], [[1, 0, 0.2]] * 3]
     system = SimpleNamespace(num=numerators, den=denominators, dt=PERIOD_S)
     expected = np.zeros((TICKS, 3))

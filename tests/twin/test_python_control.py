@@ -21,7 +21,7 @@ NONE = control.tf([0.0], [1.0], 1e-3)
 POLYNOMIALS = [[PART, NONE, LATE], [NONE, PART, NONE], [LATE, NONE, PART]]
 
 
-def drawn(states, inputs):
+def stable_system(states, inputs):
     """A stable system of as many outputs as inputs."""
     A = np.diag(generator.uniform(-0.9, 0.9, states))
     B, C = generator.uniform(-1, 1, (states, inputs)), generator.uniform(-1, 1, (inputs, states))
@@ -47,9 +47,9 @@ def torques(law):
         (control.tf([2.0, -1.5], [1.0, -0.7, 0.2], 1e-3), AXES),
         (control.sample_system(control.tf([0.05, 2.0], [0.002, 1.0]), 1e-3, "bilinear"), AXES),
         (control.zpk([0.3], [0.5, -0.2], 2.0, dt=1e-3), AXES),
-        (drawn(2, 1), AXES),
+        (stable_system(2, 1), AXES),
         (control.ss([], [], [], generator.uniform(-1, 1, (3, 6)), 1e-3), [ERRORS.reshape(40, 6)]),
-        (drawn(4, 3), [ERRORS[:, 0]]),
+        (stable_system(4, 3), [ERRORS[:, 0]]),
     ],
     ids=["polynomials", "sampled", "poles", "each axis", "gains", "all axes"],
 )

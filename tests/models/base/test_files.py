@@ -158,7 +158,7 @@ def test_an_input_without_an_end_is_refused_at_once(tmp_path):
     assert regular_file(tmp_path / "link").read_text() == "1"
     kinds = {"zero": "a device", "pipe": "a named pipe", "folder": "a folder"}
     for name, kind in kinds.items():
-        with pytest.raises(OSError, match=None) as error:  # noqa: PT011
+        with pytest.raises(OSError, match=f"it is {kind}, not a regular file") as error:
             regular_file(tmp_path / name)
         assert without_breaks(error.value) == f"it is {kind}, not a regular file: {tmp_path / name}"
     with pytest.raises(FileNotFoundError):

@@ -97,7 +97,7 @@ def fields(path):
     return results
 
 
-def drawn(path):
+def mappings_of(path):
     """Entity and mapping of each component of each visualizer."""
     return [
         (f"/{entity.partition('/overrides/')[2].partition('/visualizers')[0]}", each)
@@ -108,7 +108,7 @@ def drawn(path):
 
 
 def test_what_draws_a_signal_finds_its_values_and_its_looks(path):
-    there, taken = fields(path), drawn(path)
+    there, taken = fields(path), mappings_of(path)
     assert len(taken) > 30
     missing = [
         (entity, each)
@@ -125,7 +125,7 @@ def test_every_signal_of_a_law_is_in_a_plot(name, tmp_path):
     with Session(scenarios.load(scenario, fields)) as session:
         own = {signal.name for signal in session.law.signals}
     assert own
-    selectors = {each["selector"] for _, each in drawn(path) if each["target"] == "Scalars:scalars"}
+    selectors = {each["selector"] for _, each in mappings_of(path) if each["target"] == "Scalars:scalars"}
     assert {f".{name}[]" for name in own} <= selectors
 
 
