@@ -9,12 +9,16 @@ from numpy.typing import NDArray
 
 from spheretwin.models.base.compiled import allocation_free, copy_into
 from spheretwin.models.base.errors import InputError
+from spheretwin.models.base.record import columns_of, is_rows, transfer_rows
 
 Array = NDArray[np.float64]
 
 
 def arrays_of(part: Any, method: str = "state_arrays") -> list[NDArray[Any]]:
     """Return the arrays that a method of a part and of its nested parts gives, in a fixed order."""
+    if is_rows(part):
+        of_faults = method == "fault_arrays"
+        return list(columns_of(part, lambda field: field.set_by_faults if of_faults else field.is_state))
     if isinstance(part, np.ndarray):
         return [part]
     return [array for inner in _inner_parts(part, method) for array in arrays_of(inner, method)]
@@ -65,7 +69,9 @@ def transfer_state(before: Any, after: Any) -> None:
     """
     if type(before) is not type(after):
         return
-    if isinstance(before, np.ndarray):
+    if is_rows(before):
+        transfer_rows(before, after)
+    elif isinstance(before, np.ndarray):
         rows = min(len(before), len(after))
         after[:rows] = before[:rows]
         if rows:
