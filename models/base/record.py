@@ -93,7 +93,8 @@ class Record:
         TypeError
             A size is missing.
         """
-        return _dtype(cls, tuple(sorted(sizes.items())))
+        kind: Any = cls
+        return _dtype(kind, tuple(sorted(sizes.items())))
 
     @classmethod
     def zeros(cls, rows: int = 1, **sizes: int) -> Rows:
@@ -163,10 +164,11 @@ def columns_of(rows: Rows, is_meant: Callable[[Field], bool]) -> Iterator[NDArra
 def transfer_rows(before: Rows, after: Rows) -> None:
     """Copy the state of each row into a row with another configuration.
 
-    A part with a field `on` that is 0 before or after has no state to transfer.
+    A part with a field `on` that is 0 before or after has no state to transfer. Arrays of different lengths
+    are histories, newest entry first: missing entries repeat the oldest one.
     """
-    on = np.ones(len(after), bool)
-    if "on" in after.dtype.names:
+    on = np.ones(after.shape, bool)
+    if "on" in (after.dtype.names or ()):
         on = (before["on"] != 0) & (after["on"] != 0)
     for name, declared in _KINDS[after.dtype].fields().items():
         if is_rows(after[name]):
@@ -174,4 +176,11 @@ def transfer_rows(before: Rows, after: Rows) -> None:
             transfer_rows(inner_before, inner_after)
             after[name][on] = inner_after
         elif declared.is_state:
-            after[name][on] = before[name][on]
+            after[name][on] = _of_length(before[name][on], after[name].shape[on.ndim :][:1])
+
+
+def _of_length(history: NDArray[Any], length: tuple[int, ...]) -> NDArray[Any]:
+    """Return arrays (rows, entries, …) with another number of entries; numbers (rows,) have none."""
+    if history.shape[1:2] == length:
+        return history
+    return history[:, np.minimum(np.arange(*length), history.shape[1] - 1)]

@@ -82,3 +82,18 @@ def test_transfer_keeps_parameters_and_the_state_of_parts_that_are_off():
     np.testing.assert_array_equal(after["first"]["memory"], expected)
     np.testing.assert_array_equal(after["first"]["gain"], 2.5)
     np.testing.assert_array_equal(after["count"], 1)
+
+
+@pytest.mark.parametrize("taps", [2, 3, 5])
+def test_a_history_of_another_length_repeats_the_oldest_entry(taps):
+    before, after = bank(1), Bank.zeros(3, taps=taps, groups=4)
+    before["pair"]["on"] = after["pair"]["on"] = [[1, 1], [0, 1], [1, 0]]
+    transfer_rows(before, after)
+    oldest = before["pair"]["memory"][0, 1, 1]
+    np.testing.assert_array_equal(
+        after["pair"]["memory"][0, 1], [before["pair"]["memory"][0, 1, 0], *[oldest] * (taps - 1)]
+    )
+    assert not after["pair"]["memory"][1, 0].any()
+    np.testing.assert_array_equal(
+        after["pair"]["memory"][1, 1, 1:], [before["pair"]["memory"][1, 1, 1]] * (taps - 1)
+    )

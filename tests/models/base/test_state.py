@@ -6,7 +6,14 @@ import numpy as np
 import pytest
 
 from spheretwin.models.base.errors import InputError
-from spheretwin.models.base.state import arrays_of, push, restore_state, save_state, transfer_state
+from spheretwin.models.base.state import (
+    arrays_of,
+    capacity,
+    push,
+    restore_state,
+    save_state,
+    transfer_state,
+)
 
 
 class Filter(NamedTuple):
@@ -89,3 +96,7 @@ def test_rows_that_are_missing_repeat_the_oldest(rows, expected):
     transfer_state(before, after)
     np.testing.assert_array_equal(after.memory, before.memory[expected])
     np.testing.assert_array_equal(after.count, before.count)
+
+
+def test_the_capacity_of_a_history_is_a_power_of_two_of_at_least_eight():
+    assert [capacity(entries) for entries in (1, 2, 8, 9, 16, 17, 1002)] == [8, 8, 8, 16, 16, 32, 1024]
