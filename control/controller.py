@@ -20,6 +20,7 @@ from spheretwin.control.supervision.fault_detector import Detector, detect_fault
 from spheretwin.control.supervision.watchdog import GO, Reason, Watchdog, trip, watch
 from spheretwin.models.base.compiled import compilable
 from spheretwin.models.base.numba_internals.addresses import function_at
+from spheretwin.models.base.record import Record, Rows, field
 from spheretwin.models.kinematics import cartesian_torque
 from spheretwin.models.magnetics import CachedMatrix, TorqueModel, cached_matrix, update_cached_matrix
 
@@ -45,12 +46,12 @@ class EstimatorState(NamedTuple):
     memory: NDArray[np.float64]
 
 
-class Supervision(NamedTuple):
+class Supervision(Record):
     """Fault detection and watchdog."""
 
-    groups: EnabledGroups
-    detector: Detector
-    watchdog: Watchdog
+    groups: EnabledGroups = field("groups that the allocation may use")
+    detector: Detector = field("detector of open and shorted groups")
+    watchdog: Watchdog = field("check of measurements and commands")
 
 
 class Controller(NamedTuple):
@@ -70,7 +71,7 @@ class Controller(NamedTuple):
     scratch: NDArray[np.float64]  # of the allocation
     applied_torque: AppliedTorque
     compensators: Compensators
-    supervision: Supervision
+    supervision: Rows  # of one `Supervision`
     manual: Manual
     authority: NDArray[np.float64]  # (1,) share of the commands that is sent: 1, or less in a soft start
     python_law: int = 0  # address of a function of the time that calls a law in plain Python; 0: none
@@ -83,7 +84,7 @@ def controller(
     logged: int,
     applied_torque: AppliedTorque,
     compensators: Compensators,
-    supervision: Supervision,
+    supervision: Rows,
     manual: Manual,
     estimator: Estimator | None = None,
 ) -> Controller:
@@ -103,7 +104,7 @@ def controller(
         Estimate of the torque of the law's commands.
     compensators : Compensators
         Governor, prediction and feed-forward.
-    supervision : Supervision
+    supervision : rows of `Supervision`
     manual : Manual
         Manual currents that replace those of the law, if there are any.
     estimator : Estimator, optional
@@ -144,6 +145,7 @@ def control_tick(
     t: float,
     reference: NDArray[np.float64],
     measurement: NDArray[np.float64],
+    fresh: NDArray[np.float64],
     command: NDArray[np.float64],
 ) -> float:
     """Run the law, map its generalised torque to a Cartesian one, and allocate currents.
@@ -165,6 +167,8 @@ def control_tick(
     measurement : (3, 3) or (6, 3) array
         Measured angle (rad) and rate (rad/s); the other rows are filled in. It has six rows if the
         prediction is on. The law may write into it.
+    fresh : (3,) array
+        1 if the measurement of an angle is new, 0 if it repeats the last one.
     command : (n,) array, A
         Result: commanded group currents.
 
@@ -182,22 +186,22 @@ def control_tick(
         )
     for i in range(3):
         pose[i], controller.rates[i] = measurement[0, i], measurement[1, i]
-    watchdog = controller.supervision.watchdog
+    watchdog = controller.supervision[0].watchdog
     if watchdog.on:
-        watch(watchdog, pose, controller.rates)
+        watch(watchdog, fresh, pose, controller.rates)
     update_cached_matrix(pose, controller.magnetics, controller.cached_matrix)
     _supervise(controller, t)
-    law_active = watchdog.halt[0] == GO and not controller.manual.on
+    law_active = watchdog.halt == GO and not controller.manual.on
     if law_active and not _call_law(controller, law, t, reference, measurement):
         if not watchdog.on:
             return NO_TORQUE
         trip(watchdog, _COMMAND)
     share = 1.0
-    if law_active and watchdog.halt[0] == GO:
+    if law_active and watchdog.halt == GO:
         share = _allocate(controller, allocate, command)
     else:
         _command_zero(controller, command)
-        if watchdog.halt[0] == GO:
+        if watchdog.halt == GO:
             share = command_manual_currents(controller.manual, t, controller.current_limit_A, command)
     if controller.authority[0] != 1.0:
         for j in range(command.shape[0]):
@@ -243,8 +247,8 @@ def _call_law(
 @compilable
 def _supervise(controller: Controller, t: float) -> None:
     """Run the fault detector if it is on and the groups are driven."""
-    groups, detector, watchdog = controller.supervision
-    if detector.on and watchdog.halt[0] == GO:
+    groups, detector = controller.supervision[0].groups, controller.supervision[0].detector
+    if detector.on and controller.supervision[0].watchdog.halt == GO:
         G, current = controller.cached_matrix.G, controller.applied_torque.current
         detect_faults(detector, groups, current, G, controller.pose, controller.rates, t)
 
@@ -255,13 +259,13 @@ def _allocate(controller: Controller, allocate: Any, command: NDArray[np.float64
 
     The allocation receives a copy of the torque matrix, so that its writes have no other effect.
     """
-    groups, pose, G = controller.supervision.groups, controller.pose, controller.cached_matrix.G
+    groups, pose, G = controller.supervision[0].groups, controller.pose, controller.cached_matrix.G
     if controller.compensators.prediction.on:
         pose, G = controller.compensators.prediction.pose, controller.compensators.prediction.cached_matrix.G
     cartesian_torque(pose, controller.torque_q, controller.torque_S)
     mask_disabled_groups(groups, G)
     return allocation_at(allocate)(
-        groups.G, controller.torque_S, controller.current_limit_A, command, controller.scratch
+        groups.G[:], controller.torque_S, controller.current_limit_A, command, controller.scratch
     )
 
 

@@ -13,7 +13,7 @@ from spheretwin.control.compensators import Compensators
 from spheretwin.control.compensators.feed_forward import NominalRotor, feed_forward
 from spheretwin.control.compensators.prediction import DelayModel, prediction
 from spheretwin.control.compensators.reference_governor import governor
-from spheretwin.control.controller import Controller, Supervision, controller
+from spheretwin.control.controller import Controller, controller
 from spheretwin.control.estimators.estimator import Estimator, Sampling
 from spheretwin.control.law import Law, NominalModel
 from spheretwin.control.laws import LAWS
@@ -24,6 +24,7 @@ from spheretwin.electronics.transducers import CurrentSensors
 from spheretwin.faults.schedule import part_names
 from spheretwin.models.actuator import Actuator
 from spheretwin.models.base.errors import InputError, SpheretwinError, exception_text, shown
+from spheretwin.models.base.record import Rows
 from spheretwin.models.base.reuse import reused
 from spheretwin.models.joint_chain import JointChain
 from spheretwin.models.lagrangian import loaded_inertia
@@ -143,7 +144,7 @@ def controller_of(
     law: Law,
     magnetics: TorqueModel,
     estimator: Estimator | None,
-    supervision: Supervision,
+    supervision: Rows,
 ) -> Controller:
     """Return the controller of a resolved scenario, at the start of a run."""
     nominal, groups = scenario.nominal, magnetics.group_axes.shape[1]

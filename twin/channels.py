@@ -106,7 +106,7 @@ def fault_signals(groups: int) -> tuple[Signal, ...]:
 @part_of_its_caller
 def write_faults(row: NDArray, controller: Any, plant: Any) -> None:
     """Write the columns of one tick."""
-    groups, parts = controller.supervision.groups, plant.fault_modes.shape[0]
+    groups, parts = controller.supervision[0].groups, plant.fault_modes.shape[0]
     count = groups.out.shape[0]
     for part in range(parts):
         row[part] = plant.fault_modes[part]
@@ -334,7 +334,7 @@ WATCHDOG_SIGNALS = (
 @part_of_its_caller
 def write_watchdog(row: NDArray, controller: Any) -> None:
     """Write the columns of one tick."""
-    row[0] = controller.supervision.watchdog.reason[0]
+    row[0] = controller.supervision[0].watchdog.reason
 
 
 WATCHDOG = Channel(lambda groups: WATCHDOG_SIGNALS, lambda scenario: scenario.watchdog.on, write_watchdog)

@@ -150,7 +150,7 @@ class Connection:
             plant.rotor.qdot[:] = measurement.rate_rad_s
         plant.current[:] = external.command if measurement.current_A is None else measurement.current_A
         if reason:
-            _trip(controller.supervision.watchdog, int(reason))
+            _trip(controller.supervision[0].watchdog, int(reason))
         controller.authority[0] = self._part.authority
         return GOING
 

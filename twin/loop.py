@@ -90,6 +90,7 @@ class Scratch(NamedTuple):
 
     reference: NDArray[np.float64]  # (3, 3), passed to the law
     measurement: NDArray[np.float64]  # (3, 3), or (6, 3) if the law also receives a prediction
+    fresh: NDArray[np.float64]  # (3,) 1 if the measurement of an angle is new
 
 
 @allocation_free
@@ -133,7 +134,7 @@ def loop(
         Rows written, and `GOING`, `LEFT_WORKSPACE`, `DIVERGED`, `FAILSAFE` or `INTERRUPTED`.
     """
     reference, measurement = scratch.reference, scratch.measurement
-    watchdog, detector = controller.supervision.watchdog, controller.supervision.detector
+    watchdog, detector = controller.supervision[0].watchdog, controller.supervision[0].detector
     groups = stages.current.shape[0]
     first_current, scale = CURRENT_COMMAND + groups, CURRENT_COMMAND + 3 * groups
     first_mean = first_current + groups
@@ -157,7 +158,9 @@ def loop(
             if code != GOING:
                 return tick, code
         command = row[CURRENT_COMMAND:first_current]
-        share = control_tick(controller, law, allocate, estimate, t, reference, measurement, command)
+        share = control_tick(
+            controller, law, allocate, estimate, t, reference, measurement, scratch.fresh, command
+        )
         if share == NO_TORQUE:
             return tick, DIVERGED
         row[scale] = share
@@ -175,7 +178,7 @@ def loop(
             copy_into(current, 0, command, groups)
             copy_into(mean_current, 0, command, groups)
             copy_into(torque_S, 0, external.torque_S, 3)
-        if status == FAILSAFE and watchdog.reason[0] == 0:
+        if status == FAILSAFE and watchdog.reason == 0:
             trip(watchdog, _TEMPERATURE)
         for channel in range(stages.columns.shape[0]):
             write_at(stages.writers[channel])(
@@ -185,7 +188,7 @@ def loop(
             return tick, DIVERGED
         if status == FAILSAFE and watchdog.on:
             status = GOING  # the currents run down first
-        if count_rundown(watchdog) or (status == LEFT_WORKSPACE and watchdog.halt[0] != GO):
+        if count_rundown(watchdog) or (status == LEFT_WORKSPACE and watchdog.halt != GO):
             status = FAILSAFE
         if status != GOING:
             return tick + 1, status

@@ -41,6 +41,7 @@ NO_INPUTS = loops.Inputs(
 LAW_PARAMETERS, LAW_MEMORY = "the law's parameters", "the law's memory"
 COMPENSATORS = "the governor, the prediction and the feed-forward"
 ESTIMATOR_MEMORY = "the estimator's memory"
+WATCHDOG = "the watchdog's state"
 
 
 _PYTHON_LAW = ctypes.CFUNCTYPE(None, ctypes.c_double)
@@ -119,15 +120,15 @@ class Runtime:
         self.row_width = width(self.signals)
         magnetics = assembly.nominal_magnetics(scenario, files)
         estimator = assembly.estimator_of(scenario)
-        buffers = shared_buffers(scenario, len(files.actuator.groups))
-        supervision = supervision_of(scenario, files.nominal, buffers)
+        supervision = supervision_of(scenario, files.nominal)
+        buffers = shared_buffers(scenario, len(files.actuator.groups), supervision["watchdog"]["halt"])
         self._controller = assembly.controller_of(scenario, self.law, magnetics, estimator, supervision)
         if hasattr(external, "command"):
             manual = external_currents(len(files.actuator.groups))
             self._controller = self._controller._replace(manual=manual)
         self._plant = assembly.plant_of(scenario, files, self._rotor.data, buffers)
         self._sensors = sensors_of(scenario, buffers)
-        self._faults = faults_of(scenario, self._plant, self._sensors, supervision.groups)
+        self._faults = faults_of(scenario, self._plant, self._sensors, supervision["groups"])
         # The loop holds only addresses of its functions: this object keeps the functions alive.
         self._functions = dispatch(
             self.law,
@@ -137,7 +138,7 @@ class Runtime:
         )
         self._may_raise = is_user_law(law) or scenario.controller.check_bounds
         self._scratch = loops.Scratch(
-            np.empty((3, 3)), np.empty((6 if scenario.controller.prediction.on else 3, 3))
+            np.empty((3, 3)), np.empty((6 if scenario.controller.prediction.on else 3, 3)), buffers.fresh
         )
         if COMPILES and is_python_law(law):
             self._python_law = _PYTHON_LAW(self._call_law(step_that_writes(law)))
@@ -147,7 +148,7 @@ class Runtime:
 
     def _call_law(self, step: Callable[..., None]) -> Callable[[float], None]:
         """Return a function of the time of a tick that calls a law in plain Python."""
-        given = *self._scratch, self._controller.parameters, self._controller.memory
+        given = self._scratch[0], self._scratch[1], self._controller.parameters, self._controller.memory
         torque_q = self._controller.torque_q
 
         def call(t_s: float) -> None:
@@ -166,9 +167,13 @@ class Runtime:
         return self._rotor.data.qdot.copy()
 
     @property
+    def _watchdog(self) -> Any:
+        return self._controller.supervision[0].watchdog
+
+    @property
     def reason(self) -> Reason:
         """Reason for which a watchdog has switched off the currents, if it has."""
-        return REASONS[int(self._controller.supervision.watchdog.reason[0])]
+        return REASONS[self._watchdog.reason]
 
     @cached_property
     def loop(self) -> Callable[[loops.Inputs, NDArray[np.float64]], tuple[int, int]]:
@@ -224,7 +229,7 @@ class Runtime:
             raise raised[0]
         if raised and self.law_error is None:
             # With a watchdog the loop goes on after the exception, while the currents decay.
-            t_s = inputs.t[ticks - int(self._controller.supervision.watchdog.ticks_since_trip[0])]
+            t_s = inputs.t[ticks - self._watchdog.ticks_since_trip]
             self.law_error = LawError.of(self.law.name, t_s, raised[0])
         return ticks, code
 
@@ -253,7 +258,7 @@ class Runtime:
         for name in before.keys() - self._parts_that_start_again(other, user_law):
             transfer_state(before[name], after[name])
         transfer_drive(self._plant.drive, other._plant.drive, self._last.command)
-        transfer_trip(self._controller.supervision.watchdog, other._controller.supervision.watchdog)
+        transfer_trip(before[WATCHDOG], after[WATCHDOG])
         return other
 
     def _parts_that_start_again(self, other: Runtime, user_law: Law | None) -> set[str]:
@@ -312,9 +317,9 @@ class Runtime:
             COMPENSATORS: controller.compensators,
             ESTIMATOR_MEMORY: controller.estimator_state.memory,
             "the sensors' state": self._sensors,
-            "the groups' states": supervision.groups,
-            "the detector's state": supervision.detector,
-            "the watchdog's state": supervision.watchdog,
+            "the groups' states": supervision["groups"],
+            "the detector's state": supervision["detector"],
+            WATCHDOG: supervision["watchdog"],
         }
 
     def restore(self, state: RuntimeState) -> None:

@@ -9,10 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spheretwin.control.controller import Supervision
-from spheretwin.control.supervision.enabled_groups import EnabledGroups
-from spheretwin.control.supervision.enabled_groups import groups as all_in_use
-from spheretwin.control.supervision.fault_detector import NominalCurrents, detector
-from spheretwin.control.supervision.watchdog import MeasurementLimits, watchdog
+from spheretwin.control.supervision.fault_detector import NominalCurrents, fill_detector
+from spheretwin.control.supervision.watchdog import MeasurementLimits, fill_watchdog
 from spheretwin.electronics.drive import DriveModel, build_drive
 from spheretwin.electronics.drive_chain import DriveChain, DriveFaults
 from spheretwin.electronics.random_streams import Streams, width_of
@@ -22,6 +20,7 @@ from spheretwin.faults.effects import Effects
 from spheretwin.faults.fault_injector import FaultInjector
 from spheretwin.faults.schedule import FaultSchedule, noise_streams
 from spheretwin.models.actuator import Actuator
+from spheretwin.models.base.record import Rows
 from spheretwin.models.inductance import mutual_inductance
 from spheretwin.plant.plant_tick import Plant
 from spheretwin.scenario.plant_sections import ResolvedNominal
@@ -41,10 +40,10 @@ class SharedBuffers(NamedTuple):
     """Standard normal numbers of a tick, for faults and for the current sensors."""
 
 
-def shared_buffers(scenario: Scenario, groups: int) -> SharedBuffers:
-    """Return the shared buffers of the loop of a scenario."""
+def shared_buffers(scenario: Scenario, groups: int, halt: NDArray[np.int64]) -> SharedBuffers:
+    """Return the shared buffers of the loop of a scenario; `halt` is that of its watchdog."""
     draws = np.zeros(width_of(fault_streams(scenario, groups)))
-    return SharedBuffers(np.ones(3), np.zeros(1, dtype=np.int64), draws)
+    return SharedBuffers(np.ones(3), halt, draws)
 
 
 def fault_streams(scenario: Scenario, groups: int) -> Streams:
@@ -84,24 +83,15 @@ def drive_of(scenario: ResolvedScenario, actuator: Actuator, buffers: SharedBuff
     return build_drive(scenario.drive, step_s, scenario.substeps, groups, scenario.seed, faults, mutual_H)
 
 
-def supervision_of(scenario: ResolvedScenario, actuator: Actuator, buffers: SharedBuffers) -> Supervision:
-    """Return the supervision of groups, measurements and commands.
-
-    Parameters
-    ----------
-    scenario : ResolvedScenario
-    actuator : Actuator
-        Nominal actuator of the controller.
-    buffers : SharedBuffers
-    """
-    groups, period_s, nominal = len(actuator.groups), scenario.controller.period_s, scenario.nominal
+def supervision_of(scenario: ResolvedScenario, actuator: Actuator) -> Rows:
+    """Return the supervision of groups, measurements and commands for a nominal actuator."""
+    period_s, nominal = scenario.controller.period_s, scenario.nominal
     noise_rad, quantum_rad = np.array(nominal.angle_noise_rad), np.array(nominal.angle_resolution_rad)
     limits = MeasurementLimits(period_s, noise_rad, quantum_rad, actuator.hinge_range_rad)
-    return Supervision(
-        all_in_use(groups),
-        detector(scenario.detector, scenario.detects, groups, _nominal_currents(nominal, period_s)),
-        watchdog(scenario.watchdog, limits, buffers.fresh, buffers.halt),
-    )
+    rows, currents = Supervision.zeros(groups=len(actuator.groups)), _nominal_currents(nominal, period_s)
+    fill_detector(rows["detector"], scenario.detector, scenario.detects, currents)
+    fill_watchdog(rows["watchdog"], scenario.watchdog, limits)
+    return rows
 
 
 def _nominal_currents(nominal: ResolvedNominal, period_s: float) -> NominalCurrents:
@@ -118,9 +108,7 @@ def _nominal_currents(nominal: ResolvedNominal, period_s: float) -> NominalCurre
     )
 
 
-def faults_of(
-    scenario: ResolvedScenario, plant: Plant, sensors: Sensors, groups: EnabledGroups
-) -> FaultInjector:
+def faults_of(scenario: ResolvedScenario, plant: Plant, sensors: Sensors, groups: Rows) -> FaultInjector:
     """Return the fault injector of a scenario with the stages of its loop that faults modify."""
     period_s, count = scenario.controller.period_s, len(plant.current)
     schedule = FaultSchedule(scenario.fault, count, period_s, scenario.seed)

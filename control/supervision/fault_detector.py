@@ -30,7 +30,7 @@ that time it may look like no current. The detector waits for that many ticks, a
 from __future__ import annotations
 
 from math import ceil, exp
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -44,6 +44,7 @@ from spheretwin.control.supervision.enabled_groups import (
     EnabledGroups,
 )
 from spheretwin.models.base.compiled import allocation_free
+from spheretwin.models.base.record import Record, Rows, field
 from spheretwin.models.coil_group import PerGroup, of_each_group
 from spheretwin.models.kinematics import angular_velocity
 
@@ -88,25 +89,21 @@ class NominalCurrents(NamedTuple):
     inductance_H: PerGroup
 
 
-class Detector(NamedTuple):
-    """Detector of a run, for compiled code."""
+class Detector(Record):
+    """Detector of a run."""
 
-    on: bool
-    threshold_A: float
-    ticks: int
-    decay: Array  # (n,) of the current of a shorted coil, over a control period
-    resistance_ohm: Array  # (n,)
-    reach_A: Array  # (n,) current that the swing drives through the coil
-    measured_A: Array  # (n,) measured currents
-    shorted_A: Array  # (n,) current of the shorted model
-    indications: NDArray[np.int64]  # (n,) ticks that indicate a fault
-    open_A2: Array  # (n,) sum of squared differences over these ticks
-    shorted_A2: Array  # (n,)
-    rate_S: Array  # (3,) rad/s
-
-    def state_arrays(self) -> tuple[NDArray[Any], ...]:
-        """Return the arrays that hold the state."""
-        return self.shorted_A, self.indications, self.open_A2, self.shorted_A2
+    on: bool = field("whether the detector is on")
+    threshold_A: float = field("threshold of the difference of currents", "A")
+    ticks: int = field("ticks that must indicate a fault")
+    decay: Array = field("of the current of a shorted coil, over a control period", "", "groups")
+    resistance_ohm: Array = field("resistance of each group", "Ω", "groups")
+    reach_A: Array = field("current that the swing drives through the coil", "A", "groups")
+    measured_A: Array = field("measured currents", "A", "groups")
+    shorted_A: Array = field("current of the shorted model", "A", "groups", state=True)
+    indications: NDArray[np.int64] = field("ticks that indicate a fault", "", "groups", state=True)
+    open_A2: Array = field("sum of squared differences over these ticks", "A²", "groups", state=True)
+    shorted_A2: Array = field("the same of the shorted model", "A²", "groups", state=True)
+    rate_S: Array = field("angular velocity, stator frame", "rad/s", 3)
 
 
 def derived_threshold_A(nominal: NominalCurrents) -> float:
@@ -128,34 +125,15 @@ def derived_ticks(nominal: NominalCurrents) -> int:
     return 1 + ceil(slow_s / nominal.period_s)
 
 
-def detector(section: DetectorSection, on: bool, groups: int, nominal: NominalCurrents) -> Detector:
-    """Return a detector before the first measurement.
-
-    Parameters
-    ----------
-    section : DetectorSection
-    on : bool
-        Whether it is on.
-    groups : int
-    nominal : NominalCurrents
-        Nominal currents of healthy groups.
-    """
-    resistance_ohm = of_each_group(nominal.resistance_ohm, groups)
-    periods = nominal.period_s * resistance_ohm / of_each_group(nominal.inductance_H, groups)
-    return Detector(
-        on=on,
-        threshold_A=section.threshold_A or derived_threshold_A(nominal),
-        ticks=section.ticks or derived_ticks(nominal),
-        decay=np.array([exp(-rate) for rate in periods]),
-        resistance_ohm=resistance_ohm,
-        reach_A=nominal.swing_V / resistance_ohm,
-        measured_A=np.zeros(groups),
-        shorted_A=np.zeros(groups),
-        indications=np.zeros(groups, dtype=np.int64),
-        open_A2=np.zeros(groups),
-        shorted_A2=np.zeros(groups),
-        rate_S=np.zeros(3),
-    )
+def fill_detector(rows: Rows, section: DetectorSection, on: bool, nominal: NominalCurrents) -> None:
+    """Fill detectors before the first measurement, for the nominal currents of healthy groups."""
+    resistance_ohm = of_each_group(nominal.resistance_ohm, rows["decay"].shape[-1])
+    periods = nominal.period_s * resistance_ohm / nominal.inductance_H
+    rows["on"] = on
+    rows["threshold_A"] = section.threshold_A or derived_threshold_A(nominal)
+    rows["ticks"] = section.ticks or derived_ticks(nominal)
+    rows["decay"] = [exp(-rate) for rate in periods]
+    rows["resistance_ohm"], rows["reach_A"] = resistance_ohm, nominal.swing_V / resistance_ohm
 
 
 @allocation_free
@@ -209,7 +187,6 @@ def detect_faults(
             is_open = detector.open_A2[j] <= detector.shorted_A2[j]
             groups.out[j] = DETECTED_OPEN if is_open else DETECTED_SHORTED
             groups.out_s[j] = t
-            groups.some_out[0] = True
 
 
 @allocation_free

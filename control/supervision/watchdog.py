@@ -13,13 +13,14 @@ from __future__ import annotations
 
 from enum import IntEnum
 from math import isfinite, sqrt
-from typing import Annotated, Any, Literal, NamedTuple
+from typing import Annotated, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field
 
 from spheretwin.models.base.compiled import allocation_free
+from spheretwin.models.base.record import Record, Rows, field
 
 Array = NDArray[np.float64]
 
@@ -89,32 +90,23 @@ class WatchdogSection(BaseModel):
     )
 
 
-class Watchdog(NamedTuple):
-    """Watchdog of a run, for compiled code."""
+class Watchdog(Record):
+    """Watchdog of a run."""
 
-    on: bool
-    action: int
-    rundown_ticks: int
-    stale_ticks: int
-    largest_rate_rad_s: float
-    step_rad: float  # angle at the largest rate in a control period
-    noise_rad: Array  # (3,) further difference of two samples by noise and resolution
-    lowest_rad: Array  # (3,)
-    highest_rad: Array  # (3,)
-    fresh: Array  # (3,) 1 if the measurement of an angle is new, 0 if it repeats the last one
-    last_rad: Array  # (3,) last fresh measurement; NaN before the first
-    missing: NDArray[np.int64]  # (3,) ticks since the last fresh measurement
-    halt: NDArray[np.int64]  # (1,) `GO`, `RELEASE` or `SHORT`: the drive reads it
-    reason: NDArray[np.int64]  # (1,)
-    ticks_since_trip: NDArray[np.int64]  # (1,)
-
-    def state_arrays(self) -> tuple[NDArray[Any], ...]:
-        """Return the arrays that hold the state."""
-        return self.last_rad, self.missing, *self.trip_arrays()
-
-    def trip_arrays(self) -> tuple[NDArray[Any], ...]:
-        """Return the arrays that hold a trip."""
-        return self.halt, self.reason, self.ticks_since_trip
+    on: bool = field("whether the watchdog is on")
+    action: int = field("command to the drive after a trip")
+    rundown_ticks: int = field("ticks from the trip to the end of the run")
+    stale_ticks: int = field("ticks in a row without a fresh angle that trip")
+    largest_rate_rad_s: float = field("largest plausible rate", "rad/s")
+    step_rad: float = field("angle at the largest rate in a control period", "rad")
+    noise_rad: Array = field("further difference of two samples by noise and resolution", "rad", 3)
+    lowest_rad: Array = field("lowest plausible angles", "rad", 3)
+    highest_rad: Array = field("highest plausible angles", "rad", 3)
+    last_rad: Array = field("last fresh measurement; NaN before the first", "rad", 3, state=True)
+    missing: NDArray[np.int64] = field("ticks since the last fresh measurement", "", 3, state=True)
+    halt: int = field("`GO`, `RELEASE` or `SHORT`: the drive reads it", state=True)
+    reason: int = field("reason of the trip", state=True)
+    ticks_since_trip: int = field("ticks since the trip", state=True)
 
 
 class MeasurementLimits(NamedTuple):
@@ -126,45 +118,34 @@ class MeasurementLimits(NamedTuple):
     hinge_range_rad: Array  # (3, 2) nominal
 
 
-def watchdog(
-    section: WatchdogSection, limits: MeasurementLimits, fresh: Array, halt: NDArray[np.int64]
-) -> Watchdog:
-    """Return a watchdog before the first measurement.
-
-    Parameters
-    ----------
-    section : WatchdogSection
-    limits : MeasurementLimits
-    fresh : (3,) array
-        The sensors write into it.
-    halt : (1,) array
-        The drive reads it.
-    """
+def fill_watchdog(rows: Rows, section: WatchdogSection, limits: MeasurementLimits) -> None:
+    """Fill watchdogs before the first measurement."""
     low, high = limits.hinge_range_rad.T
-    return Watchdog(
-        on=section.on,
-        action=SHORT if section.action == "short" else RELEASE,
-        rundown_ticks=round(section.rundown_s / limits.period_s),
-        stale_ticks=section.stale_ticks,
-        largest_rate_rad_s=section.largest_rate_rad_s,
-        step_rad=section.largest_rate_rad_s * limits.period_s,
-        noise_rad=DEVIATIONS * sqrt(2) * limits.noise_rad + limits.quantum_rad,
-        lowest_rad=low + section.edge_margin_rad,
-        highest_rad=high - section.edge_margin_rad,
-        fresh=fresh,
-        last_rad=np.full(3, np.nan),
-        missing=np.zeros(3, dtype=np.int64),
-        halt=halt,
-        reason=np.zeros(1, dtype=np.int64),
-        ticks_since_trip=np.zeros(1, dtype=np.int64),
-    )
+    rows["on"], rows["action"] = section.on, SHORT if section.action == "short" else RELEASE
+    rows["rundown_ticks"] = round(section.rundown_s / limits.period_s)
+    rows["stale_ticks"] = section.stale_ticks
+    rows["largest_rate_rad_s"] = section.largest_rate_rad_s
+    rows["step_rad"] = section.largest_rate_rad_s * limits.period_s
+    rows["noise_rad"] = DEVIATIONS * sqrt(2) * limits.noise_rad + limits.quantum_rad
+    rows["lowest_rad"], rows["highest_rad"] = low + section.edge_margin_rad, high - section.edge_margin_rad
+    rows["last_rad"] = np.nan
 
 
 @allocation_free
-def watch(watchdog: Watchdog, angle: Array, rate: Array) -> None:
-    """Check the finite angles (3,), rad, and the rates (3,), rad/s, that the law receives."""
+def watch(watchdog: Watchdog, fresh: Array, angle: Array, rate: Array) -> None:
+    """Check a measurement.
+
+    Parameters
+    ----------
+    watchdog : Watchdog
+        Changed in place.
+    fresh : (3,) array
+        1 if the measurement of an angle is new, 0 if it repeats the last one.
+    angle, rate : (3,) arrays, rad and rad/s
+        Finite angles, and the rates that the law receives.
+    """
     for i in range(3):
-        if watchdog.fresh[i] == 0.0:
+        if fresh[i] == 0.0:
             watchdog.missing[i] += 1
             if watchdog.missing[i] >= watchdog.stale_ticks:
                 trip(watchdog, _STALE)
@@ -205,20 +186,20 @@ def replace_invalid(watchdog: Watchdog, measurement: Array) -> bool:
 @allocation_free
 def trip(watchdog: Watchdog, reason: int) -> None:
     """Remove the currents for a reason; a second reason has no effect."""
-    if watchdog.halt[0] == GO:
-        watchdog.halt[0], watchdog.reason[0] = watchdog.action, reason
+    if watchdog.halt == GO:
+        watchdog.halt, watchdog.reason = watchdog.action, reason
 
 
 @allocation_free
 def count_rundown(watchdog: Watchdog) -> bool:
     """Count a tick after a trip; return True if it was the last one of the run."""
-    if watchdog.halt[0] == GO:
+    if watchdog.halt == GO:
         return False
-    watchdog.ticks_since_trip[0] += 1
-    return watchdog.ticks_since_trip[0] > watchdog.rundown_ticks
+    watchdog.ticks_since_trip += 1
+    return watchdog.ticks_since_trip > watchdog.rundown_ticks
 
 
-def transfer_trip(before: Watchdog, after: Watchdog) -> None:
+def transfer_trip(before: Rows, after: Rows) -> None:
     """Copy a trip into a watchdog with other limits, also into or from one that is off."""
-    for source, target in zip(before.trip_arrays(), after.trip_arrays(), strict=True):
-        target[:] = source
+    for name in ("halt", "reason", "ticks_since_trip"):
+        after[name] = before[name]

@@ -237,7 +237,8 @@ def drive_plant(
     groups, section = len(actuator.groups), scenario.plant
     rotor = assembly.rotor_of(scenario, begun.files)  # keep it: the stepped plant has addresses within it
     stepped = rotor.start(np.array(section.initial_rad), np.array(section.initial_rad_s))
-    plant = assembly.plant_of(scenario, begun.files, stepped, shared_buffers(scenario, groups))
+    buffers = shared_buffers(scenario, groups, np.zeros(1, dtype=np.int64))
+    plant = assembly.plant_of(scenario, begun.files, stepped, buffers)
     states = np.full((len(disturbance) // every + 1, 6), np.nan)
     states[0] = [*section.initial_rad, *section.initial_rad_s]
     stage, output = plant_stage(plant), PlantOutput(np.empty(groups), np.empty(groups), np.empty(3))

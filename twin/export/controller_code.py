@@ -22,7 +22,7 @@ from spheretwin.export.c_text import constant, definitions, header, source
 from spheretwin.export.plant_code import NUMBERS, magnetic_tables
 from spheretwin.models.base.errors import InputError
 from spheretwin.scenario.sections import ResolvedScenario
-from spheretwin.shared_buffers import shared_buffers, supervision_of
+from spheretwin.shared_buffers import supervision_of
 
 LAWS: dict[Any, tuple[str, ...]] = {
     pd.step: ("st_law_pd.h",),
@@ -88,8 +88,7 @@ def controller_code(scenario: str, changes: Mapping[str, Any] | None = None) -> 
     law, estimator = assembly.law_of(resolved), assembly.estimator_of(resolved)
     _check(resolved, law)
     magnetics = assembly.nominal_magnetics(resolved, config.files)
-    buffers = shared_buffers(resolved, groups)
-    supervision = supervision_of(resolved, config.files.nominal, buffers)
+    supervision = supervision_of(resolved, config.files.nominal)
     controller = assembly.controller_of(resolved, law, magnetics, estimator, supervision)
     law_files, estimator_file = LAWS[law.step], ESTIMATORS[estimator.step if estimator else None]
     names = ["st_controller.h", "st_controller.c", "st_numbers.h", "st_equations.h"]

@@ -5,10 +5,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from spheretwin.control.supervision.enabled_groups import REPORTED, STATES, EnabledGroups, mark_faulty_groups
+from spheretwin.control.supervision.enabled_groups import REPORTED, STATES, mark_faulty_groups
 from spheretwin.control.supervision.watchdog import REASONS
 from spheretwin.faults.effects import Effects
 from spheretwin.faults.schedule import NEVER, FaultSchedule
+from spheretwin.models.base.record import Rows
 from spheretwin.models.base.state import arrays_of
 from spheretwin.models.telemetry.fault_log import ColumnChanges
 from spheretwin.models.telemetry.table import Table
@@ -22,7 +23,7 @@ class FaultInjector:
     schedule : FaultSchedule
     effects : Effects or None
         Stages without a fault; None if nothing can fail.
-    groups : Groups
+    groups : rows of `EnabledGroups`
         Groups of the controller: reported faults are marked.
     fault_modes : array
         Result: for every part the number of its failure mode, or 0.
@@ -34,7 +35,7 @@ class FaultInjector:
         self,
         schedule: FaultSchedule,
         effects: Effects | None,
-        groups: EnabledGroups,
+        groups: Rows,
         fault_modes: NDArray[np.float64],
         fault_start_s: NDArray[np.float64],
     ) -> None:

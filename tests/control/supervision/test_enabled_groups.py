@@ -12,7 +12,7 @@ from spheretwin.control.supervision.enabled_groups import (
     DETECTED_SHORTED,
     IN_USE,
     REPORTED,
-    groups,
+    EnabledGroups,
     mark_faulty_groups,
     mask_disabled_groups,
 )
@@ -26,10 +26,10 @@ def at(*places):
 
 
 def without(places, G):
-    made = groups(COUNT)
-    mark_faulty_groups(made, at(*places), 0.5)
-    mask_disabled_groups(made, G)
-    return made
+    rows = EnabledGroups.zeros(groups=COUNT)
+    mark_faulty_groups(rows, at(*places), 0.5)
+    mask_disabled_groups(rows[0], G)
+    return rows[0]
 
 
 def allocated(name, G, torque):
@@ -75,20 +75,20 @@ def test_with_too_few_left_there_is_no_torque_and_no_current(actuator, name):
 
 
 def test_reported_groups_are_enabled_again_and_detected_ones_are_not():
-    made = groups(COUNT)
-    made.out[5], made.out[6], made.some_out[0] = DETECTED_OPEN, DETECTED_SHORTED, True
-    mark_faulty_groups(made, at(2, 5), 1.0)
+    rows = EnabledGroups.zeros(groups=COUNT)
+    made = rows[0]
+    made.out[5], made.out[6] = DETECTED_OPEN, DETECTED_SHORTED
+    mark_faulty_groups(rows, at(2, 5), 1.0)
     assert made.out[[2, 5, 6]].tolist() == [REPORTED, DETECTED_OPEN, DETECTED_SHORTED]
     assert made.out_s[2] == 1.0
-    mark_faulty_groups(made, at(2, 5), 2.0)
+    mark_faulty_groups(rows, at(2, 5), 2.0)
     assert made.out_s[2] == 1.0  # since when, not until when
-    mark_faulty_groups(made, at(), 3.0)
+    mark_faulty_groups(rows, at(), 3.0)
     assert made.out[[2, 5, 6]].tolist() == [IN_USE, DETECTED_OPEN, DETECTED_SHORTED]
-    assert made.some_out[0]
 
 
 def test_with_all_in_use_no_bit_of_the_matrix_is_another(actuator):
     G = torque_matrix(np.array([0.5, 0.3, -0.2]), actuator)
     made = without((), G)
     assert made.G.tobytes() == np.ascontiguousarray(G).tobytes()
-    assert not made.some_out[0]
+    assert not made.out.any()

@@ -10,15 +10,16 @@ from spheretwin.control.supervision.enabled_groups import (
     DETECTED_SHORTED,
     IN_USE,
     REPORTED,
-    groups,
+    EnabledGroups,
 )
 from spheretwin.control.supervision.fault_detector import (
+    Detector,
     DetectorSection,
     NominalCurrents,
     derived_threshold_A,
     derived_ticks,
     detect_faults,
-    detector,
+    fill_detector,
 )
 from spheretwin.electronics.amplifier import AmplifierSection, amplifier, drive_coils, zero_flow
 from spheretwin.electronics.coil import CoilSection, group_coils
@@ -44,8 +45,16 @@ PROTOTYPE = NominalCurrents(
 POSE, STILL = np.array([0.3, -0.2, 0.5]), np.zeros(3)
 
 
+def rows_of(nominal=PROTOTYPE, **section):
+    return Detector.filled(fill_detector, DetectorSection(**section), True, nominal, groups=COUNT)
+
+
 def made(nominal=PROTOTYPE, **section):
-    return detector(DetectorSection(**section), True, COUNT, nominal)
+    return rows_of(nominal, **section)[0]
+
+
+def groups():
+    return EnabledGroups.zeros(groups=COUNT)[0]
 
 
 def test_the_prototype_s_threshold_and_ticks():
@@ -142,24 +151,24 @@ def hold(watcher, state, measured, believed=2.0, q=POSE, qdot=STILL, t=0.0, actu
 
 
 def test_a_fault_needs_the_exact_number_of_ticks():
-    watcher, state = made(ticks=5), groups(COUNT)
+    watcher, state = made(ticks=5), groups()
     for tick in range(5):
-        assert not state.some_out[0]
+        assert not state.out.any()
         hold(watcher, state, 0.01, t=0.1 * tick)
     assert state.out.tolist() == [DETECTED_OPEN] * COUNT
     assert state.out_s.tolist() == [0.4] * COUNT
-    assert state.some_out[0]
+    assert state.out.any()
 
 
 def test_a_healthy_tick_resets_the_count_and_a_neutral_one_does_not():
-    watcher, state = made(ticks=3), groups(COUNT)
+    watcher, state = made(ticks=3), groups()
     for measured, believed, counted in [
         (0.0, 2.0, 1), (0.0, 2.0, 2), (2.0, 2.0, 0), (0.0, 2.0, 1), (0.0, 0.05, 1), (0.05, -0.05, 1),
         (0.0, -2.0, 2), (-1.0, -2.0, 0),
     ]:  # fmt: skip
         hold(watcher, state, measured, believed)
         assert watcher.indications.tolist() == [counted] * COUNT
-    assert not state.some_out[0]
+    assert not state.out.any()
 
 
 TURNING = np.array([3.0, -4.0, 6.0])
@@ -174,7 +183,7 @@ def shorted_currents(actuator, ticks):
 
 @pytest.mark.parametrize("shorted", [False, True])
 def test_a_turning_rotor_distinguishes_open_and_shorted_groups(actuator, shorted):
-    watcher, state = made(ticks=6), groups(COUNT)
+    watcher, state = made(ticks=6), groups()
     settled, currents = shorted_currents(actuator, 20)
     for current in currents:
         hold(watcher, state, current if shorted else 0.0, 3.0, qdot=TURNING, actuator=actuator)
@@ -184,7 +193,7 @@ def test_a_turning_rotor_distinguishes_open_and_shorted_groups(actuator, shorted
 
 
 def test_a_guessed_classification_is_corrected_when_the_rotor_turns(actuator):
-    watcher, state = made(ticks=3), groups(COUNT)
+    watcher, state = made(ticks=3), groups()
     for _ in range(5):
         hold(watcher, state, 0.0, 3.0, actuator=actuator)
     assert state.out.tolist() == [DETECTED_OPEN] * COUNT  # still, nothing tells them apart
@@ -197,18 +206,18 @@ def test_a_guessed_classification_is_corrected_when_the_rotor_turns(actuator):
 def test_noise_changes_no_correct_classification():
     """Ten seconds of the prototype's noise on open groups of a rotor that just about turns."""
     generator = np.random.default_rng(1)
-    watcher, state, names = made(), groups(COUNT), []
+    watcher, state, names = made(), groups(), []
     for tick in range(10_000):
         qdot = 0.3 * np.ones(3) * np.sin(1e-3 * tick)
         hold(watcher, state, 0.02 * generator.normal(size=COUNT), 3.0, qdot=qdot)
-        if state.some_out[0]:
+        if state.out.any():
             names.append(state.out.copy())
     assert np.count_nonzero(np.diff(names, axis=0)) <= COUNT  # at most once, where the first name was a guess
     assert set(state.out.tolist()) == {DETECTED_OPEN}
 
 
 def test_a_reported_group_resets_the_detector():
-    watcher, state = made(ticks=3), groups(COUNT)
+    watcher, state = made(ticks=3), groups()
     for _ in range(2):
         hold(watcher, state, 0.0)
     state.out[:] = REPORTED
@@ -216,7 +225,7 @@ def test_a_reported_group_resets_the_detector():
     state.out[:] = IN_USE
     for _ in range(2):
         hold(watcher, state, 0.0)
-    assert not state.some_out[0]
+    assert not state.out.any()
     assert state.out.tolist() == [IN_USE] * COUNT
 
 
@@ -226,7 +235,7 @@ def test_a_reported_group_resets_the_detector():
     st.sampled_from([0.0, 1.0, 1e200, np.nan]),
 )
 def test_a_non_finite_current_is_no_fault_and_affects_only_its_group(measured, believed, rate):
-    watcher, state = made(ticks=2), groups(COUNT)
+    watcher, state = made(ticks=2), groups()
     for value in measured:
         everyone = np.full(COUNT, 2.0)
         everyone[3] = value
@@ -242,14 +251,14 @@ def test_a_non_finite_current_is_no_fault_and_affects_only_its_group(measured, b
 
 
 def test_the_state_is_complete(actuator):
-    one, other = made(), made()
-    first, second = groups(COUNT), groups(COUNT)
+    one, other = rows_of(), rows_of()
+    first, second = (EnabledGroups.zeros(groups=COUNT) for _ in range(2))
 
     def ticks(watcher, state, seed, count):
         draws = np.random.default_rng(seed)
         for _ in range(count):
             qdot = draws.normal(size=3)
-            hold(watcher, state, draws.normal(size=COUNT) * 0.3, 1.0, qdot=qdot, actuator=actuator)
+            hold(watcher[0], state[0], draws.normal(size=COUNT) * 0.3, 1.0, qdot=qdot, actuator=actuator)
 
     ticks(one, first, 85, 7)
     restore_state(other, save_state(one), "detector")

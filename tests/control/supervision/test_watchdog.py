@@ -12,13 +12,14 @@ from spheretwin.control.supervision.watchdog import (
     SHORT,
     MeasurementLimits,
     Reason,
+    Watchdog,
     WatchdogSection,
     count_rundown,
+    fill_watchdog,
     replace_invalid,
     transfer_trip,
     trip,
     watch,
-    watchdog,
 )
 from spheretwin.models.base.state import restore_state, save_state, transfer_state
 
@@ -28,14 +29,17 @@ WATCHED = MeasurementLimits(PERIOD_S, NOISE_RAD, QUANTUM_RAD, RANGE_RAD)
 STILL = np.zeros(3)
 
 
+def rows_of(on=True, **section):
+    return Watchdog.filled(fill_watchdog, WatchdogSection(on=on, **section), WATCHED)
+
+
 def made(**section):
-    fresh, halt = np.ones(3), np.zeros(1, dtype=np.int64)
-    return watchdog(WatchdogSection(on=True, **section), WATCHED, fresh, halt)
+    return rows_of(**section)[0]
 
 
-def looked(watcher, angle, rate=STILL):
-    watch(watcher, np.array(angle, float), np.array(rate, float))
-    return Reason(int(watcher.reason[0]))
+def looked(watcher, angle, rate=STILL, fresh=(1, 1, 1)):
+    watch(watcher, np.array(fresh, float), np.array(angle, float), np.array(rate, float))
+    return Reason(int(watcher.reason))
 
 
 @pytest.mark.parametrize("axis", range(3))
@@ -46,10 +50,8 @@ def test_a_jump_is_more_than_the_largest_rate_noise_and_resolution_allow(axis, m
         for sign in (-1, 1):
             watcher, first = made(), np.array([0.9, -0.9, 400.0])
             assert looked(watcher, first) == Reason.NONE  # a first measurement is no jump
-            watcher.fresh[axis] = 0.0
             for _ in range(missing):
-                looked(watcher, first)
-            watcher.fresh[axis] = 1.0
+                looked(watcher, first, fresh=1 - np.eye(3)[axis])
             assert looked(watcher, first + sign * share * most * np.eye(3)[axis]) == reason
 
 
@@ -58,14 +60,11 @@ def test_stale_is_so_many_ticks_in_a_row(ticks):
     watcher = made(stale_ticks=ticks)
     looked(watcher, STILL)
     for _ in range(3):  # now and then one is missing: nothing happens
-        watcher.fresh[1] = 0.0
         for _ in range(ticks - 1):
-            assert looked(watcher, STILL) == Reason.NONE
-        watcher.fresh[1] = 1.0
+            assert looked(watcher, STILL, fresh=(1, 0, 1)) == Reason.NONE
         assert looked(watcher, STILL) == Reason.NONE
-    watcher.fresh[1] = 0.0
     for tick in range(ticks):
-        assert looked(watcher, STILL) == (Reason.STALE if tick == ticks - 1 else Reason.NONE)
+        assert looked(watcher, STILL, fresh=(1, 0, 1)) == (Reason.STALE if tick == ticks - 1 else Reason.NONE)
 
 
 @pytest.mark.parametrize("axis", range(3))
@@ -89,14 +88,13 @@ def test_a_non_finite_measurement_is_replaced_and_trips(numbers):
     assert np.isfinite(measurement).all()
     np.testing.assert_array_equal(measurement[0], np.where(lost, [0.2, 0.3, 0.4], 0.1))
     np.testing.assert_array_equal(measurement[1], np.where(lost, 0.0, 0.1))
-    assert watcher.reason[0] == (Reason.MEASUREMENT if lost.any() else Reason.NONE)
+    assert watcher.reason == (Reason.MEASUREMENT if lost.any() else Reason.NONE)
     rates = measurement[0] * np.array([1.0, np.inf, np.nan])
     watcher = made()
-    watch(watcher, np.zeros(3), rates)
-    assert watcher.reason[0] == Reason.MEASUREMENT
+    watch(watcher, np.ones(3), np.zeros(3), rates)
+    assert watcher.reason == Reason.MEASUREMENT
     assert not rates[1:].any()
-    off = watchdog(WatchdogSection(), WATCHED, np.ones(3), np.zeros(1, dtype=np.int64))
-    assert not replace_invalid(off, np.full((3, 3), np.nan))
+    assert not replace_invalid(made(on=False), np.full((3, 3), np.nan))
 
 
 @pytest.mark.parametrize("action", ["release", "short"])
@@ -105,8 +103,8 @@ def test_the_first_reason_stays_and_the_run_goes_on_for_its_time(action):
     assert not count_rundown(watcher)
     trip(watcher, int(Reason.SPEED))
     trip(watcher, int(Reason.EDGE))
-    assert REASONS[int(watcher.reason[0])] == Reason.SPEED
-    assert watcher.halt[0] == (SHORT if action == "short" else RELEASE) != GO
+    assert REASONS[int(watcher.reason)] == Reason.SPEED
+    assert watcher.halt == (SHORT if action == "short" else RELEASE) != GO
     assert [count_rundown(watcher) for _ in range(6)] == [False] * 4 + [True] * 2
     at_once = made(rundown_s=0.0)
     trip(at_once, int(Reason.SPEED))
@@ -115,31 +113,30 @@ def test_the_first_reason_stays_and_the_run_goes_on_for_its_time(action):
 
 @given(st.lists(st.tuples(st.floats(-1.3, 1.3), st.floats(-50, 50), st.integers(0, 1)), max_size=20))
 def test_the_state_is_complete(samples):
-    one, other = made(), made()
+    one, other = rows_of(), rows_of()
     for place, (angle, rate, fresh) in enumerate(samples):
         if place == len(samples) // 2:
             restore_state(other, save_state(one), "watchdog")
-        one.fresh[0] = other.fresh[0] = fresh
         for each in (one, other) if place >= len(samples) // 2 else (one,):
-            looked(each, [angle, 0, 0], [rate, 0, 0])
-            count_rundown(each)
+            looked(each[0], [angle, 0, 0], [rate, 0, 0], [fresh, 1, 1])
+            count_rundown(each[0])
     if samples:
         assert save_state(other).tobytes() == save_state(one).tobytes()
 
 
 def test_a_watchdog_that_was_off_starts_again():
-    before, after = made(), made(largest_rate_rad_s=10.0)
-    looked(before, [0.3, 0, 0])
+    before, after = rows_of(), rows_of(largest_rate_rad_s=10.0)
+    looked(before[0], [0.3, 0, 0])
     transfer_state(before, after)
-    assert looked(after, STILL) == Reason.JUMP
-    after = made()
-    transfer_state(before._replace(on=False), after)
-    assert looked(after, [-0.9, 0, 0]) == Reason.NONE
+    assert looked(after[0], STILL) == Reason.JUMP
+    before["on"], after = False, rows_of()
+    transfer_state(before, after)
+    assert looked(after[0], [-0.9, 0, 0]) == Reason.NONE
 
 
 def test_a_trip_stays_when_the_watchdog_is_switched_off():
-    before, after = made(), made()._replace(on=False)
-    looked(before, [0, 0, 0], [1e5, 0, 0])
+    before, after = rows_of(), rows_of(on=False)
+    looked(before[0], [0, 0, 0], [1e5, 0, 0])
     transfer_state(before, after)
     transfer_trip(before, after)
-    assert (after.halt[0], after.reason[0]) == (RELEASE, Reason.SPEED)
+    assert (after[0].halt, after[0].reason) == (RELEASE, Reason.SPEED)

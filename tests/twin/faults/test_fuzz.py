@@ -95,10 +95,10 @@ INPUTS = {
     "estimate": lambda machine: machine._controller.estimator_state.memory,
     "law": lambda machine: machine._controller.memory,
     "belief": lambda machine: machine._controller.applied_torque.current,
-    "detector": lambda machine: machine._controller.supervision.detector.shorted_A,
+    "detector": lambda machine: machine._controller.supervision[0].detector.shorted_A,
     "wiper": lambda machine: machine._sensors.stage("potentiometer").line.table[:, LAST],
     "converted": lambda machine: machine._sensors.stage("adc").delayed_rad.ravel(),
-    "seen": lambda machine: machine._controller.supervision.watchdog.last_rad,
+    "seen": lambda machine: machine._controller.supervision[0].watchdog.last_rad,
 }
 
 PLAN = [
