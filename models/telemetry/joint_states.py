@@ -5,6 +5,7 @@ Rerun, Foxglove and PlotJuggler show their numbers by name; messages in JSON or 
 
 from __future__ import annotations
 
+import io
 import struct
 import zlib
 from collections.abc import Iterator, Mapping, Sequence
@@ -122,16 +123,32 @@ def _aligned(body: bytes, size: int) -> bytes:
     return body + bytes(-len(body) % size)
 
 
-def read(path: Path) -> tuple[dict[str, Array], dict[str, str]]:
-    """Read every number of the joint states of a file, and the metadata that `write` stored.
+STAMPS, LOG_TIME, PUBLISH_TIME = "t_s", "log_time", "publish_time"
+"""Times of messages: of their header, of the recorder, and of the sender."""
 
-    Returns
-    -------
-    dict of (n,) array
-        ``t_s``, the stamps of the messages, and the numbers by ``topic/field/name``. Consecutive messages of
-        different topics with the same stamp are one row; a number is NaN in rows without a message of it.
-    dict
-        Metadata; empty for a file of another program.
+
+class JointStates(NamedTuple):
+    """Joint states of a file: a row for each message, or for consecutive ones of several topics at one time."""
+
+    time_ns: NDArray[np.int64]
+    columns: dict[str, Array]
+    """Numbers by ``topic/field/name``, NaN in rows without a message of it."""
+    metadata: dict[str, str]
+    """Metadata that `write` stored; empty for a file of another program."""
+    notes: tuple[str, ...]
+    """What was unusual."""
+
+
+def read(path: Path, time: str = STAMPS) -> JointStates:
+    """Read every number of the joint states of a file.
+
+    A file without an end, which a killed recorder leaves, is read up to its last complete message.
+
+    Parameters
+    ----------
+    path : Path
+    time : str
+        Time of the rows: ``t_s``, ``log_time`` or ``publish_time``. If all stamps are 0, it is the log time.
 
     Raises
     ------
@@ -141,13 +158,14 @@ def read(path: Path) -> tuple[dict[str, Array], dict[str, str]]:
     _package()
     from mcap.records import Channel, DataEnd, Message, Metadata, Schema
 
-    rows: list[dict[str, float]] = []
+    messages: list[tuple[tuple[int, ...], dict[str, float]]] = []
     metadata: dict[str, str] = {}
     schemas: dict[int, Schema] = {}
     topics: dict[int, str | None] = {}  # None for messages of another type
     in_summary = False  # which repeats schemas and channels
     try:
-        for record in _records(path):
+        content, notes = _content(path)
+        for record in _records(content):
             match record:
                 case DataEnd():
                     in_summary = True
@@ -162,39 +180,104 @@ def read(path: Path) -> tuple[dict[str, Array], dict[str, str]]:
                 case Message(channel_id=channel) if channel not in topics:
                     raise ValueError(f"it has a message of channel {channel}, but not the channel")
                 case Message(channel_id=channel) if (topic := topics[channel]) is not None:
-                    stamp_s, numbers = _decode(topic, record.data)
-                    if not rows or rows[-1]["t_s"] != stamp_s or not numbers.keys().isdisjoint(rows[-1]):
-                        rows.append({"t_s": stamp_s})
-                    rows[-1] |= numbers
+                    stamp_ns, numbers = _decode(topic, record.data)
+                    messages.append(((stamp_ns, record.log_time, record.publish_time), numbers))
     # The packages of MCAP, zstd and LZ4 raise errors of their own, and lack of memory, for a damaged file.
     except Exception as error:
         raise InputError(f"MCAP {path}: expected a readable file, {without_breaks(error)}") from None
-    if not rows:
+    if not messages:
         raise InputError(f"MCAP {path}: expected messages {TYPE} in CDR, received none")
+    if time == STAMPS and not any(times[0] for times, _ in messages) and messages[-1][0][1]:
+        time, notes = LOG_TIME, (*notes, "no stamps, so log times")
+    rows: list[dict[str, float]] = []
+    time_ns: list[int] = []
+    place = (STAMPS, LOG_TIME, PUBLISH_TIME).index(time)
+    for times, numbers in messages:
+        if not rows or time_ns[-1] != times[place] or not numbers.keys().isdisjoint(rows[-1]):
+            rows.append({})
+            time_ns.append(times[place])
+        rows[-1] |= numbers
     names = dict.fromkeys(name for row in rows for name in row)
-    return {name: np.array([row.get(name, np.nan) for row in rows]) for name in names}, metadata
+    columns = {name: np.array([row.get(name, np.nan) for row in rows]) for name in names}
+    return JointStates(np.array(time_ns, np.int64), columns, metadata, notes)
 
 
-def _records(path: Path) -> Iterator[Any]:
+_MAGIC = b"\x89MCAP0\r\n"
+_RECORD_HEAD = struct.Struct("<BQ")
+_CHUNK, _FOOTER = 6, 2
+
+
+def _content(path: Path) -> tuple[bytes, tuple[str, ...]]:
+    """Return the bytes of a file, of one without an end the complete records; and notes."""
+    content = regular_file(path).read_bytes()
+    if content.endswith(_MAGIC) or not content.startswith(_MAGIC):
+        return content, ()
+    content = content.rstrip(b"\0")  # blocks that the file system had not written
+    place, opcode = len(_MAGIC), 0
+    while place + _RECORD_HEAD.size <= len(content):
+        following, length = _RECORD_HEAD.unpack_from(content, place)
+        end = place + _RECORD_HEAD.size + length
+        if not following or end > len(content):
+            break
+        place, opcode = end, following
+    complete, rest = content[:place], content[place:]
+    if opcode == _FOOTER:
+        if not _MAGIC.startswith(rest):
+            raise ValueError("its last bytes differ")
+        complete += _MAGIC
+    elif rest[:1] == bytes([_CHUNK]):
+        complete += _complete_messages(rest[_RECORD_HEAD.size :])
+    return complete, ("the file has no end: read up to its last complete message",)
+
+
+def _complete_messages(chunk: bytes) -> bytes:
+    """Return the complete records of a chunk that was cut."""
+    import lz4.frame
+    import zstandard
+
+    size_of_times = 28  # two times, size, checksum
+    if len(chunk) < size_of_times + 4:
+        return b""
+    (length,) = struct.unpack_from("<I", chunk, size_of_times)
+    start = size_of_times + 4 + length
+    compression, data = chunk[size_of_times + 4 : start], chunk[start + 8 :]
+    if compression == b"zstd":
+        data = zstandard.ZstdDecompressor().decompressobj().decompress(data)
+    elif compression == b"lz4":
+        data = lz4.frame.LZ4FrameDecompressor().decompress(data)
+    place = 0
+    while place + _RECORD_HEAD.size <= len(data):
+        end = place + _RECORD_HEAD.size + _RECORD_HEAD.unpack_from(data, place)[1]
+        if end > len(data):
+            break
+        place = end
+    return data[:place]
+
+
+def _records(content: bytes) -> Iterator[Any]:
     """Yield the records of a file in their order; compare the checksums of chunks, data and summary.
 
     The reader of the package that seeks by the summary compares those of the chunks alone.
     """
+    from mcap.exceptions import EndOfFile
     from mcap.records import Footer
     from mcap.stream_reader import StreamReader
 
-    with regular_file(path).open("rb") as file:
-        size = path.stat().st_size
-        for record in StreamReader(file, validate_crcs=True, record_size_limit=size).records:
+    record, stream = None, io.BytesIO(content)
+    try:
+        for record in StreamReader(stream, validate_crcs=True, record_size_limit=len(content)).records:
             yield record
-        if isinstance(record, Footer) and record.summary_crc:
-            file.seek(record.summary_start or size - _FOOTER_BYTES)
-            if zlib.crc32(file.read()[:-_CRC_AND_MAGIC_BYTES]) != record.summary_crc:
-                raise ValueError("the checksum of its summary differs")
+    except EndOfFile:
+        if content.endswith(_MAGIC) or record is None:
+            raise
+    if isinstance(record, Footer) and record.summary_crc:
+        start = record.summary_start or len(content) - _FOOTER_BYTES
+        if zlib.crc32(content[start:-_CRC_AND_MAGIC_BYTES]) != record.summary_crc:
+            raise ValueError("the checksum of its summary differs")
 
 
-def _decode(topic: str, data: bytes) -> tuple[float, dict[str, float]]:
-    """Return the stamp, s, and the numbers of a message by ``topic/field/name``."""
+def _decode(topic: str, data: bytes) -> tuple[int, dict[str, float]]:
+    """Return the stamp, ns, and the numbers of a message by ``topic/field/name``."""
     if data[1] > 1:
         raise ValueError(f"topic {topic}: expected CDR of version 1, received another encoding")
     order, place = "<" if data[1] else ">", 4
@@ -213,14 +296,14 @@ def _decode(topic: str, data: bytes) -> tuple[float, dict[str, float]]:
         place += length
         return data[place - length : place - 1].decode()
 
-    stamp_s = (number("i")[0] * _SECOND_ns + number("I")[0]) / _SECOND_ns
+    stamp_ns = number("i")[0] * _SECOND_ns + number("I")[0]
     text()  # frame_id
     names = [text() for _ in range(number("I")[0])]
     numbers: dict[str, float] = {}
     for field in FIELDS:
         values = number("d", number("I")[0])
         numbers |= {f"{topic}/{field}/{name}": value for name, value in zip(names, values, strict=False)}
-    return stamp_s, numbers
+    return stamp_ns, numbers
 
 
 def _package() -> None:

@@ -27,13 +27,13 @@ def path(tmp_path):
 
 
 def test_numbers_come_back(path):
-    columns, metadata = joint_states.read(path)
-    assert metadata == {"currents": "commanded"}
+    time_ns, columns, metadata, notes = joint_states.read(path)
+    assert (metadata, notes) == ({"currents": "commanded"}, ())
     assert list(columns) == [
-        "t_s", *(f"angles/{field}/{name}" for field in ("position", "velocity") for name in ANGLE_NAMES),
+        *(f"angles/{field}/{name}" for field in ("position", "velocity") for name in ANGLE_NAMES),
         "currents/effort/0", "currents/effort/11",
     ]  # fmt: skip
-    assert np.max(np.abs(columns["t_s"] - TIMES)) <= 5e-10  # nanoseconds
+    assert np.max(np.abs(1e-9 * time_ns - TIMES)) <= 5e-10
     assert np.array_equal(columns["angles/velocity/beta"], -NUMBERS[:, 1])
     assert np.array_equal(columns["currents/effort/11"], NUMBERS[:, 1])
 
@@ -63,11 +63,14 @@ def test_big_endian_messages_are_read(tmp_path):
         channel = writer.register_channel("/robot/joints", "cdr", schema)
         writer.add_message(channel, 1, b"\0\0\0\0" + body, 1)
         writer.finish()
-    columns, metadata = joint_states.read(path)
-    assert {name: values.tolist() for name, values in columns.items()} == {
-        "t_s": [1.0000005], "robot/joints/position/a": [2.5]
-    }  # fmt: skip
-    assert metadata == {}
+    states = joint_states.read(path)
+    assert states.time_ns.tolist() == [1_000_000_500]
+    assert {name: values.tolist() for name, values in states.columns.items()} == {
+        "robot/joints/position/a": [2.5]
+    }
+    assert states.metadata == {}
+    for time in ("log_time", "publish_time"):
+        assert joint_states.read(path, time).time_ns.tolist() == [1]
 
 
 def test_a_file_that_cannot_be_read_is_refused(path):
@@ -82,16 +85,41 @@ def test_times_before_zero_are_refused(tmp_path):
         joint_states.write(tmp_path / "a.mcap", np.array([-1.0, 0.0]), {}, {})
 
 
-def test_each_flipped_bit_and_each_cut_of_a_file_is_found(path):
+def test_each_flipped_bit_of_a_file_is_found(path):
     content, draws = path.read_bytes(), random.Random(43)
     for _ in range(300):
-        place, bit = draws.randrange(len(content)), 1 << draws.randrange(8)
         damaged = bytearray(content)
-        damaged[place] ^= bit
-        for wrong in (damaged, content[:place]):
-            path.write_bytes(wrong)
-            with pytest.raises(InputError, match=r"MCAP .*run\.mcap: expected a readable file"):
-                joint_states.read(path)
+        damaged[draws.randrange(len(content))] ^= 1 << draws.randrange(8)
+        path.write_bytes(damaged)
+        with pytest.raises(InputError, match=r"MCAP .*run\.mcap: expected a readable file"):
+            joint_states.read(path)
+
+
+@pytest.mark.parametrize("compression", list(CompressionType))
+@pytest.mark.parametrize("chunk_size", [64, 1 << 20])
+def test_a_file_that_a_killed_recorder_left_is_read_up_to_its_last_complete_message(
+    path, compression, chunk_size, monkeypatch
+):
+    options = {"compression": compression, "chunk_size": chunk_size}
+    monkeypatch.setattr("mcap.writer.Writer", lambda file, **_: Writer(file, **options))
+    numbers = np.random.default_rng(0).normal(size=(600, 40))  # more than the smallest part of a compression
+    times = 1e-3 * np.arange(600)
+    joint_states.write(path, times, {"angles": Topic([str(j) for j in range(40)], {"position": numbers})}, {})
+    content, most = path.read_bytes(), 0
+    path.write_bytes(content[:100])
+    with pytest.raises(InputError, match=r"expected messages .* received none"):
+        joint_states.read(path)
+    for share in (0.3, 0.6, 0.9, 1 - 4 / len(content)):
+        path.write_bytes(content[: round(share * len(content))])
+        states = joint_states.read(path)
+        assert states.notes == ("the file has no end: read up to its last complete message",)
+        rows = len(states.time_ns)
+        assert rows >= most
+        most = rows
+        assert np.array_equal(states.columns["angles/position/7"], numbers[:rows, 7])
+    assert most == 600
+    path.write_bytes(content[: len(content) // 2] + bytes(4096))
+    assert len(joint_states.read(path).time_ns) > 100  # the blocks of a file system that were not written
 
 
 @pytest.mark.parametrize("compression", [CompressionType.ZSTD, CompressionType.LZ4])
@@ -101,13 +129,13 @@ def test_a_damaged_file_of_another_program_is_no_other_error(path, compression, 
     monkeypatch.setattr("mcap.writer.Writer", lambda file, **_: Writer(file, **options))
     joint_states.write(path, TIMES, {"angles": Topic(ANGLE_NAMES, {"position": NUMBERS})}, {})
     content, draws, changed = path.read_bytes(), random.Random(43), 0
-    numbers = joint_states.read(path)[0]
+    numbers = joint_states.read(path).columns
     for _ in range(200):
         damaged = bytearray(content)
         damaged[draws.randrange(len(content))] ^= 1 << draws.randrange(8)
         path.write_bytes(damaged)
         try:
-            columns = joint_states.read(path)[0]
+            columns = joint_states.read(path).columns
         except InputError:
             continue
         changed += columns.keys() != numbers.keys()

@@ -111,7 +111,7 @@ def test_a_review_exports_joint_states(files, tmp_path):
     out = tmp_path / "run.mcap"
     succeeded("review", files[2], "--export", out)
     run = st.read(files[2]).telemetry
-    columns, metadata = joint_states.read(out)
+    _, columns, metadata, _ = joint_states.read(out)
     for name, signal, place in (
         ("angles/position/gamma", "q_measured_rad", 2),
         ("angles/velocity/beta", "qdot_estimated_rad_s", 1),
