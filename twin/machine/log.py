@@ -40,6 +40,8 @@ class Log:
         Known fields of the scenario under which it was recorded, such as ``{"plant.payload_kg": 0.05}``.
     accepted : tuple of str
         Findings of `check` that the user has accepted.
+    notes : tuple of str
+        How its file was read, if not as this package writes it.
 
     Raises
     ------
@@ -54,6 +56,7 @@ class Log:
     name: str = "log"
     conditions: Mapping[str, Any] = field(default_factory=dict)
     accepted: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         for column in _COLUMNS:

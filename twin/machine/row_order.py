@@ -1,0 +1,136 @@
+"""Rows of a log: sorted by time, those of one time merged, and all at the times of the angles.
+
+Angles and currents may come from two topics with stamps of their own. Verbs that cut a log into windows need
+one row for each sample of the angles.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spheretwin.machine.log import COMMANDED, Log
+
+Array = NDArray[np.float64]
+
+GAP_PERIODS = 2.5
+"""Periods of a stream from which an interval is a gap."""
+
+_SHORT, _MISSING = 0.7, 1.5  # periods: of a row between others, and where an angle is missing
+_MOST_SHORT = 0.01  # of the rows, more after sorting than before
+
+
+def sorted_rows(t_s: Array, angles: Array, currents: Array) -> tuple[NDArray[np.int64], tuple[str, ...]]:
+    """Return the rows of a file in the order of time, and a note if it is another one.
+
+    The order stays if sorting would leave more gaps or short intervals in the angles or the currents: then a
+    clock was set back, which the check of the log reports.
+    """
+    rows = np.arange(len(t_s))
+    if np.all(np.diff(t_s) >= 0):
+        return rows, ()
+    order = np.argsort(t_s, kind="stable")
+    moved = 0
+    for values in (angles, currents):
+        place = np.isfinite(t_s) & np.any(np.isfinite(values), axis=1)
+        before, after = t_s[place], t_s[order][place[order]]
+        moved += int(np.count_nonzero(np.diff(before) < 0))
+        steps = np.diff(before)
+        period_s = float(np.median(steps[steps > 0])) if np.any(steps > 0) else 0.0
+        (short, gaps), (short_before, gaps_before) = (_faults(one, period_s) for one in (after, before))
+        if short > short_before + _MOST_SHORT * len(before) or gaps > gaps_before:
+            return rows, ()
+    return order, (f"{moved} rows sorted by time" if moved else "rows of two topics sorted by time",)
+
+
+def _faults(t_s: Array, period_s: float) -> tuple[int, int]:
+    """Return the numbers of short intervals, 0 included, and of gaps."""
+    steps = np.diff(t_s)
+    short = np.count_nonzero((steps >= 0) & (steps < _SHORT * period_s))
+    return int(short), int(np.count_nonzero(steps > GAP_PERIODS * period_s))
+
+
+def aligned(log: Log) -> Log:
+    """Return a log with one row for each sample of the angles.
+
+    Rows of one time that complete each other are merged. Rows between those of the angles are left out: their
+    currents count in the mean over the interval of a row if they were commanded, about its time if they were
+    measured. Where the currents have a gap they are NaN.
+    """
+    log = _merged(log)
+    has_angles = np.isfinite(log.angle_rad).any(axis=1)
+    angle_s = log.t_s[has_angles]
+    if len(angle_s) < 2 or not np.all(np.diff(log.t_s) > 0):
+        return log
+    period_s = float(np.median(np.diff(angle_s)))
+    # Of a row between angles their distance; of one before or after all of them, twice that to the next.
+    place = np.clip(np.searchsorted(angle_s, log.t_s), 1, len(angle_s) - 1)
+    distance_s = (angle_s[place] - angle_s[place - 1]).copy()
+    for is_outside, end_s in ((log.t_s < angle_s[0], angle_s[0]), (log.t_s > angle_s[-1], angle_s[-1])):
+        distance_s[is_outside] = 2 * np.abs(log.t_s[is_outside] - end_s)
+    is_kept = has_angles | (distance_s > _MISSING * period_s)
+    if np.all(is_kept):
+        return log
+    has_currents = np.isfinite(log.current_A).any(axis=1)
+    if not np.any(has_currents & ~is_kept):
+        return replace(
+            log, t_s=log.t_s[is_kept], current_A=log.current_A[is_kept], angle_rad=log.angle_rad[is_kept]
+        )
+    t_s, period_s = log.t_s[is_kept], float(np.median(np.diff(log.t_s[is_kept])))
+    ends = t_s + np.minimum(np.diff(t_s, append=t_s[-1] + period_s), GAP_PERIODS * period_s)
+    if log.currents == COMMANDED:
+        current_A = _means(log.t_s[has_currents], log.current_A[has_currents], t_s, ends, held=True)
+    else:
+        half_s = 0.5 * (ends - t_s)
+        current_A = _means(
+            log.t_s[has_currents], log.current_A[has_currents], t_s - half_s, t_s + half_s, held=False
+        )
+    note = "currents at times of their own, as means at the times of the angles"
+    return replace(
+        log, t_s=t_s, current_A=current_A, angle_rad=log.angle_rad[is_kept], notes=(*log.notes, note)
+    )
+
+
+def _means(sample_s: Array, samples: Array, starts: Array, ends: Array, *, held: bool) -> Array:
+    """Return the means of samples over intervals, held or interpolated; NaN in a gap."""
+    columns = []
+    for column in samples.T:
+        known = np.isfinite(column)
+        at, values = sample_s[known], column[known]
+        if len(at) < 2:
+            columns.append(np.full(len(starts), np.nan))
+            continue
+        steps = np.diff(at)
+        longest_s = GAP_PERIODS * float(np.median(steps))
+        at = np.concatenate([[at[0] - longest_s], at, [at[-1] + longest_s]])
+        values = np.concatenate([values[:1], values, values[-1:]])
+        areas = np.diff(at) * (values[:-1] if held else 0.5 * (values[1:] + values[:-1]))
+        integral = np.concatenate([[0.0], np.cumsum(areas)])
+        means = (np.interp(ends, at, integral) - np.interp(starts, at, integral)) / (ends - starts)
+        after = np.clip(np.searchsorted(at, starts, side="right"), 1, len(at) - 1)
+        is_gap = (at[after] - at[after - 1] > longest_s * (1 + 1e-9)) | (starts < at[0]) | (ends > at[-1])
+        columns.append(np.where(is_gap, np.nan, means))
+    return np.stack(columns, axis=1)
+
+
+def _merged(log: Log) -> Log:
+    """Return a log whose rows of one time are one, if no number of them differs."""
+    steps = np.diff(log.t_s)
+    if not np.any(steps == 0):
+        return log
+    values = np.concatenate([log.angle_rad, log.current_A], axis=1)
+    starts = np.concatenate([[0], np.flatnonzero(steps != 0) + 1])
+    low, high = np.fmin.reduceat(values, starts), np.fmax.reduceat(values, starts)
+    agrees = np.all((low == high) | np.isnan(low), axis=1)
+    rows = np.repeat(agrees, np.diff(starts, append=len(log)))
+    rows[starts] = False  # the first row of a time stays, as do all that differ
+    values[starts[agrees]] = low[agrees]
+    hinges = log.angle_rad.shape[1]
+    return replace(
+        log,
+        t_s=log.t_s[~rows],
+        angle_rad=values[~rows, :hinges],
+        current_A=values[~rows, hinges:],
+    )
