@@ -15,6 +15,7 @@ from spheretwin.linear import linearise
 from spheretwin.machine import Log
 from spheretwin.machine import columns as column_maps
 from spheretwin.machine.link import frame_format
+from spheretwin.machine.raw_table import RawTable
 from spheretwin.models import actuator as actuators
 from spheretwin.models import torque_curve, torque_field
 from spheretwin.models.base.errors import shown
@@ -241,7 +242,9 @@ def invalid_logs():
     file = dict.fromkeys(["t_s", "a", "b", "c", "i0", "i1"], np.zeros(3))
 
     def mapped(fields):
-        return column_maps.of_fields({"angles": ANGLES, "currents": CURRENTS, **fields}).log(file, "bad")
+        return column_maps.of_fields({"angles": ANGLES, "currents": CURRENTS, **fields}).log(
+            RawTable("bad", file)
+        )
 
     logs = [f"{place}: {refusal(Log, *given, name='bad')}" for place, given in enumerate(LOGS)]
     frames = of_texts(

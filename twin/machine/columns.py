@@ -4,17 +4,21 @@ from __future__ import annotations
 
 import json
 import math
+import re
 import tomllib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, model_validator
 
+from spheretwin.machine.csv_files import CsvFormat
 from spheretwin.machine.log import COMMANDED, MEASURED, Log
-from spheretwin.models.base.errors import InputError, did_you_mean, without_breaks
+from spheretwin.machine.raw_table import RawTable, listed
+from spheretwin.machine.row_order import aligned, sorted_rows
+from spheretwin.models.base.errors import InputError, without_breaks
 from spheretwin.models.base.files import regular_file
 from spheretwin.models.telemetry.joint_states import ANGLE_NAMES
 from spheretwin.scenario.fields import explain
@@ -24,11 +28,16 @@ Numbers = tuple[float, ...]
 
 CONFIG = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
 EVERY = "*"
-"""End of a name that stands for the same name followed by 0, 1, 2, ... as far as the file has them."""
+"""Part of a name that stands for the numbers from 0 or 1 on that the file has, also with leading zeros."""
 
-TIME_UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
-ANGLE_UNITS = {"rad": 1.0, "deg": math.pi / 180, "turn": 2 * math.pi}
+ANGLE_UNITS = {"rad": 1.0, "mrad": 1e-3, "deg": math.pi / 180, "turn": 2 * math.pi}
 CURRENT_UNITS = {"A": 1.0, "mA": 1e-3}
+FILE_UNITS = {
+    "°": "deg", "degree": "deg", "degrees": "deg", "turns": "turn", "rev": "turn", "amp": "A", "amps": "A",
+    "ampere": "A", "a": "A", "ma": "mA", "sec": "s", "second": "s", "seconds": "s", "msec": "ms", "µs": "us",
+    "μs": "us",
+}  # fmt: skip
+"""Units by other names that a file may state."""
 
 
 class TimeColumn(BaseModel):
@@ -36,8 +45,16 @@ class TimeColumn(BaseModel):
 
     model_config = CONFIG
 
-    column: str = Field("t_s", description="name of the column")
-    unit: Literal["s", "ms", "us", "ns"] = Field("s", description="unit of its numbers")
+    column: str = Field(
+        "t_s",
+        description="name of the column; in MCAP t_s (stamps of the messages), log_time or publish_time",
+    )
+    unit: Literal["s", "ms", "us", "ns"] | None = Field(
+        None, description="unit of its numbers; unless given, that which the file states, or s"
+    )
+    wrap: Annotated[float, Field(ge=0)] = Field(
+        0.0, description="number after which the clock starts again, such as 4294967296; 0 for none"
+    )
 
 
 class Channels(BaseModel):
@@ -60,11 +77,14 @@ class Channels(BaseModel):
         (0.0,), description="raw numbers after which a counter starts again; 0 for none"
     )
 
+    unit: tuple[str, ...] = ()
+    section: ClassVar[str] = ""
+
     @model_validator(mode="after")
     def _fits(self) -> Channels:
         if EVERY not in "".join(self.columns):
-            for name in ("sign", "scale", "offset", "wrap"):
-                if (count := len(getattr(self, name))) not in (1, len(self.columns)):
+            for name in ("sign", "scale", "offset", "wrap", "unit"):
+                if (count := len(getattr(self, name))) not in (0, 1, len(self.columns)):
                     raise ValueError(
                         f"expected {name} once or for {len(self.columns)} columns, received {count}"
                     )
@@ -75,33 +95,94 @@ class Channels(BaseModel):
         return self
 
     def names(self, available: Sequence[str]) -> list[str]:
-        """Return the names of the columns in a file with the available ones."""
-        names: list[str] = []
-        for name in self.columns:
-            if name.endswith(EVERY):
-                count = 0
-                while (numbered := f"{name[:-1]}{count}") in available:
-                    names.append(numbered)
-                    count += 1
-                names.extend([] if count else [f"{name[:-1]}0"])
-            else:
-                names.append(name)
-        return names
+        """Return the names of the columns in a file with the available ones.
 
-    def values(self, raw: Array, unit: float) -> Array:
-        """Return the values of raw numbers (n, columns)."""
-        unwrapped = raw.copy()
-        for place, wrap in enumerate(np.broadcast_to(self.wrap, raw.shape[1])):
+        Raises
+        ------
+        InputError
+            A pattern has a number between others that the file lacks.
+        """
+        return [name for pattern in self.columns for name in (_numbered(pattern, available) or [pattern])]
+
+    def values(self, table: RawTable, units: Mapping[str, float], rows: slice | NDArray[np.int64]) -> Array:
+        """Return the values of some rows of a file, (n, columns).
+
+        Raises
+        ------
+        InputError
+            A column is missing or has no numbers, or the file has another number of them than the map.
+        """
+        names = self.names(tuple(table.columns))
+        entries = {}
+        for field in ("sign", "scale", "offset", "wrap", "unit"):
+            given = getattr(self, field)
+            if len(given) not in (0, 1, len(names)):
+                raise InputError(
+                    f"log {table.name}: expected {self.section}.{field} once or for {len(names)} columns, received"
+                    f" {len(given)}"
+                )
+            entries[field] = [*given] * len(names) if len(given) == 1 else given
+        entries["unit"] = entries["unit"] or [_stated_unit(table, name, units) for name in names]
+        values = np.stack([table.numbers(name)[rows] for name in names], axis=1)
+        for place, (offset, wrap) in enumerate(zip(entries["offset"], entries["wrap"], strict=True)):
             if wrap:
-                finite = np.isfinite(raw[:, place])
-                unwrapped[finite, place] = np.unwrap(raw[finite, place], period=wrap)
-        return np.array(self.sign) * unit * np.array(self.scale) * (unwrapped - np.array(self.offset))
+                values[:, place] = _unwrapped(values[:, place], offset, wrap)
+        factors = [units[unit] for unit in entries["unit"]]
+        return (
+            np.array(entries["sign"])
+            * factors
+            * np.array(entries["scale"])
+            * (values - np.array(entries["offset"]))
+        )
+
+
+def _numbered(pattern: str, available: Sequence[str]) -> list[str]:
+    """Return the available names that a pattern stands for, by their numbers; none for a plain name."""
+    before, every, after = pattern.partition(EVERY)
+    if not every:
+        return []
+    matches = (re.fullmatch(rf"{re.escape(before)}(\d+){re.escape(after)}", name) for name in available)
+    numbered = {int(match[1]): match[0] for match in matches if match}
+    if not numbered:
+        return [f"{before}0{after}"]
+    first = min(numbered)
+    expected = range(first if first in (0, 1) else 0, max(numbered) + 1)
+    if lacking := [number for number in expected if number not in numbered]:
+        raise InputError(
+            f"columns {pattern}: expected every number up to {max(numbered)}, received none of"
+            f" {before}{lacking[0]}{after}: list the columns in the order of the groups"
+        )
+    return [numbered[number] for number in expected]
+
+
+def _stated_unit(table: RawTable, name: str, units: Mapping[str, float]) -> str:
+    """Return the unit that a file states for a column, or that of the package."""
+    stated = table.units.get(name, "")
+    stated = stated if stated in units else FILE_UNITS.get(stated.lower(), "")
+    return stated if stated in units else next(iter(units))
+
+
+def _unwrapped(raw: Array, offset: float, wrap: float) -> Array:
+    """Return a continuous count, whose first number is within half a revolution of the offset."""
+    values, finite = raw.copy(), np.flatnonzero(np.isfinite(raw))
+    if len(finite):
+        values[finite] = np.unwrap(raw[finite], period=wrap)
+        values -= wrap * np.floor((values[finite[0]] - offset) / wrap + 0.5)
+    return values
+
+
+def _entries(value: Any) -> Any:
+    """Return entries, or one, as a tuple."""
+    return (value,) if isinstance(value, str) else tuple(value) if isinstance(value, list) else value
 
 
 class AngleColumns(Channels):
     """Columns of the angles alpha, beta, gamma, in this order."""
 
-    unit: Literal["rad", "deg", "turn"] = Field("rad", description="unit of numbers times scale")
+    section = "angles"
+    unit: Annotated[tuple[Literal["rad", "mrad", "deg", "turn"], ...], BeforeValidator(_entries)] = Field(
+        (), description="unit of numbers times scale, or one for each; unless given, that of the file, or rad"
+    )
 
     @model_validator(mode="after")
     def _three(self) -> AngleColumns:
@@ -113,7 +194,10 @@ class AngleColumns(Channels):
 class CurrentColumns(Channels):
     """Columns of the currents of the coil groups, in their order."""
 
-    unit: Literal["A", "mA"] = Field("A", description="unit of numbers times scale")
+    section = "currents"
+    unit: Annotated[tuple[Literal["A", "mA"], ...], BeforeValidator(_entries)] = Field(
+        (), description="unit of numbers times scale, or one for each; unless given, that of the file, or A"
+    )
     kind: Literal["commanded", "measured"] = Field(
         "commanded", description="sent to the amplifiers and held, or measured in the coils"
     )
@@ -124,6 +208,7 @@ class ColumnMap(BaseModel):
 
     model_config = CONFIG
 
+    csv: CsvFormat = CsvFormat()
     time: TimeColumn = TimeColumn()
     angles: AngleColumns
     currents: CurrentColumns
@@ -131,40 +216,32 @@ class ColumnMap(BaseModel):
         default_factory=dict, description="known fields of the scenario during the log"
     )
 
-    def log(self, columns: Mapping[str, Array], name: str, accepted: tuple[str, ...] = ()) -> Log:
-        """Return the log of columns of a file.
+    def log(self, table: RawTable, accepted: tuple[str, ...] = ()) -> Log:
+        """Return the log of a file: rows in the order of time, at the times of the angles.
 
         Raises
         ------
         InputError
-            A column is missing.
+            A column is missing, or has something else than numbers.
         """
-        angles, currents = self.angles.names(tuple(columns)), self.currents.names(tuple(columns))
-        for column in (self.time.column, *angles, *currents):
-            if column not in columns:
-                raise InputError(
-                    f"log {name}: expected a column {column} of numbers, received {', '.join(columns)}"
-                    f"{did_you_mean(column, columns)}"
-                )
-        for field in ("sign", "scale", "offset", "wrap"):
-            if (count := len(getattr(self.currents, field))) not in (1, len(currents)):
-                raise InputError(
-                    f"log {name}: expected currents.{field} once or for {len(currents)} columns,"
-                    f" received {count}"
-                )
-        return Log(
-            TIME_UNITS[self.time.unit] * columns[self.time.column],
-            self.currents.values(_table(columns, currents), CURRENT_UNITS[self.currents.unit]),
-            self.angles.values(_table(columns, angles), ANGLE_UNITS[self.angles.unit]),
+        unit = self.time.unit or FILE_UNITS.get(table.units.get(self.time.column, "").lower())
+        t_s, notes = table.times(self.time.column, unit, self.time.wrap)
+        raw = [
+            np.stack([table.numbers(name) for name in channels.names(tuple(table.columns))], axis=1)
+            for channels in (self.angles, self.currents)
+        ]
+        rows, order = sorted_rows(t_s, *raw)
+        log = Log(
+            t_s[rows],
+            self.currents.values(table, CURRENT_UNITS, rows),
+            self.angles.values(table, ANGLE_UNITS, rows),
             self.currents.kind,
-            name,
+            table.name,
             self.conditions,
             accepted,
+            (*table.notes, *notes, *order),
         )
-
-
-def _table(columns: Mapping[str, Array], names: Sequence[str]) -> Array:
-    return np.stack([columns[name] for name in names], axis=1)
+        return aligned(log)
 
 
 def load(source: str | Path) -> ColumnMap:
@@ -209,44 +286,45 @@ def _flat(fields: Any, prefix: str = "") -> Any:
     return flat
 
 
-# The names of our own files: exported logs, telemetry with and without sensors, MCAP.
+# The names of our own files: logs, telemetry with and without sensors, MCAP.
 ANGLE_PREFIXES = ("angle_rad_", "q_measured_rad_", "q_rad_", "angles/position/")
 CURRENT_PREFIXES = {
     "current_command_A_": COMMANDED,
     "current_measured_A_": MEASURED,
     "currents/effort/": COMMANDED,
+    "current_A_": COMMANDED,
 }
 
 
-def default(columns: Sequence[str], kind: str | None = None, name: str = "given") -> ColumnMap:
+def default(table: RawTable, kind: str | None = None) -> ColumnMap:
     """Return the column map of a file that this package wrote.
 
     Parameters
     ----------
-    columns : sequence of str
-        Names of the columns of the file.
+    table : RawTable
     kind : str, optional
         Kind of the currents, if the file states it.
-    name : str
-        Of the file, for messages.
 
     Raises
     ------
     InputError
         The columns have other names.
     """
-    angles = [prefix for prefix in ANGLE_PREFIXES if f"{prefix}{ANGLE_NAMES[0]}" in columns]
-    currents = [prefix for prefix in CURRENT_PREFIXES if f"{prefix}0" in columns]
+    labels = [*(prefix + axis for prefix in ANGLE_PREFIXES for axis in ANGLE_NAMES), "angle_rad_0"]
+    angles = next((label for label in labels if label in table.columns), None)
+    currents = next((prefix for prefix in CURRENT_PREFIXES if f"{prefix}0" in table.columns), None)
     if not (angles and currents):
         raise InputError(
-            f"log {name}: expected a column map (--columns MAP.toml), or the columns"
+            f"log {table.name}: expected a column map (--columns MAP.toml), or the columns"
             f" {', '.join(ANGLE_PREFIXES[0] + axis for axis in ANGLE_NAMES)} and"
-            f" {next(iter(CURRENT_PREFIXES))}0 to the last group, received"
-            f" {', '.join(columns) or 'no column of numbers'}"
+            f" {next(iter(CURRENT_PREFIXES))}0 to the last group, received {listed(tuple(table.columns))}"
+            f"{''.join(f'; {note}' for note in table.notes)}"
         )
+    prefix = next(prefix for prefix in ANGLE_PREFIXES if angles.startswith(prefix))
+    axes = ("0", "1", "2") if angles.endswith("0") else ANGLE_NAMES
     return of_fields(
         {
-            "angles": {"columns": [angles[0] + axis for axis in ANGLE_NAMES]},
-            "currents": {"columns": [currents[0] + EVERY], "kind": kind or CURRENT_PREFIXES[currents[0]]},
+            "angles": {"columns": [prefix + axis for axis in axes]},
+            "currents": {"columns": [currents + EVERY], "kind": kind or CURRENT_PREFIXES[currents]},
         }
     )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -12,8 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spheretwin.machine import columns as column_maps
+from spheretwin.machine import csv_files
 from spheretwin.machine.columns import ColumnMap
 from spheretwin.machine.log import COMMANDED, MEASURED, Log
+from spheretwin.machine.raw_table import RawTable, unique
 from spheretwin.models.base.errors import InputError, shown
 from spheretwin.models.base.files import regular_file, whole_file
 from spheretwin.models.telemetry import joint_states
@@ -42,7 +44,8 @@ def read(
     Parameters
     ----------
     path : str or Path
-        The file; vectors of Parquet and joint states of MCAP become a column for each number.
+        The file; vectors of Parquet and joint states of MCAP become a column for each number. Its first bytes
+        tell the format; without those of Parquet or MCAP it is CSV.
     columns : ColumnMap, mapping, str or Path, optional
         Column map, its fields, or its TOML file; default: the columns that this package writes, also the
         telemetry of a run.
@@ -56,24 +59,24 @@ def read(
     """
     from spheretwin.machine.findings import check_names  # imports an optimiser, which an export does not need
 
-    path = Path(path)
-    numbers, metadata = _read_columns(path)
-    if columns is None:
-        column_map = column_maps.default(tuple(numbers), metadata.get(CURRENTS), str(path))
-    elif isinstance(columns, ColumnMap):
+    if columns is None or isinstance(columns, ColumnMap):
         column_map = columns
     elif isinstance(columns, str | Path):
         column_map = column_maps.load(columns)
     else:
         column_map = column_maps.of_fields(columns)
+    path = Path(path)
+    table = _read_table(path, column_map)
+    if column_map is None:
+        column_map = column_maps.default(table, table.metadata.get(CURRENTS))
     try:
-        stated = json.loads(metadata.get(CONDITIONS, "{}"))
-        before = tuple(json.loads(metadata.get(ACCEPTED, "[]")))
+        stated = json.loads(table.metadata.get(CONDITIONS, "{}"))
+        before = tuple(json.loads(table.metadata.get(ACCEPTED, "[]")))
     except ValueError:
         raise InputError(f"log {path}: expected conditions and accepted findings as JSON") from None
     column_map = column_map.model_copy(update={"conditions": {**stated, **column_map.conditions}})
 
-    return column_map.log(numbers, str(path), check_names((*before, *accepted)))
+    return column_map.log(table, check_names((*before, *accepted)))
 
 
 def write(log: Log, path: str | Path) -> None:
@@ -92,7 +95,7 @@ def write(log: Log, path: str | Path) -> None:
         CONDITIONS: json.dumps(dict(log.conditions)),
         ACCEPTED: json.dumps(log.accepted),
     }
-    if path.suffix == ".mcap":
+    if path.suffix.lower() == ".mcap":
         topics = {
             "angles": Topic(ANGLE_NAMES, {"position": log.angle_rad}),
             "currents": Topic(groups, {"effort": log.current_A}),
@@ -101,9 +104,9 @@ def write(log: Log, path: str | Path) -> None:
         return
     signals = log_signals(len(groups), (log.currents,))
     table = Table(signals, np.column_stack([log.t_s, log.angle_rad, log.current_A])).scalars()
-    if path.suffix == ".parquet":
+    if path.suffix.lower() == ".parquet":
         table.write_parquet(path, metadata)
-    elif path.suffix == ".csv":
+    elif path.suffix.lower() == ".csv":
         with whole_file(path) as temporary, temporary.open("w", encoding="utf-8", newline="") as file:
             writer = csv.writer(file, lineterminator="\n")
             writer.writerow(signal.name for signal in table.signals)
@@ -126,54 +129,89 @@ def log_signals(groups: int, kinds: tuple[str, ...]) -> tuple[Signal, ...]:
     )
 
 
-def _read_columns(path: Path) -> tuple[dict[str, Array], dict[str, str]]:
-    """Return the columns of numbers of a file, and its metadata."""
-    if path.suffix == ".mcap":
-        return joint_states.read(path)
-    if path.suffix not in (".parquet", ".csv"):
-        raise _unknown_kind(path)
+def _read_table(path: Path, column_map: ColumnMap | None) -> RawTable:
+    """Return the columns of a file, whose first bytes tell its format."""
+    try:
+        with regular_file(path).open("rb") as file:
+            start = file.read(8)
+    except OSError as error:
+        raise unreadable(path, error, "a log") from None
+    if start.startswith(_MCAP):
+        return _read_mcap(path, column_map)
+    if start.startswith(_PARQUET):
+        return _read_parquet(path)
+    if start.startswith(_ZIP):
+        raise InputError(
+            f"log {path}: expected CSV, Parquet or MCAP, received a ZIP archive, such as a workbook of Excel:"
+            " save it as CSV"
+        )
+    if path.suffix.lower() in (".mcap", ".parquet"):
+        raise InputError(f"log {path}: expected {path.suffix[1:]}, received other bytes at its beginning")
+    return csv_files.read(path, column_map.csv if column_map else None)
+
+
+_MCAP, _PARQUET, _ZIP = b"\x89MCAP0\r\n", b"PAR1", b"PK\x03\x04"
+
+
+def _read_mcap(path: Path, column_map: ColumnMap | None) -> RawTable:
+    time = column_map.time.column if column_map else joint_states.STAMPS
+    if time not in (times := (joint_states.STAMPS, joint_states.LOG_TIME, joint_states.PUBLISH_TIME)):
+        raise InputError(f"log {path}: expected time.column as one of {', '.join(times)}, received {time}")
+    states = joint_states.read(path, time)
+    columns = {time: states.time_ns, **states.columns}
+    return RawTable(str(path), columns, {time: "ns"}, states.metadata, states.notes)
+
+
+def _read_parquet(path: Path) -> RawTable:
     import pyarrow as pa
-    import pyarrow.csv
 
     try:
-        if path.suffix == ".csv":
-            table = pyarrow.csv.read_csv(regular_file(path))
-        else:
-            with open_parquet(path) as file:
-                table = file.read(use_threads=False)
-        names = table.schema.names
-        if twice := sorted({name for name in names if names.count(name) > 1}):
-            raise InputError(f"log {path}: expected each column once, received {', '.join(twice)} twice")
+        with open_parquet(path) as file:
+            table = file.read(use_threads=False)
         metadata = {
             name.decode(): text.decode()
             for name, text in (table.schema.metadata or {}).items()
             if name.decode() not in METADATA
         }
-        numbers = {
-            name: values
-            for field in table.schema
-            for name, values in _scalars(field, table[field.name]).items()
-        }
+        columns = [part for field in table.schema for part in _scalars(field, table[field.name])]
     except (OSError, pa.ArrowException, UnicodeDecodeError) as error:
         raise unreadable(path, error, "columns of numbers") from None
-    return numbers, metadata
+    names = [name for name, _ in columns]
+    return RawTable(str(path), dict(columns), {}, metadata, (), unique(names))
 
 
-def _scalars(field: pa.Field, column: pa.ChunkedArray) -> dict[str, Array]:
-    """Return the numbers of a column by name; none of a column without numbers."""
+MOST_ENTRIES = 1024
+"""Length of vectors beyond which they are not read."""
+
+
+def _scalars(field: pa.Field, column: pa.ChunkedArray) -> Iterator[tuple[str, Any]]:
+    """Yield name and content of a column; a column for each entry of a vector or a structure."""
     import pyarrow as pa
+    import pyarrow.compute as pc
+    import pyarrow.types as types
 
-    if pa.types.is_fixed_size_list(field.type):
-        size = field.type.list_size
+    kind = field.type
+    if types.is_struct(kind):
+        for entry in kind:
+            yield from _scalars(
+                entry.with_name(f"{field.name}.{entry.name}"), pc.struct_field(column, entry.name)
+            )
+    elif types.is_fixed_size_list(kind) or types.is_list(kind) or types.is_large_list(kind):
+        if not (types.is_integer(kind.value_type) or types.is_floating(kind.value_type)):
+            return
+        lengths = pc.fill_null(pc.list_value_length(column), 0).to_numpy()
+        size = int(lengths.max(initial=0))
+        if not 0 < size <= MOST_ENTRIES:
+            return
         labels = (field.metadata or {}).get(b"labels", b"").decode()
         signal = Signal(field.name, "", size, "", tuple(filter(None, labels.split(","))))
-        values = np.asarray(column.combine_chunks().flatten(), np.float64).reshape(-1, size)
         names = [scalar.name for scalar in signal.scalars()] if size > 1 else [field.name]
-        return dict(zip(names, values.T, strict=True))
-    # A missing number of Arrow becomes NaN, also in a column without any.
-    types = pa.types.is_integer, pa.types.is_floating, pa.types.is_null
-    is_number = any(is_type(field.type) for is_type in types)
-    return {field.name: column.cast(pa.float64()).to_numpy()} if is_number else {}
+        values = np.full((len(column), size), np.nan)
+        flat = pc.list_flatten(column).cast(pa.float64(), safe=False)
+        values[np.arange(size) < lengths[:, None]] = flat.to_numpy()
+        yield from zip(names, values.T, strict=True)
+    else:
+        yield field.name, column
 
 
 def _unknown_kind(path: Path) -> InputError:

@@ -8,6 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from spheretwin.machine import columns
+from spheretwin.machine.raw_table import RawTable
 from spheretwin.models.base.errors import InputError
 
 ANGLES = {"columns": ["a", "b", "c"]}
@@ -37,7 +38,7 @@ def test_angles_come_back_from_raw_numbers(scale, offset, sign, names, unit, tim
             "angles": {"columns": names, "unit": unit, "scale": scale, "offset": offset, "sign": sign},
             "currents": CURRENTS | {"unit": "mA", "kind": "measured", "sign": [1, -1], "offset": [1.0]},
         }
-    ).log(file, "a.csv")
+    ).log(RawTable("a.csv", file))
     # The offset costs digits: of a raw number of 1e5, 1.5e-11 are lost.
     lost = 1e-15 + 3e-11 * np.abs(np.array(scale) * factor)
     assert np.all(np.abs(log.angle_rad - RADIANS) <= lost)
@@ -52,7 +53,8 @@ def test_a_counter_that_starts_again_is_continuous(wrap, phase):
     counts = np.arange(40) * np.trunc(0.45 * wrap * phase)  # less than half a turn between two rows
     file = dict.fromkeys(("a", "b", "i0"), np.zeros(40)) | {"t_s": np.arange(40.0), "c": counts % wrap}
     angles = {**ANGLES, "unit": "turn", "scale": [1.0, 1.0, 1 / wrap], "wrap": [0, 0, wrap]}
-    log = columns.of_fields({"angles": angles, "currents": CURRENTS}).log(file, "a")
+    log = columns.of_fields({"angles": angles, "currents": CURRENTS}).log(RawTable("a", file))
+    # The first count is within half a revolution of the offset, 0.
     assert log.angle_rad[:, 2] == pytest.approx(math.tau * counts / wrap, abs=1e-9)
 
 
@@ -74,7 +76,51 @@ def test_a_map_is_read_from_toml(tmp_path):
     column_map = columns.load(path)
     assert column_map.angles.scale == (1.047, 1.047, 3.14159e-3)
     assert column_map.conditions == {"plant.payload_kg": 0.05}
-    assert column_map.currents.names(["current_0", "current_1", "current_3"]) == ["current_0", "current_1"]
+    assert column_map.currents.names(["current_1", "b", "current_0"]) == ["current_0", "current_1"]
+
+
+@pytest.mark.parametrize(
+    ("pattern", "names"),
+    [("i*", ["i0", "i1", "i2"]), ("i_*_A", ["i_01_A", "i_02_A"]), ("axis*.i", ["axis0.i"])],
+)
+def test_a_pattern_stands_for_each_number(pattern, names):
+    currents = columns.CurrentColumns(columns=(pattern,))
+    assert currents.names(["i0x", *reversed(names), "t"]) == names
+
+
+def test_a_pattern_does_not_end_at_a_number_that_lacks():
+    with pytest.raises(InputError, match="every number up to 3, received none of i2"):
+        columns.CurrentColumns(columns=("i*",)).names(["i0", "i1", "i3"])
+
+
+@pytest.mark.parametrize(("first", "offset", "turns"), [(10, 16380, 1), (16370, 3, -1), (8000, 16380, 1)])
+def test_the_first_count_is_within_half_a_revolution_of_the_offset(first, offset, turns):
+    counts = (first + np.arange(5)) % 16384
+    file = dict.fromkeys(("a", "b", "i0"), np.zeros(5)) | {"t_s": np.arange(5.0), "c": counts}
+    angles = {**ANGLES, "wrap": [0, 0, 16384], "offset": [0, 0, offset]}
+    log = columns.of_fields({"angles": angles, "currents": CURRENTS}).log(RawTable("a", file))
+    expected = first + 16384 * turns - offset + np.arange(5)
+    assert log.angle_rad[:, 2] == pytest.approx(expected, abs=1e-9)
+
+
+def test_each_axis_has_a_unit_of_its_own():
+    file = {"t_s": TIMES, "a": 180 + 0 * TIMES, "b": 1e3 + 0 * TIMES, "c": 0.5 + 0 * TIMES, "i0": TIMES}
+    fields = {"angles": {**ANGLES, "unit": ["deg", "mrad", "turn"]}, "currents": CURRENTS}
+    log = columns.of_fields(fields).log(RawTable("a", file))
+    assert log.angle_rad[0] == pytest.approx([math.pi, 1.0, math.pi])
+    with pytest.raises(InputError, match="expected unit once or for 3 columns, received 2"):
+        columns.of_fields({**fields, "angles": {**ANGLES, "unit": ["deg", "deg"]}})
+
+
+def test_units_of_the_file_apply_unless_the_map_has_others():
+    file = {"t_s": 1e3 * TIMES, "a": 180 + 0 * TIMES, "b": TIMES, "c": TIMES, "i0": 5 + 0 * TIMES}
+    table = RawTable("a", file, {"t_s": "msec", "a": "degrees", "b": "V", "i0": "mA"})
+    log = columns.of_fields({"angles": ANGLES, "currents": CURRENTS}).log(table)
+    assert log.t_s == pytest.approx(TIMES)
+    assert log.angle_rad[0, 0] == pytest.approx(math.pi)
+    assert log.current_A[0, 0] == pytest.approx(5e-3)
+    stated = {"angles": {**ANGLES, "unit": "rad"}, "currents": {**CURRENTS, "unit": "A"}}
+    assert columns.of_fields(stated).log(table).angle_rad[0, 0] == pytest.approx(180)
 
 
 def test_a_file_that_is_no_toml_is_refused(tmp_path):
