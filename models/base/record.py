@@ -91,7 +91,7 @@ class Record:
         Raises
         ------
         TypeError
-            A size is missing.
+            A size is missing, or a field has the name of a method of a record of NumPy, such as `mean`.
         """
         kind: Any = cls
         return _dtype(kind, tuple(sorted(sizes.items())))
@@ -131,6 +131,10 @@ def _dtype(kind: type[Record], sizes: tuple[tuple[str, int], ...]) -> np.dtype[A
         return known[name] if isinstance(name, str) else name
 
     for name, declared in kind.fields().items():
+        if hasattr(np.record, name):
+            raise TypeError(
+                f"{kind.__name__}: expected a name that numpy.record does not have, received {name}"
+            )
         if issubclass(kinds[name], Record):
             renamed = {inner: length(outer, name) for inner, outer in declared.sizes.items()}
             member = _dtype(kinds[name], tuple(sorted({**known, **renamed}.items())))

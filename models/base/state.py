@@ -118,16 +118,17 @@ def push_all(history: Array, values: Array) -> None:
 
 
 @allocation_free
-def delayed_mean(history: Array, column: int, fraction: float) -> float:
-    """Return the mean of a column over a period that the two oldest rows share.
+def delayed_mean(history: Array, due: int, column: int, fraction: float) -> float:
+    """Return the mean of a column over a period in which the next row becomes due.
 
     Parameters
     ----------
-    history : (n + 2, m) array
-        Newest row first; row n is due after a delay of n periods.
+    history : (n, m) array
+        Newest row first.
+    due : int
+        Row that is due: periods of the delay.
     column : int
     fraction : float
-        Share of the period in which the oldest row acts.
+        Share of the period in which the older row acts.
     """
-    last = history.shape[0] - 1
-    return fraction * history[last, column] + (1.0 - fraction) * history[last - 1, column]
+    return fraction * history[due + 1, column] + (1.0 - fraction) * history[due, column]

@@ -42,6 +42,14 @@ def test_layout_is_that_of_the_declarations_and_every_field_is_aligned():
         Bank.zeros(groups=4)
 
 
+def test_a_name_of_numpy_s_records_is_refused():
+    class Flow(Record):
+        mean: float = field("mean current", "A")
+
+    with pytest.raises(TypeError, match=r"Flow: expected a name that .* does not have, received mean"):
+        Flow.zeros()
+
+
 @allocation_free
 def advance(bank, value):
     filters = bank.pair
