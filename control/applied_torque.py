@@ -7,86 +7,77 @@ k - n - 1 for a share f of the period, then command k - n. The lag is solved exa
 from __future__ import annotations
 
 from math import exp, expm1
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from spheretwin.models.base.compiled import allocation_free
-from spheretwin.models.base.state import push
+from spheretwin.models.base.record import Record, Rows, field
+from spheretwin.models.base.state import capacity, push_all
 from spheretwin.models.coil_group import PerGroup, of_each_group
 from spheretwin.models.kinematics import generalised_torque
 from spheretwin.models.magnetics import rotor_torque
+
+Array = NDArray[np.float64]
 
 # A delay of a whole number of periods is one to rounding only.
 ROUNDING = 1e-9
 
 
-class LagStep(NamedTuple):
+class LagStep(Record):
     """First-order lag over a part of a period, with a constant command."""
 
-    decay: NDArray[np.float64]
-    """(groups,) remaining share of the distance to the command at the end of the part."""
-    mean_share: NDArray[np.float64]
-    """(groups,) mean remaining share of that distance."""
+    decay: Array = field(
+        "remaining share of the distance to the command at the end of the part", "", "groups"
+    )
+    mean_share: Array = field("mean remaining share of that distance", "", "groups")
 
 
-class AppliedTorque(NamedTuple):
+class AppliedTorque(Record):
     """Estimated currents and applied torque."""
 
-    on: bool
-    """True if the law, the detector or the prediction uses it; otherwise nothing is computed."""
-    fraction: float
-    """Share of a period in which the older command acts, f."""
-    older_lag: LagStep
-    newer_lag: LagStep
-    commands: NDArray[np.float64]  # (n + 2, groups) A, newest first
-    current: NDArray[np.float64]  # (groups,) A, at the end of the last period
-    mean: NDArray[np.float64]  # (groups,) A, over the last period
-    torque_S: NDArray[np.float64]  # (3,) N·m, mean over the last period, stator frame
-    torque_q: NDArray[np.float64]  # (3,) N·m, the same on the hinges; NaN if `on` is False
-
-    def state_arrays(self) -> tuple[NDArray[np.float64], ...]:
-        """Return the arrays that hold the state."""
-        return self.commands, self.current, self.torque_q
+    on: bool = field("whether the law, the detector or the prediction uses it")
+    due: int = field("row of the commands that acts at the end of a period: whole periods of the delay")
+    fraction: float = field("share of a period in which the older command acts, f")
+    older_lag: LagStep = field("lag over that share")
+    newer_lag: LagStep = field("lag over the rest of the period")
+    commands: Array = field("commands, newest first", "A", ("delays", "groups"), state=True)
+    current: Array = field("currents at the end of the last period", "A", "groups", state=True)
+    mean_current: Array = field("currents over the last period", "A", "groups")
+    torque_S: Array = field("mean torque over the last period, stator frame", "N·m", 3)
+    torque_q: Array = field("the same on the hinges; NaN if it is off", "N·m", 3, state=True)
 
 
-def applied_torque(
-    on: bool, groups: int, period_s: float, delay_s: float, time_constant_s: PerGroup
-) -> AppliedTorque:
-    """Applied torque at rest: no currents and no pending commands.
+def fill_applied_torque(
+    rows: Rows, on: bool, period_s: float, delay_s: float, time_constant_s: PerGroup
+) -> None:
+    """Fill applied torques at rest: no currents and no pending commands.
 
     Parameters
     ----------
+    rows : rows of `AppliedTorque`
+        As many delays as `delay_capacity` gives.
     on : bool
         Whether it is used.
-    groups : int
-        Coil groups.
     period_s, delay_s : float, s
         Control period and nominal delay.
     time_constant_s : float or one for each group, s
         Time constant L/R of the lag; 0 for none.
     """
-    whole, fraction = split_delay(delay_s if on else 0.0, period_s)
-    return AppliedTorque(
-        on=on,
-        fraction=fraction,
-        older_lag=lag_step(fraction * period_s, time_constant_s, groups),
-        newer_lag=lag_step((1 - fraction) * period_s, time_constant_s, groups),
-        commands=np.zeros((whole + 2, groups)),
-        current=np.zeros(groups),
-        mean=np.zeros(groups),
-        torque_S=np.zeros(3),
-        torque_q=np.zeros(3) if on else np.full(3, np.nan),
-    )
+    rows["on"] = on
+    rows["due"], fraction = split_delay(delay_s if on else 0.0, period_s)
+    rows["fraction"] = fraction
+    fill_lag_step(rows["older_lag"], fraction * period_s, time_constant_s)
+    fill_lag_step(rows["newer_lag"], (1 - fraction) * period_s, time_constant_s)
+    rows["torque_q"] = 0.0 if on else np.nan
 
 
 @allocation_free
 def estimate_applied_torque(
     applied_torque: AppliedTorque,
-    pose: NDArray[np.float64],
-    G: NDArray[np.float64],
-    command: NDArray[np.float64],
+    pose: Array,
+    G: Array,
+    command: Array,
 ) -> None:
     """Advance the estimate by one control period.
 
@@ -101,24 +92,23 @@ def estimate_applied_torque(
     command : (groups,) array, A
         Commanded in this tick.
     """
-    commands, current, mean, fraction = (
-        applied_torque.commands,
+    current, mean_current, fraction, due = (
         applied_torque.current,
-        applied_torque.mean,
+        applied_torque.mean_current,
         applied_torque.fraction,
+        applied_torque.due,
     )
-    last = commands.shape[0] - 1
+    push_all(applied_torque.commands, command)
     for j in range(command.shape[0]):
-        push(commands, j, command[j])
-        older, newer = commands[last, j], commands[last - 1, j]
+        older, newer = applied_torque.commands[due + 1, j], applied_torque.commands[due, j]
         distance = current[j] - older
         first = older + applied_torque.older_lag.mean_share[j] * distance
         distance = older + applied_torque.older_lag.decay[j] * distance - newer
-        mean[j] = fraction * first + (1.0 - fraction) * (
+        mean_current[j] = fraction * first + (1.0 - fraction) * (
             newer + applied_torque.newer_lag.mean_share[j] * distance
         )
         current[j] = newer + applied_torque.newer_lag.decay[j] * distance
-    rotor_torque(G, mean, applied_torque.torque_S)
+    rotor_torque(G, mean_current, applied_torque.torque_S)
     generalised_torque(pose, applied_torque.torque_S, applied_torque.torque_q)
 
 
@@ -129,10 +119,22 @@ def split_delay(delay_s: float, period_s: float) -> tuple[int, float]:
     return whole, max(0.0, periods - whole)
 
 
-def lag_step(duration_s: float, time_constant_s: ArrayLike, groups: int) -> LagStep:
-    """Return the first-order lag of all groups over a duration."""
+def delay_capacity(delay_s: float, period_s: float) -> int:
+    """Return the length of a history of commands for a delay."""
+    return capacity(split_delay(delay_s, period_s)[0] + 2)
+
+
+def fill_lag_step(rows: Rows, duration_s: float, time_constant_s: ArrayLike) -> None:
+    """Fill first-order lags (`LagStep`) of all groups over a duration."""
+    groups = rows["decay"].shape[-1]
+    rows["decay"], rows["mean_share"] = lag_step(duration_s, time_constant_s, groups)
+
+
+def lag_step(duration_s: float, time_constant_s: ArrayLike, groups: int) -> tuple[Array, Array]:
+    """Return remaining and mean remaining shares of the first-order lag of all groups over a duration."""
     constants_s = of_each_group(time_constant_s, groups).tolist()
-    return LagStep(*np.array([_shares(duration_s, constant_s) for constant_s in constants_s]).T.copy())
+    decay, mean_share = np.array([_shares(duration_s, constant_s) for constant_s in constants_s]).T.copy()
+    return decay, mean_share
 
 
 def _shares(duration_s: float, time_constant_s: float) -> tuple[float, float]:

@@ -22,7 +22,9 @@ from spheretwin.models.base.compiled import compilable
 from spheretwin.models.base.numba_internals.addresses import function_at
 from spheretwin.models.base.record import Record, Rows, field
 from spheretwin.models.kinematics import cartesian_torque
-from spheretwin.models.magnetics import CachedMatrix, TorqueModel, cached_matrix, update_cached_matrix
+from spheretwin.models.magnetics import CachedMatrix, TorqueModel, update_cached_matrix
+
+Array = NDArray[np.float64]
 
 # A diverging law may command any torque; beyond this the products of the allocation would overflow.
 LARGEST_TORQUE_Nm = 1e100
@@ -37,15 +39,6 @@ python_law_at = function_at(types.void(types.float64))
 allocation_at = function_at(allocations.SIGNATURE)
 
 
-class EstimatorState(NamedTuple):
-    """Parameters and memory of the estimator of rates."""
-
-    on: bool
-    """True if there is an estimator; otherwise the law receives the measured rates."""
-    parameters: NDArray[np.float64]
-    memory: NDArray[np.float64]
-
-
 class Supervision(Record):
     """Fault detection and watchdog."""
 
@@ -54,85 +47,73 @@ class Supervision(Record):
     watchdog: Watchdog = field("check of measurements and commands")
 
 
-class Controller(NamedTuple):
-    """State and parameters of the controller; it has no access to the plant."""
+class ControllerData(Record):
+    """Data of a controller, except those of its law and its estimator; it has no access to the plant."""
 
-    parameters: NDArray[np.float64]  # of the law
-    memory: NDArray[np.float64]  # state of the law
-    magnetics: TorqueModel  # nominal
-    cached_matrix: CachedMatrix
-    current_limit_A: float
-    logged: int  # leading entries of the memory that are logged
-    torque_q: NDArray[np.float64]  # (3,) N·m, commanded by the law in this tick
-    torque_S: NDArray[np.float64]  # (3,) N·m, the same in the stator frame
-    estimator_state: EstimatorState
-    pose: NDArray[np.float64]  # (3,) rad, that the law receives
-    rates: NDArray[np.float64]  # (3,) rad/s, that the law receives
-    scratch: NDArray[np.float64]  # of the allocation
-    applied_torque: AppliedTorque
-    compensators: Compensators
-    supervision: Rows  # of one `Supervision`
-    manual: Manual
-    authority: NDArray[np.float64]  # (1,) share of the commands that is sent: 1, or less in a soft start
-    python_law: int = 0  # address of a function of the time that calls a law in plain Python; 0: none
+    estimator_on: bool = field("whether rates are estimated; otherwise the law receives the measured rates")
+    pose: Array = field("pose that the law receives", "rad", 3)
+    rates: Array = field("rates that the law receives", "rad/s", 3)
+    matrix: CachedMatrix = field("nominal torque matrix at that pose")
+    applied_torque: AppliedTorque = field("estimate of the torque of the law's commands")
+    compensators: Compensators = field("governor, prediction and feed-forward")
+    supervision: Supervision = field("detector and watchdog")
+    manual: Manual = field("currents instead of those of the law")
+    python_law: int = field("address of a function of the time that calls a law in plain Python; 0: none")
+    logged: int = field("leading numbers of the law's memory that are logged")
+    torque_q: Array = field("torque commanded by the law in this tick", "N·m", 3)
+    torque_S: Array = field("the same in the stator frame", "N·m", 3)
+    current_limit_A: float = field("largest current that is commanded", "A")
+    scratch: Array = field("working space of the allocation", "", (SCRATCH_ROWS, "groups"))
+    authority: float = field("share of the commands that is sent: 1, or less in a soft start")
+
+
+class Controller(NamedTuple):
+    """Controller of a run: data, law and estimator with their own sizes, and the nominal magnetics."""
+
+    data: Rows  # of one `ControllerData`
+    parameters: Array  # of the law
+    memory: Array  # state of the law
+    estimator_parameters: Array
+    estimator_memory: Array
+    magnetics: TorqueModel
 
 
 def controller(
     law: laws.Law,
+    estimator: Estimator | None,
     magnetics: TorqueModel,
     current_limit_A: float,
     logged: int,
-    applied_torque: AppliedTorque,
-    compensators: Compensators,
-    supervision: Rows,
-    manual: Manual,
-    estimator: Estimator | None = None,
+    delays: int,
 ) -> Controller:
-    """Return the controller at the start of a run.
+    """Return a controller without compensators and supervision.
 
     Parameters
     ----------
     law : Law
         Its parameters and state are copied: a law may change both.
+    estimator : Estimator or None
+        Estimator of the rates; None if the law receives the measured rates.
     magnetics : TorqueModel
         Nominal.
     current_limit_A : float, A
         Largest group current that the controller commands.
     logged : int
         Numbers of the law's state that the telemetry logs.
-    applied_torque : AppliedTorque
-        Estimate of the torque of the law's commands.
-    compensators : Compensators
-        Governor, prediction and feed-forward.
-    supervision : rows of `Supervision`
-    manual : Manual
-        Manual currents that replace those of the law, if there are any.
-    estimator : Estimator, optional
-        Estimator of the rates; the law receives the measured rates unless it is given.
+    delays : int
+        Commands that are stored, of `delay_capacity`.
     """
-    groups = magnetics.group_axes.shape[1]
+    groups, lines = magnetics.group_axes.shape[1], len(magnetics.line_weights)
+    rows = ControllerData.zeros(groups=groups, lines=lines, delays=delays)
+    rows["estimator_on"], rows["logged"] = estimator is not None, logged
+    rows["current_limit_A"], rows["authority"], rows["matrix"]["q"] = current_limit_A, 1.0, np.nan
     return Controller(
-        parameters=law.parameters.copy(),
-        memory=law.state.copy(),
-        magnetics=magnetics,
-        cached_matrix=cached_matrix(magnetics),
-        current_limit_A=current_limit_A,
-        logged=logged,
-        torque_q=np.zeros(3),
-        torque_S=np.zeros(3),
-        estimator_state=EstimatorState(
-            estimator is not None,
-            estimator.parameters.copy() if estimator else np.zeros(0),
-            estimator.state.copy() if estimator else np.zeros(0),
-        ),
-        pose=np.zeros(3),
-        rates=np.zeros(3),
-        scratch=np.empty((SCRATCH_ROWS, groups)),
-        applied_torque=applied_torque,
-        compensators=compensators,
-        supervision=supervision,
-        manual=manual,
-        authority=np.ones(1),
+        rows,
+        law.parameters.copy(),
+        law.state.copy(),
+        estimator.parameters.copy() if estimator else np.zeros(0),
+        estimator.state.copy() if estimator else np.zeros(0),
+        magnetics,
     )
 
 
@@ -143,10 +124,10 @@ def control_tick(
     allocate: Any,
     estimate: Any,
     t: float,
-    reference: NDArray[np.float64],
-    measurement: NDArray[np.float64],
-    fresh: NDArray[np.float64],
-    command: NDArray[np.float64],
+    reference: Array,
+    measurement: Array,
+    fresh: Array,
+    command: Array,
 ) -> float:
     """Run the law, map its generalised torque to a Cartesian one, and allocate currents.
 
@@ -179,35 +160,37 @@ def control_tick(
         the law gave no torque, or one beyond `LARGEST_TORQUE_Nm`, or logs a value that is not finite, and the
         watchdog is off. If the watchdog is on, it trips instead: the currents are 0 and the share is 1.
     """
-    pose, estimator_state = controller.pose, controller.estimator_state
-    if estimator_state.on:
+    data = controller.data[0]
+    watchdog, pose = data.supervision.watchdog, data.pose
+    if data.estimator_on:
         estimator_at(estimate)(
-            measurement[0], estimator_state.parameters, estimator_state.memory, measurement[1]
+            measurement[0], controller.estimator_parameters, controller.estimator_memory, measurement[1]
         )
     for i in range(3):
-        pose[i], controller.rates[i] = measurement[0, i], measurement[1, i]
-    watchdog = controller.supervision[0].watchdog
+        pose[i], data.rates[i] = measurement[0, i], measurement[1, i]
     if watchdog.on:
-        watch(watchdog, fresh, pose, controller.rates)
-    update_cached_matrix(pose, controller.magnetics, controller.cached_matrix)
-    _supervise(controller, t)
-    law_active = watchdog.halt == GO and not controller.manual.on
+        watch(watchdog, fresh, pose, data.rates)
+    update_cached_matrix(pose, controller.magnetics, data.matrix)
+    if data.supervision.detector.on and watchdog.halt == GO:
+        current, detector = data.applied_torque.current, data.supervision.detector
+        detect_faults(detector, data.supervision.groups, current, data.matrix.G, pose, data.rates, t)
+    law_active = watchdog.halt == GO and not data.manual.on
     if law_active and not _call_law(controller, law, t, reference, measurement):
         if not watchdog.on:
             return NO_TORQUE
         trip(watchdog, _COMMAND)
     share = 1.0
     if law_active and watchdog.halt == GO:
-        share = _allocate(controller, allocate, command)
+        share = _allocate(data, allocate, command)
     else:
-        _command_zero(controller, command)
+        _command_zero(data, controller.memory, command)
         if watchdog.halt == GO:
-            share = command_manual_currents(controller.manual, t, controller.current_limit_A, command)
-    if controller.authority[0] != 1.0:
+            share = command_manual_currents(data.manual, data.current_limit_A, command)
+    if data.authority != 1.0:
         for j in range(command.shape[0]):
-            command[j] *= controller.authority[0]
-    if controller.applied_torque.on:
-        estimate_applied_torque(controller.applied_torque, pose, controller.cached_matrix.G, command)
+            command[j] *= data.authority
+    if data.applied_torque.on:
+        estimate_applied_torque(data.applied_torque, pose, data.matrix.G, command)
     return share
 
 
@@ -216,22 +199,23 @@ def _call_law(
     controller: Controller,
     law: Any,
     t: float,
-    reference: NDArray[np.float64],
-    measurement: NDArray[np.float64],
+    reference: Array,
+    measurement: Array,
 ) -> bool:
     """Call the law; return True if its inputs, its torque and its logged values are finite."""
-    torque_q, compensators = controller.torque_q, controller.compensators
+    data = controller.data[0]
+    torque_q, compensators = data.torque_q, data.compensators
     for i in range(3):
         torque_q[i] = np.nan  # detects a law that writes no torque, or raises
-        measurement[2, i] = controller.applied_torque.torque_q[i]
+        measurement[2, i] = data.applied_torque.torque_q[i]
     if compensators.on and not apply_compensators(
-        compensators, controller.applied_torque, controller.magnetics, measurement, reference
+        compensators, data.applied_torque, controller.magnetics, measurement, reference
     ):
         return False
-    if controller.python_law != 0:
-        python_law_at(controller.python_law)(t)
+    if data.python_law != 0:
+        python_law_at(data.python_law)(t)
     else:
-        law_at(law)(t, reference, measurement, controller.parameters, controller.memory, torque_q)
+        law_at(law)(t, reference, measurement, controller.parameters, controller.memory, torque_q[:])
     if compensators.feed_forward.on:
         for i in range(3):
             torque_q[i] += compensators.feed_forward.torque_q[i]
@@ -239,45 +223,40 @@ def _call_law(
         if not abs(torque_q[i]) < LARGEST_TORQUE_Nm:  # also where it is not a number
             return False
     finite = True
-    for i in range(controller.logged):
+    for i in range(data.logged):
         finite = finite and abs(controller.memory[i]) < np.inf
     return finite
 
 
 @compilable
-def _supervise(controller: Controller, t: float) -> None:
-    """Run the fault detector if it is on and the groups are driven."""
-    groups, detector = controller.supervision[0].groups, controller.supervision[0].detector
-    if detector.on and controller.supervision[0].watchdog.halt == GO:
-        G, current = controller.cached_matrix.G, controller.applied_torque.current
-        detect_faults(detector, groups, current, G, controller.pose, controller.rates, t)
-
-
-@compilable
-def _allocate(controller: Controller, allocate: Any, command: NDArray[np.float64]) -> float:
+def _allocate(data: ControllerData, allocate: Any, command: Array) -> float:
     """Compute currents for the law's torque from the enabled groups.
 
     The allocation receives a copy of the torque matrix, so that its writes have no other effect.
     """
-    groups, pose, G = controller.supervision[0].groups, controller.pose, controller.cached_matrix.G
-    if controller.compensators.prediction.on:
-        pose, G = controller.compensators.prediction.pose, controller.compensators.prediction.cached_matrix.G
-    cartesian_torque(pose, controller.torque_q, controller.torque_S)
+    groups, prediction, pose, G = (
+        data.supervision.groups,
+        data.compensators.prediction,
+        data.pose,
+        data.matrix.G,
+    )
+    if prediction.on:
+        pose, G = prediction.pose, prediction.matrix.G
+    cartesian_torque(pose, data.torque_q, data.torque_S)
     mask_disabled_groups(groups, G)
+    # Slices: the addressed function takes arrays, not fields of a record.
     return allocation_at(allocate)(
-        groups.G[:], controller.torque_S, controller.current_limit_A, command, controller.scratch
+        groups.G[:], data.torque_S[:], data.current_limit_A, command, data.scratch[:]
     )
 
 
 @compilable
-def _command_zero(controller: Controller, command: NDArray[np.float64]) -> None:
+def _command_zero(data: ControllerData, memory: Array, command: Array) -> None:
     """Command no torque and no currents; logged values of the law stay unless they are not finite."""
     for i in range(3):
-        controller.torque_q[i] = controller.torque_S[i] = controller.compensators.feed_forward.torque_q[i] = (
-            0.0
-        )
+        data.torque_q[i] = data.torque_S[i] = data.compensators.feed_forward.torque_q[i] = 0.0
     for j in range(command.shape[0]):
         command[j] = 0.0
-    for i in range(controller.logged):
-        if not abs(controller.memory[i]) < np.inf:
-            controller.memory[i] = 0.0
+    for i in range(data.logged):
+        if not abs(memory[i]) < np.inf:
+            memory[i] = 0.0

@@ -8,14 +8,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated, Literal, NamedTuple
+from typing import Annotated, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, PrivateAttr, model_validator
 
 from spheretwin.models.base.compiled import allocation_free
-from spheretwin.models.base.reuse import reused
+from spheretwin.models.base.record import Record, field
 from spheretwin.models.telemetry.csv_series import TIME, TimeSeries, reached, read
 
 Array = NDArray[np.float64]
@@ -83,48 +83,34 @@ def current_columns(header: Sequence[str]) -> list[str]:
     return [f"current_{group:02}_A" for group in range(max(count, 1))]
 
 
-class Manual(NamedTuple):
-    """Manual currents of a run, for compiled code."""
+class Manual(Record):
+    """Manual currents of a run."""
 
-    on: bool
-    linear: bool
-    t_s: Array  # (m,) rising
-    currents_A: Array  # (m, n)
+    on: bool = field("whether they replace the currents of the law")
+    current_A: Array = field("currents of this tick, not limited", "A", "groups")
 
 
-@reused
-def manual(section: ManualSection, groups: int) -> Manual:
-    """Return the manual currents of a section whose number of groups has been checked."""
-    series = section.series or TimeSeries(np.zeros(1), np.zeros((1, groups)))
-    return Manual(section.on, section.between == "linear", reached(series.t_s), series.values)
+def sample_currents(section: ManualSection, t: Array) -> Array:
+    """Return the manual currents (k, n), A, at some times (k,), s; (k, 0) if there are none."""
+    series = section.series
+    if series is None:
+        return np.empty((len(t), 0))
+    t_s, values = reached(series.t_s), series.values
+    after = np.searchsorted(t_s, t, side="right")
+    row, after = np.maximum(after - 1, 0), np.minimum(after, len(t_s) - 1)
+    if section.between == "held":
+        return values[row]
+    duration_s = np.where(after > row, t_s[after] - t_s[row], np.inf)
+    return values[row] + ((t - t_s[row]) / duration_s)[:, None] * (values[after] - values[row])
 
 
 @allocation_free
-def command_manual_currents(manual: Manual, t: float, limit_A: float, command: Array) -> float:
+def command_manual_currents(manual: Manual, limit_A: float, command: Array) -> float:
     """Write the currents (n,), A, each limited; return the least share of a current that the limit leaves."""
-    row, after = _rows_at(manual.t_s, t)
-    part = 0.0
-    if manual.linear and after > row:
-        part = (t - manual.t_s[row]) / (manual.t_s[after] - manual.t_s[row])
     share = 1.0
     for j in range(command.shape[0]):
-        desired = manual.currents_A[row, j]
-        if part > 0:
-            desired += part * (manual.currents_A[after, j] - desired)
+        desired = manual.current_A[j]
         command[j] = min(max(desired, -limit_A), limit_A)
         if command[j] != desired:
             share = min(share, limit_A / abs(desired))
     return share
-
-
-@allocation_free
-def _rows_at(t_s: Array, t: float) -> tuple[int, int]:
-    """Return the rows before and after a time; twice the same row before the first and after the last."""
-    low, high = 0, t_s.shape[0]
-    while low < high:
-        middle = (low + high) // 2
-        if t_s[middle] <= t:
-            low = middle + 1
-        else:
-            high = middle
-    return max(low - 1, 0), min(low, t_s.shape[0] - 1)

@@ -12,6 +12,7 @@ from spheretwin.models.actuator import Actuator, CoilGeometry, Magnet
 from spheretwin.models.base.cache import cached_array
 from spheretwin.models.base.compiled import allocation_free, inlined
 from spheretwin.models.base.errors import InputError, distinct_texts, one_line
+from spheretwin.models.base.record import Record, field
 from spheretwin.models.base.vectors import (
     WIDTH,
     Vector,
@@ -317,17 +318,14 @@ def _spline_weights(t: float) -> tuple[float, float, float, float]:
     )
 
 
-class CachedMatrix(NamedTuple):
+class CachedMatrix(Record):
     """Torque matrix with its pose: at the same pose it is not computed again."""
 
-    q: NDArray[np.float64]  # (3,) rad; NaN before the first update
-    G: NDArray[np.float64]  # (3, n) N·m/A
-    scratch: NDArray[np.float64]  # (lines, 6), of `scratch_of`
-
-
-def cached_matrix(model: TorqueModel) -> CachedMatrix:
-    """Return an empty cache of the torque matrix of a model."""
-    return CachedMatrix(np.full(3, np.nan), np.empty((3, model.group_axes.shape[1])), scratch_of(model))
+    q: NDArray[np.float64] = field("pose; NaN before the first update", "rad", 3)
+    G: NDArray[np.float64] = field("torque matrix", "N·m/A", (3, "groups"))
+    scratch: NDArray[np.float64] = field(
+        "working space of `fill_torque_matrix`", "", ("lines", SCRATCH_COLUMNS)
+    )
 
 
 @inlined

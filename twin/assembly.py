@@ -8,16 +8,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spheretwin.channels import CHANNELS
-from spheretwin.control.applied_torque import applied_torque
-from spheretwin.control.compensators import Compensators
-from spheretwin.control.compensators.feed_forward import NominalRotor, feed_forward
-from spheretwin.control.compensators.prediction import DelayModel, prediction
-from spheretwin.control.compensators.reference_governor import governor
+from spheretwin.control.applied_torque import delay_capacity, fill_applied_torque
+from spheretwin.control.compensators.feed_forward import NominalRotor, fill_feed_forward
+from spheretwin.control.compensators.prediction import DelayModel, fill_prediction
+from spheretwin.control.compensators.reference_governor import fill_governor
 from spheretwin.control.controller import Controller, controller
 from spheretwin.control.estimators.estimator import Estimator, Sampling
 from spheretwin.control.law import Law, NominalModel
 from spheretwin.control.laws import LAWS
-from spheretwin.control.manual_currents import manual
 from spheretwin.electronics.drive import DriveModel
 from spheretwin.electronics.drive_chain import DriveChain
 from spheretwin.electronics.transducers import CurrentSensors
@@ -42,7 +40,7 @@ from spheretwin.plant.rotor import Rotor, RotorSettings
 from spheretwin.scenario.files import Files
 from spheretwin.scenario.plant_sections import ResolvedNominal, ResolvedPlant
 from spheretwin.scenario.sections import ResolvedScenario
-from spheretwin.shared_buffers import SharedBuffers, drive_of
+from spheretwin.shared_buffers import SharedBuffers, drive_of, fill_supervision
 
 Array = NDArray[np.float64]
 
@@ -144,40 +142,30 @@ def controller_of(
     law: Law,
     magnetics: TorqueModel,
     estimator: Estimator | None,
-    supervision: Rows,
+    actuator: Actuator,
 ) -> Controller:
-    """Return the controller of a resolved scenario, at the start of a run."""
-    nominal, groups = scenario.nominal, magnetics.group_axes.shape[1]
+    """Return the controller of a resolved scenario, at the start of a run, for its nominal actuator."""
+    nominal, period_s = scenario.nominal, scenario.controller.period_s
+    limit_A = min(nominal.current_limit_A, law.current_limit_A)
+    delays = delay_capacity(nominal.delay_s, period_s)
+    made = controller(law, estimator, magnetics, limit_A, width(law.signals), delays)
     on = law.asks_torque or scenario.detects or scenario.controller.prediction.on
-    applied = applied_torque(
-        on, groups, scenario.controller.period_s, nominal.delay_s, nominal.time_constant_s
-    )
-    compensators = _compensators_of(scenario, magnetics)
-    manual_currents = manual(scenario.manual, groups)
-    return controller(
-        law,
-        magnetics,
-        min(nominal.current_limit_A, law.current_limit_A),
-        width(law.signals),
-        applied,
-        compensators,
-        supervision,
-        manual_currents,
-        estimator,
-    )
+    applied_torque = made.data["applied_torque"]
+    fill_applied_torque(applied_torque, on, period_s, nominal.delay_s, nominal.time_constant_s)
+    _fill_compensators(made.data["compensators"], scenario)
+    fill_supervision(made.data["supervision"], scenario, actuator)
+    made.data["manual"]["on"] = scenario.manual.on
+    return made
 
 
-def _compensators_of(scenario: ResolvedScenario, magnetics: TorqueModel) -> Compensators:
-    """Return the compensators of a resolved scenario."""
+def _fill_compensators(rows: Rows, scenario: ResolvedScenario) -> None:
     section, nominal, known = scenario.controller, scenario.nominal, _known(scenario)
     delay = DelayModel(known.period_s, known.ahead_s, nominal.time_constant_s, known.inertia)
     rotor = NominalRotor(known.inertia, np.array(nominal.coulomb_Nm), np.array(nominal.viscous_Nm_s))
-    return Compensators(
-        section.governor.on or section.prediction.on or section.feed_forward.on,
-        governor(section.governor, known.period_s),
-        prediction(section.prediction, delay, magnetics),
-        feed_forward(section.feed_forward, rotor, known.period_s, known.delay_s),
-    )
+    rows["on"] = section.governor.on or section.prediction.on or section.feed_forward.on
+    fill_governor(rows["governor"], section.governor, known.period_s)
+    fill_prediction(rows["prediction"], section.prediction, delay)
+    fill_feed_forward(rows["feed_forward"], section.feed_forward, rotor, known.period_s, known.delay_s)
 
 
 def true_magnetics(section: ResolvedPlant, seed: int, actuator: Actuator) -> TorqueModel:

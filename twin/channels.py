@@ -106,7 +106,7 @@ def fault_signals(groups: int) -> tuple[Signal, ...]:
 @part_of_its_caller
 def write_faults(row: NDArray, controller: Any, plant: Any) -> None:
     """Write the columns of one tick."""
-    groups, parts = controller.supervision[0].groups, plant.fault_modes.shape[0]
+    groups, parts = controller.data[0].supervision.groups, plant.fault_modes.shape[0]
     count = groups.out.shape[0]
     for part in range(parts):
         row[part] = plant.fault_modes[part]
@@ -135,7 +135,7 @@ FEED_FORWARD_SIGNALS = (
 def write_feed_forward(row: NDArray, controller: Any) -> None:
     """Write the columns of one tick."""
     for i in range(3):
-        row[i] = controller.compensators.feed_forward.torque_q[i]
+        row[i] = controller.data[0].compensators.feed_forward.torque_q[i]
 
 
 def _logs_feed_forward(scenario: Scenario) -> bool:
@@ -239,7 +239,7 @@ REFERENCE_GOVERNOR_SIGNALS = (
 @part_of_its_caller
 def write_reference_governor(row: NDArray, controller: Any) -> None:
     """Write the columns of one tick."""
-    motion = controller.compensators.governor.motion
+    motion = controller.data[0].compensators.governor.motion
     for part in range(3):
         for i in range(3):
             row[3 * part + i] = motion[part, i]
@@ -264,7 +264,7 @@ SENSOR_SIGNALS = (
 def write_sensors(row: NDArray, controller: Any) -> None:
     """Write the columns of one tick."""
     for i in range(3):
-        row[i], row[3 + i] = controller.pose[i], controller.rates[i]
+        row[i], row[3 + i] = controller.data[0].pose[i], controller.data[0].rates[i]
 
 
 def _logs_sensors(scenario: Scenario) -> bool:
@@ -308,7 +308,7 @@ PREDICTION_SIGNALS = (
 @part_of_its_caller
 def write_prediction(row: NDArray, controller: Any) -> None:
     """Write the columns of one tick."""
-    prediction = controller.compensators.prediction
+    prediction = controller.data[0].compensators.prediction
     for i in range(3):
         row[i], row[3 + i] = prediction.pose[i], prediction.rates[i]
 
@@ -334,7 +334,7 @@ WATCHDOG_SIGNALS = (
 @part_of_its_caller
 def write_watchdog(row: NDArray, controller: Any) -> None:
     """Write the columns of one tick."""
-    row[0] = controller.supervision[0].watchdog.reason
+    row[0] = controller.data[0].supervision.watchdog.reason
 
 
 WATCHDOG = Channel(lambda groups: WATCHDOG_SIGNALS, lambda scenario: scenario.watchdog.on, write_watchdog)

@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spheretwin.control.controller import Controller
-from spheretwin.control.manual_currents import Manual
 from spheretwin.control.supervision.watchdog import Reason, trip
 from spheretwin.electronics.drive_chain import DriveChain
 from spheretwin.loop import INTERRUPTED, NO_EXTERNAL, External, Scratch
@@ -89,7 +88,7 @@ class Connection:
     """
 
     def __init__(self, part: Any, controller: Controller, plant: Plant, scratch: Scratch) -> None:
-        self._part, self._controller, self._plant = part, controller, plant
+        self._part, self._data, self._plant = part, controller.data, plant
         self._measured = scratch.measurement
         self._error: BaseException | None = None
         self.external = NO_EXTERNAL
@@ -104,7 +103,7 @@ class Connection:
             0 if is_plant else entry, entry if is_plant else 0, np.zeros(groups), np.zeros(3)
         )
         if is_plant:
-            controller.authority[0] = part.authority
+            controller.data["authority"] = part.authority
 
     def raise_error(self) -> None:
         """Raise the exception of the part, if there was one: it cannot pass the compiled loop."""
@@ -123,24 +122,24 @@ class Connection:
         return call
 
     def _command(self, t_s: float) -> int:
-        plant, controller = self._plant, self._controller
+        plant, data = self._plant, self._data[0]
         sensors, drive = plant.current_sensors, plant.drive
         measurement = Measurement(
             self._measured[0],
-            None if controller.estimator_state.on else self._measured[1],
+            None if data.estimator_on else self._measured[1],
             sensors.measured_A if sensors.on else plant.current,
             drive.coil.temperature_degC.max() if isinstance(drive, DriveChain) else None,
         )
         command = self._part.command(t_s, measurement)
         if command is None:
             return INTERRUPTED
-        controller.manual.currents_A[0] = command
+        data.manual.current_A[:] = command
         return GOING
 
     def _advance(self, t_s: float) -> int:
-        controller, plant, external = self._controller, self._plant, self.external
+        data, plant, external = self._data[0], self._plant, self.external
         # Nominal torque of the currents: the true one is not known.
-        np.dot(controller.cached_matrix.G, external.command, out=external.torque_S)
+        np.dot(data.matrix.G, external.command, out=external.torque_S)
         result = self._part.advance(t_s, external.command)
         if result is None:
             return INTERRUPTED
@@ -150,14 +149,9 @@ class Connection:
             plant.rotor.qdot[:] = measurement.rate_rad_s
         plant.current[:] = external.command if measurement.current_A is None else measurement.current_A
         if reason:
-            _trip(controller.supervision[0].watchdog, int(reason))
-        controller.authority[0] = self._part.authority
+            _trip(data.supervision.watchdog, int(reason))
+        data.authority = self._part.authority
         return GOING
 
 
 _trip = uncompiled(trip)
-
-
-def external_currents(groups: int) -> Manual:
-    """Return the manual currents that an external controller writes."""
-    return Manual(True, False, np.zeros(1), np.zeros((1, groups)))

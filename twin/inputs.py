@@ -14,6 +14,7 @@ from typing import Any, NamedTuple, NoReturn
 import numpy as np
 from numpy.typing import NDArray
 
+from spheretwin.control.manual_currents import sample_currents
 from spheretwin.disturbances import Draws, term_draws
 from spheretwin.electronics.random_streams import noise_table
 from spheretwin.electronics.sensor_chain import noise_streams
@@ -153,7 +154,8 @@ class InputGenerator:
         seed, first, count = self._scenario.seed, self._first, len(inputs.t)
         noise = noise_table(seed, first, count, noise_streams(self._scenario.sensors))
         fault_noise = noise_table(seed, first, count, fault_streams(self._scenario, self._groups))
-        return Inputs(inputs.t, inputs.reference, inputs.disturbance, noise, fault_noise)
+        manual_A = sample_currents(self._scenario.manual, inputs.t)
+        return Inputs(inputs.t, inputs.reference, inputs.disturbance, noise, fault_noise, manual_A)
 
     def _refuse(self, rows: Inputs | _NoiseFreeInputs, row: int) -> NoReturn:
         name = "disturbance" if np.isfinite(rows.reference[row]).all() else "trajectory"

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from spheretwin.active_config import initial_config
 from spheretwin.control.law import Law
+from spheretwin.control.manual_currents import sample_currents
 from spheretwin.electronics.random_streams import noise_table
 from spheretwin.electronics.sensor_chain import noise_streams
 from spheretwin.linear import python_control
@@ -120,6 +121,7 @@ class LoopSystem:
             disturbance=given[9:].reshape(1, 3).copy(),
             noise=noise_table(scenario.seed, tick, 1, noise_streams(scenario.sensors)),
             fault_noise=noise_table(scenario.seed, tick, 1, fault_streams(scenario, self._groups)),
+            manual_A=sample_currents(scenario.manual, np.array([t])),
         )
         self._runtime.run(inputs, self._log)
         return _numbers(self._runtime.state())

@@ -62,6 +62,7 @@ class Inputs(NamedTuple):
     disturbance: NDArray[np.float64]  # (n, 3) N·m, generalised, subtracted in (1)
     noise: NDArray[np.float64]  # (n, k) standard normal numbers of the sensors
     fault_noise: NDArray[np.float64]  # (n, m) of faults, and of the sensors of currents
+    manual_A: NDArray[np.float64]  # (n, groups) manual currents; (n, 0) without
 
 
 EXTERNAL_SIGNATURE = types.int64(types.float64)
@@ -134,7 +135,8 @@ def loop(
         Rows written, and `GOING`, `LEFT_WORKSPACE`, `DIVERGED`, `FAILSAFE` or `INTERRUPTED`.
     """
     reference, measurement = scratch.reference, scratch.measurement
-    watchdog, detector = controller.supervision[0].watchdog, controller.supervision[0].detector
+    data, manual_currents = controller.data[0], inputs.manual_A.shape[1]
+    watchdog, detector = data.supervision.watchdog, data.supervision.detector
     groups = stages.current.shape[0]
     first_current, scale = CURRENT_COMMAND + groups, CURRENT_COMMAND + 3 * groups
     first_mean = first_current + groups
@@ -153,6 +155,7 @@ def loop(
             sense_currents(stages.current_sensors, stages.current, stages.draws)
             if detector.on:
                 copy_into(detector.measured_A, 0, stages.current_sensors.measured_A, groups)
+        copy_into(data.manual.current_A, 0, inputs.manual_A[tick], manual_currents)
         if external.controller != 0:
             code = external_at(external.controller)(t)
             if code != GOING:
@@ -164,8 +167,8 @@ def loop(
         if share == NO_TORQUE:
             return tick, DIVERGED
         row[scale] = share
-        copy_into(row, TORQUE_COMMAND, controller.torque_q, 3)
-        copy_into(row, law_signals, controller.memory, controller.logged)
+        copy_into(row, TORQUE_COMMAND, data.torque_q, 3)
+        copy_into(row, law_signals, controller.memory, data.logged)
         current, mean_current = row[first_current:first_mean], row[first_mean:scale]
         torque_S = row[TORQUE : TORQUE + 3]
         if external.plant == 0:

@@ -17,7 +17,7 @@ from spheretwin.control.law import Law
 from spheretwin.control.supervision.watchdog import REASONS, Reason, transfer_trip
 from spheretwin.electronics.drive import transfer_drive
 from spheretwin.electronics.sensors import measure_again
-from spheretwin.external import Connection, ExternalController, ExternalPlant, external_currents
+from spheretwin.external import Connection, ExternalController, ExternalPlant
 from spheretwin.loop import dispatch, is_python_law, is_user_law, step_that_writes
 from spheretwin.models.base.compiled import COMPILES, for_types_of
 from spheretwin.models.base.errors import LawError
@@ -29,12 +29,12 @@ from spheretwin.plant.rotor import Rotor
 from spheretwin.scenario.changes import StateChange
 from spheretwin.scenario.files import Files
 from spheretwin.scenario.sections import ResolvedScenario
-from spheretwin.shared_buffers import faults_of, sensors_of, shared_buffers, supervision_of
+from spheretwin.shared_buffers import faults_of, sensors_of, shared_buffers
 from spheretwin.stages import compiled_stages
 
 # Only for the types.
 NO_INPUTS = loops.Inputs(
-    np.empty(0), np.empty((0, 3, 3)), np.empty((0, 3)), np.empty((0, 0)), np.empty((0, 0))
+    np.empty(0), np.empty((0, 3, 3)), np.empty((0, 3)), np.empty((0, 0)), np.empty((0, 0)), np.empty((0, 0))
 )
 
 # Names of parts in messages.
@@ -120,12 +120,12 @@ class Runtime:
         self.row_width = width(self.signals)
         magnetics = assembly.nominal_magnetics(scenario, files)
         estimator = assembly.estimator_of(scenario)
-        supervision = supervision_of(scenario, files.nominal)
-        buffers = shared_buffers(scenario, len(files.actuator.groups), supervision["watchdog"]["halt"])
-        self._controller = assembly.controller_of(scenario, self.law, magnetics, estimator, supervision)
+        self._controller = assembly.controller_of(scenario, self.law, magnetics, estimator, files.nominal)
+        self._data = self._controller.data
         if hasattr(external, "command"):
-            manual = external_currents(len(files.actuator.groups))
-            self._controller = self._controller._replace(manual=manual)
+            self._data["manual"]["on"] = True
+        supervision = self._data["supervision"]
+        buffers = shared_buffers(scenario, len(files.actuator.groups), supervision["watchdog"]["halt"])
         self._plant = assembly.plant_of(scenario, files, self._rotor.data, buffers)
         self._sensors = sensors_of(scenario, buffers)
         self._faults = faults_of(scenario, self._plant, self._sensors, supervision["groups"])
@@ -142,14 +142,13 @@ class Runtime:
         )
         if COMPILES and is_python_law(law):
             self._python_law = _PYTHON_LAW(self._call_law(step_that_writes(law)))
-            address = ctypes.cast(self._python_law, ctypes.c_void_p).value or 0
-            self._controller = self._controller._replace(python_law=address)
+            self._data["python_law"] = ctypes.cast(self._python_law, ctypes.c_void_p).value or 0
         self._connection = Connection(external, self._controller, self._plant, self._scratch)
 
     def _call_law(self, step: Callable[..., None]) -> Callable[[float], None]:
         """Return a function of the time of a tick that calls a law in plain Python."""
         given = self._scratch[0], self._scratch[1], self._controller.parameters, self._controller.memory
-        torque_q = self._controller.torque_q
+        torque_q = self._data["torque_q"][0]
 
         def call(t_s: float) -> None:
             step(t_s, *given, torque_q)
@@ -168,7 +167,7 @@ class Runtime:
 
     @property
     def _watchdog(self) -> Any:
-        return self._controller.supervision[0].watchdog
+        return self._data[0].supervision.watchdog
 
     @property
     def reason(self) -> Reason:
@@ -220,7 +219,7 @@ class Runtime:
 
         def receive(error: BaseException) -> None:
             raised.append(error)
-            self._controller.torque_q[:] = np.nan  # the law may have written part of a torque
+            self._data["torque_q"] = np.nan  # the law may have written part of a torque
 
         with outside_turn, callback_errors(receive):
             ticks, code = self.loop(inputs, log)
@@ -304,7 +303,7 @@ class Runtime:
     @property
     def parts(self) -> dict[str, Any]:
         """Components with a state, except the rotor, by the names that messages use."""
-        controller, supervision = self._controller, self._controller.supervision
+        controller, data, supervision = self._controller, self._data, self._data["supervision"]
         return {
             "currents": self._plant.current,
             "the last rates": self._plant.last_qdot,
@@ -313,9 +312,9 @@ class Runtime:
             "the temperatures of stator and rotor": self._plant.heat,
             LAW_PARAMETERS: controller.parameters,
             LAW_MEMORY: controller.memory,
-            "the applied torque": controller.applied_torque,
-            COMPENSATORS: controller.compensators,
-            ESTIMATOR_MEMORY: controller.estimator_state.memory,
+            "the applied torque": data["applied_torque"],
+            COMPENSATORS: data["compensators"],
+            ESTIMATOR_MEMORY: controller.estimator_memory,
             "the sensors' state": self._sensors,
             "the groups' states": supervision["groups"],
             "the detector's state": supervision["detector"],

@@ -8,7 +8,6 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from spheretwin.control.controller import Supervision
 from spheretwin.control.supervision.fault_detector import NominalCurrents, fill_detector
 from spheretwin.control.supervision.watchdog import MeasurementLimits, fill_watchdog
 from spheretwin.electronics.drive import DriveModel, build_drive
@@ -83,15 +82,14 @@ def drive_of(scenario: ResolvedScenario, actuator: Actuator, buffers: SharedBuff
     return build_drive(scenario.drive, step_s, scenario.substeps, groups, scenario.seed, faults, mutual_H)
 
 
-def supervision_of(scenario: ResolvedScenario, actuator: Actuator) -> Rows:
-    """Return the supervision of groups, measurements and commands for a nominal actuator."""
+def fill_supervision(rows: Rows, scenario: ResolvedScenario, actuator: Actuator) -> None:
+    """Fill supervisions of groups, measurements and commands for a nominal actuator."""
     period_s, nominal = scenario.controller.period_s, scenario.nominal
     noise_rad, quantum_rad = np.array(nominal.angle_noise_rad), np.array(nominal.angle_resolution_rad)
     limits = MeasurementLimits(period_s, noise_rad, quantum_rad, actuator.hinge_range_rad)
-    rows, currents = Supervision.zeros(groups=len(actuator.groups)), _nominal_currents(nominal, period_s)
+    currents = _nominal_currents(nominal, period_s)
     fill_detector(rows["detector"], scenario.detector, scenario.detects, currents)
     fill_watchdog(rows["watchdog"], scenario.watchdog, limits)
-    return rows
 
 
 def _nominal_currents(nominal: ResolvedNominal, period_s: float) -> NominalCurrents:

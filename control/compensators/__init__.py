@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -16,19 +14,19 @@ from spheretwin.control.compensators.feed_forward import (
 from spheretwin.control.compensators.prediction import Prediction, advance, predict
 from spheretwin.control.compensators.reference_governor import Governor, govern
 from spheretwin.models.base.compiled import allocation_free
+from spheretwin.models.base.record import Record, field
 from spheretwin.models.magnetics import TorqueModel
 
 Array = NDArray[np.float64]
 
 
-class Compensators(NamedTuple):
-    """Compensators of a run, for compiled code."""
+class Compensators(Record):
+    """Compensators of a run."""
 
-    on: bool
-    """True if any compensator is on."""
-    governor: Governor
-    prediction: Prediction
-    feed_forward: FeedForward
+    on: bool = field("whether any compensator is on")
+    governor: Governor = field("reference governor")
+    prediction: Prediction = field("prediction over the delay")
+    feed_forward: FeedForward = field("feed-forward of nominal torques")
 
 
 @allocation_free

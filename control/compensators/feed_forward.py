@@ -26,6 +26,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from spheretwin.control.applied_torque import split_delay
 from spheretwin.control.law import NonNegativeEach, each
 from spheretwin.models.base.compiled import allocation_free
+from spheretwin.models.base.record import Record, Rows, field
 from spheretwin.models.base.state import delayed_mean, push
 from spheretwin.models.kinematics import triple, turns
 from spheretwin.models.lagrangian import coriolis_rows, inertia_entries
@@ -56,22 +57,19 @@ class FeedForwardSection(BaseModel):
         return any(self.friction) or any(self.inertia)
 
 
-class FeedForward(NamedTuple):
-    """Feed-forward of a run, for compiled code."""
+class FeedForward(Record):
+    """Feed-forward of a run."""
 
-    on: bool
-    share: Array  # (3,) of the inertial torque
-    inertia: Array  # (3,) kg·m², nominal
-    coulomb_Nm: Array  # (3,) share of the nominal
-    viscous_Nm_s: Array  # (3,) likewise
-    smoothing_rad_s: float
-    fraction: float  # share of a period in which the older torque acts
-    history: Array  # (n + 2, 3) N·m, torques fed forward, newest first
-    torque_q: Array  # (3,) N·m, in this tick
-
-    def state_arrays(self) -> tuple[Array, ...]:
-        """Return the arrays that hold the state."""
-        return self.history, self.torque_q
+    on: bool = field("whether the feed-forward is on")
+    share: Array = field("share of the inertial torque", "", 3)
+    inertia: Array = field("nominal", "kg·m²", 3)
+    coulomb_Nm: Array = field("share of the nominal Coulomb friction", "N·m", 3)
+    viscous_Nm_s: Array = field("share of the nominal viscous friction", "N·m·s", 3)
+    smoothing_rad_s: float = field("rate over which the friction changes sign", "rad/s")
+    due: int = field("row of the history that acts at the end of a period: whole periods of the delay")
+    fraction: float = field("share of a period in which the older torque acts")
+    history: Array = field("torques fed forward, newest first", "N·m", ("delays", 3), state=True)
+    torque_q: Array = field("torque fed forward in this tick", "N·m", 3, state=True)
 
 
 class NominalRotor(NamedTuple):
@@ -82,37 +80,31 @@ class NominalRotor(NamedTuple):
     viscous_Nm_s: Array  # (3,)
 
 
-def feed_forward(
-    section: FeedForwardSection, rotor: NominalRotor, period_s: float, delay_s: float
-) -> FeedForward:
-    """Return the feed-forward before the first tick.
+def fill_feed_forward(
+    rows: Rows, section: FeedForwardSection, rotor: NominalRotor, period_s: float, delay_s: float
+) -> None:
+    """Fill feed-forwards before the first tick.
 
     Parameters
     ----------
+    rows : rows of `FeedForward`
     section : FeedForwardSection
     rotor : NominalRotor
     period_s, delay_s : float, s
         Control period, and the delay that the law receives.
     """
-    whole, fraction = split_delay(delay_s, period_s)
-    return FeedForward(
-        on=section.on,
-        share=np.array(section.inertia),
-        inertia=rotor.inertia,
-        coulomb_Nm=np.array(section.friction) * rotor.coulomb_Nm,
-        viscous_Nm_s=np.array(section.friction) * rotor.viscous_Nm_s,
-        smoothing_rad_s=section.smoothing_rad_s,
-        fraction=fraction,
-        history=np.zeros((whole + 2, 3)),
-        torque_q=np.zeros(3),
-    )
+    rows["on"], rows["share"], rows["inertia"] = section.on, section.inertia, rotor.inertia
+    rows["coulomb_Nm"] = np.array(section.friction) * rotor.coulomb_Nm
+    rows["viscous_Nm_s"] = np.array(section.friction) * rotor.viscous_Nm_s
+    rows["smoothing_rad_s"] = section.smoothing_rad_s
+    rows["due"], rows["fraction"] = split_delay(delay_s, period_s)
 
 
 @allocation_free
 def subtract_feed_forward(feed: FeedForward, torque_q: Array) -> None:
     """Subtract the torque fed forward from the applied torque (N·m) of the last period."""
     for i in range(3):
-        torque_q[i] -= delayed_mean(feed.history, i, feed.fraction)
+        torque_q[i] -= delayed_mean(feed.history, feed.due, i, feed.fraction)
 
 
 @allocation_free

@@ -32,15 +32,15 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field
 
-from spheretwin.control.applied_torque import AppliedTorque, LagStep, lag_step
+from spheretwin.control.applied_torque import AppliedTorque, LagStep, fill_lag_step
 from spheretwin.models.base.compiled import allocation_free
+from spheretwin.models.base.record import Record, Rows, field
 from spheretwin.models.coil_group import PerGroup
 from spheretwin.models.kinematics import generalised_torque, triple, turns
 from spheretwin.models.lagrangian import acceleration_entries
 from spheretwin.models.magnetics import (
     CachedMatrix,
     TorqueModel,
-    cached_matrix,
     rotor_torque,
     update_cached_matrix,
 )
@@ -59,27 +59,23 @@ class PredictionSection(BaseModel):
     on: bool = Field(False, description="whether the law receives the predicted motion after nominal.delay_s")
 
 
-class Prediction(NamedTuple):
-    """Prediction of a run, for compiled code."""
+class Prediction(Record):
+    """Prediction of a run."""
 
-    on: bool
-    ahead_s: float
-    period_s: float
-    inertia: Array  # (3,) kg·m², nominal
-    full_lag: LagStep
-    pose: Array  # (3,) rad, predicted
-    rates: Array  # (3,) rad/s, predicted
-    cached_matrix: CachedMatrix  # nominal, at the predicted pose
-    midpoint: Array  # (3,) rad, pose in the middle of a step
-    current: Array  # (groups,) A, at the end of a step
-    mean: Array  # (groups,) A, over a step
-    torque_S: Array  # (3,) N·m, over a step
-    torque_q: Array  # (3,) N·m, the same on the hinges
-    first_step_torque_q: Array  # (3,) N·m, over the first step of the last tick
-
-    def state_arrays(self) -> tuple[Array, ...]:
-        """Return the arrays that hold the state."""
-        return self.pose, self.rates, self.first_step_torque_q
+    on: bool = field("whether the prediction is on")
+    ahead_s: float = field("time from the measurement to the predicted motion", "s")
+    period_s: float = field("control period", "s")
+    inertia: Array = field("nominal", "kg·m²", 3)
+    full_lag: LagStep = field("lag over a period")
+    pose: Array = field("predicted", "rad", 3, state=True)
+    rates: Array = field("predicted", "rad/s", 3, state=True)
+    matrix: CachedMatrix = field("nominal torque matrix at the predicted pose")
+    midpoint: Array = field("pose in the middle of a step", "rad", 3)
+    current: Array = field("currents at the end of a step", "A", "groups")
+    mean_current: Array = field("currents over a step", "A", "groups")
+    torque_S: Array = field("torque over a step, stator frame", "N·m", 3)
+    torque_q: Array = field("the same on the hinges", "N·m", 3)
+    first_step_torque_q: Array = field("torque over the first step of the last tick", "N·m", 3, state=True)
 
 
 class DelayModel(NamedTuple):
@@ -91,33 +87,11 @@ class DelayModel(NamedTuple):
     inertia: Array  # (3,) kg·m²
 
 
-def prediction(section: PredictionSection, model: DelayModel, magnetics: TorqueModel) -> Prediction:
-    """Return a prediction without pending commands.
-
-    Parameters
-    ----------
-    section : PredictionSection
-    model : DelayModel
-    magnetics : TorqueModel
-        Nominal.
-    """
-    groups = magnetics.group_axes.shape[1]
-    return Prediction(
-        on=section.on,
-        ahead_s=model.delay_s,
-        period_s=model.period_s,
-        inertia=model.inertia,
-        full_lag=lag_step(model.period_s, model.time_constant_s, groups),
-        pose=np.zeros(3),
-        rates=np.zeros(3),
-        cached_matrix=cached_matrix(magnetics),
-        midpoint=np.zeros(3),
-        current=np.zeros(groups),
-        mean=np.zeros(groups),
-        torque_S=np.zeros(3),
-        torque_q=np.zeros(3),
-        first_step_torque_q=np.zeros(3),
-    )
+def fill_prediction(rows: Rows, section: PredictionSection, model: DelayModel) -> None:
+    """Fill predictions without pending commands."""
+    rows["on"], rows["ahead_s"], rows["period_s"] = section.on, model.delay_s, model.period_s
+    rows["inertia"], rows["matrix"]["q"] = model.inertia, np.nan
+    fill_lag_step(rows["full_lag"], model.period_s, model.time_constant_s)
 
 
 @allocation_free
@@ -149,7 +123,7 @@ def predict(
             measurement[MEASURED + row, i] = measurement[row, i]
     for j in range(prediction.current.shape[0]):
         prediction.current[j] = applied_torque.current[j]
-    whole, fraction, finite = applied_torque.commands.shape[0] - 2, applied_torque.fraction, True
+    whole, fraction, finite = applied_torque.due, applied_torque.fraction, True
     if fraction > 0.0:
         command = applied_torque.commands[whole]
         finite = _step(
@@ -195,9 +169,9 @@ def _step(
         return False
     for j in range(command.shape[0]):
         distance = prediction.current[j] - command[j]
-        prediction.mean[j] = command[j] + lag.mean_share[j] * distance
+        prediction.mean_current[j] = command[j] + lag.mean_share[j] * distance
         prediction.current[j] = command[j] + lag.decay[j] * distance
-    rotor_torque(prediction.cached_matrix.G, prediction.mean, prediction.torque_S)
+    rotor_torque(prediction.matrix.G, prediction.mean_current, prediction.torque_S)
     generalised_torque(midpoint, prediction.torque_S, prediction.torque_q)
     torque, inertia = triple(prediction.torque_q), triple(prediction.inertia)
     first = acceleration_entries(turns(triple(q)), triple(v), torque, inertia, 0.0)
@@ -216,5 +190,5 @@ def _update_matrix(prediction: Prediction, magnetics: TorqueModel, pose: Array) 
     for i in range(3):
         if not isfinite(pose[i]):
             return False
-    update_cached_matrix(pose, magnetics, prediction.cached_matrix)
+    update_cached_matrix(pose, magnetics, prediction.matrix)
     return True

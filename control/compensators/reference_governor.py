@@ -24,7 +24,6 @@ reference. The study `compensators` measures it on the prototype's tilt.
 from __future__ import annotations
 
 from math import copysign, isfinite, sqrt
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,6 +31,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from spheretwin.control.law import PositiveEach
 from spheretwin.models.base.compiled import allocation_free
+from spheretwin.models.base.record import Record, Rows, field
 
 Array = NDArray[np.float64]
 
@@ -56,24 +56,22 @@ class GovernorSection(BaseModel):
         return self.acceleration_rad_s2 is not None
 
 
-class Governor(NamedTuple):
-    """Governor of a run, for compiled code."""
+class Governor(Record):
+    """Governor of a run."""
 
-    on: bool
-    largest_rad_s2: Array  # (3,)
-    period_s: float
-    motion: Array  # (3, 3) angle, rate, acceleration of the governed reference as rows
-    started: Array  # (1,) 1 after the first tick
-
-    def state_arrays(self) -> tuple[Array, ...]:
-        """Return the arrays that hold the state."""
-        return self.motion, self.started
+    on: bool = field("whether the governor is on")
+    largest_rad_s2: Array = field("largest acceleration", "rad/s²", 3)
+    period_s: float = field("control period", "s")
+    motion: Array = field(
+        "angle, rate, acceleration of the governed reference as rows", "", (3, 3), state=True
+    )
+    started: bool = field("whether the governed reference has begun", state=True)
 
 
-def governor(section: GovernorSection, period_s: float) -> Governor:
-    """Return the governor before the first tick."""
-    largest = np.array(section.acceleration_rad_s2 or (1.0, 1.0, 1.0))
-    return Governor(section.on, largest, period_s, np.zeros((3, 3)), np.zeros(1))
+def fill_governor(rows: Rows, section: GovernorSection, period_s: float) -> None:
+    """Fill governors before the first tick."""
+    rows["on"], rows["period_s"] = section.on, period_s
+    rows["largest_rad_s2"] = section.acceleration_rad_s2 or 1.0
 
 
 @allocation_free
@@ -97,7 +95,7 @@ def govern(governor: Governor, measurement: Array, reference: Array) -> bool:
     motion, h = governor.motion, governor.period_s
     finite = True
     for axis in range(3):
-        if governor.started[0] == 0.0:
+        if not governor.started:
             motion[0, axis], motion[1, axis] = measurement[0, axis], measurement[1, axis]
         else:
             motion[0, axis] += h * (motion[1, axis] + 0.5 * h * motion[2, axis])
@@ -110,9 +108,8 @@ def govern(governor: Governor, measurement: Array, reference: Array) -> bool:
         for row in range(3):
             finite = finite and isfinite(motion[row, axis])
             reference[row, axis] = motion[row, axis]
-    governor.started[0] = 1.0
+    governor.started = finite
     if not finite:
-        governor.started[0] = 0.0
         for axis in range(3):
             motion[0, axis] = motion[1, axis] = motion[2, axis] = 0.0
     return finite

@@ -141,7 +141,8 @@ def history_layout(known: NominalModel) -> tuple[float, int]:
 @allocation_free
 def delayed_command(history: NDArray[np.float64], axis: int, fraction: float) -> float:
     """Return the torque (N·m) on an axis that was commanded for the last period."""
-    return delayed_mean(history.reshape((-1, 3)), axis, fraction)
+    rows = history.reshape((-1, 3))
+    return delayed_mean(rows, rows.shape[0] - 2, axis, fraction)
 
 
 @allocation_free

@@ -6,7 +6,12 @@ import pytest
 from scipy.integrate import quad
 
 from spheretwin import scenario as scenarios
-from spheretwin.control.applied_torque import applied_torque, estimate_applied_torque
+from spheretwin.control.applied_torque import (
+    AppliedTorque,
+    delay_capacity,
+    estimate_applied_torque,
+    fill_applied_torque,
+)
 from spheretwin.control.law import Law
 from spheretwin.models.kinematics import rate_jacobian
 from spheretwin.models.magnetics import torque_matrix
@@ -25,7 +30,11 @@ def test_mean_current_is_that_of_the_delayed_and_lagged_command(delay, lag_s):
     """Against the convolution of the piecewise constant command with the lag, by quadrature."""
     generator = np.random.default_rng(3)
     commands = generator.normal(size=12)
-    mine = applied_torque(True, 2, PERIOD_S, delay * PERIOD_S, (2e-4, lag_s))  # the second group is measured
+    delay_s = delay * PERIOD_S
+    mine = AppliedTorque.filled(
+        fill_applied_torque, True, PERIOD_S, delay_s, (2e-4, lag_s),  # the second group is measured
+        groups=2, delays=delay_capacity(delay_s, PERIOD_S),
+    )[0]  # fmt: skip
     G, pose = np.zeros((3, 2)), np.zeros(3)
 
     def current(t):
@@ -39,7 +48,7 @@ def test_mean_current_is_that_of_the_delayed_and_lagged_command(delay, lag_s):
         # Midpoints of a jump are no matter: each part is smooth. Quadrature keeps 1e-12 of the largest.
         inside = 1e-13
         mean = sum(quad(current, a + inside, b - inside, epsabs=0, epsrel=1e-11)[0] for a, b in parts)
-        np.testing.assert_allclose(mine.mean[1], mean / PERIOD_S, rtol=1e-8, atol=1e-9)
+        np.testing.assert_allclose(mine.mean_current[1], mean / PERIOD_S, rtol=1e-8, atol=1e-9)
 
 
 @numba.njit

@@ -13,7 +13,6 @@ from spheretwin.session import Session
 from spheretwin.simulation import simulate
 
 CURRENTS = [0.1 * (-1) ** group * group for group in range(18)]
-CONSTANT = Manual(True, False, np.zeros(1), np.array([[0.5, -4.0, 10.0]]))
 FAST = {"plant.engine": "lagrangian", "disturbance.random_bound_Nm": 0.0, "disturbance.load": 0.0}
 
 
@@ -32,8 +31,9 @@ def test_each_group_is_commanded_its_current_and_the_law_is_not_called():
 
 
 def test_no_group_is_commanded_more_than_the_limit():
-    command = np.empty(3)
-    share = command_manual_currents(CONSTANT, 0.0, 2.0, command)
+    rows, command = Manual.zeros(groups=3), np.empty(3)
+    rows["current_A"] = [0.5, -4.0, 10.0]
+    share = command_manual_currents(rows[0], 2.0, command)
     np.testing.assert_array_equal(command, [0.5, -2.0, 2.0])
     assert share == 0.2
     rows = by_hand(**{"nominal.current_limit_A": 0.4, "drive.current_limit_A": 0.3}).telemetry

@@ -12,6 +12,7 @@ from spheretwin.control.allocation import ALLOCATIONS
 from spheretwin.control.allocation.least_norm import allocate
 from spheretwin.control.law import Law
 from spheretwin.models import actuator as actuators
+from spheretwin.models.base.record import is_rows
 from spheretwin.models.lagrangian import loaded_inertia
 from spheretwin.scenario.fields import every_field, fields_of, kind_of
 from spheretwin.scenario.sections import ResolvedScenario, Scenario
@@ -89,9 +90,10 @@ def resolved(name="tilt", **changes):
 
 def numbers(part, path=""):
     """Every number of a controller by its place; what is computed anew in each tick is left out."""
-    if isinstance(part, tuple):
-        names = getattr(part, "_fields", range(len(part)))
-        inside = [numbers(value, f"{path}.{name}") for name, value in zip(names, part, strict=True)]
+    if isinstance(part, tuple) or is_rows(part):
+        names = part.dtype.names if is_rows(part) else getattr(part, "_fields", range(len(part)))
+        values = [part[name] for name in names] if is_rows(part) else part
+        inside = [numbers(value, f"{path}.{name}") for name, value in zip(names, values, strict=True)]
         return {place: value for each in inside for place, value in each.items()}
     computed = path.rpartition(".")[2] in ("scratch", "G")
     return {} if computed else {path: np.asarray(part).tobytes()}

@@ -22,7 +22,6 @@ from spheretwin.export.c_text import constant, definitions, header, source
 from spheretwin.export.plant_code import NUMBERS, magnetic_tables
 from spheretwin.models.base.errors import InputError
 from spheretwin.scenario.sections import ResolvedScenario
-from spheretwin.shared_buffers import supervision_of
 
 LAWS: dict[Any, tuple[str, ...]] = {
     pd.step: ("st_law_pd.h",),
@@ -88,12 +87,11 @@ def controller_code(scenario: str, changes: Mapping[str, Any] | None = None) -> 
     law, estimator = assembly.law_of(resolved), assembly.estimator_of(resolved)
     _check(resolved, law)
     magnetics = assembly.nominal_magnetics(resolved, config.files)
-    supervision = supervision_of(resolved, config.files.nominal)
-    controller = assembly.controller_of(resolved, law, magnetics, estimator, supervision)
+    controller = assembly.controller_of(resolved, law, magnetics, estimator, config.files.nominal)
     law_files, estimator_file = LAWS[law.step], ESTIMATORS[estimator.step if estimator else None]
     names = ["st_controller.h", "st_controller.c", "st_numbers.h", "st_equations.h"]
     names += [*law_files, estimator_file, *_ALLOCATIONS[resolved.allocation]]
-    compensators = controller.compensators
+    compensators = controller.data[0].compensators
     names += ["st_governor.h"] * compensators.governor.on + [
         "st_feed_forward.h"
     ] * compensators.feed_forward.on
@@ -136,19 +134,19 @@ def _check(scenario: ResolvedScenario, law: Law) -> None:
 
 def _model_header(scenario: ResolvedScenario, law: Law, controller: Controller, groups: int) -> str:
     """Return the header of sizes."""
-    compensators, applied = controller.compensators, controller.applied_torque
+    compensators, applied = controller.data[0].compensators, controller.data[0].applied_torque
     return header(
         definitions(
             {
                 "ST_GROUPS": groups,
                 "ST_PERIOD_S": f"((st_real){scenario.controller.period_s!r})",
                 "ST_LAW_STATE": len(controller.memory),
-                "ST_ESTIMATOR_STATE": len(controller.estimator_state.memory),
+                "ST_ESTIMATOR_STATE": len(controller.estimator_memory),
                 "ST_APPLIED_TORQUE": applied.on,
-                "ST_COMMANDS": len(applied.commands),
+                "ST_COMMANDS": applied.due + 2,
                 "ST_GOVERNOR": compensators.governor.on,
                 "ST_FEED_FORWARD": compensators.feed_forward.on,
-                "ST_FED_FORWARD": len(compensators.feed_forward.history),
+                "ST_FED_FORWARD": compensators.feed_forward.due + 2,
             }
         )
     )
@@ -162,10 +160,10 @@ def _table_header(
     estimator: str,
 ) -> str:
     """Return the header of parts, bounds, parameters and tables."""
-    applied = controller.applied_torque
+    applied = controller.data[0].applied_torque
     angles = hinge_range_rad + MARGIN_rad * np.array([-1.0, 1.0])
     numbers: dict[str, Any] = {
-        "ST_CURRENT_LIMIT_A": controller.current_limit_A,
+        "ST_CURRENT_LIMIT_A": controller.data[0].current_limit_A,
         "ST_ANGLE_BOUNDS": np.clip(angles, -LARGEST_ANGLE_rad, LARGEST_ANGLE_rad),
         "ST_LARGEST_ERROR": LARGEST_ERROR_rad,
         "ST_LARGEST_RATE": scenario.watchdog.largest_rate_rad_s,
@@ -181,8 +179,8 @@ def _table_header(
         }
     tables: dict[str, Any] = {"ST_LAW_PARAMETERS": controller.parameters, "ST_LAW_START": controller.memory}
     if scenario.estimator.kind != "ideal":
-        tables["ST_ESTIMATOR_PARAMETERS"] = controller.estimator_state.parameters
-    tables |= _compensator_tables(controller.compensators)
+        tables["ST_ESTIMATOR_PARAMETERS"] = controller.estimator_parameters
+    tables |= _compensator_tables(controller.data[0].compensators)
     files = {"ST_LAW": law, "ST_ESTIMATOR": estimator, "ST_ALLOCATION": _ALLOCATIONS[scenario.allocation][0]}
     return header(
         [

@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spheretwin.models.base.compiled import allocation_free
+from spheretwin.models.base.record import Rows
 from spheretwin.models.kinematics import generalised_torque
 from spheretwin.models.magnetics import (
     CachedMatrix,
-    cached_matrix,
     rotor_torque,
     torque_model,
     update_cached_matrix,
@@ -29,7 +29,7 @@ class Coils(NamedTuple):
     """Coils of one instance in one `mjData`."""
 
     magnetics: Any  # of `torque_model`
-    matrix: CachedMatrix
+    matrix: Rows  # of one `CachedMatrix`
     gain: Array  # (n,) torque per ampere over that of the matrix
     has_voltages: int  # 1 if the controls are voltages: the activations are currents behind R and L
     resistance_ohm: Array  # (n,)
@@ -62,9 +62,11 @@ class Coils(NamedTuple):
 def coils_of(parts: Parts, data: dict[str, NDArray[Any]]) -> Coils:
     """Return the coils of an instance, with views of the arrays of `mjData` by their name here."""
     magnetics, n = torque_model(parts.actuator), len(parts.actuator.groups)
+    matrix = CachedMatrix.zeros(groups=n, lines=len(magnetics.line_weights))
+    matrix["q"] = np.nan
     return Coils(
         magnetics=magnetics,
-        matrix=cached_matrix(magnetics),
+        matrix=matrix,
         gain=parts.gain,
         has_voltages=int(parts.attributes.input == "voltage"),
         resistance_ohm=parts.resistance_ohm,
@@ -112,10 +114,10 @@ def respond(coils: Coils, task: int) -> None:
 @allocation_free
 def _update_columns(coils: Coils) -> None:
     """Compute the torque on the hinges per ampere of each group, ``E^T G_t(q)`` times gain."""
-    q, G, axis, of_axis = coils.q, coils.matrix.G, coils.torque_S, coils.torque_q
+    q, G, axis, of_axis = coils.q, coils.matrix[0].G, coils.torque_S, coils.torque_q
     for i in range(3):
         q[i] = coils.qpos[coils.qpos_at[i]]
-    update_cached_matrix(q, coils.magnetics, coils.matrix)
+    update_cached_matrix(q, coils.magnetics, coils.matrix[0])
     coils.column_q[:] = 0.0
     for k in range(3):  # the columns of E^T: the torque on the hinges of 1 N·m about each axis of the stator
         for i in range(3):
@@ -160,7 +162,7 @@ def _fill_sensors(coils: Coils) -> None:
     """Write currents (A), back-EMFs (V) and coil torque (N·m, stator frame) into the sensors."""
     for j in range(coils.gain.shape[0]):
         coils.effective[j] = coils.gain[j] * coils.force[coils.force_at[j]]
-    rotor_torque(coils.matrix.G, coils.effective, coils.torque_S)
+    rotor_torque(coils.matrix[0].G, coils.effective, coils.torque_S)
     for k in range(coils.sensors.shape[0]):
         quantity, first = coils.sensors[k, 0], coils.sensors[k, 1]
         if quantity == TORQUE:

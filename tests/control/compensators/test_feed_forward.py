@@ -7,10 +7,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from spheretwin.control.compensators.feed_forward import (
+    FeedForward,
     FeedForwardSection,
     NominalRotor,
     compute_feed_forward,
-    feed_forward,
+    fill_feed_forward,
 )
 from spheretwin.control.law import Law
 from spheretwin.models.lagrangian import coriolis_matrix, inertia_matrix
@@ -28,7 +29,7 @@ numbers = st.lists(st.floats(-3, 3), min_size=3, max_size=3).map(np.array)
 
 
 def torque_of(reference, **shares):
-    feed = feed_forward(FeedForwardSection(**shares), ROTOR, 1e-3, 0.0)
+    feed = FeedForward.filled(fill_feed_forward, FeedForwardSection(**shares), ROTOR, 1e-3, 0.0, delays=8)[0]
     compute_feed_forward(feed, np.array(reference))
     return feed.torque_q
 

@@ -7,8 +7,19 @@ import numpy as np
 import pytest
 from scipy.integrate import quad, solve_ivp
 
-from spheretwin.control.applied_torque import applied_torque, estimate_applied_torque
-from spheretwin.control.compensators.prediction import DelayModel, PredictionSection, predict, prediction
+from spheretwin.control.applied_torque import (
+    AppliedTorque,
+    delay_capacity,
+    estimate_applied_torque,
+    fill_applied_torque,
+)
+from spheretwin.control.compensators.prediction import (
+    DelayModel,
+    Prediction,
+    PredictionSection,
+    fill_prediction,
+    predict,
+)
 from spheretwin.control.law import Law
 from spheretwin.models.kinematics import rate_jacobian
 from spheretwin.models.lagrangian import acceleration
@@ -37,8 +48,18 @@ class Way:
         self.ticks = round(delay) + 20
         self.commands = [commands_at(-period_s * (self.ticks - k)) for k in range(self.ticks)]
         delayed = DelayModel(period_s, delay * period_s, LAG_S, self.inertia)
-        self.mine = prediction(PredictionSection(on=True), delayed, self.model)
-        self.applied_torque = applied_torque(True, 18, period_s, delay * period_s, LAG_S)
+        self.mine = Prediction.filled(
+            fill_prediction,
+            PredictionSection(on=True),
+            delayed,
+            groups=18,
+            lines=len(self.model.line_weights),
+        )[0]
+        delay_s = delay * period_s
+        self.applied_torque = AppliedTorque.filled(
+            fill_applied_torque, True, period_s, delay_s, LAG_S,
+            groups=18, delays=delay_capacity(delay_s, period_s),
+        )[0]  # fmt: skip
         self.measurement = np.zeros((6, 3))
         G = torque_matrix(Q, actuator)
         for k in range(self.ticks):

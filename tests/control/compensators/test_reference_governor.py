@@ -5,14 +5,19 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from spheretwin.control.compensators.reference_governor import GovernorSection, govern, governor
+from spheretwin.control.compensators.reference_governor import (
+    Governor,
+    GovernorSection,
+    fill_governor,
+    govern,
+)
 
 PERIOD_S = 1e-3
 LARGEST = (2.0, 3.0, 5.0)
 
 
 def made(acceleration=LARGEST, period_s=PERIOD_S):
-    return governor(GovernorSection(acceleration_rad_s2=acceleration), period_s)
+    return Governor.filled(fill_governor, GovernorSection(acceleration_rad_s2=acceleration), period_s)[0]
 
 
 def governed(desired, angle=(0.0, 0.0, 0.0), rate=(0.0, 0.0, 0.0), **of_governor):

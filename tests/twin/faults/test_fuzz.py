@@ -92,13 +92,13 @@ INPUTS = {
     "on their way": lambda machine: machine._plant.drive.delay.history.ravel(),
     "held": lambda machine: machine._plant.drive.stage("dac").line.table[:, LAST],
     "group gain": lambda machine: machine._plant.group_gain,
-    "estimate": lambda machine: machine._controller.estimator_state.memory,
+    "estimate": lambda machine: machine._controller.estimator_memory,
     "law": lambda machine: machine._controller.memory,
-    "belief": lambda machine: machine._controller.applied_torque.current,
-    "detector": lambda machine: machine._controller.supervision[0].detector.shorted_A,
+    "belief": lambda machine: machine._controller.data[0].applied_torque.current,
+    "detector": lambda machine: machine._controller.data[0].supervision.detector.shorted_A,
     "wiper": lambda machine: machine._sensors.stage("potentiometer").line.table[:, LAST],
     "converted": lambda machine: machine._sensors.stage("adc").delayed_rad.ravel(),
-    "seen": lambda machine: machine._controller.supervision[0].watchdog.last_rad,
+    "seen": lambda machine: machine._controller.data[0].supervision.watchdog.last_rad,
 }
 
 PLAN = [
