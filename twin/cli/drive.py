@@ -11,6 +11,7 @@ from typing import Any
 from spheretwin.cli.common import interruptible, print_message, warn
 from spheretwin.cli.machine import add_common_options, read_scenario, run_session
 from spheretwin.cli.options import Parser, number
+from spheretwin.machine.files import conditions_of
 from spheretwin.machine.link.controller_scenario import left_out
 from spheretwin.machine.link.limits import Limits
 from spheretwin.machine.link.log_file import LogFile
@@ -101,8 +102,8 @@ def run(options: argparse.Namespace) -> bool:
         open_link(options, scenario, stop_requested, shadow=shadow) as link,
         link.session(scenario) as session,
     ):
-        period_s = scenario.controller.period_s
-        log = LogFile(options.log, link.late_ticks, period_s) if options.log else None
+        period_s, conditions = scenario.controller.period_s, conditions_of(scenario.plant.payload_kg)
+        log = LogFile(options.log, link.late_ticks, period_s, conditions) if options.log else None
 
         def finish() -> None:
             link.release()

@@ -12,7 +12,7 @@ import numpy as np
 
 from spheretwin.electronics.drive import build_drive
 from spheretwin.electronics.sensor_chain import sensor_chain
-from spheretwin.machine.files import CONDITIONS, CURRENTS, log_signals
+from spheretwin.machine.files import CONDITIONS, CURRENTS, conditions_of, log_signals
 from spheretwin.machine.log import COMMANDED, MEASURED
 from spheretwin.models.base.errors import SpheretwinError
 from spheretwin.models.base.files import check_writable, whole_file
@@ -152,8 +152,7 @@ def _log_file(path: Path, session: Session, available: tuple[str, ...]) -> Signa
     time, angles, *currents = log_signals(len(session.actuator.groups), kinds)
     signals: Sources = {("t_s",): time, ("q_measured_rad", "q_rad"): angles}
     signals |= {(signal.name,): signal for signal in currents}
-    payload_kg = session.initial_scenario.plant.payload_kg
-    conditions = {"plant.payload_kg": payload_kg} if payload_kg else {}
+    conditions = conditions_of(session.initial_scenario.plant.payload_kg)
     return SignalFile(path, signals, {CURRENTS: COMMANDED, CONDITIONS: json.dumps(conditions)})
 
 

@@ -70,7 +70,7 @@ def read(
     if column_map is None:
         column_map = column_maps.default(table, table.metadata.get(CURRENTS))
     try:
-        stated = json.loads(table.metadata.get(CONDITIONS, "{}"))
+        stated = _conditions(table.metadata)
         before = tuple(json.loads(table.metadata.get(ACCEPTED, "[]")))
     except ValueError:
         raise InputError(f"log {path}: expected conditions and accepted findings as JSON") from None
@@ -129,6 +129,18 @@ def log_signals(groups: int, kinds: tuple[str, ...]) -> tuple[Signal, ...]:
     )
 
 
+def conditions_of(payload_kg: float) -> dict[str, Any]:
+    """Return the conditions of a run with a payload."""
+    return {"plant.payload_kg": payload_kg} if payload_kg else {}
+
+
+def _conditions(metadata: Mapping[str, str]) -> dict[str, Any]:
+    """Return the conditions that a log states, or those of the scenario of telemetry."""
+    if CONDITIONS in metadata or "scenario" not in metadata:
+        return dict(json.loads(metadata.get(CONDITIONS, "{}")))
+    return conditions_of(json.loads(metadata["scenario"]).get("plant", {}).get("payload_kg", 0.0))
+
+
 def _read_table(path: Path, column_map: ColumnMap | None) -> RawTable:
     """Return the columns of a file, whose first bytes tell its format."""
     try:
@@ -145,6 +157,8 @@ def _read_table(path: Path, column_map: ColumnMap | None) -> RawTable:
             f"log {path}: expected CSV, Parquet or MCAP, received a ZIP archive, such as a workbook of Excel:"
             " save it as CSV"
         )
+    if path.suffix == ".rrd":
+        raise unreadable(path, ValueError("received other bytes"), "a log")
     if path.suffix.lower() in (".mcap", ".parquet"):
         raise InputError(f"log {path}: expected {path.suffix[1:]}, received other bytes at its beginning")
     return csv_files.read(path, column_map.csv if column_map else None)

@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Container
+import json
+from collections.abc import Container, Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
+from spheretwin.machine.files import CONDITIONS, CURRENTS, log_signals
 from spheretwin.machine.log import COMMANDED
 from spheretwin.models.base.files import check_writable
-from spheretwin.models.telemetry import checksums
-from spheretwin.models.telemetry.table import PARQUET_FORMAT, Table
+from spheretwin.models.telemetry.table import Table
 
 
 class LogFile:
-    """Sink that writes the columns of a `machine.Log` as Parquet: time, sent currents, measured angles.
+    """Sink that writes a log as Parquet: time, measured angles, commanded currents.
 
     Parameters
     ----------
@@ -23,6 +25,8 @@ class LogFile:
         Ticks without a new measurement: their angles are NaN.
     period_s : float
         Control period.
+    conditions : mapping
+        Known fields of the scenario during the run.
 
     Raises
     ------
@@ -30,17 +34,20 @@ class LogFile:
         The file cannot be written.
     """
 
-    def __init__(self, path: Path, late_ticks: Container[int], period_s: float) -> None:
+    def __init__(
+        self, path: Path, late_ticks: Container[int], period_s: float, conditions: Mapping[str, Any]
+    ) -> None:
         check_writable(path, ".parquet")
         self._path, self._late_ticks, self._period_s = path, late_ticks, period_s
-        self._parts: list[tuple[np.ndarray, ...]] = []
+        self._metadata = {CURRENTS: COMMANDED, CONDITIONS: json.dumps(dict(conditions))}
+        self._parts: list[np.ndarray] = []
 
     def write(self, rows: Table) -> None:
         """Add the rows of one chunk."""
         angle_rad = rows["q_rad"].copy()
         ticks = np.rint(rows["t_s"] / self._period_s).astype(int).tolist()
         angle_rad[[tick in self._late_ticks for tick in ticks]] = np.nan
-        self._parts.append((rows["t_s"].copy(), rows["current_A"].copy(), angle_rad))
+        self._parts.append(np.column_stack([rows["t_s"], angle_rad, rows["current_A"]]))
 
     def note(self, t_s: float, text: str) -> None:
         """Ignore a message: a log has numbers alone."""
@@ -51,16 +58,6 @@ class LogFile:
     def close(self) -> None:
         """Write the file, also after an error; no file without a tick."""
         if self._parts:
-            write_log(self._path, *map(np.concatenate, zip(*self._parts, strict=True)))
-
-
-def write_log(path: Path, t_s: np.ndarray, current_A: np.ndarray, angle_rad: np.ndarray) -> None:
-    """Write a log of commanded currents."""
-    import pyarrow as pa
-
-    columns = {"t_s": pa.array(t_s)}
-    for name, values in (("current_A", current_A), ("angle_rad", angle_rad)):
-        flat = pa.array(np.ascontiguousarray(values).ravel())
-        columns[name] = pa.FixedSizeListArray.from_arrays(flat, values.shape[1])
-    table = pa.table(columns).replace_schema_metadata({"currents": COMMANDED})
-    checksums.write_parquet(path, table.schema, [table], **PARQUET_FORMAT)
+            rows = np.concatenate(self._parts)
+            signals = log_signals(rows.shape[1] - 4, (COMMANDED,))
+            Table(signals, rows).scalars().write_parquet(self._path, self._metadata)
