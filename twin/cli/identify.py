@@ -41,7 +41,7 @@ def declare(parser: Parser) -> None:
         action="append",
         default=[],
         metavar="KG",
-        help="known payload of the designed experiment; repeatable",
+        help="known payload of all logs, or of each in their order; repeatable. With --design: of its runs",
     )
     parser.add_argument(
         "--candidates",
@@ -82,8 +82,8 @@ def run(options: argparse.Namespace) -> bool:
             check_writable(path, suffix)
     if options.design:
         return _design(options)
-    if options.payload or options.candidates or options.currents:
-        raise InputError("command line: expected --payload, --candidates and --currents with --design")
+    if options.candidates or options.currents:
+        raise InputError("command line: expected --candidates and --currents with --design")
     logs, changes = read_logs(options), changes_of(options)
     settings = IdentifySettings(**({"window_s": options.window} if options.window else {}))
     names = options.parameter or list(DEFAULT)
@@ -97,6 +97,8 @@ def run(options: argparse.Namespace) -> bool:
         write_twin(options.out, result, scenario_of(options), changes, logs)
         if not options.json:
             runs.print_written([options.out])
+    if result.nothing_to_correct:
+        print_message("identify: nothing to correct: the values of the scenario are those of the logs")
     for reason in result.reasons:
         print_message(f"identify: not accepted: {reason}")
     return result.accepted
@@ -160,6 +162,7 @@ def _currents(run: Table) -> str:
 def _figures(result: Identified) -> dict[str, object]:
     return {
         "accepted": result.accepted,
+        "nothing_to_correct": result.nothing_to_correct,
         "parameters": {
             name: {"value": one.value, "interval": list(one.interval), "unit": one.unit}
             for name, one in result.parameters.items()

@@ -10,10 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 from scipy.optimize import least_squares
+from scipy.stats import chi2
 
 from spheretwin.machine.intervals import Cost, Uncertainty, interval
 from spheretwin.machine.log import Log
 from spheretwin.machine.parameters import Machine, Parameter, priors, selected, short_names
+from spheretwin.machine.row_order import aligned
 from spheretwin.machine.windows import Part, Shooting, Window, windows_of
 from spheretwin.models.base.errors import InputError
 from spheretwin.scenario.fields import SettingsModel
@@ -22,6 +24,9 @@ Array = NDArray[np.float64]
 
 
 _MOST_EVALUATIONS = 30
+
+# Probability that the values of a right scenario differ from those found by more than is accepted.
+_BY_CHANCE = 1e-3
 
 
 class IdentifySettings(SettingsModel):
@@ -85,6 +90,8 @@ class Identified(NamedTuple):
     covariance: Array | None
     fields: dict[str, Any]
     """Fields of a scenario with the found values."""
+    nothing_to_correct: bool = False
+    """True if the values of the scenario do not differ from those found: the twin has these all the same."""
 
     @property
     def uncertainty(self) -> Uncertainty | None:
@@ -182,6 +189,7 @@ class Problem:
         settings: IdentifySettings | None = None,
     ) -> None:
         self.settings = settings = settings or IdentifySettings()
+        logs = [aligned(log) for log in logs]
         machines = [Machine(scenario, {**changes, **log.conditions}) for log in logs]
         self._machines, self.machine = machines, machines[0]
         self.requested = selected(names, self.machine.model.actuator)
@@ -286,7 +294,8 @@ class Problem:
         before = _fit(self.held_out.parts(self.initial, slopes=False), self.held_out)
         after = _fit(self.held_out.parts(values, slopes=False), self.held_out)
         improvement = 1 - np.sqrt(after.chi2 / before.chi2)
-        reasons = list(self._reasons(after, improvement))
+        is_right = self._is_right(after, values, covariance)
+        reasons = [] if is_right else self._reasons(after, improvement)
         cost = Cost(self._cost, self.normal, values, self._cost(values), self.least)
         fields = self.machine.fields(self.requested, values[: len(self.requested)].tolist())
         return Identified(
@@ -308,7 +317,17 @@ class Problem:
             reasons=tuple(reasons),
             covariance=covariance[: len(self.requested), : len(self.requested)],
             fields=fields,
+            nothing_to_correct=is_right and not improvement >= self.settings.least_improvement,
         )
+
+    def _is_right(self, after: Fit, values: Array, covariance: Array) -> bool:
+        """True if the model explains the held-out windows with values like those of the scenario."""
+        if not abs(after.chi2 - 1) <= self.settings.chi2_limit:
+            return False
+        count = len(self.requested)
+        departures = values[:count] - self.initial[:count]
+        distance = departures @ np.linalg.solve(covariance[:count, :count], departures)
+        return bool(distance <= chi2.isf(_BY_CHANCE, count))
 
     def _reasons(self, after: Fit, improvement: float) -> list[str]:
         reasons, limit = [], self.settings.chi2_limit
