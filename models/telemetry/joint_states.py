@@ -128,7 +128,7 @@ STAMPS, LOG_TIME, PUBLISH_TIME = "t_s", "log_time", "publish_time"
 
 
 class JointStates(NamedTuple):
-    """Joint states of a file: a row for each message, or for consecutive ones of several topics at one time."""
+    """Joint states of a file: a row for each message, or for consecutive ones of topics at one time."""
 
     time_ns: NDArray[np.int64]
     columns: dict[str, Array]

@@ -10,11 +10,13 @@ from pathlib import Path
 from spheretwin import machine
 from spheretwin import scenario as scenarios
 from spheretwin.cli.common import print_json, print_message
+from spheretwin.cli.log_options import for_each_log
 from spheretwin.cli.options import Parser
-from spheretwin.machine import columns
 from spheretwin.machine.findings import FINDINGS, check_names
 from spheretwin.machine.identification import identifiability
+from spheretwin.machine.log import Log
 from spheretwin.machine.verdict import Verdict
+from spheretwin.models.base.errors import InputError
 from spheretwin.viz.terminal.texts import print_findings
 
 # A shorter log has too few windows for any parameter.
@@ -34,8 +36,11 @@ def declare(parser: Parser) -> None:
     check.add_argument(
         "--columns",
         type=Path,
+        action="append",
+        default=[],
         metavar="MAP.toml",
-        help="column map: names, units, signs, order and scales; the names of our exports unless given",
+        help="column map: names, units, signs, order and scales; one for all logs, or one for each; the names"
+        " of our exports unless given",
     )
     check.add_argument(
         "--scenario",
@@ -57,17 +62,18 @@ def declare(parser: Parser) -> None:
 def run(options: argparse.Namespace) -> bool:
     """Run the verb; return True if every log is accepted."""
     accepted = check_names(options.accept)
-    column_map = columns.load(options.columns) if options.columns else None
+    maps = for_each_log(options.columns, len(options.files), "--columns")
     scenario = scenarios.load(options.scenario)
-    verdicts, digests = {}, {}
-    for path in options.files:
+    verdicts: dict[str, Verdict] = {}
+    logs: dict[str, Log] = {}
+    for path, column_map in zip(options.files, maps, strict=True):
         log = machine.read(path, column_map, accepted)
         verdict = machine.check(log, scenario)
         if verdict.accepted and len(log) >= _LEAST_ROWS:
-            verdict = replace(verdict, identifiability=identifiability(log, options.scenario))
-        verdicts[str(path)], digests[str(path)] = verdict, log.digest
+            verdict = replace(verdict, identifiability=_identifiability(log, options.scenario))
+        verdicts[str(path)], logs[str(path)] = verdict, log
     if options.json:
-        _print_json(verdicts, digests)
+        _print_json(verdicts, logs)
     else:
         for path, verdict in verdicts.items():
             rate = f"{verdict.rate_Hz:.4g} Hz" if verdict.rate_Hz else "no rate"
@@ -76,23 +82,40 @@ def run(options: argparse.Namespace) -> bool:
                 f._replace(severity=f"accepted {f.severity}") if f.name in verdict.accepted_findings else f
                 for f in verdict.findings
             ]
-            print_findings(title, marked, verdict.identifiability)
+            notes = logs[path].notes
+            lines = [f"read with {'; '.join(notes)}"] if notes else []
+            print_findings(title, marked, [*lines, *verdict.identifiability])
     _report_unused(accepted, list(verdicts.values()))
     return all(verdict.accepted for verdict in verdicts.values())
 
 
-def _print_json(verdicts: dict[str, Verdict], digests: dict[str, str]) -> None:
+def _identifiability(log: Log, scenario: str) -> tuple[str, ...]:
+    """Return what a log identifies, or why that is not known: the verdict on it stands."""
+    try:
+        return identifiability(log, scenario)
+    except InputError as error:
+        return (f"what it identifies is not known: {error}",)
+
+
+def _print_json(verdicts: dict[str, Verdict], logs: dict[str, Log]) -> None:
     """Print the verdict; with several logs the common one, and that of each log."""
-    logs_ = [
-        {"path": path, "log_sha256": digests[path], **verdict.figures()} for path, verdict in verdicts.items()
+    entries = [
+        {
+            "path": path,
+            "log_sha256": logs[path].digest,
+            "currents": logs[path].currents,
+            "notes": logs[path].notes,
+            **verdict.figures(),
+        }
+        for path, verdict in verdicts.items()
     ]
     print_json(
         {
-            "accepted": all(log["accepted"] for log in logs_),
-            "findings": [finding for log in logs_ for finding in log["findings"]],
-            "rows": sum(log["rows"] for log in logs_),
-            "rate_Hz": min((log["rate_Hz"] for log in logs_ if log["rate_Hz"]), default=None),
-            "logs": logs_,
+            "accepted": all(entry["accepted"] for entry in entries),
+            "findings": [finding for entry in entries for finding in entry["findings"]],
+            "rows": sum(entry["rows"] for entry in entries),
+            "rate_Hz": min((entry["rate_Hz"] for entry in entries if entry["rate_Hz"]), default=None),
+            "logs": entries,
         }
     )
 

@@ -6,10 +6,11 @@ import argparse
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
-from spheretwin.cli.common import keep_viewer
+from spheretwin.cli.common import keep_viewer, print_message
 from spheretwin.cli.options import Parser
 from spheretwin.machine.files import read
 from spheretwin.machine.link.frame_format import DEFAULT_FRAME, shipped
@@ -26,14 +27,18 @@ from spheretwin.scenario.sections import Scenario
 if TYPE_CHECKING:
     from spheretwin.viz.comparison.shadow_live import ShadowView
 
+T = TypeVar("T")
+
 
 def add_logs(parser: Parser, *, many: bool) -> None:
     """Declare logs, their columns, the scenario of the machine and its twin."""
     if many:
         parser.add_argument("logs", type=Path, nargs="*", metavar="LOG", help="Parquet, CSV or MCAP")
+        text = "column map of all logs, or one for each in their order"
     else:
         parser.add_argument("logs", nargs="?", metavar="LOG", help="Parquet, CSV or MCAP")
-    parser.add_argument("--columns", type=Path, metavar="MAP.toml", help="column map of the logs")
+        text = "column map of the log"
+    parser.add_argument("--columns", type=Path, action="append", default=[], metavar="MAP.toml", help=text)
     parser.add_argument("--scenario", metavar="SCENARIO", help="scenario of the machine (default: hold)")
     parser.add_argument("--twin", type=Path, metavar="TWIN.toml", help="identified parameters of the machine")
     parser.add_argument(
@@ -144,17 +149,43 @@ def read_logs(options: argparse.Namespace) -> list[Log]:
 
     paths = options.logs if isinstance(options.logs, list) else [Path(options.logs)]
     scenario = scenarios.load(scenario_of(options), changes_of(options))
-    return [_accepted(path, options, scenario) for path in paths]
+    maps = for_each_log(options.columns, len(paths), "--columns")
+    payloads = for_each_log(getattr(options, "payload", []), len(paths), "--payload")
+    logs = []
+    for path, column_map, payload_kg in zip(paths, maps, payloads, strict=True):
+        log = read(path, column_map, tuple(options.accept))
+        if payload_kg is not None:
+            log = replace(log, conditions={**log.conditions, "plant.payload_kg": payload_kg})
+        logs.append(_accepted(log, scenario))
+    return logs
 
 
-def _accepted(path: Path, options: argparse.Namespace, scenario: Scenario) -> Log:
-    log = read(path, options.columns, tuple(options.accept))
+def for_each_log(given: Sequence[T], count: int, flag: str) -> list[T | None]:
+    """Return the entry of a repeatable flag for each log: none, one for all, or one for each.
+
+    Raises
+    ------
+    InputError
+        Another number of entries.
+    """
+    if not given:
+        return [None] * count
+    if len(given) not in (1, count):
+        raise InputError(
+            f"command line: expected {flag} once or for {count} logs, received {len(given)} of them"
+        )
+    return [*given] * (count if len(given) == 1 else 1)
+
+
+def _accepted(log: Log, scenario: Scenario) -> Log:
+    if log.notes:
+        print_message(f"log {log.name}: read with {'; '.join(log.notes)}")
     verdict = check(log, scenario)
     if not verdict.accepted:
         names = [
             one.name for one in verdict.findings if one.severity == "error" and one.name not in log.accepted
         ]
         raise SpheretwinError(
-            f"log {path}: expected one that `spheretwin log check` accepts, received {', '.join(names)}"
+            f"log {log.name}: expected one that `spheretwin log check` accepts, received {', '.join(names)}"
         )
     return log

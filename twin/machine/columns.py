@@ -118,8 +118,8 @@ class Channels(BaseModel):
             given = getattr(self, field)
             if len(given) not in (0, 1, len(names)):
                 raise InputError(
-                    f"log {table.name}: expected {self.section}.{field} once or for {len(names)} columns, received"
-                    f" {len(given)}"
+                    f"log {table.name}: expected {self.section}.{field} once or for {len(names)} columns,"
+                    f" received {len(given)}"
                 )
             entries[field] = [*given] * len(names) if len(given) == 1 else given
         entries["unit"] = entries["unit"] or [_stated_unit(table, name, units) for name in names]

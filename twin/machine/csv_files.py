@@ -221,9 +221,9 @@ def _cells(line: str, delimiter: str) -> list[str]:
 
 _UNITS = {
     "s", "sec", "seconds", "second", "ms", "msec", "us", "µs", "μs", "ns", "rad", "mrad", "deg", "°",
-    "degree", "degrees", "turn", "turns", "rev", "a", "ma", "amp", "amps", "ampere", "v", "mv", "volt", "volts", "n·m",
-    "nm", "mnm", "n.m", "n*m", "rad/s", "deg/s", "°/s", "rpm", "hz", "1", "-", "%", "count", "counts", "°c",
-    "degc", "c", "k", "w", "bool", "int",
+    "degree", "degrees", "turn", "turns", "rev", "a", "ma", "amp", "amps", "ampere", "v", "mv", "volt",
+    "volts", "n·m", "nm", "mnm", "n.m", "n*m", "rad/s", "deg/s", "°/s", "rpm", "hz", "1", "-", "%",
+    "count", "counts", "°c", "degc", "c", "k", "w", "bool", "int",
 }  # fmt: skip
 
 

@@ -8,6 +8,7 @@ import pytest
 
 import spheretwin as st
 from spheretwin import machine
+from spheretwin.models.base.errors import InputError
 from spheretwin.models.telemetry import joint_states
 from tests.twin.cli.calls import call, refusal, succeeded
 from tests.twin.machine.logs import MULTISINE, multisine
@@ -98,6 +99,16 @@ def test_a_column_map_is_applied(tmp_path):
     assert "expected a column map (--columns MAP.toml)" in refusal("log", "check", path)
 
 
+def test_a_failure_of_identifiability_does_not_replace_the_verdict(files, monkeypatch):
+    def fail(*_):
+        raise InputError("expected 0.2 s without gaps")
+
+    monkeypatch.setattr("spheretwin.cli.log.identifiability", fail)
+    result = call("log", "check", files[0])
+    assert (result.code, result.out.splitlines()[0].split(":")[1]) == (0, " accepted, 1500 rows, 1000 Hz")
+    assert "what it identifies is not known: expected 0.2 s without gaps" in result.out
+
+
 def test_a_review_exports_the_same_telemetry(files, tmp_path):
     out = tmp_path / "run.parquet"
     succeeded("review", files[2], "--export", out)
@@ -119,7 +130,7 @@ def test_a_review_exports_joint_states(files, tmp_path):
         ("telemetry/effort/q_rad_alpha", "q_rad", 0),
     ):
         assert np.array_equal(columns[name], run[signal][:, place])
-    assert len(columns) == run.values.shape[1]
+    assert len(columns) == run.values.shape[1] - 1  # without the time
     assert json.loads(metadata["scenario"])["name"] == "hold"
     assert np.array_equal(machine.read(out).angle_rad, run["q_measured_rad"])
 

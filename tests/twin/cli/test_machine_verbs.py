@@ -1,12 +1,16 @@
 """Verbs of a real machine: their output, files, JSON and exit codes."""
 
+import argparse
 import json
 
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
+from spheretwin.cli.log_options import read_logs
 from spheretwin.machine import read, write
+from spheretwin.machine.twin_file import read_uncertainty
+from spheretwin.models.base.errors import InputError
 from spheretwin.models.telemetry.table import read_parquet
 from spheretwin.scenario.writing import command_words
 from spheretwin.viz.recording.live import LivePage
@@ -60,6 +64,44 @@ def test_identify_refuses_and_writes_nothing(log, tmp_path):
     assert "torque_scale" in result.json["refused"][0]["parameters"]
     assert "cannot be distinguished" in result.err
     assert not twin.exists()
+
+
+def test_a_data_sheet_that_is_right_gives_a_covariance(log, tmp_path):
+    twin = tmp_path / "twin.toml"
+    words = ["--parameter", "plant.coulomb_Nm", "--out", twin, "--json"]
+    result = call("identify", log, *MACHINE, *words)
+    assert (result.code, result.json["accepted"], result.json["nothing_to_correct"]) == (0, True, True)
+    assert "nothing to correct" in result.err
+    uncertainty = read_uncertainty(twin)
+    low, high = result.json["parameters"]["plant.coulomb_Nm.0"]["interval"]
+    assert 4 * uncertainty.covariance[0, 0] ** 0.5 == pytest.approx(high - low, rel=0.1)
+
+
+def test_each_log_has_a_map_and_a_payload(tmp_path):
+    raw = changing_log(1.0, seed=3)
+    paths, maps = [tmp_path / name for name in ("a.csv", "b.csv")], [tmp_path / name for name in "ab"]
+    for path, column_map, unit, factor in zip(paths, maps, ("rad", "deg"), (1.0, 180 / np.pi), strict=True):
+        names = ["t", *(f"{unit}{axis}" for axis in "xyz"), *(f"{unit}_{group}" for group in range(18))]
+        rows = np.column_stack([raw.t_s, factor * raw.angle_rad, raw.current_A])
+        np.savetxt(path, rows, delimiter=";", header=";".join(names), comments="")
+        column_map.write_text(
+            f'time.column = "t"\nangles = {{columns = ["{unit}x", "{unit}y", "{unit}z"], unit = "{unit}"}}\n'
+            f'currents.columns = ["{unit}_*"]\nconditions.plant.payload_kg = 0.2\n'
+        )
+    given = {
+        "logs": paths,
+        "columns": maps,
+        "payload": [0.1, 0.05],
+        "accept": ["lack-of-excitation"],
+        "fields": [],
+    }
+    options = argparse.Namespace(**given, scenario=SCENARIO, twin=None)
+    logs = read_logs(options)
+    assert [log.conditions["plant.payload_kg"] for log in logs] == [0.1, 0.05]
+    assert np.allclose(logs[0].angle_rad, logs[1].angle_rad, atol=1e-14)
+    options.columns = maps * 2
+    with pytest.raises(InputError, match="expected --columns once or for 2 logs, received 4 of them"):
+        read_logs(options)
 
 
 def test_a_twin_is_identified_validated_and_simulated(log, tmp_path):
