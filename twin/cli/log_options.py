@@ -13,9 +13,10 @@ from typing import TYPE_CHECKING, Any, TypeVar
 from spheretwin.cli.common import keep_viewer, print_message
 from spheretwin.cli.options import Parser
 from spheretwin.machine.files import read
+from spheretwin.machine.link import frame_format
 from spheretwin.machine.link.frame_format import DEFAULT_FRAME, shipped
 from spheretwin.machine.link.stream import is_address, played, streamed
-from spheretwin.machine.log import Log
+from spheretwin.machine.log import COMMANDED, MEASURED, Log
 from spheretwin.machine.model import Model
 from spheretwin.machine.twin_file import read_twin
 from spheretwin.machine.verdict import check
@@ -78,6 +79,12 @@ def add_stream(parser: Parser) -> None:
         f" {', '.join(shipped())}, or a .toml file (default: {DEFAULT_FRAME})",
     )
     parser.add_argument(
+        "--currents",
+        choices=(COMMANDED, MEASURED),
+        help="currents of a stream: sent to the amplifiers and held, or measured in the coils (default: as"
+        " the frames state)",
+    )
+    parser.add_argument(
         "--live",
         action="store_true",
         help="follow the data in a viewer on 127.0.0.1; a file is played at the pace of its times",
@@ -85,8 +92,23 @@ def add_stream(parser: Parser) -> None:
 
 
 def file_log(options: argparse.Namespace) -> Log | None:
-    """Return the log of a file, which a check has accepted; None if a stream is named."""
-    return None if is_address(options.logs) else read_logs(options)[0]
+    """Return the log of a file, which a check has accepted; None if a stream is named.
+
+    Raises
+    ------
+    InputError
+        The log cannot be read, or a flag does not belong to a file or a stream.
+    """
+    if not is_address(options.logs):
+        if options.currents:
+            raise InputError("command line: expected --currents with a stream, received a file")
+        return read_logs(options)[0]
+    if not (options.currents or frame_format.load(options.frame).currents):
+        print_message(
+            f"warning: frame {options.frame}: expected currents = {COMMANDED!r} or {MEASURED!r} in it or"
+            f" --currents, received none: taken as {MEASURED}"
+        )
+    return None
 
 
 def known_fields(options: argparse.Namespace, log: Log | None) -> dict[str, Any]:
@@ -99,7 +121,7 @@ def blocks(
 ) -> Iterator[Log]:
     """Return the blocks of a stream, or the log of a file: with a live view as time goes by, else at once."""
     if log is None:
-        return streamed(options.logs, groups, options.frame, stop_requested=stop_requested)
+        return streamed(options.logs, groups, options.frame, options.currents, stop_requested=stop_requested)
     return played(log, stop_requested=stop_requested) if options.live else iter([log])
 
 

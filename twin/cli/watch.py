@@ -17,6 +17,7 @@ from spheretwin.cli.log_options import (
     scenario_of,
 )
 from spheretwin.cli.options import Parser, number
+from spheretwin.machine.log import Log
 from spheretwin.machine.model import model_of
 from spheretwin.machine.state_estimation import Shadow, signals
 from spheretwin.machine.watching import WATCHED, Watch, WatchSettings
@@ -59,7 +60,7 @@ def run(options: argparse.Namespace) -> bool:
     known = known_fields(options, log)
     model = model_of(scenario, known)
     watch = Watch(scenario, known, options.parameter or WATCHED, settings)
-    count, seconds = 0, 0.0
+    count, seconds, warned = 0, 0.0, False
     with (
         interruptible() as stop_requested,
         live_view(options, model, signals(False), stop_requested, watched=True) as view,
@@ -67,6 +68,9 @@ def run(options: argparse.Namespace) -> bool:
         estimator = Shadow(model) if view else None
         for block in blocks(options, log, model.groups, stop_requested):
             alarms = watch.advance(block)
+            if not warned and watch.variance > MOST_VARIANCE:
+                warned = True
+                print_message(_warning(watch.variance, settings, block, is_stream=log is None))
             for alarm in alarms:
                 of_log = {"log_sha256": log and log.digest, "accepted_findings": list(block.accepted)}
                 print_json({**alarm._asdict(), **of_log})
@@ -80,15 +84,19 @@ def run(options: argparse.Namespace) -> bool:
             f"watch: expected more than {settings.calibration_s + settings.window_s:g} s of data, of which"
             f" the first {settings.calibration_s:g} s measure the noise, received {seconds:.3g} s"
         )
-    if watch.variance > MOST_VARIANCE:
-        print_message(
-            f"warning: in the first {settings.calibration_s:g} s the mean square of the residuals is"
-            f" {watch.variance:.3g} times that of the noise: the twin lacks something that the machine has;"
-            " validate it first"
-        )
     if not options.json:
         print_message(
             f"watch: alarms: {count} in {seconds:.3g} s; without a change, fewer than"
             f" {options.false_alarms:g} in an hour on average"
         )
     return not count
+
+
+def _warning(variance: float, settings: WatchSettings, block: Log, *, is_stream: bool) -> str:
+    """Return the warning about a twin that does not explain the start of a log or a stream."""
+    others = f", or the currents are not {block.currents} (--currents)" if is_stream else ""
+    return (
+        f"warning: in the first {settings.calibration_s:g} s the mean square of the residuals is"
+        f" {variance:.3g} times that of the noise: the twin lacks something that the machine has{others};"
+        " validate it first"
+    )

@@ -2,6 +2,7 @@
 
 import argparse
 import json
+from dataclasses import replace
 
 import numpy as np
 import pyarrow.parquet as pq
@@ -165,6 +166,20 @@ def test_watch_prints_a_line_of_json_for_each_alarm(tmp_path):
     assert alarms[0]["log_sha256"] == read(path).digest
     assert alarms[0]["accepted_findings"] == ["jitter"]
     assert "fewer than 0.1 in an hour" in result.err
+
+
+def test_a_stream_that_the_twin_does_not_explain_warns_before_its_first_alarm(monkeypatch):
+    log = changing_log(2.5, (2.1, "plant.coulomb_Nm", [0.02] * 3), seed=2)
+    log = replace(log, currents="measured", current_A=np.roll(log.current_A, 12, axis=0))  # late by 12 ms
+    lines = []
+    monkeypatch.setattr("spheretwin.cli.watch.print_json", lambda alarm: lines.append(alarm["what"]))
+    monkeypatch.setattr("spheretwin.cli.watch.print_message", lines.append)
+    blocks = [log.rows(first, first + 20) for first in range(0, len(log), 20)]
+    monkeypatch.setattr("spheretwin.cli.log_options.streamed", lambda *_, **__: iter(blocks))
+    assert call("watch", "udp://:0", *MACHINE).code == 1
+    assert "times that of the noise" in lines[0]
+    assert "or the currents are not measured (--currents)" in lines[0]
+    assert len(lines) > 2  # false alarms, and the summary
 
 
 @pytest.fixture

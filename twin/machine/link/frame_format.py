@@ -174,6 +174,10 @@ class Frames(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
 
     description: str = Field("", description="machine and purpose")
+    currents: Literal["commanded", "measured"] | None = Field(
+        None,
+        description="currents of a measurement: sent to the amplifiers and held, or measured in the coils",
+    )
     measurement: FrameFormat = Field(description="from the machine")
     command: FrameFormat | None = Field(None, description="to the machine; none for one that only reports")
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,6 +41,7 @@ def streamed(
     address: str,
     groups: int,
     frame: str = DEFAULT_FRAME,
+    currents: Literal["commanded", "measured"] | None = None,
     *,
     stop_requested: Callable[[], bool] = lambda: False,
     now: Callable[[], float] = time.monotonic,
@@ -54,6 +56,8 @@ def streamed(
         Coil groups of the machine.
     frame : str
         Shipped name or TOML file of the frames.
+    currents : str, optional
+        Kind of the currents: default that of the frames, ``measured`` if they state none.
 
     Raises
     ------
@@ -62,7 +66,8 @@ def streamed(
     SpheretwinError
         The stream ended before the first block was complete.
     """
-    format_ = frame_format.load(frame).measurement
+    description = frame_format.load(frame)
+    format_, kind = description.measurement, currents or description.currents or MEASURED
     if lacking := [name for name in ("time", "angle", "current") if not format_.has(name)]:
         raise InputError(f"frame {frame}: expected measurements with {', '.join(lacking)}, received none")
     transport = open_transport(address, listening=True)
@@ -79,10 +84,10 @@ def streamed(
             elif transport.is_closed or (heard_s is not None and now() - heard_s > SILENCE_s):
                 ended = True
             if len(frames) >= BLOCK_ROWS:
-                yield _log(frames, address)
+                yield _log(frames, kind, address)
                 yielded, frames = yielded + len(frames), []
         if len(frames) > 1:
-            yield _log(frames, address)
+            yield _log(frames, kind, address)
         elif not yielded:
             raise SpheretwinError(
                 f"stream {address}: expected frames, received {decoder.counts.corrupt} texts that are none"
@@ -108,11 +113,11 @@ def played(
         yield block
 
 
-def _log(frames: list[Values], name: str) -> Log:
+def _log(frames: list[Values], kind: Literal["commanded", "measured"], name: str) -> Log:
     times, currents, angles = (
         np.array([frame[field] for frame in frames]) for field in ("time", "current", "angle")
     )
-    return Log(times.ravel(), currents, angles, MEASURED, name)
+    return Log(times.ravel(), currents, angles, kind, name)
 
 
 class RunningShadow:

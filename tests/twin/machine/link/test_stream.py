@@ -36,14 +36,14 @@ def frames_of(log, *, end=True):
         yield codec.encode({**values, "temperature": 20.0})
 
 
-def received(script, *contents, closed=False):
+def received(script, *contents, closed=False, currents=None):
     """Blocks of a stream of bytes, which its sender may close."""
     script.datagrams, script.is_closed = False, closed
     for content in contents:
         script.plan(content)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("spheretwin.machine.link.stream.open_transport", lambda *_, **__: script)
-        return list(streamed("-", 18, now=script.now))
+        return list(streamed("-", 18, currents=currents, now=script.now))
 
 
 def test_a_stream_is_the_log_of_its_frames(log, model):
@@ -53,6 +53,19 @@ def test_a_stream_is_the_log_of_its_frames(log, model):
     running = Shadow(model)
     values = np.vstack([running.advance(block).values for block in received(Script(), *frames_of(log))])
     assert np.array_equal(values, shadow(log, model).telemetry.values)
+
+
+@pytest.mark.parametrize(("frames", "given", "kind"), [
+    ("measured", None, "measured"), ("commanded", None, "commanded"), (None, None, "measured"),
+    ("measured", "commanded", "commanded"), (None, "commanded", "commanded"),
+])  # fmt: skip
+def test_a_stream_has_the_kind_of_currents_that_it_or_its_reader_states(
+    log, frames, given, kind, monkeypatch
+):
+    description = frame_format.load("spheretwin").model_copy(update={"currents": frames})
+    monkeypatch.setattr(frame_format, "load", lambda _: description)
+    blocks = received(Script(), b"".join(frames_of(log)), currents=given)
+    assert {block.currents for block in blocks} == {kind}
 
 
 def test_a_stream_ends_with_its_sender(log):
