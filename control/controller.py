@@ -13,6 +13,7 @@ from spheretwin.control import law as laws
 from spheretwin.control.allocation.bounded import SCRATCH_ROWS
 from spheretwin.control.applied_torque import AppliedTorque, estimate_applied_torque
 from spheretwin.control.compensators import Compensators, apply_compensators
+from spheretwin.control.compensators.prediction import MEASURED
 from spheretwin.control.estimators.estimator import Estimator, estimator_at
 from spheretwin.control.manual_currents import Manual, command_manual_currents
 from spheretwin.control.supervision.enabled_groups import EnabledGroups, mask_disabled_groups
@@ -50,6 +51,8 @@ class Supervision(Record):
 class ControllerData(Record):
     """Data of a controller, except those of its law and its estimator; it has no access to the plant."""
 
+    reference: Array = field("desired angle, rate, acceleration as rows; the law may write", "", (3, 3))
+    measurement: Array = field("angle, rate, torque as rows; those of `predict`", "", (2 * MEASURED, 3))
     estimator_on: bool = field("whether rates are estimated; otherwise the law receives the measured rates")
     pose: Array = field("pose that the law receives", "rad", 3)
     rates: Array = field("rates that the law receives", "rad/s", 3)

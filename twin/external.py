@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from spheretwin.control.controller import Controller
 from spheretwin.control.supervision.watchdog import Reason, trip
 from spheretwin.electronics.drive_chain import DriveChain
-from spheretwin.loop import INTERRUPTED, NO_EXTERNAL, External, Scratch
+from spheretwin.loop import INTERRUPTED, NO_EXTERNAL, External
 from spheretwin.models.base.compiled import COMPILES, uncompiled
 from spheretwin.plant.plant_tick import GOING, Plant
 
@@ -78,8 +78,6 @@ class Connection:
     part : ExternalController or ExternalPlant, optional
     controller : Controller
     plant : Plant
-    scratch : Scratch
-        Buffers of the loop.
 
     Attributes
     ----------
@@ -87,9 +85,8 @@ class Connection:
         Argument of the loop. It has only addresses: this object keeps the functions alive.
     """
 
-    def __init__(self, part: Any, controller: Controller, plant: Plant, scratch: Scratch) -> None:
+    def __init__(self, part: Any, controller: Controller, plant: Plant) -> None:
         self._part, self._data, self._plant = part, controller.data, plant
-        self._measured = scratch.measurement
         self._error: BaseException | None = None
         self.external = NO_EXTERNAL
         if part is None:
@@ -125,8 +122,8 @@ class Connection:
         plant, data = self._plant, self._data[0]
         sensors, drive = plant.current_sensors, plant.drive
         measurement = Measurement(
-            self._measured[0],
-            None if data.estimator_on else self._measured[1],
+            data.measurement[0],
+            None if data.estimator_on else data.measurement[1],
             sensors.measured_A if sensors.on else plant.current,
             drive.coil.temperature_degC.max() if isinstance(drive, DriveChain) else None,
         )

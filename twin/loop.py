@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 
 from spheretwin.control import allocation as allocations
 from spheretwin.control import law as laws
-from spheretwin.control.controller import NO_TORQUE, Controller, control_tick
+from spheretwin.control.compensators.prediction import MEASURED
+from spheretwin.control.controller import NO_TORQUE, Controller, ControllerData, control_tick
 from spheretwin.control.estimators import estimator as estimators
 from spheretwin.control.law import Law
 from spheretwin.control.supervision.watchdog import GO, Reason, count_rundown, replace_invalid, trip
@@ -86,14 +87,6 @@ class External(NamedTuple):
 NO_EXTERNAL = External(0, 0, np.zeros(0), np.zeros(3))
 
 
-class Scratch(NamedTuple):
-    """Buffers for intermediate values."""
-
-    reference: NDArray[np.float64]  # (3, 3), passed to the law
-    measurement: NDArray[np.float64]  # (3, 3), or (6, 3) if the law also receives a prediction
-    fresh: NDArray[np.float64]  # (3,) 1 if the measurement of an angle is new
-
-
 @allocation_free
 def loop(
     inputs: Inputs,
@@ -103,7 +96,7 @@ def loop(
     controller: Controller,
     stages: Stages,
     law_signals: int,
-    scratch: Scratch,
+    fresh: Array,
     external: External,
     log: Array,
 ) -> tuple[int, int]:
@@ -122,8 +115,8 @@ def loop(
         Sensors, plant and channels.
     law_signals : int
         First column of the law's signals.
-    scratch : Scratch
-        The content is irrelevant.
+    fresh : (3,) array
+        1 if the measurement of an angle is new, 0 if it repeats the last one: the sensors write it.
     external : External
         Parts outside of this process.
     log : (ticks, width) array
@@ -134,8 +127,8 @@ def loop(
     tuple of int
         Rows written, and `GOING`, `LEFT_WORKSPACE`, `DIVERGED`, `FAILSAFE` or `INTERRUPTED`.
     """
-    reference, measurement = scratch.reference, scratch.measurement
     data, manual_currents = controller.data[0], inputs.manual_A.shape[1]
+    reference, measurement = data.reference[:], data.measurement[: measured_rows(data)]
     watchdog, detector = data.supervision.watchdog, data.supervision.detector
     groups = stages.current.shape[0]
     first_current, scale = CURRENT_COMMAND + groups, CURRENT_COMMAND + 3 * groups
@@ -161,9 +154,7 @@ def loop(
             if code != GOING:
                 return tick, code
         command = row[CURRENT_COMMAND:first_current]
-        share = control_tick(
-            controller, law, allocate, estimate, t, reference, measurement, scratch.fresh, command
-        )
+        share = control_tick(controller, law, allocate, estimate, t, reference, measurement, fresh, command)
         if share == NO_TORQUE:
             return tick, DIVERGED
         row[scale] = share
@@ -196,6 +187,12 @@ def loop(
         if status != GOING:
             return tick + 1, status
     return log.shape[0], GOING
+
+
+@allocation_free
+def measured_rows(data: ControllerData) -> int:
+    """Return the rows of a measurement that the law receives."""
+    return 2 * MEASURED if data.compensators.prediction.on else MEASURED
 
 
 @allocation_free

@@ -137,21 +137,20 @@ class Runtime:
             check_bounds=scenario.controller.check_bounds,
         )
         self._may_raise = is_user_law(law) or scenario.controller.check_bounds
-        self._scratch = loops.Scratch(
-            np.empty((3, 3)), np.empty((6 if scenario.controller.prediction.on else 3, 3)), buffers.fresh
-        )
+        self._fresh = buffers.fresh
         if COMPILES and is_python_law(law):
             self._python_law = _PYTHON_LAW(self._call_law(step_that_writes(law)))
             self._data["python_law"] = ctypes.cast(self._python_law, ctypes.c_void_p).value or 0
-        self._connection = Connection(external, self._controller, self._plant, self._scratch)
+        self._connection = Connection(external, self._controller, self._plant)
 
     def _call_law(self, step: Callable[..., None]) -> Callable[[float], None]:
         """Return a function of the time of a tick that calls a law in plain Python."""
-        given = self._scratch[0], self._scratch[1], self._controller.parameters, self._controller.memory
-        torque_q = self._data["torque_q"][0]
+        data, own = self._data[0], (self._controller.parameters, self._controller.memory)
+        measurement = data.measurement[: loops.measured_rows(data)]
+        given = data.reference, measurement, *own, data.torque_q
 
         def call(t_s: float) -> None:
-            step(t_s, *given, torque_q)
+            step(t_s, *given)
 
         return call
 
@@ -185,7 +184,7 @@ class Runtime:
             self._controller,
             stages,
             self.row_width - width(self.law.signals),
-            self._scratch,
+            self._fresh,
             self._connection.external,
         )
         entry = for_types_of(loops.loop, NO_INPUTS, *parts, np.empty((0, self.row_width)))
