@@ -15,19 +15,19 @@ acceleration of the point at constant hinge rates. No tensor and no derivative o
 from __future__ import annotations
 
 from math import asin, atan2
-from typing import Any, NamedTuple
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from spheretwin.models.base.compiled import inlined
+from spheretwin.models.base.compiled import allocation_free, inlined
+from spheretwin.models.base.record import Record, Rows, field
 from spheretwin.models.kinematics import Triple, generalised_torque, triple, turns
 from spheretwin.models.lagrangian import InertiaEntries, acceleration_entries, inertia_entries, solve_inertia
 from spheretwin.models.mjcf import gravity
 
 Array = NDArray[np.float64]
-Rows = tuple[Triple, Triple, Triple]
+Triples = tuple[Triple, Triple, Triple]
 Frame = tuple[Triple, Triple, Triple, Triple]  # axes x, y, z and origin
 
 _ZERO: Triple = (0.0, 0.0, 0.0)
@@ -36,25 +36,39 @@ _TETRAHEDRON = np.array([[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]])
 _ROUNDING = 1e-12  # of axes that a compiler normalises
 
 
-class JointChain(NamedTuple):
+class JointChain(Record):
     """Joint of a machine with the hinges alpha, beta, gamma."""
 
-    axes: Rows  # unit vectors along the hinges at the pose 0
-    points: Rows  # m, a point of each axis
-    masses: Array  # (3, 4, 4) of outer ring, inner ring, rotor with payload: x, y, z in m, mass in kg
-    gravity: Triple  # m/s², stator frame
+    on: bool = field("whether the equations of a general joint apply; 0: closed forms of an ideal one")
+    is_tilted: bool = field("whether the hinges are not along x, y, z through the joint centre")
+    inertia: Array = field("principal moments of an ideal joint, with the payload", "kg·m²", 3)
+    weight_moment: float = field("weight of the payload times its height, of an ideal joint", "N·m")
+    axes: Array = field("unit vectors along the hinges at the pose 0", "", (3, 3))
+    points: Array = field("point of each axis", "m", (3, 3))
+    masses: Array = field("x, y, z (m) and mass (kg) in outer ring, inner ring, rotor", "", (3, 4, 4))
+    gravity: Array = field("gravity in the stator frame", "m/s²", 3)
 
-    @property
-    def has_ideal_hinges(self) -> bool:
-        """True if the hinges are along x, y, z through the joint centre."""
-        return np.allclose((*self.axes, *self.points), (*np.eye(3), *np.zeros((3, 3))), 0, _ROUNDING)
 
-
-def read_chain(model: mujoco.MjModel) -> JointChain:
-    """Read the joint of a compiled model with three hinges in series.
+def fill_ideal(joints: Rows, inertia: ArrayLike, weight_moment: ArrayLike = 0.0) -> None:
+    """Fill joints with hinges along x, y, z through the centre of mass, and rings without mass.
 
     Parameters
     ----------
+    joints : array of JointChain
+    inertia : (3,) or (n, 3) array, kg·m²
+        Principal moments about the joint centre, payload included.
+    weight_moment : float or (n,) array, N·m
+        Weight of the payload times its height.
+    """
+    joints["inertia"], joints["weight_moment"], joints["axes"] = inertia, weight_moment, np.eye(3)
+
+
+def fill_chain(joints: Rows, model: mujoco.MjModel) -> None:
+    """Fill joints with the hinges, masses and gravity of a compiled model with three hinges in series.
+
+    Parameters
+    ----------
+    joints : array of JointChain
     model : MjModel
         Each moving body belongs to the last hinge before it.
     """
@@ -75,43 +89,55 @@ def read_chain(model: mujoco.MjModel) -> JointChain:
         squares, axes = np.linalg.eigh(second[last] / mass[last] - np.outer(centre, centre))
         masses[last, :, :3] = centre + _TETRAHEDRON * np.sqrt(np.maximum(squares, 0)) @ axes.T
         masses[last, :, 3] = mass[last] / 4
-    hinges: Any = [tuple(map(tuple, vectors.tolist())) for vectors in (data.xaxis, data.xanchor)]
-    return JointChain(hinges[0], hinges[1], masses, gravity(model.opt))
+    is_ideal = np.allclose((data.xaxis, data.xanchor), (np.eye(3), np.zeros((3, 3))), 0, _ROUNDING)
+    joints["on"], joints["is_tilted"] = 1, not is_ideal
+    joints["axes"], joints["points"], joints["masses"] = data.xaxis, data.xanchor, masses
+    joints["gravity"] = gravity(model.opt)
 
 
 @inlined
-def inertia_at(chain: JointChain | None, inertia: Array, q: Triple) -> InertiaEntries:
-    """Return the inertia matrix at a pose (rad) of a general joint or, if chain is None, an ideal one.
+def inertia_at(joint: JointChain, inertia: Triple, q: Triple) -> InertiaEntries:
+    """Return the inertia matrix of a joint at a pose (rad).
 
     `inertia` (3,) has the principal moments of the ideal joint, kg·m².
     """
-    # Numba omits the branch that the type of an argument excludes.
-    if chain is None:
-        return inertia_entries(turns(q), triple(inertia))
-    return equations(chain, q, _ZERO)[0]
+    return general_inertia(joint, q) if joint.on else inertia_entries(turns(q), inertia)
 
 
 @inlined
 def acceleration_at(
-    chain: JointChain | None, inertia: Array, weight_moment: float, q: Triple, qdot: Triple, torque: Triple
+    joint: JointChain, inertia: Triple, weight_moment: float, q: Triple, qdot: Triple, torque: Triple
 ) -> Triple:
-    """Return the hinge accelerations (rad/s²) of a general joint or, if chain is None, an ideal one.
+    """Return the hinge accelerations (rad/s²) of a joint.
 
     `inertia` and `weight_moment` are those of `acceleration`, for the ideal joint alone.
     """
-    if chain is None:
-        return acceleration_entries(turns(q), qdot, torque, triple(inertia), weight_moment)
-    M, bias = equations(chain, q, qdot)
-    return solve_inertia(M, _less(torque, bias), chain)
+    if joint.on:
+        return general_acceleration(joint, q, qdot, torque)
+    return acceleration_entries(turns(q), qdot, torque, inertia, weight_moment)
+
+
+# Not inlined: a rotor with an ideal joint does not compile them into each place, nor executes them.
+@allocation_free
+def general_inertia(joint: JointChain, q: Triple) -> InertiaEntries:
+    """Return the inertia matrix of a general joint at a pose (rad)."""
+    return equations(joint, q, _ZERO)[0]
+
+
+@allocation_free
+def general_acceleration(joint: JointChain, q: Triple, qdot: Triple, torque: Triple) -> Triple:
+    """Return the hinge accelerations (rad/s²) of a general joint."""
+    M, bias = equations(joint, q, qdot)
+    return solve_inertia(M, _less(torque, bias), True)
 
 
 @inlined
-def equations(chain: JointChain, q: Triple, qdot: Triple) -> tuple[InertiaEntries, Triple]:
+def equations(joint: JointChain, q: Triple, qdot: Triple) -> tuple[InertiaEntries, Triple]:
     """Return the equations of motion of a general joint.
 
     Parameters
     ----------
-    chain : JointChain
+    joint : JointChain
     q, qdot : (3,) tuples, rad and rad/s
         Pose and hinge rates.
 
@@ -121,16 +147,16 @@ def equations(chain: JointChain, q: Triple, qdot: Triple) -> tuple[InertiaEntrie
         Inertia matrix, and the torque on the hinges that holds the rates: Coriolis, centrifugal and gravity
         torque. A positive entry requires a positive torque, as on the left side of (1).
     """
-    frames, axes, points = chain_at(chain, q)
+    frames, axes, points = chain_at(joint, q)
     aa = bb = cc = ab = ac = bc = bias_a = bias_b = bias_c = 0.0
-    w, w_rate, a = _ZERO, _ZERO, _less(_ZERO, chain.gravity)  # of the present body; at the origin of S
+    w, w_rate, a = _ZERO, _ZERO, _less(_ZERO, joint.gravity)  # of the present body; at the origin of S
     for body in range(3):
         e, p = axes[body], points[body]
         at_hinge, own = _acceleration(w, w_rate, a, p), _scaled(e, qdot[body])
         w_rate, w = _sum(w_rate, _cross(w, own)), _sum(w, own)
         a = _less(at_hinge, _acceleration(w, w_rate, _ZERO, p))
         for k in range(4):
-            y = chain.masses[body, k]
+            y = joint.masses[body, k]
             m, x = y[3], _place(frames[body], (y[0], y[1], y[2]))
             force = _scaled(_acceleration(w, w_rate, a, x), m)
             J_a = _cross(axes[0], _less(x, points[0]))
@@ -143,13 +169,13 @@ def equations(chain: JointChain, q: Triple, qdot: Triple) -> tuple[InertiaEntrie
     return InertiaEntries(aa, bb, cc, ab, ac, bc), (bias_a, bias_b, bias_c)
 
 
-@inlined
-def hinge_torque(chain: JointChain, q: Array, torque_S: Array, torque_q: Array) -> None:
+@allocation_free
+def hinge_torque(joint: JointChain, q: Array, torque_S: Array, torque_q: Array) -> None:
     """Compute the torque on each hinge of a torque on the rotor: its component along the axis.
 
     Parameters
     ----------
-    chain : JointChain
+    joint : JointChain
     q : (3,) array, rad
         Pose.
     torque_S : (3,) array, N·m
@@ -157,25 +183,25 @@ def hinge_torque(chain: JointChain, q: Array, torque_S: Array, torque_q: Array) 
     torque_q : (3,) array, N·m
         Result, on (alpha, beta, gamma).
     """
-    _, axes, _ = chain_at(chain, triple(q))
+    _, axes, _ = chain_at(joint, triple(q))
     for i in range(3):
         torque_q[i] = _dot(axes[i], triple(torque_S))
 
 
-@inlined
-def ideal_pose(chain: JointChain, q: Array, qdot: Array, ideal_q: Array, ideal_qdot: Array) -> None:
+@allocation_free
+def ideal_pose(joint: JointChain, q: Array, qdot: Array, ideal_q: Array, ideal_qdot: Array) -> None:
     """Compute the angles of ideal hinges with the orientation of a general joint, and their rates.
 
     Parameters
     ----------
-    chain : JointChain
+    joint : JointChain
     q, qdot : (3,) arrays, rad and rad/s
         Pose and rates of the general joint.
     ideal_q, ideal_qdot : (3,) arrays, rad and rad/s
         Result: `rotation` of the first is the orientation of the rotor, `rate_jacobian` times the second its
         angular velocity. Singular at +-90 degrees of the second angle.
     """
-    (_, _, (X, Y, Z, _)), (e_a, e_b, e_c), _ = chain_at(chain, triple(q))
+    (_, _, (X, Y, Z, _)), (e_a, e_b, e_c), _ = chain_at(joint, triple(q))
     ideal_q[0], ideal_q[1], ideal_q[2] = atan2(-Z[1], Z[2]), asin(Z[0]), atan2(-Y[0], X[0])
     at = turns(triple(ideal_q))
     x, y, z = _sum(_scaled(e_a, qdot[0]), _sum(_scaled(e_b, qdot[1]), _scaled(e_c, qdot[2])))
@@ -185,39 +211,40 @@ def ideal_pose(chain: JointChain, q: Array, qdot: Array, ideal_q: Array, ideal_q
 
 
 @inlined
-def update_ideal_motion(
-    chain: JointChain | None, q: Array, qdot: Array, ideal_q: Array, ideal_qdot: Array
-) -> None:
-    """Compute `ideal_pose` of a general joint; the results stay as they are if chain is None."""
-    if chain is not None:
-        ideal_pose(chain, q, qdot, ideal_q, ideal_qdot)
-
-
-@inlined
-def torque_on_hinges(chain: JointChain | None, q: Array, torque_S: Array, torque_q: Array) -> None:
-    """Compute the torque on the hinges of a torque on the rotor, as `hinge_torque`, of any joint."""
-    if chain is None:
-        generalised_torque(q, torque_S, torque_q)
+def update_ideal_motion(joint: JointChain, q: Array, qdot: Array, ideal_q: Array, ideal_qdot: Array) -> None:
+    """Compute `ideal_pose` of any joint."""
+    if joint.is_tilted:
+        ideal_pose(joint, q, qdot, ideal_q, ideal_qdot)
     else:
-        hinge_torque(chain, q, torque_S, torque_q)
+        for i in range(3):
+            ideal_q[i], ideal_qdot[i] = q[i], qdot[i]
 
 
 @inlined
-def chain_at(chain: JointChain, q: Triple) -> tuple[tuple[Frame, Frame, Frame], Rows, Rows]:
+def torque_on_hinges(joint: JointChain, q: Array, torque_S: Array, torque_q: Array) -> None:
+    """Compute the torque on the hinges of a torque on the rotor, as `hinge_torque`, of any joint."""
+    if joint.is_tilted:
+        hinge_torque(joint, q, torque_S, torque_q)
+    else:
+        generalised_torque(q, torque_S, torque_q)
+
+
+@inlined
+def chain_at(joint: JointChain, q: Triple) -> tuple[tuple[Frame, Frame, Frame], Triples, Triples]:
     """Return frames of the bodies, axes of the hinges, and a point of each axis, at a pose (rad)."""
     at = turns(q)
-    outer, e_a, p_a = _turned(chain, 0, _STATOR, at.ca, at.sa)
-    inner, e_b, p_b = _turned(chain, 1, outer, at.cb, at.sb)
-    rotor, e_c, p_c = _turned(chain, 2, inner, at.cg, at.sg)
+    outer, e_a, p_a = _turned(joint, 0, _STATOR, at.ca, at.sa)
+    inner, e_b, p_b = _turned(joint, 1, outer, at.cb, at.sb)
+    rotor, e_c, p_c = _turned(joint, 2, inner, at.cg, at.sg)
     return (outer, inner, rotor), (e_a, e_b, e_c), (p_a, p_b, p_c)
 
 
 @inlined
-def _turned(chain: JointChain, hinge: int, frame: Frame, c: float, s: float) -> tuple[Frame, Triple, Triple]:
+def _turned(joint: JointChain, hinge: int, frame: Frame, c: float, s: float) -> tuple[Frame, Triple, Triple]:
     """Return the frame after a hinge at an angle of cosine c and sine s, its axis and a point of the axis."""
     X, Y, Z, origin = frame
-    p = _place(frame, chain.points[hinge])
-    e = _less(_place(frame, chain.axes[hinge]), origin)
+    p = _place(frame, joint.points[hinge])
+    e = _less(_place(frame, joint.axes[hinge]), origin)
     x, y, z = _rotated(X, e, c, s), _rotated(Y, e, c, s), _rotated(Z, e, c, s)
     return (x, y, z, _sum(p, _rotated(_less(origin, p), e, c, s))), e, p
 

@@ -272,18 +272,18 @@ def acceleration_entries(
         torque[1] - C_beta[0] * qdot[0] - C_beta[1] * qdot[1] - C_beta[2] * qdot[2] - G[1],
         torque[2] - C_gamma[0] * qdot[0] - C_gamma[1] * qdot[1] - C_gamma[2] * qdot[2] - G[2],
     )
-    return solve_inertia(inertia_entries(at, inertia), net, None)
+    return solve_inertia(inertia_entries(at, inertia), net, False)
 
 
 @inlined
-def solve_inertia(M: InertiaEntries, torque: Triple, chain: object | None) -> Triple:
+def solve_inertia(M: InertiaEntries, torque: Triple, general: bool) -> Triple:
     """Solve ``M x = torque`` for an inertia matrix, or its sum with a diagonal matrix, also a complex one.
 
-    M is eliminated from its last row upward. It is positive definite, so that no pivoting is needed. `chain`
-    is None for an ideal joint, whose entry (beta, gamma) is zero: this order then divides by two diagonal
-    entries that never vanish. Numba omits the branch of a general joint if the type of `chain` is None.
+    M is eliminated from its last row upward. It is positive definite, so that no pivoting is needed. It is
+    `general` if its entry (beta, gamma) is not zero, as that of an ideal joint: this order then divides by
+    two diagonal entries that never vanish.
     """
-    if chain is not None:
+    if general:
         from_alpha, from_beta = M.alpha_gamma / M.gamma, M.beta_gamma / M.gamma
         coupling, b = M.alpha_beta - from_alpha * M.beta_gamma, M.beta - from_beta * M.beta_gamma
         on_beta, share = torque[1] - from_beta * torque[2], coupling / b

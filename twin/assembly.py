@@ -25,13 +25,12 @@ from spheretwin.models.base.errors import InputError, SpheretwinError, exception
 from spheretwin.models.base.record import Rows
 from spheretwin.models.base.reuse import reused
 from spheretwin.models.joint_chain import JointChain
-from spheretwin.models.lagrangian import loaded_inertia
 from spheretwin.models.magnetics import TorqueModel, scaled, scratch_of, torque_model
 from spheretwin.models.scatter import scattered_model
 from spheretwin.models.telemetry.signals import Signal, common_signals, width
-from spheretwin.plant.bristle_friction import bristle_friction
-from spheretwin.plant.end_stops import end_stops
-from spheretwin.plant.friction import Friction, friction
+from spheretwin.plant.bristle_friction import BristleFriction, fill_bristles
+from spheretwin.plant.end_stops import fill_end_stops
+from spheretwin.plant.friction import Friction, fill_friction
 from spheretwin.plant.magnet_heat import MagnetHeat, magnet_heat
 from spheretwin.plant.mass_properties import mass_errors
 from spheretwin.plant.part_scatter import scatter_of
@@ -177,9 +176,8 @@ def true_magnetics(section: ResolvedPlant, seed: int, actuator: Actuator) -> Tor
 def plant_of(scenario: ResolvedScenario, files: Files, rotor: Any, buffers: SharedBuffers) -> Plant:
     """Return the plant of a resolved scenario with a started rotor and zero currents."""
     section, actuator, groups = scenario.plant, files.actuator, len(files.actuator.groups)
-    chain, inertia = _rotor_settings(scenario, files).joint_chain(), _inertia(section, actuator)
-    joint = chain if chain and not chain.has_ideal_hinges else None
-    middle_q, middle_qdot = np.empty((2, 3))
+    joint = JointChain.filled(_rotor_settings(scenario, files).fill_joint)
+    middle_q, middle_qdot, coil_q, coil_qdot = np.empty((4, 3))
     magnetics = true_magnetics(section, scenario.seed, actuator)
     drive, group_gain = drive_of(scenario, actuator, buffers), np.array(section.group_gain)
     heat = _heat(scenario, drive)
@@ -190,16 +188,9 @@ def plant_of(scenario: ResolvedScenario, files: Files, rotor: Any, buffers: Shar
         G=np.empty((3, groups)),
         scratch=scratch_of(magnetics),
         drive=drive,
-        friction=_friction(section, inertia, chain),
-        bristles=bristle_friction(
-            section.stiction,
-            section.coulomb_Nm,
-            section.cable,
-            inertia,
-            section.step_s,
-            chain,
-            seed=scenario.seed,
-            stops=end_stops(section.end_stops, actuator.hinge_range_rad, inertia, section.step_s),
+        friction=Friction.filled(_fill_friction, section),
+        bristles=BristleFriction.filled(
+            _fill_bristles, section, actuator.hinge_range_rad, joint["inertia"], scenario.seed
         ),
         heat=heat,
         group_gain=group_gain,
@@ -210,8 +201,8 @@ def plant_of(scenario: ResolvedScenario, files: Files, rotor: Any, buffers: Shar
         step_s=section.step_s,
         middle_q=middle_q,
         middle_qdot=middle_qdot,
-        coil_q=np.empty(3) if joint else middle_q,
-        coil_qdot=np.empty(3) if joint else middle_qdot,
+        coil_q=coil_q,
+        coil_qdot=coil_qdot,
         last_qdot=rotor.qdot.copy(),
         current=np.zeros(groups),
         mean_current=np.zeros(groups),
@@ -228,15 +219,16 @@ def plant_of(scenario: ResolvedScenario, files: Files, rotor: Any, buffers: Shar
     )
 
 
-def _friction(section: ResolvedPlant, inertia: Array, chain: JointChain | None) -> Friction:
-    return friction(
-        np.zeros(3) if section.stiction.on else np.array(section.coulomb_Nm),
-        np.array(section.viscous_Nm_s),
-        section.friction_smoothing_rad_s,
-        inertia,
-        section.step_s,
-        chain,
-    )
+def _fill_friction(rows: Rows, section: ResolvedPlant) -> None:
+    coulomb_Nm = np.zeros(3) if section.stiction.on else np.array(section.coulomb_Nm)
+    smoothing_rad_s, step_s = section.friction_smoothing_rad_s, section.step_s
+    fill_friction(rows, coulomb_Nm, np.array(section.viscous_Nm_s), smoothing_rad_s, step_s)
+
+
+def _fill_bristles(rows: Rows, section: ResolvedPlant, range_rad: Array, inertia: Array, seed: int) -> None:
+    stiction, step_s = section.stiction, section.step_s
+    fill_end_stops(rows["stops"], section.end_stops, range_rad, inertia, step_s)
+    fill_bristles(rows, stiction, section.coulomb_Nm, section.cable, inertia, step_s, seed)
 
 
 def _heat(scenario: ResolvedScenario, drive: DriveModel) -> MagnetHeat | None:
@@ -244,11 +236,6 @@ def _heat(scenario: ResolvedScenario, drive: DriveModel) -> MagnetHeat | None:
         return None
     coil = scenario.drive
     return magnet_heat(scenario.plant.thermal, drive, coil.ambient_degC, coil.heat_capacity_J_K)
-
-
-def _inertia(section: ResolvedPlant, actuator: Actuator) -> Array:
-    height = float(actuator.payload_mount_m[2])
-    return loaded_inertia((1 + section.modelling_error) * actuator.inertia, section.payload_kg, height)
 
 
 def rotor_of(scenario: ResolvedScenario, files: Files) -> Rotor:

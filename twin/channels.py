@@ -172,7 +172,7 @@ PRESLIDING_SIGNALS = (
 @part_of_its_caller
 def write_presliding(row: NDArray, plant: Any) -> None:
     """Write the columns of one tick."""
-    log_presliding(plant.bristles, row)
+    log_presliding(plant.bristles[0], row)
 
 
 PRESLIDING = Channel(
@@ -188,7 +188,7 @@ CABLE_SIGNALS = (
 @part_of_its_caller
 def write_cable(row: NDArray, plant: Any) -> None:
     """Write the columns of one tick."""
-    log_cable(plant.bristles, row)
+    log_cable(plant.bristles[0], row)
 
 
 CABLE = Channel(lambda groups: CABLE_SIGNALS, lambda scenario: acts(scenario.plant.cable), write_cable)
@@ -204,7 +204,7 @@ END_STOP_SIGNALS = (
 @part_of_its_caller
 def write_end_stops(row: NDArray, plant: Any) -> None:
     """Write the columns of one tick."""
-    log_end_stops(plant.bristles, row)
+    log_end_stops(plant.bristles[0], row)
 
 
 END_STOPS = Channel(

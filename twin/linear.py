@@ -79,7 +79,7 @@ def linearisation_data(scenario: ResolvedScenario, files: Files, *, nominal: boo
             current_limit_A=sheet.current_limit_A,
         )
     true = parameters_of(scenario, files)
-    if true.joint:
+    if true.joint["on"][0]:
         raise InputError(
             "linear model: expected an ideal joint, received plant.mass or a model file with mass properties"
             " or hinges that differ from it"

@@ -65,12 +65,13 @@ def parameters_of(scenario: ResolvedScenario, files: Files) -> Parameters:
     section, cable = scenario.plant, scenario.plant.cable
     engine = section.model_copy(update={"engine": "lagrangian", "integrator": "RK4"})
     rotor = cast("LagrangianRotor", assembly.rotor_of(scenario.model_copy(update={"plant": engine}), files))
+    joint = rotor.joint
     spring = np.array(cable.stiffness_Nm_rad)
     cable_Nm = constant_torque_Nm(cable, scenario.seed) + spring * cable.neutral_rad
     return Parameters(
-        inertia_kg_m2=rotor.inertia,
-        weight_moment_Nm=rotor.weight_moment,
-        joint=rotor.chain,
+        inertia_kg_m2=joint["inertia"][0].copy(),
+        weight_moment_Nm=float(joint["weight_moment"][0]),
+        joint=joint,
         coulomb_Nm=np.array(section.coulomb_Nm),
         viscous_Nm_s=np.array(section.viscous_Nm_s),
         friction_smoothing_rad_s=section.friction_smoothing_rad_s,

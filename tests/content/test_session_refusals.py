@@ -13,8 +13,6 @@ from spheretwin.inputs import InputGenerator
 from spheretwin.machine import IdentifySettings, Log, identify, shadow
 from spheretwin.machine.link.controller_scenario import check_measurement
 from spheretwin.machine.link.transports import open_transport
-from spheretwin.models import actuator as actuators
-from spheretwin.plant.friction import friction
 from spheretwin.plant.plant_step import roll_out
 from spheretwin.session import Session
 from tests.content.content import content_test, refusal, scratch
@@ -23,6 +21,7 @@ from tests.control.test_manual_currents import series_file
 from tests.control.test_user_law import FILE
 from tests.models.model_files import edited
 from tests.twin.plant import user_models
+from tests.twin.plant.motions import friction
 from tests.twin.session_cases import ENGINES, REFUSED, session
 
 ZEROS, NAN = np.zeros, [0.0, np.nan, 0.0]
@@ -101,7 +100,7 @@ def invalid_plants():
             *(f"{place}: {refusal(many.set_state, *state)}" for place, state in enumerate(STATES)),
             *(f"{name}: {refusal(call)}" for name, call in calls.items()),
             f"state: {many.q_rad.tolist()}, {many.qdot_rad_s.tolist()}",
-            listed(lambda given: friction(*given, actuators.load().inertia, 5e-4), FRICTIONS),
+            listed(lambda given: friction(*given, 5e-4), FRICTIONS),
             listed(lambda given: regulator(*given), [(0.0, 0.0, 1e9, 1.0), (3e7, 6e-4, 6e-9, 1e-3)]),
         ]
     )

@@ -7,12 +7,14 @@ import pytest
 from spheretwin.models import actuator as actuators
 from spheretwin.models import lagrangian, mjcf
 from spheretwin.models.joint_chain import (
+    JointChain,
     acceleration_at,
     equations,
+    fill_chain,
+    fill_ideal,
     hinge_torque,
     ideal_pose,
     inertia_at,
-    read_chain,
 )
 from spheretwin.models.kinematics import rate_jacobian, rotation
 from spheretwin.plant import lagrangian_rotor
@@ -64,6 +66,10 @@ def full(M):
     ])  # fmt: skip
 
 
+def chain_of(model):
+    return JointChain.filled(fill_chain, model)[0]
+
+
 def of(chain, q, qdot):
     M, bias = equations(chain, tuple(q), tuple(qdot))
     return full(M), np.array(bias)
@@ -72,7 +78,7 @@ def of(chain, q, qdot):
 @pytest.mark.parametrize("seed", range(5))
 def test_inertia_matrix_and_bias_are_mujoco_s(seed):
     model = random_machine(seed)
-    data, chain, M = mujoco.MjData(model), read_chain(model), np.empty((3, 3))
+    data, chain, M = mujoco.MjData(model), chain_of(model), np.empty((3, 3))
     for q, qdot in random_states(20, seed):
         data.qpos[:], data.qvel[:] = q, qdot
         mujoco.mj_forward(model, data)
@@ -85,7 +91,7 @@ def test_inertia_matrix_and_bias_are_mujoco_s(seed):
 @pytest.mark.parametrize("seed", range(5))
 def test_orientation_angular_velocity_and_power_are_mujoco_s(seed):
     model = random_machine(seed)
-    data, chain, angles, rates = mujoco.MjData(model), read_chain(model), np.empty(3), np.empty(3)
+    data, chain, angles, rates = mujoco.MjData(model), chain_of(model), np.empty(3), np.empty(3)
     rotor, torque_S, torque_q = data.body("gamma"), np.array([0.3, -0.2, 0.5]), np.empty(3)
     mujoco.mj_forward(model, data)
     upright = rotor.xmat.reshape(3, 3).copy()
@@ -105,13 +111,13 @@ SHIPPED = mjcf.read(actuators.MJCF_PATH).bare
 
 
 def test_ideal_joint_has_the_closed_forms(actuator):
-    chain, payload_kg, height = read_chain(SHIPPED), 0.05, 0.1
+    chain, payload_kg, height = chain_of(SHIPPED), 0.05, 0.1
     spec = mujoco.MjSpec.from_file(str(actuators.MJCF_PATH))
     spec.body("payload").mass, spec.body("payload").explicitinertial = payload_kg, True
-    loaded = read_chain(spec.compile())
+    loaded = chain_of(spec.compile())
     heavier = actuator.inertia + payload_kg * height**2 * np.array([1, 1, 0])
     for machine, inertia, moment in ((chain, actuator.inertia, 0.0), (loaded, heavier, payload_kg * 0.981)):
-        assert machine.has_ideal_hinges
+        assert not machine.is_tilted
         for q, qdot in random_states(50):
             M, bias = of(machine, q, qdot)
             expected = lagrangian.inertia_matrix(q, inertia)
@@ -125,7 +131,7 @@ def test_ideal_joint_has_the_closed_forms(actuator):
 
 def test_energy_of_the_free_chain_is_kept_to_the_order_of_the_step(actuator):
     machine = random_machine(3)
-    chain, data = read_chain(machine), mujoco.MjData(machine)
+    joint, data = JointChain.filled(fill_chain, machine), mujoco.MjData(machine)
     machine.opt.enableflags |= int(mujoco.mjtEnableBit.mjENBL_ENERGY)
     q0, rates0, steps = np.array([0.3, -0.4, 0.2]), np.array([1.0, -2.0, 1.5]), np.array([4e-3, 2e-3, 1e-3])
 
@@ -136,7 +142,7 @@ def test_energy_of_the_free_chain_is_kept_to_the_order_of_the_step(actuator):
 
     drifts = []
     for step_s in steps:
-        plant = LagrangianRotor(actuator, step_s, chain=chain).start(q0, rates0)
+        plant = LagrangianRotor(actuator, step_s, joint=joint).start(q0, rates0)
         for _ in range(round(0.8 / step_s)):
             lagrangian_rotor.step(plant)
         drifts.append(abs(energy(plant.q, plant.qdot) - energy(q0, rates0)))
@@ -148,24 +154,25 @@ def test_energy_of_the_free_chain_is_kept_to_the_order_of_the_step(actuator):
 def test_full_inertia_matrix_is_solved_as_by_a_library():
     generator = np.random.default_rng(3)
     for seed in range(5):
-        chain = read_chain(random_machine(seed))
+        chain = chain_of(random_machine(seed))
         for q, torque in random_states(20, seed):
-            M = inertia_at(chain, np.empty(0), tuple(q))
+            M = inertia_at(chain, (0.0,) * 3, tuple(q))
             added = generator.uniform(0, 1e-2, 3) * (1 + 1j)
             M = M._replace(**dict(zip(("alpha", "beta", "gamma"), full(M).diagonal() + added, strict=True)))
             expected = np.linalg.solve(full(M), torque)
             # Rounding, with a condition up to some hundreds.
             size = 1e-12 * np.abs(expected).max()
-            solution = lagrangian.solve_inertia(M, tuple(torque), chain)
+            solution = lagrangian.solve_inertia(M, tuple(torque), True)
             np.testing.assert_allclose(solution, expected, rtol=0, atol=size)
 
 
 def test_acceleration_is_that_of_the_joint_that_is_given(actuator):
     q, qdot, torque = np.array([0.2, 0.3, 0.1]), np.array([1.0, 2.0, 3.0]), np.array([0.1, -0.2, 0.3])
-    ideal, motion = (actuator.inertia, 0.05), (tuple(q), tuple(qdot), tuple(torque))
-    closed = lagrangian.acceleration(q, qdot, torque, *ideal)
-    np.testing.assert_array_equal(acceleration_at(None, *ideal, *motion), closed)
-    chain = read_chain(random_machine(1))
+    ideal, motion = (tuple(actuator.inertia), 0.05), (tuple(q), tuple(qdot), tuple(torque))
+    closed = lagrangian.acceleration(q, qdot, torque, actuator.inertia, 0.05)
+    joint = JointChain.filled(fill_ideal, *ideal)[0]
+    np.testing.assert_array_equal(acceleration_at(joint, *ideal, *motion), closed)
+    chain = chain_of(random_machine(1))
     M, bias = of(chain, q, qdot)
     # Rounding, with a condition up to some hundreds.
     general = M @ acceleration_at(chain, *ideal, *motion)
@@ -175,4 +182,4 @@ def test_acceleration_is_that_of_the_joint_that_is_given(actuator):
 def test_a_tilted_hinge_is_not_ideal():
     model = mujoco.MjModel.from_xml_path(str(actuators.MJCF_PATH))
     model.jnt_axis[1] = np.array([0.02, 1, -0.02]) / np.sqrt(1 + 2 * 0.02**2)
-    assert not read_chain(model).has_ideal_hinges
+    assert chain_of(model).is_tilted

@@ -42,6 +42,6 @@ def test_solution_is_a_library_s_whatever_is_added_to_the_diagonal(actuator):
         M = inertia_matrix(q, actuator.inertia)
         M += np.diag(10 ** generator.uniform(-6, 0, 3) * generator.integers(0, 2, 3))
         entries = InertiaEntries(M[0, 0], M[1, 1], M[2, 2], M[0, 1], M[0, 2], 0.0)
-        solution, expected = solve_inertia(entries, triple(torque), None), np.linalg.solve(M, torque)
+        solution, expected = solve_inertia(entries, triple(torque), False), np.linalg.solve(M, torque)
         # Rounding of either, with a condition of 140 at the largest tilt.
         np.testing.assert_allclose(solution, expected, rtol=0, atol=1e-13 * np.abs(expected).max())

@@ -12,10 +12,11 @@ from spheretwin.models.base.errors import InputError
 from spheretwin.models.kinematics import rate_jacobian
 from spheretwin.models.lagrangian import acceleration, loaded_inertia
 from spheretwin.models.magnetics import torque_matrix
-from spheretwin.plant.friction import friction, slow_down
+from spheretwin.plant.friction import slow_down
 from spheretwin.plant.plant_tick import step_rotor
 from tests.models.model_files import edited
-from tests.twin.plant.motions import gradient
+from tests.twin.plant.motions import friction, gradient
+from tests.twin.plant.test_friction import ideal
 
 LOADED = {"plant.modelling_error": 0.2, "plant.payload_kg": 0.05}
 TILTED = np.array([0.3, -0.2, 0.4])
@@ -58,11 +59,11 @@ def test_viscous_friction_damps_as_the_plant_s_does(actuator, pose):
     height = actuator.payload_mount_m[2]
     inertia = loaded_inertia(1.2 * actuator.inertia, 0.05, height)
     # Over a step this short friction is that at the rates before it, to 1e-6.
-    acting = friction(np.zeros(3), viscous, 0.01, inertia, 1e-6)
+    acting = friction(np.zeros(3), viscous, 0.01, 1e-6)
 
     def accelerated(qdot):
         torque = np.zeros(3)
-        slow_down(acting, pose, qdot.copy(), torque)
+        slow_down(acting, ideal(inertia), pose, qdot.copy(), torque)
         return acceleration(pose, qdot, 2 * torque, inertia, 0.0)  # half a step's share of the mean
 
     expected = gradient(accelerated, np.zeros(3))

@@ -160,7 +160,7 @@ def torque_matrix(parameters: Parameters) -> Any:
 
 
 def _check(parameters: Parameters) -> None:
-    if parameters.joint is not None:
+    if parameters.joint["on"][0]:
         raise InputError("casadi: expected a plant with an ideal joint, received plant.mass or such a model")
 
 

@@ -23,7 +23,7 @@ from spheretwin.crosscheck.scale import scale_of
 from spheretwin.models.actuator import Actuator
 from spheretwin.models.base.checks import Check
 from spheretwin.models.base.errors import InputError, without_breaks
-from spheretwin.models.joint_chain import JointChain, chain_at, equations, read_chain
+from spheretwin.models.joint_chain import JointChain, chain_at, equations, fill_chain
 from spheretwin.models.kinematics import Triple, rate_jacobian, rotation, triple
 from spheretwin.models.lagrangian import coriolis_matrix, gravity_torque, inertia_matrix
 from spheretwin.models.mjcf import PAYLOAD, gravity, read
@@ -158,7 +158,7 @@ def compare(mjcf: Path, actuator: Actuator, count: int) -> Dynamics:
         States a case.
     """
     states, motion = random_states(count), equations_of(mjcf, actuator)
-    is_general = motion.chain is not None
+    is_general = bool(motion.joint["on"][0])
     bounds = {
         quantity.name: quantity.bound + quantity.ring_factor * motion.neglected for quantity in QUANTITIES
     }
@@ -252,7 +252,7 @@ def ask_pinocchio_about_chain(mjcf: Path, case: Case, states: States) -> Answers
     """Answers of Pinocchio, from the axes and bodies of the compiled model."""
     model = _compiled(mjcf, case)
     chain, joint = _pinocchio_chain(model)
-    return _pinocchio_answers(chain, joint, states, _chain_terms(read_chain(model), states).torque_q)
+    return _pinocchio_answers(chain, joint, states, _chain_terms(model, states).torque_q)
 
 
 def _pinocchio_answers(model: Any, joint: int, states: States, torque_q: Array) -> Answers:
@@ -285,7 +285,7 @@ def _differences(
     """Relative differences by quantity, one entry a state."""
     said = ask(mjcf, case, states)
     if is_general:
-        R, torque, M, C, bias, G = _chain_terms(read_chain(_compiled(mjcf, case)), states)
+        R, torque, M, C, bias, G = _chain_terms(_compiled(mjcf, case), states)
     else:
         R, torque, M, C, bias, G = _closed_terms(mjcf, actuator, case, states)
     bias_size = _norm(C) * _norm(states.qdot) + _norm(G)
@@ -306,22 +306,24 @@ def _closed_terms(mjcf: Path, actuator: Actuator, case: Case, states: States) ->
     rotor = LagrangianRotor(
         actuator, STEP_S, "RK4", case.modelling_error, case.payload_kg, gravity_m_s2=gravity_m_s2
     )
+    joint = rotor.joint[0]
     pairs = list(zip(states.q, states.qdot, strict=True))
     E = np.array([rate_jacobian(q) for q, _ in pairs])
-    C = np.array([coriolis_matrix(q, qdot, rotor.inertia) for q, qdot in pairs])
-    G = np.array([gravity_torque(q, rotor.weight_moment) for q, _ in pairs])
+    C = np.array([coriolis_matrix(q, qdot, joint.inertia) for q, qdot in pairs])
+    G = np.array([gravity_torque(q, joint.weight_moment) for q, _ in pairs])
     return _Terms(
         R=np.array([rotation(q) for q, _ in pairs]),
         torque_q=states.torque_q + _times(_turned(E), states.torque_S),
-        M=np.array([inertia_matrix(q, rotor.inertia) for q, _ in pairs]),
+        M=np.array([inertia_matrix(q, joint.inertia) for q, _ in pairs]),
         C=C,
         bias=_times(C, states.qdot) + G,
         G=G,
     )
 
 
-def _chain_terms(chain: JointChain, states: States) -> _Terms:
+def _chain_terms(model: mujoco.MjModel, states: States) -> _Terms:
     """Return the terms of a general joint."""
+    chain = JointChain.filled(fill_chain, model)[0]
     rows = [_chain_row(chain, triple(q), qdot) for q, qdot in zip(states.q, states.qdot, strict=True)]
     R, axes, M, C, bias, G = (np.array(term) for term in zip(*rows, strict=True))
     return _Terms(R, states.torque_q + _times(axes, states.torque_S), M, C, bias, G)
@@ -335,7 +337,8 @@ def _chain_row(chain: JointChain, q: Triple, qdot: Array) -> tuple[Any, ...]:
     """
     (_, _, rotor), axes, _ = chain_at(chain, q)
     M, bias = equations(chain, q, triple(qdot))
-    weightless = chain._replace(gravity=(0.0, 0.0, 0.0))
+    weightless = chain.copy()
+    weightless["gravity"] = 0.0
 
     def inertial(rates: Array) -> Array:
         return np.array(equations(weightless, q, triple(rates))[1])
@@ -354,7 +357,7 @@ def _general_joint(mjcf: Path, actuator: Actuator, states: States) -> list[Check
     scale = scale_of(actuator)
     mass = MassSection(**{name: scale.field(f"plant.mass.{name}", value) for name, value in MASS})
     case = Case("general joint", 0.2, 0.05, mass_errors(mass, SEED))
-    terms = _chain_terms(read_chain(_compiled(mjcf, case)), states)
+    terms = _chain_terms(_compiled(mjcf, case), states)
     qddot_of = {"MuJoCo": ask_mujoco(mjcf, case, states).qddot}
     with suppress(ImportError):
         qddot_of["Pinocchio"] = ask_pinocchio_about_chain(mjcf, case, states).qddot

@@ -15,16 +15,19 @@ from numpy.typing import NDArray
 
 from spheretwin.linear import Magnetics, hinge_matrix
 from spheretwin.models.actuator import MJCF_PATH, Actuator
+from spheretwin.models.base.record import Rows
 from spheretwin.models.joint_chain import (
     JointChain,
     acceleration_at,
     chain_at,
     equations,
+    fill_chain,
+    fill_ideal,
     ideal_pose,
-    read_chain,
+    inertia_at,
 )
 from spheretwin.models.kinematics import rate_jacobian, triple
-from spheretwin.models.lagrangian import acceleration, coriolis_matrix, inertia_matrix
+from spheretwin.models.lagrangian import coriolis_matrix
 from spheretwin.models.mjcf import PAYLOAD, ROTOR, beyond_an_ideal_joint, read
 
 Array = NDArray[np.float64]
@@ -39,43 +42,40 @@ class Equations(NamedTuple):
     An unbalanced rotor falls: without gravity, small differences do not grow along a motion.
     """
 
-    inertia: Array
-    """(3,) kg·m²: principal inertias of the ideal joint."""
-    chain: JointChain | None
-    """General joint; None for an ideal one."""
+    joint: Rows
+    """Array of one joint, an ideal or a general one."""
     neglected: float
     """Inertia of the rings that they neglect, over that of the rotor."""
 
     def inertia_matrix(self, q: Array) -> Array:
         """Return M (3, 3) at a pose, kg·m²."""
-        if self.chain is None:
-            return inertia_matrix(q, self.inertia)
-        return symmetric(equations(self.chain, triple(q), (0.0, 0.0, 0.0))[0])
+        joint = self.joint[0]
+        return symmetric(inertia_at(joint, triple(joint.inertia), triple(q)))
 
     def torque(self, q: Array, qdot: Array, qddot: Array) -> Array:
         """Return the torque on the hinges (3,) of a motion, N·m."""
-        if self.chain is None:
-            bias: Array = coriolis_matrix(q, qdot, self.inertia) @ qdot
+        joint = self.joint[0]
+        if joint.on:
+            bias = np.array(equations(joint, triple(q), triple(qdot))[1])
         else:
-            bias = np.array(equations(self.chain, triple(q), triple(qdot))[1])
-        return self.inertia_matrix(q) @ qddot + bias
+            bias = coriolis_matrix(q, qdot, joint.inertia) @ qdot
+        return np.asarray(self.inertia_matrix(q) @ qddot + bias)
 
     def flow(self, state: Array, torque: Array) -> Array:
         """Return the derivative of the state (6,) under torques on the hinges."""
-        q, qdot = state[:3].copy(), state[3:].copy()
-        if self.chain is None:
-            return np.concatenate([qdot, acceleration(q, qdot, torque, self.inertia, 0.0)])
-        qddot = acceleration_at(self.chain, self.inertia, 0.0, triple(q), triple(qdot), triple(torque))
+        joint, q, qdot = self.joint[0], triple(state), triple(state[3:])
+        qddot = acceleration_at(joint, triple(joint.inertia), 0.0, q, qdot, triple(torque))
         return np.concatenate([qdot, qddot])
 
     def hinge_matrix(self, q: Array, magnetics: Magnetics) -> Array:
         """Return the torque on the hinges per current (3, n) at a pose, N·m/A."""
-        if self.chain is None or self.chain.has_ideal_hinges:
+        joint = self.joint[0]
+        if not joint.is_tilted:
             return hinge_matrix(q, magnetics)
         ideal_q, rates = np.empty((2, 3))
-        ideal_pose(self.chain, q, np.zeros(3), ideal_q, rates)
+        ideal_pose(joint, q, np.zeros(3), ideal_q, rates)
         torque_S = np.linalg.solve(rate_jacobian(ideal_q).T, hinge_matrix(ideal_q, magnetics))
-        axes: Array = np.array(chain_at(self.chain, triple(q))[1])
+        axes: Array = np.array(chain_at(joint, triple(q))[1])
         return axes @ torque_S
 
 
@@ -90,10 +90,11 @@ def equations_of(mjcf: Path, actuator: Actuator) -> Equations:
         Its inertia is that of an ideal joint.
     """
     model, share = read(mjcf).bare, ring_share(mjcf, actuator)
-    is_general = share > NEGLIGIBLE_RINGS or bool(beyond_an_ideal_joint(model))
-    if not is_general:
-        return Equations(actuator.inertia, None, share)
-    return Equations(actuator.inertia, read_chain(model)._replace(gravity=(0.0, 0.0, 0.0)), 0.0)
+    joint = JointChain.filled(fill_ideal, actuator.inertia)
+    if share > NEGLIGIBLE_RINGS or beyond_an_ideal_joint(model):
+        fill_chain(joint, model)
+        joint["gravity"], share = 0.0, 0.0
+    return Equations(joint, share)
 
 
 def ring_share(mjcf: Path, actuator: Actuator) -> float:
@@ -112,7 +113,7 @@ def ideal_file(mjcf: Path, actuator: Actuator) -> Path:
 
     Exact solutions of one rotor or one hinge need such a joint; they take the inertia of the machine.
     """
-    return mjcf if equations_of(mjcf, actuator).chain is None else MJCF_PATH
+    return MJCF_PATH if equations_of(mjcf, actuator).joint["on"][0] else mjcf
 
 
 def symmetric(entries: tuple[float, ...]) -> Array:

@@ -164,7 +164,7 @@ def by_mujoco(mjcf: Path, pieces: Pieces, integrator: str, step_s: float) -> Arr
 
 def by_own_steps(actuator: Actuator, motion: Equations, pieces: Pieces, step_s: float) -> Array:
     """States at the ends of the pieces by the Lagrangian plant."""
-    plant = LagrangianRotor(actuator, step_s, chain=motion.chain).start(pieces.start[:3], pieces.start[3:])
+    plant = LagrangianRotor(actuator, step_s, joint=motion.joint).start(pieces.start[:3], pieces.start[3:])
     states = [pieces.start]
     for torque in pieces.torque:
         plant.torque_q[:] = torque

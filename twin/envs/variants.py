@@ -94,7 +94,7 @@ def _ideal() -> Scenario:
 
 
 def _ideal_joint(one: Parameters) -> Parameters:
-    if one.joint is not None:
+    if one.joint["on"][0]:
         raise InputError("environment: expected an ideal joint, received hinges or masses of plant.mass")
     return one
 

@@ -120,18 +120,18 @@ class PlantCode(NamedTuple):
 
     def table_header(self) -> str:
         """Return the header of tables and default values."""
-        joint = self.step.joint
+        joint = self.step.joint[0]
         lines = [
             NUMBERS,
             *magnetic_tables(self.step.magnetics),
-            *definitions({"ST_GENERAL_JOINT": joint is not None}),
+            *definitions({"ST_GENERAL_JOINT": bool(joint.on)}),
             constant("ST_HINGE_RANGE", self.hinge_range_rad, "double"),
             constant("ST_INITIAL", [value for one in self.states for value in one.values], "double"),
             "static const st_parameters ST_DEFAULTS = {",
             *(f"    {_initialiser(one)}, /* {one.name} */" for one in self.parameters),
             "};",
         ]
-        if joint is not None:
+        if joint.on:
             lines += [
                 constant("ST_HINGE_AXES", joint.axes, "double"),
                 constant("ST_HINGE_POINTS", joint.points, "double"),
@@ -249,7 +249,7 @@ def _parameters(scenario: ResolvedScenario, step: Parameters, inputs: Inputs, gr
         return Variable(name, (float(value),), unit, text, (), least, **more)
 
     rows = []
-    if step.joint is None:
+    if not step.joint["on"][0]:
         rows += [
             each_hinge(
                 "inertia_kg_m2", step.inertia_kg_m2, "kg.m2", "principal moments, with the payload", SMALLEST

@@ -29,18 +29,19 @@ Altpeter, "Single state elastoplastic friction models", IEEE Trans. Autom. Contr
 from __future__ import annotations
 
 from math import exp
-from typing import Annotated, NamedTuple
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field
 
-from spheretwin.models.base.compiled import copy_into, inlined
+from spheretwin.models.base.compiled import allocation_free, copy_into, inlined
+from spheretwin.models.base.record import Record, Rows, field
 from spheretwin.models.joint_chain import JointChain, inertia_at
 from spheretwin.models.kinematics import triple
 from spheretwin.models.lagrangian import InertiaEntries, solve_inertia
 from spheretwin.plant.cable import CableSection, acts, constant_torque_Nm
-from spheretwin.plant.end_stops import EndStops, log_stops, store_stop, with_stop
+from spheretwin.plant.end_stops import EndStops, store_stop, with_stop
 from spheretwin.plant.friction import momentum
 
 Array = NDArray[np.float64]
@@ -87,98 +88,77 @@ class StictionSection(BaseModel):
     )
 
 
-class BristleFriction(NamedTuple):
-    """Elements of a run with their state, for compiled code; the first index is the element."""
+class BristleFriction(Record):
+    """Elements of the hinges with their state; the first index is the element, the second the hinge."""
 
-    stiffness_Nm_rad: Array  # (3, 3) by hinge
-    damping_Nm_s: Array  # (3, 3) by hinge, only as long as an element does not slip
-    slip_rad: Array  # (3,) largest deflection
-    coulomb_share: float  # Coulomb level over break-away torque
-    stribeck_rad_s: float
-    spring: Array  # (3, 3) stiffness of the cable, its neutral pose, its constant torque, by hinge
-    implicitness: float  # 1/2 to 1
-    inertia: Array  # (3,) kg·m² about the joint centre, modelling error and payload included
-    chain: JointChain | None  # general joint, instead of the inertia; None for an ideal one
-    step_s: float
-    deflection_rad: Array  # (3, 3) state: by hinge
-    stribeck_factor: Array  # (3,) state: of each hinge at the end of the last step
-    torque_q: Array  # (2, 3) N·m state: against bearing and cable, mean over the last step
-    spring_q: Array  # (3,) N·m on the hinges: spring and constant torque of the cable
-    first_cable_q: Array  # (3,) N·m on the hinges: cable, in the first step of the control period
-    trial: Array  # (5, 3) of the present step: rows below
-    stops: EndStops | None
-
-    def state_arrays(self) -> tuple[Array, ...]:
-        """Return the arrays that hold the state."""
-        return self.deflection_rad, self.stribeck_factor, self.torque_q
+    on: bool = field("whether there is static friction, a cable or an end stop")
+    stiffness_Nm_rad: Array = field("stiffness", "N·m/rad", (3, 3))
+    damping_Nm_s: Array = field("damping, only as long as an element does not slip", "N·m·s", (3, 3))
+    slip_rad: Array = field("largest deflection", "rad", 3)
+    coulomb_share: float = field("Coulomb level over break-away torque")
+    stribeck_rad_s: float = field("rate of slip with 1/e of the excess", "rad/s")
+    spring: Array = field("stiffness of the cable, its neutral pose, its constant torque", "", (3, 3))
+    implicitness: float = field("1/2 to 1")
+    step_s: float = field("physics step", "s")
+    deflection_rad: Array = field("deflection", "rad", (3, 3), state=True)
+    stribeck_factor: Array = field("factor of each hinge at the end of the last step", "", 3, state=True)
+    torque_q: Array = field("against bearing and cable, mean over the last step", "N·m", (2, 3), state=True)
+    spring_q: Array = field("spring and constant torque of the cable on the hinges", "N·m", 3)
+    first_cable_q: Array = field("cable on the hinges, in the first step of the control period", "N·m", 3)
+    trial: Array = field("rows of the present step: START and following", "", (5, 3))
+    stops: EndStops = field("end stops, solved together with the elements")
 
 
-def bristle_friction(
+def fill_bristles(
+    bristles: Rows,
     stiction: StictionSection,
     coulomb_Nm: tuple[float, ...],
     cable: CableSection,
     inertia: Array,
     step_s: float,
-    chain: JointChain | None = None,
     seed: int = 0,
-    stops: EndStops | None = None,
-) -> BristleFriction | None:
-    """Return the elements of the hinges (alpha, beta, gamma), all without deflection; None without any.
+) -> None:
+    """Fill the elements of the hinges (alpha, beta, gamma), all without deflection.
 
     Parameters
     ----------
+    bristles : array of BristleFriction
+        With their end stops.
     stiction : StictionSection
     coulomb_Nm : (3,) tuple, N·m
         Coulomb level.
     cable : CableSection
-    inertia : (3,) array, kg·m²
+    inertia : (3,) or (n, 3) array, kg·m²
         Principal inertias about the joint centre, modelling error and payload included.
     step_s : float, s
         Physics step.
-    chain : JointChain
-        General joint, whose inertia counts in the motion instead; default: an ideal joint.
     seed : int
         Seed of the run, for the constant torque of the cable.
-    stops : EndStops, optional
-        End stops.
     """
-    if not (stiction.on or acts(cable) or stops):
-        return None
+    bristles["on"] = stiction.on | acts(cable) | bristles["stops"]["on"]
     slip = np.array([*SLIP_SHARES, 0.0]) * stiction.presliding_rad
     slip[CABLE] = cable.hysteresis_rad
-    stiffness, damping = np.zeros((2, ELEMENTS, 3))
+    stiffness, damping = np.zeros((ELEMENTS, 3)), bristles["damping_Nm_s"]
     if stiction.on:
         stiffness[:CABLE] = stiction.break_away * np.array(coulomb_Nm) / slip[:CABLE].sum()
         # Critical damping is 2 sqrt(k J); each element has its share.
-        damping[:CABLE] = stiction.damping_ratio * np.sqrt(2.0 * stiffness[:CABLE] * inertia)
+        each = np.asarray(inertia)[..., None, :]
+        damping[:, :CABLE] = stiction.damping_ratio * np.sqrt(2.0 * stiffness[:CABLE] * each)
     stiffness[CABLE] = np.array(cable.hysteresis_Nm) / cable.hysteresis_rad
     # Squares of step times natural frequency, and of step times decay, at most.
-    stiff = step_s**2 * stiffness.sum(axis=0).max() / inertia.min()
-    stiff += (step_s * damping.sum(axis=0).max() / inertia.min()) ** 2
-    return BristleFriction(
-        stiffness_Nm_rad=stiffness,
-        damping_Nm_s=damping,
-        slip_rad=slip,
-        coulomb_share=1.0 / stiction.break_away,
-        stribeck_rad_s=stiction.stribeck_rad_s,
-        spring=np.array([cable.stiffness_Nm_rad, cable.neutral_rad, constant_torque_Nm(cable, seed)]),
-        implicitness=0.5 + 0.5 * stiff / (stiff + 4.0),
-        inertia=np.array(inertia, dtype=np.float64),
-        chain=chain,
-        step_s=float(step_s),
-        deflection_rad=np.zeros((ELEMENTS, 3)),
-        stribeck_factor=np.ones(3),
-        torque_q=np.zeros((2, 3)),
-        spring_q=np.zeros(3),
-        first_cable_q=np.zeros(3),
-        trial=np.zeros((5, 3)),
-        stops=stops,
-    )
+    least = np.min(inertia, axis=-1)
+    stiff = step_s**2 * stiffness.sum(axis=0).max() / least
+    stiff = stiff + (step_s * damping.sum(axis=1).max(axis=1) / least) ** 2
+    bristles["stiffness_Nm_rad"], bristles["slip_rad"] = stiffness, slip
+    bristles["coulomb_share"], bristles["stribeck_rad_s"] = 1.0 / stiction.break_away, stiction.stribeck_rad_s
+    bristles["spring"] = cable.stiffness_Nm_rad, cable.neutral_rad, constant_torque_Nm(cable, seed)
+    bristles["implicitness"], bristles["step_s"] = 0.5 + 0.5 * stiff / (stiff + 4.0), step_s
+    bristles["stribeck_factor"] = 1.0
 
 
 @inlined
 def begin_bristles(
-    bristles: BristleFriction | None, middle_q: Array, q: Array, qdot: Array, torque_q: Array
+    bristles: BristleFriction, middle_q: Array, q: Array, qdot: Array, torque_q: Array
 ) -> None:
     """Store pose and rates (3,) at the start of the rotor's step; add the cable and the last torque.
 
@@ -186,7 +166,7 @@ def begin_bristles(
     step, the spring of the cable is of second order and preserves phase volume: it gains and loses no energy
     on average. It is stable for a step below 2 sqrt(J / stiffness).
     """
-    if bristles is None:
+    if not bristles.on:
         return
     for i in range(3):
         bristles.trial[START, i], bristles.trial[START_RATE, i] = q[i], qdot[i]
@@ -197,7 +177,23 @@ def begin_bristles(
 
 @inlined
 def apply_bristles(
-    bristles: BristleFriction | None,
+    bristles: BristleFriction,
+    joint: JointChain,
+    middle_q: Array,
+    middle_qdot: Array,
+    last_qdot: Array,
+    q: Array,
+    qdot: Array,
+) -> None:
+    """Correct the rotor's step as `solve_bristles` does, if there are elements or end stops."""
+    if bristles.on:
+        solve_bristles(bristles, joint, middle_q, middle_qdot, last_qdot, q, qdot)
+
+
+@allocation_free  # not inlined: a part that is off is compiled once
+def solve_bristles(
+    bristles: BristleFriction,
+    joint: JointChain,
     middle_q: Array,
     middle_qdot: Array,
     last_qdot: Array,
@@ -210,6 +206,8 @@ def apply_bristles(
     ----------
     bristles : BristleFriction
         Its state is advanced by one physics step, `torque_q` is set.
+    joint : JointChain
+        Its inertia counts.
     middle_q, middle_qdot : (3,) arrays, rad and rad/s
         Predicted pose and rates in the middle of the physics step.
     last_qdot : (3,) array, rad/s
@@ -240,10 +238,8 @@ def apply_bristles(
     springs store: an implicit spring, damping and slip take energy, and a smaller slip deflection releases it
     as heat.
     """
-    if bristles is None:
-        return
     h, g, trial, former = bristles.step_s, bristles.implicitness, bristles.trial, bristles.torque_q
-    M = inertia_at(bristles.chain, bristles.inertia, triple(middle_q))
+    M = inertia_at(joint, triple(joint.inertia), triple(middle_q))
     for i in range(3):
         trial[FACTOR, i] = _stribeck_factor(bristles, i, 2.0 * middle_qdot[i] - last_qdot[i])
         trial[RATE, i] = qdot[i]
@@ -256,7 +252,7 @@ def apply_bristles(
         F1, k1 = _hinge_torque(bristles, 1, iteration >= NEWTON_STEPS)
         F2, k2 = _hinge_torque(bristles, 2, iteration >= NEWTON_STEPS)
         behind = qdot[0] - trial[RATE, 0], qdot[1] - trial[RATE, 1], qdot[2] - trial[RATE, 2]
-        p = momentum(M, behind, bristles.chain)
+        p = momentum(M, behind, joint.on)
         residual = (
             p[0] - h * (F0 - former[0, 0] - former[1, 0]),
             p[1] - h * (F1 - former[0, 1] - former[1, 1]),
@@ -264,7 +260,7 @@ def apply_bristles(
         )
         a, b, c = M.alpha + g * h * h * k0, M.beta + g * h * h * k1, M.gamma + g * h * h * k2
         stiff = InertiaEntries(a, b, c, M.alpha_beta, M.alpha_gamma, M.beta_gamma)
-        change = solve_inertia(stiff, residual, bristles.chain)
+        change = solve_inertia(stiff, residual, joint.on)
         largest, size = 0.0, 0.0
         for i in range(3):
             trial[RATE, i] += change[i]
@@ -285,9 +281,9 @@ def apply_bristles(
 
 
 @inlined
-def log_bristles(bristles: BristleFriction | None, substep: int, friction_q: Array) -> None:
+def log_bristles(bristles: BristleFriction, substep: int, friction_q: Array) -> None:
     """Add the friction of the bearings in a physics step to (3,), N·m; keep the cable's in the first one."""
-    if bristles is None:
+    if not bristles.on:
         return
     for i in range(3):
         friction_q[i] -= bristles.torque_q[0, i]
@@ -296,24 +292,21 @@ def log_bristles(bristles: BristleFriction | None, substep: int, friction_q: Arr
 
 
 @inlined
-def log_presliding(bristles: BristleFriction | None, row: Array) -> None:
+def log_presliding(bristles: BristleFriction, row: Array) -> None:
     """Write the elastic rotation within static friction into the beginning of a row."""
-    if bristles is not None:
-        copy_into(row, 0, bristles.deflection_rad[LAST], 3)
+    copy_into(row, 0, bristles.deflection_rad[LAST], 3)
 
 
 @inlined
-def log_cable(bristles: BristleFriction | None, row: Array) -> None:
+def log_cable(bristles: BristleFriction, row: Array) -> None:
     """Write the torque of the cable into the beginning of a row."""
-    if bristles is not None:
-        copy_into(row, 0, bristles.first_cable_q, 3)
+    copy_into(row, 0, bristles.first_cable_q, 3)
 
 
 @inlined
-def log_end_stops(bristles: BristleFriction | None, row: Array) -> None:
+def log_end_stops(bristles: BristleFriction, row: Array) -> None:
     """Write the torque of the end stops into the beginning of a row."""
-    if bristles is not None:
-        log_stops(bristles.stops, row)
+    copy_into(row, 0, bristles.stops.torque_q, 3)
 
 
 @inlined

@@ -19,14 +19,15 @@ ratio of 0.05 or more none had more energy than at its start; single steps added
 
 from __future__ import annotations
 
-from typing import Annotated, NamedTuple
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field
 
-from spheretwin.models.base.compiled import copy_into, inlined
+from spheretwin.models.base.compiled import inlined
 from spheretwin.models.base.errors import InputError
+from spheretwin.models.base.record import Record, Rows, field
 
 Array = NDArray[np.float64]
 
@@ -51,27 +52,29 @@ class EndStopsSection(BaseModel):
     )
 
 
-class EndStops(NamedTuple):
-    """End stops of a run, for compiled code."""
+class EndStops(Record):
+    """End stops of the hinges."""
 
-    contact_rad: Array  # (3, 2) angles at which the contact begins
-    stiffness_Nm_rad: float
-    damping_Nm_s: Array  # (3,)
-    step_s: float
-    torque_q: Array  # (3,) N·m on the hinges, mean over the last physics step
+    on: bool = field("whether there are end stops")
+    contact_rad: Array = field("angles at which the contact begins", "rad", (3, 2))
+    stiffness_Nm_rad: float = field("stiffness of a buffer about its hinge", "N·m/rad")
+    damping_Nm_s: Array = field("damping of a buffer about its hinge", "N·m·s", 3)
+    step_s: float = field("physics step", "s")
+    torque_q: Array = field("torque on the hinges, mean over the last physics step", "N·m", 3)
 
 
-def end_stops(
-    section: EndStopsSection, hinge_range_rad: Array, inertia: Array, step_s: float
-) -> EndStops | None:
-    """Return the end stops of the hinges (alpha, beta, gamma); None if they are off.
+def fill_end_stops(
+    stops: Rows, section: EndStopsSection, hinge_range_rad: Array, inertia: Array, step_s: float
+) -> None:
+    """Fill the end stops of the hinges (alpha, beta, gamma), which may be off.
 
     Parameters
     ----------
+    stops : array of EndStops
     section : EndStopsSection
     hinge_range_rad : (3, 2) array
         A hinge without end has an infinite range.
-    inertia : (3,) array, kg·m²
+    inertia : (3,) or (n, 3) array, kg·m²
         Principal inertias about the joint centre, for the damping.
     step_s : float, s
         Physics step.
@@ -82,23 +85,24 @@ def end_stops(
         The buffers of a hinge overlap.
     """
     if not section.on:
-        return None
+        return
     contact = hinge_range_rad + section.travel_rad * np.array([1.0, -1.0])
     if np.any(contact[:, 0] >= contact[:, 1]):
         raise InputError(
             "plant.end_stops: expected a travel_rad below half of each hinge's range,"
             f" received {section.travel_rad:g}"
         )
-    damping = 2 * section.damping_ratio * np.sqrt(section.stiffness_Nm_rad * np.asarray(inertia))
-    return EndStops(contact, section.stiffness_Nm_rad, damping, float(step_s), np.zeros(3))
+    stops["on"], stops["contact_rad"], stops["step_s"] = 1, contact, step_s
+    stiffness = stops["stiffness_Nm_rad"] = section.stiffness_Nm_rad
+    stops["damping_Nm_s"] = 2 * section.damping_ratio * np.sqrt(stiffness * np.asarray(inertia))
 
 
 @inlined
 def with_stop(
-    stops: EndStops | None, hinge: int, start: float, travel: float, secant: bool, torque: float, slope: float
+    stops: EndStops, hinge: int, start: float, travel: float, secant: bool, torque: float, slope: float
 ) -> tuple[float, float]:
     """Add the end stop of a hinge to a mean torque against a rotation, N·m, and to its slope or secant."""
-    if stops is None:
+    if not stops.on:
         return torque, slope
     own, own_slope = _mean_torque(stops, hinge, start, travel)
     if secant and travel != 0.0:
@@ -107,17 +111,10 @@ def with_stop(
 
 
 @inlined
-def store_stop(stops: EndStops | None, hinge: int, start: float, travel: float) -> None:
+def store_stop(stops: EndStops, hinge: int, start: float, travel: float) -> None:
     """Store the torque of the end stop of a hinge for the rotation of a complete step."""
-    if stops is not None:
+    if stops.on:
         stops.torque_q[hinge] = -_mean_torque(stops, hinge, start, travel)[0]
-
-
-@inlined
-def log_stops(stops: EndStops | None, row: Array) -> None:
-    """Write the torque of the end stops into the beginning of a row."""
-    if stops is not None:
-        copy_into(row, 0, stops.torque_q, 3)
 
 
 @inlined

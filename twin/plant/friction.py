@@ -10,17 +10,22 @@ would never rest. Instead `slow_down` advances the rates under friction alone, b
 the step of the rotor and by half a step after it: this splitting is symmetric (Strang) and of second order.
 """
 
-from math import isfinite, sqrt
-from typing import Any, NamedTuple
+from __future__ import annotations
+
+from math import sqrt
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from spheretwin.models.base.compiled import inlined
 from spheretwin.models.base.errors import InputError
+from spheretwin.models.base.record import Record, Rows, field
 from spheretwin.models.joint_chain import JointChain, inertia_at
 from spheretwin.models.kinematics import Triple, triple
 from spheretwin.models.lagrangian import InertiaEntries, solve_inertia
+
+Array = NDArray[np.float64]
 
 # Far below any motion; its square is far above the smallest number, so that k(0) is finite.
 SLOWEST_SMOOTHING_rad_s = 1e-12
@@ -30,78 +35,82 @@ _POLE: Any = 0.5 + 0.5j
 _RESIDUE: Any = 1.0 - 1.0j
 
 
-class Friction(NamedTuple):
-    """Friction of a run, for compiled code."""
+class Friction(Record):
+    """Friction of the hinges."""
 
-    coulomb_Nm: NDArray[np.float64]  # (3,)
-    viscous_Nm_s: NDArray[np.float64]  # (3,)
-    smoothing_rate_rad_s: float
-    inertia: NDArray[np.float64]  # (3,) kg·m² about the joint centre, modelling error and payload included
-    step_s: float
-    acts: bool  # false if there is no friction, which then costs no time
-    chain: JointChain | None  # general joint, instead of the inertia; None for an ideal one
+    on: bool = field("whether there is friction")
+    coulomb_Nm: Array = field("friction well above the smoothing rate", "N·m", 3)
+    viscous_Nm_s: Array = field("friction per unit of rate", "N·m·s", 3)
+    smoothing_rate_rad_s: float = field("rate over which the Coulomb term changes sign", "rad/s")
+    step_s: float = field("physics step, of which `slow_down` advances half", "s")
 
 
-def friction(
-    coulomb_Nm: NDArray[np.float64],
-    viscous_Nm_s: NDArray[np.float64],
-    smoothing_rate_rad_s: float,
-    inertia: NDArray[np.float64],
-    step_s: float,
-    chain: JointChain | None = None,
-) -> Friction:
-    """Return the friction on the hinges (alpha, beta, gamma) of a rotor.
+def fill_friction(
+    frictions: Rows, coulomb_Nm: Array, viscous_Nm_s: Array, smoothing_rate_rad_s: float, step_s: float
+) -> None:
+    """Fill the friction on the hinges (alpha, beta, gamma) of rotors.
 
     Parameters
     ----------
-    coulomb_Nm : (3,) array, N·m
-        Friction well above the smoothing rate.
-    viscous_Nm_s : (3,) array, N·m·s
-        Friction per unit of rate.
-    smoothing_rate_rad_s : float, rad/s
-        Rate over which the Coulomb term changes sign.
-    inertia : (3,) array, kg·m²
-        Principal inertias about the joint centre, modelling error and payload included.
+    frictions : array of Friction
+    coulomb_Nm : (3,) or (n, 3) array, N·m
+    viscous_Nm_s : (3,) or (n, 3) array, N·m·s
+    smoothing_rate_rad_s : float or (n,) array, rad/s
     step_s : float, s
-        Physics step; `slow_down` advances half of it.
-    chain : JointChain
-        General joint, whose inertia counts instead; default: an ideal joint.
 
     Raises
     ------
     InputError
         A coefficient that is negative or not finite, or a smoothing rate that is too small or not finite.
     """
-    coulomb, viscous = _coefficients("coulomb_Nm", coulomb_Nm), _coefficients("viscous_Nm_s", viscous_Nm_s)
-    if not (isfinite(smoothing_rate_rad_s) and smoothing_rate_rad_s >= SLOWEST_SMOOTHING_rad_s):
+    for name, values in (("coulomb_Nm", coulomb_Nm), ("viscous_Nm_s", viscous_Nm_s)):
+        frictions[name] = _coefficients(name, values)
+    if not np.all(np.isfinite(smoothing_rate_rad_s) & (smoothing_rate_rad_s >= SLOWEST_SMOOTHING_rad_s)):
         raise InputError(
             f"friction: expected a finite smoothing_rate_rad_s of at least {SLOWEST_SMOOTHING_rad_s:g},"
             f" received {smoothing_rate_rad_s:g}"
         )
-    acts = bool(np.any(coulomb) or np.any(viscous))
-    moments = np.array(inertia, dtype=np.float64)
-    return Friction(coulomb, viscous, float(smoothing_rate_rad_s), moments, float(step_s), acts, chain)
+    frictions["on"] = np.any(frictions["coulomb_Nm"] + frictions["viscous_Nm_s"], axis=1)
+    frictions["smoothing_rate_rad_s"], frictions["step_s"] = smoothing_rate_rad_s, step_s
 
 
 @inlined
-def slow_down(
-    friction: Friction,
-    q: NDArray[np.float64],
-    qdot: NDArray[np.float64],
-    mean_torque_q: NDArray[np.float64],
-) -> None:
-    """Advance the rates by half a physics step under friction alone.
+def slow_down(friction: Friction, joint: JointChain, q: Array, qdot: Array, mean_torque_q: Array) -> None:
+    """Advance the rates by half a physics step under friction alone, if there is any.
 
     Parameters
     ----------
     friction : Friction
-        Coefficients, inertia and physics step.
+    joint : JointChain
+        Its inertia counts.
     q : (3,) array, rad
         Pose, away from beta = +-90 degrees; held.
     qdot : (3,) array, rad/s
         Hinge rates; changed in place.
     mean_torque_q : (3,) array, N·m
         Friction on (alpha, beta, gamma), mean over a complete physics step: this half is added.
+    """
+    if friction.on:
+        viscous, coulomb = triple(friction.viscous_Nm_s), triple(friction.coulomb_Nm)
+        smoothing, step_s = friction.smoothing_rate_rad_s, friction.step_s
+        slow_hinges(joint, triple(joint.inertia), viscous, coulomb, smoothing, step_s, q, qdot, mean_torque_q)
+
+
+@inlined
+def slow_hinges(
+    joint: JointChain,
+    inertia: Triple,
+    viscous: Triple,
+    coulomb: Triple,
+    smoothing: float,
+    step_s: float,
+    q: Array,
+    qdot: Array,
+    mean_torque_q: Array,
+) -> None:
+    """Advance the rates by half a physics step under friction alone.
+
+    The parameters are those of `slow_down` as numbers; `inertia` is that of an ideal joint.
 
     Notes
     -----
@@ -119,13 +128,11 @@ def slow_down(
     ``(M + p t K) u = M v``, of the same zeros as M.
     """
     v = triple(qdot)
-    M = inertia_at(friction.chain, friction.inertia, triple(q))
-    viscous, coulomb = triple(friction.viscous_Nm_s), triple(friction.coulomb_Nm)
-    smoothing, chain = friction.smoothing_rate_rad_s, friction.chain
-    qdot[0], qdot[1], qdot[2] = slowed(M, v, viscous, coulomb, smoothing, 0.5 * friction.step_s, chain)
-    gained = momentum(M, (qdot[0] - v[0], qdot[1] - v[1], qdot[2] - v[2]), chain)
+    M = inertia_at(joint, inertia, triple(q))
+    qdot[0], qdot[1], qdot[2] = slowed(M, v, viscous, coulomb, smoothing, 0.5 * step_s, joint.on)
+    gained = momentum(M, (qdot[0] - v[0], qdot[1] - v[1], qdot[2] - v[2]), joint.on)
     for i in range(3):
-        mean_torque_q[i] += gained[i] / friction.step_s
+        mean_torque_q[i] += gained[i] / step_s
 
 
 @inlined
@@ -136,25 +143,25 @@ def slowed(
     coulomb: Triple,
     smoothing: float,
     t: float,
-    chain: JointChain | None,
+    general: bool,
 ) -> Triple:
-    """Return the rates (rad/s) after a time t (s) of friction alone; chain is None for an ideal joint."""
-    before = momentum(M, v, chain)
+    """Return the rates (rad/s) after a time t (s) of friction alone, of a general or an ideal joint."""
+    before = momentum(M, v, general)
     k = _factors(viscous, coulomb, smoothing, v)
-    middle = solve_inertia(_damped(M, k, 0.5 * t), before, chain)
+    middle = solve_inertia(_damped(M, k, 0.5 * t), before, general)
     k = _factors(viscous, coulomb, smoothing, middle)
-    if chain is None:
+    if not general:
         return _slowed_ideal(M, (0.5 * t * k[0], 0.5 * t * k[1], 0.5 * t * k[2]), before)
-    alpha, beta, gamma = solve_inertia(_damped(M, k, _POLE * t), before, chain)
+    alpha, beta, gamma = solve_inertia(_damped(M, k, _POLE * t), before, general)
     return (_RESIDUE * alpha).real, (_RESIDUE * beta).real, (_RESIDUE * gamma).real
 
 
 @inlined
-def momentum(M: InertiaEntries, v: Triple, chain: JointChain | None) -> Triple:
-    """Return ``M v``; chain is None for an ideal joint."""
+def momentum(M: InertiaEntries, v: Triple, general: bool) -> Triple:
+    """Return ``M v``, of a general or an ideal joint."""
     alpha = M.alpha * v[0] + M.alpha_beta * v[1] + M.alpha_gamma * v[2]
     beta, gamma = M.alpha_beta * v[0] + M.beta * v[1], M.alpha_gamma * v[0] + M.gamma * v[2]
-    if chain is None:
+    if not general:
         return alpha, beta, gamma
     return alpha, beta + M.beta_gamma * v[2], gamma + M.beta_gamma * v[1]
 
@@ -214,9 +221,9 @@ def _slowed_ideal(M: InertiaEntries, damping: Triple, before: Triple) -> Triple:
     return alpha_re + alpha_im, beta, gamma
 
 
-def _coefficients(name: str, values: NDArray[np.float64]) -> NDArray[np.float64]:
-    coefficients = np.array(values, dtype=np.float64)
-    if coefficients.shape != (3,) or not np.all(np.isfinite(coefficients) & (coefficients >= 0)):
+def _coefficients(name: str, values: Array) -> Array:
+    coefficients = np.asarray(values, dtype=np.float64)
+    if coefficients.shape[-1:] != (3,) or not np.all(np.isfinite(coefficients) & (coefficients >= 0)):
         raise InputError(
             f"friction: expected {name} of three finite values that are not negative, received {values}"
         )

@@ -14,19 +14,20 @@ from spheretwin.models import mjcf
 from spheretwin.models.actuator import Actuator
 from spheretwin.models.base.compiled import allocation_free, inlined
 from spheretwin.models.base.errors import InputError
-from spheretwin.models.joint_chain import JointChain, acceleration_at
+from spheretwin.models.base.record import Rows
+from spheretwin.models.joint_chain import JointChain, acceleration_at, fill_ideal
 from spheretwin.models.kinematics import Triple, triple
 from spheretwin.models.lagrangian import GRAVITY_m_s2, loaded_inertia
 from spheretwin.plant.rotor import EngineKind, RotorSettings
 
+Array = NDArray[np.float64]
+
 
 class LagrangianData(NamedTuple):
-    """Equations of motion for compiled code; the loop reads and writes the last four fields."""
+    """Equations of motion for compiled code; the loop reads and writes the last four."""
 
     step_s: float
-    chain: JointChain | None  # general joint; None for an ideal one
-    inertia: NDArray[np.float64]  # (3,) kg·m², payload included, of the ideal joint
-    weight_moment: float  # N·m, m g l of its payload
+    joint: Rows  # array of one JointChain
     q: NDArray[np.float64]  # (3,) rad
     qdot: NDArray[np.float64]  # (3,) rad/s
     torque_q: NDArray[np.float64]  # (3,) N·m on the hinges
@@ -50,9 +51,12 @@ class LagrangianRotor:
         Point mass at the payload mount; 0 for none.
     gravity_m_s2 : float, m/s²
         Gravity on the payload along -z of the stator frame.
-    chain : JointChain
-        General joint with mass properties and gravity, which replaces all of the above but the step;
-        default: an ideal joint.
+    joint : array of one JointChain
+        Replaces all of the above but the step and the integrator; default: an ideal joint.
+
+    Attributes
+    ----------
+    joint : array of one JointChain
 
     Raises
     ------
@@ -68,20 +72,21 @@ class LagrangianRotor:
         modelling_error: float = 0.0,
         payload_kg: float = 0.0,
         gravity_m_s2: float = GRAVITY_m_s2,
-        chain: JointChain | None = None,
+        joint: Rows | None = None,
     ) -> None:
         x, y, height = (float(length) for length in actuator.payload_mount_m)
         if integrator != "RK4":
             raise InputError(f"Lagrangian plant: expected the integrator RK4, received {integrator}")
-        if payload_kg and (x or y) and not chain:
+        if payload_kg and (x or y) and joint is None:
             raise InputError(
                 "Lagrangian plant: expected a payload mount on the rotor's third axis,"
                 f" received one at ({x:g}, {y:g}, {height:g}) m"
             )
         self._step_s = step_s
-        self.chain = chain
-        self.inertia = loaded_inertia((1 + modelling_error) * actuator.inertia, payload_kg, height)
-        self.weight_moment = payload_kg * gravity_m_s2 * height
+        if joint is None:
+            inertia = loaded_inertia((1 + modelling_error) * actuator.inertia, payload_kg, height)
+            joint = JointChain.filled(fill_ideal, inertia, payload_kg * gravity_m_s2 * height)
+        self.joint = joint
 
     def start(self, q: NDArray[np.float64], qdot: NDArray[np.float64]) -> LagrangianData:
         """Set pose and rates at time 0; return the data that compiled code steps.
@@ -97,9 +102,7 @@ class LagrangianRotor:
         self._state = pose, rates
         return LagrangianData(
             step_s=self._step_s,
-            chain=self.chain,
-            inertia=self.inertia,
-            weight_moment=self.weight_moment,
+            joint=self.joint,
             q=pose,
             qdot=rates,
             torque_q=np.zeros(3),
@@ -116,30 +119,33 @@ class LagrangianRotor:
 
 
 @allocation_free  # inlined, it makes the loop 7 % slower
-def step(plant: LagrangianData) -> None:
-    """Advance by one physics step of the classical Runge-Kutta method of order four.
-
-    The torque on the hinges is held over the step, as in MuJoCo. The stages use tuples: nothing is allocated,
-    and a step takes a tenth of the time with arrays of three.
-    """
-    h = plant.step_s
-    q1, v1 = triple(plant.q), triple(plant.qdot)
-    a1 = _acceleration(plant, q1, v1)
-    q2, v2 = _moved(q1, 0.5 * h, v1), _moved(v1, 0.5 * h, a1)
-    a2 = _acceleration(plant, q2, v2)
-    q3, v3 = _moved(q1, 0.5 * h, v2), _moved(v1, 0.5 * h, a2)
-    a3 = _acceleration(plant, q3, v3)
-    q4, v4 = _moved(q1, h, v3), _moved(v1, h, a3)
-    a4 = _acceleration(plant, q4, v4)
-    for i in range(3):
-        plant.q[i] = q1[i] + h / 6 * (v1[i] + 2 * v2[i] + 2 * v3[i] + v4[i])
-        plant.qdot[i] = v1[i] + h / 6 * (a1[i] + 2 * a2[i] + 2 * a3[i] + a4[i])
+def step(rotor: LagrangianData) -> None:
+    """Advance by one physics step; the torque on the hinges is held over it, as in MuJoCo."""
+    joint = rotor.joint[0]
+    inertia, moment = triple(joint.inertia), joint.weight_moment
+    runge_kutta(rotor.step_s, joint, inertia, moment, triple(rotor.torque_q), rotor.q, rotor.qdot)
 
 
 @inlined
-def _acceleration(plant: LagrangianData, q: Triple, qdot: Triple) -> Triple:
-    torque = triple(plant.torque_q)
-    return acceleration_at(plant.chain, plant.inertia, plant.weight_moment, q, qdot, torque)
+def runge_kutta(
+    h: float, joint: JointChain, inertia: Triple, weight_moment: float, torque: Triple, q: Array, qdot: Array
+) -> None:
+    """Advance pose and rates by a step h (s) of the classical Runge-Kutta method of order four.
+
+    The stages use tuples: nothing is allocated, and a step takes a tenth of the time with arrays of three.
+    `inertia` and `weight_moment` are those of an ideal joint.
+    """
+    q1, v1 = triple(q), triple(qdot)
+    a1 = acceleration_at(joint, inertia, weight_moment, q1, v1, torque)
+    q2, v2 = _moved(q1, 0.5 * h, v1), _moved(v1, 0.5 * h, a1)
+    a2 = acceleration_at(joint, inertia, weight_moment, q2, v2, torque)
+    q3, v3 = _moved(q1, 0.5 * h, v2), _moved(v1, 0.5 * h, a2)
+    a3 = acceleration_at(joint, inertia, weight_moment, q3, v3, torque)
+    q4, v4 = _moved(q1, h, v3), _moved(v1, h, a3)
+    a4 = acceleration_at(joint, inertia, weight_moment, q4, v4, torque)
+    for i in range(3):
+        q[i] = q1[i] + h / 6 * (v1[i] + 2 * v2[i] + 2 * v3[i] + v4[i])
+        qdot[i] = v1[i] + h / 6 * (a1[i] + 2 * a2[i] + 2 * a3[i] + a4[i])
 
 
 @inlined
@@ -148,8 +154,7 @@ def _moved(start: Triple, time: float, rate: Triple) -> Triple:
 
 
 def _set_up(settings: RotorSettings) -> LagrangianRotor:
-    gravity_m_s2 = settings.gravity_m_s2
-    supported = () if gravity_m_s2 is None else (mjcf.OTHER_GRAVITY,)
+    supported = () if settings.gravity_m_s2 is None else (mjcf.OTHER_GRAVITY,)
     unsupported = [name for name in settings.model.unknown_to_the_lagrangian if name not in supported]
     if unsupported:
         raise InputError(
@@ -157,13 +162,7 @@ def _set_up(settings: RotorSettings) -> LagrangianRotor:
             f" {', '.join(unsupported)}; plant.engine mujoco computes it"
         )
     return LagrangianRotor(
-        settings.actuator,
-        settings.step_s,
-        settings.integrator,
-        settings.modelling_error,
-        settings.payload_kg,
-        gravity_m_s2=0.0 if gravity_m_s2 is None else gravity_m_s2,
-        chain=settings.joint_chain(),
+        settings.actuator, settings.step_s, settings.integrator, joint=JointChain.filled(settings.fill_joint)
     )
 
 

@@ -206,6 +206,6 @@ def _slow_down(block: Array, dt: float) -> None:
         M = inertia_entries(_turns(block, lane), _triple(block, INERTIA, lane))
         rates = _triple(block, QDOT, lane)
         viscous, coulomb = _triple(block, VISCOUS, lane), _triple(block, COULOMB, lane)
-        alpha, beta, gamma = slowed(M, rates, viscous, coulomb, block[SMOOTHING + lane], t, None)
+        alpha, beta, gamma = slowed(M, rates, viscous, coulomb, block[SMOOTHING + lane], t, False)
         block[QDOT + lane], block[QDOT + LANES + lane] = alpha, beta
         block[QDOT + 2 * LANES + lane] = gamma

@@ -14,11 +14,12 @@ from numpy.typing import NDArray
 
 from spheretwin.models.base.compiled import allocation_free, compiled
 from spheretwin.models.base.errors import InputError
-from spheretwin.models.joint_chain import JointChain, torque_on_hinges, update_ideal_motion
+from spheretwin.models.base.record import Rows
+from spheretwin.models.joint_chain import torque_on_hinges, update_ideal_motion
+from spheretwin.models.kinematics import triple
 from spheretwin.models.magnetics import SCRATCH_COLUMNS, TorqueModel, fill_torque_matrix, rotor_torque
-from spheretwin.plant.friction import Friction, slow_down
-from spheretwin.plant.lagrangian_rotor import LagrangianData
-from spheretwin.plant.lagrangian_rotor import step as step_rotor
+from spheretwin.plant.friction import slow_hinges
+from spheretwin.plant.lagrangian_rotor import runge_kutta
 
 Array = NDArray[np.float64]
 
@@ -36,11 +37,11 @@ class Parameters(NamedTuple):
     """Everything that the step depends on; `_replace` gives a field another value."""
 
     inertia_kg_m2: Array
-    """Principal moments about the joint centre (3,), payload included; of an ideal joint."""
+    """Principal moments about the joint centre (3,), payload included; only if the joint is ideal."""
     weight_moment_Nm: float
-    """Weight of the payload times its distance from the joint centre; of an ideal joint."""
-    joint: JointChain | None
-    """Hinges, masses and gravity of a general joint, instead of the two fields above; None: ideal."""
+    """Weight of the payload times its distance from the joint centre; only if the joint is ideal."""
+    joint: Rows
+    """Array of one `JointChain`: if it is on, its hinges, masses and gravity replace the two fields above."""
     coulomb_Nm: Array
     """Coulomb friction of each hinge (3,)."""
     viscous_Nm_s: Array
@@ -95,6 +96,8 @@ def check_parameters(parameters: Parameters) -> None:
         raise InputError(
             "plant: expected a finite weight_moment_Nm, friction_smoothing_rad_s above 0, received others"
         )
+    if parameters.joint.shape[0] != 1:
+        raise InputError("plant: expected an array of one joint, received another")
     lines, pairs = magnetics.line_axes.shape[0], magnetics.pair_gain.shape[1]
     if magnetics.line_weights.shape[0] != lines or magnetics.pair_stretch.shape[1] != pairs:
         raise InputError("plant: expected magnetics with arrays of matching lengths, received others")
@@ -181,7 +184,7 @@ def step(state: State, currents: Array, disturbance: Array, parameters: Paramete
     # As `step_of_checked`: a call with all arrays of the parameters, each counted up and down, takes a third
     # of a step.
     groups = parameters.torque_gain.shape[0]
-    G, vectors = np.empty((3, groups)), np.empty((10, max(3, groups)))
+    G, vectors = np.empty((3, groups)), np.empty((8, max(3, groups)))
     scratch = np.empty((parameters.magnetics.line_weights.shape[0], SCRATCH_COLUMNS))
     q, qdot = state.q_rad.copy(), state.qdot_rad_s.copy()
     _advance(q, qdot, currents, disturbance, parameters, dt, vectors, G, scratch)
@@ -197,7 +200,7 @@ def step_of_checked(
     """Return the state after one step of arguments that the caller has checked, as `step` does."""
     groups = parameters.torque_gain.shape[0]
     # Few allocations: with one for each vector the step takes half as long again.
-    G, vectors = np.empty((3, groups)), np.empty((10, max(3, groups)))
+    G, vectors = np.empty((3, groups)), np.empty((8, max(3, groups)))
     scratch = np.empty((parameters.magnetics.line_weights.shape[0], SCRATCH_COLUMNS))
     q, qdot = state.q_rad.copy(), state.qdot_rad_s.copy()
     _advance(q, qdot, currents, disturbance, parameters, dt, vectors, G, scratch)
@@ -238,7 +241,7 @@ def roll_out(
             "plant: expected currents (m, groups), q (m, 3) and steps from 0 on, received others"
         )
     groups = parameters.torque_gain.shape[0]
-    G, vectors = np.empty((3, groups)), np.empty((10, max(3, groups)))
+    G, vectors = np.empty((3, groups)), np.empty((8, max(3, groups)))
     scratch = np.empty((parameters.magnetics.line_weights.shape[0], SCRATCH_COLUMNS))
     present, qdot = state.q_rad.copy(), state.qdot_rad_s.copy()
     for k in range(currents.shape[0]):
@@ -260,25 +263,17 @@ def _advance(
     G: Array,
     scratch: Array,
 ) -> None:
-    """Advance angles and rates in place; `vectors` (10, n), `G` and `scratch` are working space."""
-    joint, friction_q, warnings = parameters.joint, vectors[3], vectors[4].view(np.int32)
-    middle_q, torque_S, torque_q, effective = vectors[5], vectors[6], vectors[7], vectors[8]
-    for i in range(3):
-        middle_q[i], friction_q[i] = q[i] + 0.5 * dt * qdot[i], 0.0
+    """Advance angles and rates in place; `vectors` (8, n), `G` and `scratch` are working space."""
+    joint, friction_q, middle_q, torque_S = parameters.joint[0], vectors[3], vectors[4], vectors[5]
+    torque_q, effective = vectors[6], vectors[7]
+    inertia, coulomb = triple(parameters.inertia_kg_m2), triple(parameters.coulomb_Nm)
+    viscous, smoothing = triple(parameters.viscous_Nm_s), parameters.friction_smoothing_rad_s
     acts = False
     for i in range(3):
-        acts = acts or parameters.coulomb_Nm[i] > 0 or parameters.viscous_Nm_s[i] > 0
-    friction = Friction(
-        parameters.coulomb_Nm,
-        parameters.viscous_Nm_s,
-        parameters.friction_smoothing_rad_s,
-        parameters.inertia_kg_m2,
-        dt,
-        acts,
-        joint,
-    )
+        middle_q[i], friction_q[i] = q[i] + 0.5 * dt * qdot[i], 0.0
+        acts = acts or coulomb[i] > 0 or viscous[i] > 0
     if acts:
-        slow_down(friction, q, qdot, friction_q)
+        slow_hinges(joint, inertia, viscous, coulomb, smoothing, dt, q, qdot, friction_q)
     _fill(middle_q, parameters, vectors, G, scratch)
     for j in range(G.shape[1]):
         effective[j] = parameters.torque_gain[j] * currents[j]
@@ -288,20 +283,9 @@ def _advance(
         torque_q[i] -= (
             disturbance[i] + parameters.constant_torque_Nm[i] + parameters.spring_Nm_rad[i] * middle_q[i]
         )
-    step_rotor(
-        LagrangianData(
-            dt,
-            joint,
-            parameters.inertia_kg_m2,
-            parameters.weight_moment_Nm,
-            q,
-            qdot,
-            torque_q,
-            warnings,
-        )
-    )
+    runge_kutta(dt, joint, inertia, parameters.weight_moment_Nm, triple(torque_q), q, qdot)
     if acts:
-        slow_down(friction, q, qdot, friction_q)
+        slow_hinges(joint, inertia, viscous, coulomb, smoothing, dt, q, qdot, friction_q)
 
 
 @allocation_free
@@ -309,6 +293,6 @@ def _fill(q: Array, parameters: Parameters, vectors: Array, G: Array, scratch: A
     """Fill `G` without gains at a pose; the first three rows of `vectors` are working space."""
     ideal_q, rates, ideal_rates = vectors[0], vectors[1], vectors[2]
     for i in range(3):
-        ideal_q[i], rates[i] = q[i], 0.0
-    update_ideal_motion(parameters.joint, q, rates, ideal_q, ideal_rates)
+        rates[i] = 0.0
+    update_ideal_motion(parameters.joint[0], q, rates, ideal_q, ideal_rates)
     fill_torque_matrix(ideal_q, parameters.magnetics, G, scratch)

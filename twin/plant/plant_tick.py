@@ -11,11 +11,12 @@ from numpy.typing import NDArray
 from spheretwin.electronics.drive import DriveModel, advance_currents, begin, end
 from spheretwin.electronics.transducers import CurrentSensors
 from spheretwin.models.base.compiled import copy_into, implements, inlined
-from spheretwin.models.joint_chain import JointChain, torque_on_hinges, update_ideal_motion
+from spheretwin.models.base.record import Rows
+from spheretwin.models.joint_chain import torque_on_hinges, update_ideal_motion
 from spheretwin.models.magnetics import TorqueModel, fill_torque_matrix, rotor_torque
 from spheretwin.plant import lagrangian_rotor, mujoco_rotor
-from spheretwin.plant.bristle_friction import BristleFriction, apply_bristles, begin_bristles, log_bristles
-from spheretwin.plant.friction import Friction, slow_down
+from spheretwin.plant.bristle_friction import apply_bristles, begin_bristles, log_bristles
+from spheretwin.plant.friction import slow_down
 from spheretwin.plant.magnet_heat import MagnetHeat, advance_heat, update_gain
 from spheretwin.plant.rotor import EngineKind
 
@@ -64,13 +65,13 @@ class Plant(NamedTuple):
     """True plant; the controller knows nothing of it."""
 
     rotor: Any  # data of `Rotor.start`
-    joint: JointChain | None  # hinges that are tilted or apart; None for ideal ones
+    joint: Rows  # array of one JointChain
     magnetics: TorqueModel  # true
     G: NDArray[np.float64]  # (3, n) N·m/A, true torque matrix in the middle of the physics step
     scratch: NDArray[np.float64]  # of `fill_torque_matrix`
     drive: DriveModel
-    friction: Friction
-    bristles: BristleFriction | None
+    friction: Rows  # array of one Friction
+    bristles: Rows  # array of one BristleFriction
     heat: MagnetHeat | None
     group_gain: NDArray[np.float64]  # (n,) torque per ampere over that of the torque matrix
     present_gain: NDArray[np.float64]  # (n,) the same with the present remanence; without heat that array
@@ -80,8 +81,8 @@ class Plant(NamedTuple):
     step_s: float
     middle_q: NDArray[np.float64]  # (3,) rad, predicted pose in the middle of the physics step
     middle_qdot: NDArray[np.float64]  # (3,) rad/s, predicted rates there
-    coil_q: Array  # (3,) rad, ideal hinges with the same orientation; with an ideal joint that array
-    coil_qdot: Array  # (3,) rad/s, their rates with the same angular velocity; with an ideal joint that array
+    coil_q: Array  # (3,) rad, ideal hinges with the same orientation
+    coil_qdot: Array  # (3,) rad/s, their rates with the same angular velocity
     last_qdot: NDArray[np.float64]  # (3,) rad/s at the start of the last physics step
     current: NDArray[np.float64]  # (n,) A, present
     mean_current: NDArray[np.float64]  # (n,) A, over the physics step
@@ -136,13 +137,8 @@ def plant_tick(
     middle_q, middle_qdot, last_qdot = plant.middle_q, plant.middle_qdot, plant.last_qdot
     hinge_range, half_step_s = plant.hinge_range, 0.5 * plant.step_s
     current, mean_current, effective_current = plant.current, plant.mean_current, plant.effective_current
-    gain, unmodelled, friction, friction_q = (
-        plant.present_gain,
-        plant.unmodelled_torque,
-        plant.friction,
-        plant.friction_q,
-    )
-    drive, bristles, joint = plant.drive, plant.bristles, plant.joint
+    gain, unmodelled, friction_q = plant.present_gain, plant.unmodelled_torque, plant.friction_q
+    drive, friction, bristles, joint = plant.drive, plant.friction[0], plant.bristles[0], plant.joint[0]
     coil_q, coil_qdot = plant.coil_q, plant.coil_qdot
     update_gain(plant.heat, plant.group_gain, gain)
     begin(drive, command)
@@ -152,8 +148,7 @@ def plant_tick(
             middle_qdot[i] = qdot[i] + 0.5 * (qdot[i] - last_qdot[i])
             last_qdot[i] = qdot[i]
             friction_q[i] = 0.0
-        if friction.acts:
-            slow_down(friction, q, qdot, friction_q)
+        slow_down(friction, joint, q, qdot, friction_q)
         update_ideal_motion(joint, middle_q, middle_qdot, coil_q, coil_qdot)
         fill_torque_matrix(coil_q, magnetics, G, scratch)
         advance_currents(drive, command, substep, coil_q, coil_qdot, G, gain, current, mean_current)
@@ -166,10 +161,9 @@ def plant_tick(
             torque_q[i] -= disturbance[i] + unmodelled[i]
         begin_bristles(bristles, middle_q, q, qdot, torque_q)
         step_rotor(rotor)
-        apply_bristles(bristles, middle_q, middle_qdot, last_qdot, q, qdot)
+        apply_bristles(bristles, joint, middle_q, middle_qdot, last_qdot, q, qdot)
         log_bristles(bristles, substep, friction_q)
-        if friction.acts:
-            slow_down(friction, q, qdot, friction_q)
+        slow_down(friction, joint, q, qdot, friction_q)
         if substep == 0:
             copy_into(output.current, 0, mean_current, mean_current.shape[0])
             copy_into(output.torque_S, 0, torque_S, 3)

@@ -301,7 +301,7 @@ class Plants:
         self, currents: Array, disturbance: Array, dt: float, steps: int, angles: Array | None = None
     ) -> dict[int, State]:
         """Return the states that plants with a general joint reach, by their number; write their angles."""
-        general = [number for number, one in enumerate(self._parameters) if one.joint is not None]
+        general = [number for number, one in enumerate(self._parameters) if one.joint["on"][0]]
         if not general:
             return {}
         reached, q, qdot = {}, self.q_rad, self.qdot_rad_s

@@ -9,7 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spheretwin.models.actuator import Actuator
-from spheretwin.models.joint_chain import JointChain, read_chain
+from spheretwin.models.base.record import Rows
+from spheretwin.models.joint_chain import fill_chain, fill_ideal
+from spheretwin.models.lagrangian import loaded_inertia
 from spheretwin.models.mjcf import Mjcf
 from spheretwin.plant.mass_properties import MassErrors, true_model
 
@@ -29,13 +31,19 @@ class RotorSettings(NamedTuple):
     mass: MassErrors | None = None
     """Differences of the machine from the model file."""
 
-    def joint_chain(self) -> JointChain | None:
-        """Return the joint of the true rotor; None if the equations of motion in closed form describe it."""
-        off_axis = self.payload_kg and np.any(self.actuator.payload_mount_m[:2])
-        if self.mass is None and self.model.has_ideal_joint and not off_axis:
-            return None
+    def fill_joint(self, joints: Rows) -> None:
+        """Fill the joint of the true rotor: an ideal one if its closed equations of motion hold.
+
+        Parameters
+        ----------
+        joints : array of JointChain
+        """
         error, payload_kg, gravity_m_s2 = self.modelling_error, self.payload_kg, self.gravity_m_s2
-        return read_chain(true_model(self.model, error, payload_kg, gravity_m_s2, self.mass))
+        x, y, height = map(float, self.actuator.payload_mount_m)
+        inertia = loaded_inertia((1 + error) * self.actuator.inertia, payload_kg, height)
+        fill_ideal(joints, inertia, payload_kg * (gravity_m_s2 or 0.0) * height)
+        if self.mass is not None or not self.model.has_ideal_joint or (payload_kg and (x or y)):
+            fill_chain(joints, true_model(self.model, error, payload_kg, gravity_m_s2, self.mass))
 
 
 class Rotor(Protocol):

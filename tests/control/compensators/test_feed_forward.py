@@ -16,10 +16,12 @@ from spheretwin.control.compensators.feed_forward import (
 from spheretwin.control.law import Law
 from spheretwin.models.lagrangian import coriolis_matrix, inertia_matrix
 from spheretwin.models.telemetry.signals import ANGLES, Signal
-from spheretwin.plant.friction import friction, slow_down
+from spheretwin.plant.friction import slow_down
 from spheretwin.session import Session
 from spheretwin.simulation import simulate
 from tests.control.compensators import cases
+from tests.twin.plant.motions import friction
+from tests.twin.plant.test_friction import ideal
 
 COULOMB, VISCOUS = np.array([2e-3, 3e-3, 4e-3]), np.array([1e-4, 2e-4, 3e-4])
 INERTIA = np.array([2.0e-3, 2.3e-3, 2.6e-3])
@@ -40,8 +42,10 @@ def test_at_a_steady_rate_it_cancels_the_plant_s_friction(q, v):
     """To rounding where both are smoothed alike; else by what the smoothing takes off Coulomb's level."""
     smooth = np.sqrt(v**2 + 0.01**2)
     torque = -(VISCOUS + COULOMB / smooth) * v
-    plant, mean = friction(COULOMB, VISCOUS, 0.01, INERTIA, 1e-8), np.zeros(3)
-    slow_down(plant, q, v.copy(), mean)  # the plant's own: half a step's share of the mean over a step
+    plant, mean = friction(COULOMB, VISCOUS, 0.01, 1e-8), np.zeros(3)
+    slow_down(
+        plant, ideal(INERTIA), q, v.copy(), mean
+    )  # the plant's own: half a step's share of the mean over a step
     # In half a step the rate changes by k h / 2J, a share of 1e-6 at most, and those it is coupled to; what
     # is lost of the rates, 1e-16 of them, is over h a torque of up to 1e-10 N·m.
     np.testing.assert_allclose(2 * mean, torque, rtol=0, atol=3e-6 * np.abs(COULOMB).max() + 1e-9)

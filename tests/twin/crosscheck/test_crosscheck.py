@@ -180,7 +180,8 @@ def test_wrong_inertia_breaks_the_trajectory(monkeypatch, actuator):
     right = trajectories.integrate
 
     def wrong(pieces, motion):
-        return right(pieces, motion._replace(inertia=motion.inertia * (1 + 2e-8 * np.eye(3)[1])))
+        motion.joint["inertia"] *= 1 + 2e-8 * np.eye(3)[1]
+        return right(pieces, motion)
 
     monkeypatch.setattr(trajectories, "integrate", wrong)
     assert "trajectory: MuJoCo RK4" in broken(

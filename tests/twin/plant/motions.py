@@ -4,8 +4,8 @@ import numpy as np
 
 from spheretwin.models.base.compiled import compiled
 from spheretwin.models.kinematics import rate_jacobian, rotation, rotor_rate_jacobian
-from spheretwin.plant.bristle_friction import apply_bristles, begin_bristles
-from spheretwin.plant.friction import friction, slow_down
+from spheretwin.plant.bristle_friction import BristleFriction, apply_bristles, begin_bristles
+from spheretwin.plant.friction import Friction, fill_friction, slow_down
 from spheretwin.plant.plant_tick import step_rotor
 
 STEP_s = 5e-4
@@ -18,7 +18,7 @@ def on_gamma(values):
 
 
 @compiled
-def moving(plant, bristles, viscous, torque, q, qdot, bearing, every):
+def moving(plant, joint, bristles, viscous, torque, q, qdot, bearing, every):
     """Steps of the plant as `plant_tick` takes them; states before each step, torque of the bearing in it."""
     middle_q, middle_qdot, last_qdot, unused = np.zeros(3), np.zeros(3), plant.qdot.copy(), np.zeros(3)
     for row in range(torque.shape[0]):
@@ -29,27 +29,29 @@ def moving(plant, bristles, viscous, torque, q, qdot, bearing, every):
             middle_qdot[i] = plant.qdot[i] + 0.5 * (plant.qdot[i] - last_qdot[i])
             last_qdot[i] = plant.qdot[i]
             plant.torque_q[i] = torque[row, i]
-        slow_down(viscous, plant.q, plant.qdot, unused)
-        if bristles is not None:
-            begin_bristles(bristles, middle_q, plant.q, plant.qdot, plant.torque_q)
+        slow_down(viscous, joint, plant.q, plant.qdot, unused)
+        begin_bristles(bristles, middle_q, plant.q, plant.qdot, plant.torque_q)
         step_rotor(plant)
-        if bristles is not None:
-            apply_bristles(bristles, middle_q, middle_qdot, last_qdot, plant.q, plant.qdot)
-        slow_down(viscous, plant.q, plant.qdot, unused)
-        if bristles is not None:
-            for i in range(3):
-                bearing[row // every, i] = bristles.torque_q[0, i]
+        apply_bristles(bristles, joint, middle_q, middle_qdot, last_qdot, plant.q, plant.qdot)
+        slow_down(viscous, joint, plant.q, plant.qdot, unused)
+        for i in range(3):
+            bearing[row // every, i] = bristles.torque_q[0, i]
 
 
 def motion(rotor, bristles, torque, start=UPRIGHT, rates=STILL, viscous_Nm_s=0.0, every=1):
     """Pose, rates and torque of the bearing (n, 3) of a rotor under torques (n, 3)."""
-    resistance = friction(NONE, np.full(3, viscous_Nm_s), 0.01, np.array(bristles.inertia), bristles.step_s)
+    resistance = friction(NONE, np.full(3, viscous_Nm_s), 0.01, bristles.step_s)
     return steps(rotor, bristles, resistance, torque, start, rates, every)
+
+
+def friction(*arguments):
+    return Friction.filled(fill_friction, *arguments)[0]
 
 
 def steps(rotor, bristles, resistance, torque, start, rates, every=1):
     q, qdot, bearing = np.zeros((3, -(-len(torque) // every), 3))
-    moving(rotor.start(start, rates), bristles, resistance, torque, q, qdot, bearing, every)
+    elements = BristleFriction.zeros()[0] if bristles is None else bristles
+    moving(rotor.start(start, rates), rotor.joint[0], elements, resistance, torque, q, qdot, bearing, every)
     return q, qdot, bearing
 
 

@@ -7,19 +7,23 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
+from spheretwin.models.base.compiled import compiled
+from spheretwin.models.joint_chain import JointChain, fill_ideal
 from spheretwin.models.lagrangian import inertia_matrix
 from spheretwin.plant.bristle_friction import (
     CABLE,
     LAST,
+    BristleFriction,
     StictionSection,
     apply_bristles,
     begin_bristles,
-    bristle_friction,
+    fill_bristles,
 )
 from spheretwin.plant.cable import CableSection, constant_torque_Nm
 from spheretwin.plant.lagrangian_rotor import LagrangianRotor
 from tests.twin.plant.allocations import allocates_nothing
 from tests.twin.plant.motions import UPRIGHT, STEP_s, motion, on_gamma, order
+from tests.twin.plant.test_friction import ideal
 
 COULOMB_Nm, RATIO, PRESLIDING_rad = 2e-3, 1.5, 1e-3
 BREAK_AWAY_Nm = RATIO * COULOMB_Nm
@@ -32,7 +36,11 @@ TILTED = np.array([0.3, -0.4, 0.2])
 
 
 def elements(actuator, stiction=STICTION, cable=NO_CABLE, coulomb=COULOMB, step_s=STEP_s):
-    return bristle_friction(stiction, coulomb, cable, actuator.inertia, step_s)
+    return rows_of(actuator, stiction, cable, coulomb, step_s)[0]
+
+
+def rows_of(actuator, stiction=STICTION, cable=NO_CABLE, coulomb=COULOMB, step_s=STEP_s):
+    return BristleFriction.filled(fill_bristles, stiction, coulomb, cable, actuator.inertia, step_s)
 
 
 def spin(actuator, torque, step_s=STEP_s, stiction=STICTION, cable=NO_CABLE, rate=0.0, viscous_Nm_s=0.0):
@@ -193,14 +201,14 @@ def test_the_elements_neither_create_energy_nor_lose_their_own_balance(actuator,
     stiction = StictionSection(on=True, break_away=case.ratio, damping_ratio=case.damping, **fields)
     cable = CableSection(hysteresis_Nm=(1e-3, 5e-2, 1.0), hysteresis_rad=0.3)
     coulomb = tuple(10 ** (-6 + 6 * share) for share in case.levels)
-    bristles = bristle_friction(stiction, coulomb, cable, actuator.inertia, h)
+    bristles, joint = elements(actuator, stiction, cable, coulomb, h), ideal(actuator.inertia)
     bristles.deflection_rad[:] = np.array(case.deflection) * bristles.slip_rad[:, None]
     if case.slips:
         bristles.deflection_rad[:2] = np.sign(case.direction) * bristles.slip_rad[:2, None]
     before = bristles.deflection_rad.copy()
     after_q, after = q + h * qdot, qdot.copy()  # of a rotor without torque, and with constant inertia
     begin_bristles(bristles, q, q, qdot, np.zeros(3))
-    apply_bristles(bristles, q, 10**case.speed * case.ahead, qdot, after_q, after)
+    apply_bristles(bristles, joint, q, 10**case.speed * case.ahead, qdot, after_q, after)
     M = inertia_matrix(q, actuator.inertia)
 
     def energy(rates, stretched):
@@ -264,15 +272,20 @@ def test_smooth_slip_is_of_second_order(actuator):
     assert 1.9 < order(steps, errors) < 2.15, errors
 
 
+@compiled
+def step_first(bristles, joints, q, qdot, torque):
+    begin_bristles(bristles[0], q, q, qdot, torque)
+    apply_bristles(bristles[0], joints[0], q, qdot, qdot, q, qdot)
+
+
 def test_the_elements_allocate_nothing(actuator):
-    bristles, (q, qdot, torque) = elements(actuator), np.zeros((3, 3))
-    assert allocates_nothing(begin_bristles, bristles, q, q, qdot, torque)
-    assert allocates_nothing(apply_bristles, bristles, q, qdot, qdot, q, qdot)
+    joints = JointChain.filled(fill_ideal, actuator.inertia)
+    assert allocates_nothing(step_first, rows_of(actuator), joints, *np.zeros((3, 3)))
 
 
 def test_there_are_elements_only_with_static_friction_or_a_cable(actuator):
-    assert elements(actuator, StictionSection()) is None
-    assert elements(actuator, StictionSection(), CableSection(hysteresis_Nm=(0.0, 1e-3, 0.0))) is not None
+    assert not elements(actuator, StictionSection()).on
+    assert elements(actuator, StictionSection(), CableSection(hysteresis_Nm=(0.0, 1e-3, 0.0))).on
     assert elements(actuator).stiffness_Nm_rad[: LAST + 1].sum(axis=0) == pytest.approx(STIFFNESS_Nm_rad)
 
 

@@ -10,19 +10,20 @@ from spheretwin import scenario as scenarios
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.lagrangian import inertia_matrix
 from spheretwin.plant.bristle_friction import (
+    BristleFriction,
     StictionSection,
     apply_bristles,
     begin_bristles,
-    bristle_friction,
+    fill_bristles,
 )
 from spheretwin.plant.cable import CableSection
-from spheretwin.plant.end_stops import EndStopsSection, end_stops
-from spheretwin.plant.friction import friction
+from spheretwin.plant.end_stops import EndStops, EndStopsSection, fill_end_stops
 from spheretwin.plant.lagrangian_rotor import LagrangianRotor
 from spheretwin.session import Session
 from tests.twin.passive_cases import STILL
-from tests.twin.plant.motions import NONE, STEP_s, motion, on_gamma, steps
+from tests.twin.plant.motions import NONE, STEP_s, friction, motion, on_gamma, steps
 from tests.twin.plant.test_bristle_friction import three
+from tests.twin.plant.test_friction import ideal
 
 ON = EndStopsSection(on=True)
 # Hinge γ has no end in the shipped model; upright and alone it has the inertia J3, and exact solutions.
@@ -31,9 +32,14 @@ CONTACT_rad = 0.5 - ON.travel_rad
 
 
 def stopped(actuator, section=ON, step_s=STEP_s):
-    stops = end_stops(section, RANGE_rad, actuator.inertia, step_s)
-    nothing = StictionSection(), (0.0, 0.0, 0.0), CableSection()
-    return bristle_friction(*nothing, actuator.inertia, step_s, stops=stops)
+    return bristles_of(actuator, section, step_s, StictionSection(), (0.0, 0.0, 0.0))
+
+
+def bristles_of(actuator, section, step_s, stiction, coulomb):
+    rows = BristleFriction.zeros()
+    fill_end_stops(rows["stops"], section, RANGE_rad, actuator.inertia, step_s)
+    fill_bristles(rows, stiction, coulomb, CableSection(), actuator.inertia, step_s)
+    return rows[0]
 
 
 def spin(actuator, duration_s, rate, load=0.0, section=ON, step_s=STEP_s):
@@ -112,12 +118,11 @@ def test_a_contact_never_adds_energy_and_never_pulls(
     """A step in which no hinge moves from stop to stop; at β = 1.4 rad α has a 30th of its inertia."""
     h, qdot = 10**step, 10**speed * direction
     section = ON.model_copy(update={"stiffness_Nm_rad": 10**stiffness, "damping_ratio": ratio})
-    stops = end_stops(section, RANGE_rad, actuator.inertia, h)
-    other = StictionSection(on=sticks), (2e-3, 2e-3, 2e-3), CableSection()
-    bristles = bristle_friction(*other, actuator.inertia, h, stops=stops)
+    bristles = bristles_of(actuator, section, h, StictionSection(on=sticks), (2e-3, 2e-3, 2e-3))
+    stops = bristles.stops
     after_q, after = q + h * qdot, qdot.copy()  # of a rotor without torque, and with constant inertia
     begin_bristles(bristles, q, q, qdot, np.zeros(3))
-    apply_bristles(bristles, q, qdot, qdot, after_q, after)
+    apply_bristles(bristles, ideal(actuator.inertia), q, qdot, qdot, after_q, after)
     assume(np.all(np.abs(after_q - q) < np.ptp(stops.contact_rad, axis=1)))
     M = inertia_matrix(q, actuator.inertia)
 
@@ -172,7 +177,7 @@ def test_without_stops_the_run_ends_at_the_end_of_the_range():
 def test_stops_that_are_not_touched_leave_the_motion(actuator):
     start, rates, torque = np.array([0.1, 0.0, -0.2]), np.array([0.4, -0.3, 0.5]), np.zeros((600, 3))
     rotor, stops = LagrangianRotor(actuator, STEP_s), stopped(actuator)
-    resistance = friction(NONE, NONE, 0.01, actuator.inertia, STEP_s)
+    resistance = friction(NONE, NONE, 0.01, STEP_s)
     free, with_stops = (steps(rotor, of, resistance, torque, start, rates) for of in (None, stops))
     # The correction of a step adds and subtracts the pose: one rounding of the angle a step.
     np.testing.assert_allclose(with_stops, free, rtol=0, atol=1e-12)
@@ -180,6 +185,6 @@ def test_stops_that_are_not_touched_leave_the_motion(actuator):
 
 def test_there_are_no_stops_unless_they_are_on(actuator):
     for section in (EndStopsSection(), EndStopsSection(on=False)):
-        assert end_stops(section, RANGE_rad, actuator.inertia, STEP_s) is None
+        assert not EndStops.filled(fill_end_stops, section, RANGE_rad, actuator.inertia, STEP_s)["on"]
     with pytest.raises(InputError, match="expected a travel_rad below half of each hinge's range"):
-        end_stops(ON.model_copy(update={"travel_rad": 0.6}), RANGE_rad, actuator.inertia, STEP_s)
+        stopped(actuator, ON.model_copy(update={"travel_rad": 0.6}))

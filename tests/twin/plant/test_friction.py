@@ -10,11 +10,13 @@ from hypothesis import strategies as st
 
 from spheretwin.models import actuator as actuators
 from spheretwin.models import mjcf
+from spheretwin.models.base.compiled import compiled
+from spheretwin.models.joint_chain import JointChain, fill_ideal
 from spheretwin.models.lagrangian import inertia_matrix, loaded_inertia
-from spheretwin.plant.friction import friction, slow_down
+from spheretwin.plant.friction import Friction, fill_friction, slow_down
 from spheretwin.plant.lagrangian_rotor import LagrangianRotor
 from tests.twin.plant.allocations import allocates_nothing
-from tests.twin.plant.motions import NONE, STEP_s, on_gamma, order, steps
+from tests.twin.plant.motions import NONE, STEP_s, friction, on_gamma, order, steps
 
 COULOMB_Nm, SMOOTHING_rad_s = 5e-3, 1e-3
 START = np.array([0.2, -0.3, 0.5, 3.0, -2.0, 20.0])
@@ -32,7 +34,7 @@ def test_viscous_friction_is_an_exponential_decay(actuator):
     decay = viscous / actuator.inertia[2]
     step_sizes, errors = np.array([4e-3, 2e-3, 1e-3, STEP_s]), []
     for h in step_sizes:
-        resistance = friction(NONE, on_gamma(viscous), SMOOTHING_rad_s, actuator.inertia, h)
+        resistance = friction(NONE, on_gamma(viscous), SMOOTHING_rad_s, h)
         q, qdot = motion(actuator, resistance, duration, np.array([0, 0, 0, 0, 0, rate]))
         np.testing.assert_array_equal(q[:, :2], 0)  # upright, the third hinge alone, with the inertia J3
         rates = qdot[:, 2]
@@ -64,7 +66,7 @@ def test_no_step_gains_energy_or_turns_back(
 ):
     inertia = loaded_inertia(actuator.inertia, payload_kg, 0.1)
     torque, after = np.zeros(3), qdot.copy()
-    slow_down(friction(coulomb, viscous, smoothing, inertia, step_s), q, after, torque)
+    slow_down(friction(coulomb, viscous, smoothing, step_s), ideal(inertia), q, after, torque)
     M = inertia_matrix(q, inertia)
     energy = 0.5 * qdot @ M @ qdot
     # Rounding, 1e-16, in matrices whose condition is at most 140 once their diagonal is scaled to 1.
@@ -76,9 +78,13 @@ def test_no_step_gains_energy_or_turns_back(
     assert abs(work - 0.5 * (after @ M @ after - qdot @ M @ qdot)) <= rounding
 
 
-def slowly(q, qdot, resistance):
+def ideal(inertia):
+    return JointChain.filled(fill_ideal, inertia)[0]
+
+
+def slowly(q, qdot, resistance, inertia):
     """Rates after half a step, as the equations read, with a library's solutions."""
-    M, half = inertia_matrix(q, resistance.inertia), 0.5 * resistance.step_s
+    M, half = inertia_matrix(q, inertia), 0.5 * resistance.step_s
 
     def share(rates, time):
         smooth = np.sqrt(rates**2 + resistance.smoothing_rate_rad_s**2)
@@ -95,31 +101,37 @@ def test_friction_is_what_a_library_solves(actuator):
         q, qdot = generator.uniform(-1.4, 1.4, 3), generator.uniform(-50, 50, 3)
         coulomb, viscous = 10 ** generator.uniform(-5, 0, (2, 3))
         smoothing, step_s = 10 ** generator.uniform([-3, -5], [0, -2])
-        resistance = friction(coulomb, viscous, smoothing, actuator.inertia, step_s)
+        resistance = friction(coulomb, viscous, smoothing, step_s)
         rates, torque = qdot.copy(), np.zeros(3)
-        slow_down(resistance, q, rates, torque)
-        expected = slowly(q, qdot, resistance)
+        slow_down(resistance, ideal(actuator.inertia), q, rates, torque)
+        expected = slowly(q, qdot, resistance, actuator.inertia)
         # Rounding of both solutions, with a condition of some hundred at the largest tilt, squared by X².
         np.testing.assert_allclose(rates, expected, rtol=0, atol=1e-10 * np.abs(qdot).max())
-        lost = inertia_matrix(q, resistance.inertia) @ (rates - qdot)
+        lost = inertia_matrix(q, actuator.inertia) @ (rates - qdot)
         np.testing.assert_allclose(torque, lost / step_s, rtol=0, atol=1e-12 * np.abs(lost).max() / step_s)
 
 
 def test_without_coefficients_there_is_no_friction(actuator):
-    nothing = friction(NONE, NONE, SMOOTHING_rad_s, actuator.inertia, STEP_s)
+    nothing = friction(NONE, NONE, SMOOTHING_rad_s, STEP_s)
     rates, torque = START[3:].copy(), np.zeros(3)
-    slow_down(nothing, START[:3], rates, torque)
-    np.testing.assert_allclose(rates, START[3:], rtol=1e-14)  # of one solution, condition 2
-    assert not nothing.acts
+    slow_down(nothing, ideal(actuator.inertia), START[:3], rates, torque)
+    np.testing.assert_array_equal(rates, START[3:])
     for coulomb, viscous in ((on_gamma(1e-3), NONE), (NONE, on_gamma(1e-3))):
-        assert friction(coulomb, viscous, SMOOTHING_rad_s, actuator.inertia, STEP_s).acts
+        slow_down(
+            friction(coulomb, viscous, SMOOTHING_rad_s, STEP_s),
+            ideal(actuator.inertia),
+            START[:3],
+            rates,
+            torque,
+        )
+        assert np.all(rates != START[3:])
 
 
 VISCOUS_Nm_s = np.array([2e-3, 1e-3, 5e-4])
 DURATION_s = 0.4
 
 
-def by_mujoco(step_s, damping, resistance=None):
+def by_mujoco(step_s, damping, joint=None, resistance=None):
     """State at the end by stock MuJoCo, under its own damping of the hinges or our friction."""
     model = copy(mjcf.read(actuators.MJCF_PATH).bare)
     model.opt.timestep, model.opt.integrator = step_s, mujoco.mjtIntegrator.mjINT_RK4
@@ -128,15 +140,15 @@ def by_mujoco(step_s, damping, resistance=None):
     data.qpos[:], data.qvel[:] = START[:3], START[3:]
     for _ in range(round(DURATION_s / step_s)):
         if resistance is not None:
-            slow_down(resistance, data.qpos, data.qvel, torque)
+            slow_down(resistance, joint, data.qpos, data.qvel, torque)
         mujoco.mj_step(model, data)
         if resistance is not None:
-            slow_down(resistance, data.qpos, data.qvel, torque)
+            slow_down(resistance, joint, data.qpos, data.qvel, torque)
     return np.concatenate([data.qpos, data.qvel])
 
 
-def viscous_friction(actuator, step_s):
-    return friction(NONE, VISCOUS_Nm_s, SMOOTHING_rad_s, actuator.inertia, step_s)
+def viscous_friction(step_s):
+    return friction(NONE, VISCOUS_Nm_s, SMOOTHING_rad_s, step_s)
 
 
 STEPS_s = np.array([1.6e-3, 8e-4, 4e-4, 2e-4])
@@ -147,9 +159,9 @@ def test_a_free_motion_is_that_under_mujoco_s_own_damping(actuator, engine):
     expected = by_mujoco(1e-4, VISCOUS_Nm_s)
     errors = []
     for step_s in STEPS_s:
-        resistance = viscous_friction(actuator, step_s)
+        resistance = viscous_friction(step_s)
         if engine == "mujoco":
-            result = by_mujoco(step_s, 0.0, resistance)
+            result = by_mujoco(step_s, 0.0, ideal(actuator.inertia), resistance)
         else:
             q, qdot = motion(actuator, resistance, DURATION_s)
             result = np.concatenate([q[-1], qdot[-1]])
@@ -159,5 +171,12 @@ def test_a_free_motion_is_that_under_mujoco_s_own_damping(actuator, engine):
     assert 1.95 < order(STEPS_s, errors) < 2.05, errors
 
 
+@compiled
+def slow_first(frictions, joints, q, qdot, torque):
+    slow_down(frictions[0], joints[0], q, qdot, torque)
+
+
 def test_friction_allocates_nothing(actuator):
-    assert allocates_nothing(slow_down, viscous_friction(actuator, STEP_s), *np.zeros((3, 3)))
+    frictions = Friction.filled(fill_friction, NONE, VISCOUS_Nm_s, SMOOTHING_rad_s, STEP_s)
+    joints = JointChain.filled(fill_ideal, actuator.inertia)
+    assert allocates_nothing(slow_first, frictions, joints, *np.zeros((3, 3)))

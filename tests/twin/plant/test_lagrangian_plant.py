@@ -28,7 +28,7 @@ def test_the_inertia_matrix_has_the_kinetic_energy_of_rotor_and_payload(actuator
     """Its Coriolis matrix belongs to it: tests/models/test_lagrangian.py."""
     rotor = LagrangianRotor(actuator, STEP_S, payload_kg=PAYLOAD_KG)
     for q, qdot, _ in states(20):
-        energy = 0.5 * qdot @ inertia_matrix(q, rotor.inertia) @ qdot
+        energy = 0.5 * qdot @ inertia_matrix(q, rotor.joint[0].inertia) @ qdot
         assert energy == pytest.approx(kinetic_J(q, qdot, actuator, PAYLOAD_KG), rel=1e-12)
 
 
@@ -37,9 +37,9 @@ def test_payload_weighs_what_gravity_makes_of_it(actuator, gravity_m_s2):
     rotor = LagrangianRotor(actuator, STEP_S, payload_kg=PAYLOAD_KG, gravity_m_s2=gravity_m_s2)
     for q, _, _ in states(20):
         expected = gradient(lambda pose: potential_J(pose, actuator, PAYLOAD_KG, gravity_m_s2), q)
-        np.testing.assert_allclose(gravity_torque(q, rotor.weight_moment), expected, atol=1e-12)
+        np.testing.assert_allclose(gravity_torque(q, rotor.joint[0].weight_moment), expected, atol=1e-12)
     earth = LagrangianRotor(actuator, STEP_S, payload_kg=PAYLOAD_KG)
-    np.testing.assert_array_equal(rotor.inertia, earth.inertia)
+    np.testing.assert_array_equal(rotor.joint["inertia"], earth.joint["inertia"])
     plant = rotor.start(np.array([0.1, 0.0, 0.0]), np.zeros(3))
     lagrangian_rotor.step(plant)
     assert np.sign(plant.qdot[0]) == np.sign(gravity_m_s2)  # a tilted shaft falls to where gravity pulls
@@ -75,11 +75,11 @@ START = np.array([0.2, -0.3, 0.5, 3.0, -2.0, 20.0])
 
 def test_steps_are_of_order_four(actuator):
     duration, torque_q = 0.08, np.array([0.15, -0.1, -0.05])
-    rotor = LagrangianRotor(actuator, STEP_S, payload_kg=PAYLOAD_KG)
+    joint = LagrangianRotor(actuator, STEP_S, payload_kg=PAYLOAD_KG).joint[0]
 
     def flow(_, state):
         q, qdot = state[:3].copy(), state[3:].copy()
-        return np.concatenate([qdot, acceleration(q, qdot, torque_q, rotor.inertia, rotor.weight_moment)])
+        return np.concatenate([qdot, acceleration(q, qdot, torque_q, joint.inertia, joint.weight_moment)])
 
     exact = solve_ivp(flow, (0, duration), START, method="DOP853", rtol=1e-13, atol=1e-14).y[:, -1]
     steps = np.array([8e-3, 4e-3, 2e-3, 1e-3, 5e-4])

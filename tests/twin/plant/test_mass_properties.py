@@ -10,10 +10,10 @@ from spheretwin.active_config import initial_config
 from spheretwin.models import actuator as actuators
 from spheretwin.models import mjcf
 from spheretwin.models.base.errors import InputError
-from spheretwin.models.joint_chain import equations, read_chain
+from spheretwin.models.joint_chain import JointChain, equations, fill_chain
 from spheretwin.plant import bristle_friction as bearing
 from spheretwin.plant.cable import CableSection
-from spheretwin.plant.friction import friction, slow_down
+from spheretwin.plant.friction import slow_down
 from spheretwin.plant.lagrangian_rotor import LagrangianRotor
 from spheretwin.plant.mass_properties import MassSection, mass_errors, true_model
 from spheretwin.plant.mujoco_rotor import MujocoRotor
@@ -23,7 +23,7 @@ from spheretwin.simulation import simulate
 from tests.models.model_files import edited, edited_text
 from tests.models.test_joint_chain import full
 from tests.twin.plant import user_models as models
-from tests.twin.plant.motions import STEP_s
+from tests.twin.plant.motions import STEP_s, friction
 
 EVERYTHING = {
     "centre_m": (1e-3, -2e-3, 5e-4),
@@ -44,7 +44,9 @@ SHIPPED = mjcf.read(actuators.MJCF_PATH)
 
 def chain_of(section, modelling_error=0.0, payload_kg=0.0, gravity_m_s2=9.81, seed=0):
     errors = mass_errors(section, seed)
-    return read_chain(true_model(SHIPPED, modelling_error, payload_kg, gravity_m_s2, errors))
+    return JointChain.filled(
+        fill_chain, true_model(SHIPPED, modelling_error, payload_kg, gravity_m_s2, errors)
+    )[0]
 
 
 def upright(chain):
@@ -61,9 +63,7 @@ def test_the_plant_has_general_parts_only_if_it_needs_them(engine, fields, gener
     changes = fields | {"plant.engine": engine, "plant.payload_kg": 0.05}
     with Session(scenarios.load("hold", changes)) as session:
         plant = session._runtime._plant
-    assert (plant.joint is not None) == skewed
-    assert (plant.friction.chain is not None) == general
-    assert (getattr(plant.rotor, "chain", None) is not None) == (general and engine == "lagrangian")
+    assert (plant.joint["is_tilted"][0], plant.joint["on"][0]) == (skewed, general)
 
 
 def test_inertia_of_the_rotor_upright_is_the_sum_of_its_parts(actuator):
@@ -130,7 +130,7 @@ def assert_same_steps(first, second, start):
 def test_engines_agree_step_by_step(actuator, payload_kg):
     errors = mass_errors(MassSection(**EVERYTHING), 3)
     engine = MujocoRotor(SHIPPED, STEP_s, "RK4", 0.2, payload_kg, 9.81, errors)
-    equations_of_motion = LagrangianRotor(actuator, STEP_s, chain=read_chain(engine.model))
+    equations_of_motion = LagrangianRotor(actuator, STEP_s, joint=JointChain.filled(fill_chain, engine.model))
     assert_same_steps(engine, equations_of_motion, ([0.4, -0.3, 0.2], [1.0, 2.0, -3.0]))
 
 
@@ -175,11 +175,11 @@ def test_friction_gains_no_energy_on_a_general_joint():
     chain = chain_of(MassSection(**EVERYTHING))
     generator = np.random.default_rng(2)
     for coulomb in (1e-3, 1.0, 1e3):
-        stage = friction(np.full(3, coulomb), np.full(3, 1e-3), 0.01, np.full(3, 2e-3), STEP_s, chain)
+        stage = friction(np.full(3, coulomb), np.full(3, 1e-3), 0.01, STEP_s)
         for _ in range(100):
             q, qdot, torque = generator.uniform(-1.3, 1.3, 3), generator.normal(size=3), np.zeros(3)
             M, before = full(equations(chain, tuple(q), (0.0,) * 3)[0]), qdot.copy()
-            slow_down(stage, q, qdot, torque)
+            slow_down(stage, chain, q, qdot, torque)
             # Rounding relative to the energy before.
             assert qdot @ M @ qdot <= before @ M @ before * (1 + 1e-12)
             assert before @ M @ qdot >= -1e-12 * (before @ M @ before)
@@ -191,7 +191,8 @@ def test_friction_gains_no_energy_on_a_general_joint():
 def test_static_friction_gains_no_energy_on_a_general_joint():
     chain = chain_of(MassSection(**EVERYTHING), gravity_m_s2=0.0)
     section = bearing.StictionSection(on=True)
-    stage = bearing.bristle_friction(section, (5e-3,) * 3, CableSection(), np.full(3, 2e-3), STEP_s, chain)
+    fields = section, (5e-3,) * 3, CableSection(), np.full(3, 2e-3), STEP_s
+    stage = bearing.BristleFriction.filled(bearing.fill_bristles, *fields)[0]
     q, torque = np.array([0.3, -0.4, 0.5]), np.zeros(3)
     M = full(equations(chain, tuple(q), (0.0,) * 3)[0])
     qdot = np.array([0.2, -0.1, 0.15])
@@ -208,7 +209,7 @@ def test_static_friction_gains_no_energy_on_a_general_joint():
         bearing.begin_bristles(stage, middle, q, qdot, torque)
         qdot += STEP_s * np.linalg.solve(M, torque)
         q += 0.5 * STEP_s * (qdot + start_qdot)
-        bearing.apply_bristles(stage, middle, start_qdot, start_qdot, q, qdot)
+        bearing.apply_bristles(stage, chain, middle, start_qdot, start_qdot, q, qdot)
         assert energy() <= last + 1e-12 * start
         last = energy()
         assert np.abs(q - start_q).max() < 1e-3

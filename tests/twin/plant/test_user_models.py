@@ -10,7 +10,7 @@ from spheretwin import scenario as scenarios
 from spheretwin.control.law import Law
 from spheretwin.models import actuator as actuators
 from spheretwin.models import mjcf
-from spheretwin.models.joint_chain import read_chain
+from spheretwin.models.joint_chain import JointChain, fill_chain
 from spheretwin.models.kinematics import generalised_torque
 from spheretwin.plant.lagrangian_rotor import LagrangianRotor
 from spheretwin.plant.lagrangian_rotor import step as lagrangian_step
@@ -171,9 +171,9 @@ def test_mass_properties_and_hinges_of_a_file_act_in_both_engines(written, actua
     expected = stock(path, CONSTANT)
     assert np.abs(expected - stock(actuators.MJCF_PATH, CONSTANT)).max() > 1e-4
     np.testing.assert_array_equal(ours(path, CONSTANT), expected)
-    chain = read_chain(true_model(mjcf.read(path), 0.0, 0.0, 9.81, None))
+    joint = JointChain.filled(fill_chain, true_model(mjcf.read(path), 0.0, 0.0, 9.81, None))
     # Rounding of two engines over 400 steps; without these properties they differ by 1e-6 or more.
-    final = equations_of_motion(LagrangianRotor(actuator, STEP_S, chain=chain))
+    final = equations_of_motion(LagrangianRotor(actuator, STEP_S, joint=joint))
     np.testing.assert_allclose(final, expected[-1], rtol=0, atol=1e-10)
     # The closed forms of the cross-check do not describe the model.
     assert any(part.startswith(name) for part in mjcf.beyond_an_ideal_joint(mjcf.read(path).loaded))
