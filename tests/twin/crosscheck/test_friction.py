@@ -9,6 +9,7 @@ from spheretwin.crosscheck import hinge as runs
 from spheretwin.crosscheck.hinge import Hinge, STEP_s, by_mujoco, by_stage
 from spheretwin.models import actuator as actuators
 from spheretwin.models.base.checks import Check
+from spheretwin.plant.friction import fill_friction
 from tests.models.model_files import edited
 
 J = 2.256e-3
@@ -223,10 +224,10 @@ CREEP, BREAKAWAY, VISCOUS = "creep, our stage", "breakaway, our stage", "viscous
     ],
 )
 def test_a_wrong_stage_breaks_its_rows(monkeypatch, actuator, level, viscous, smoothing, step, rows):
-    right = runs.friction
-    monkeypatch.setattr(
-        runs, "friction", lambda C, c, s, J, h: right(level * C, viscous * c, smoothing * s, J, step * h)
-    )
+    def wrong(rows, C, c, s, h):
+        fill_friction(rows, level * C, viscous * c, smoothing * s, step * h)
+
+    monkeypatch.setattr(runs, "fill_friction", wrong)
     assert broken(actuators.MJCF_PATH, actuator) == rows
 
 
