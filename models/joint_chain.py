@@ -149,7 +149,7 @@ def equations(joint: JointChain, q: Triple, qdot: Triple) -> tuple[InertiaEntrie
     """
     frames, axes, points = chain_at(joint, q)
     aa = bb = cc = ab = ac = bc = bias_a = bias_b = bias_c = 0.0
-    w, w_rate, a = _ZERO, _ZERO, _less(_ZERO, joint.gravity)  # of the present body; at the origin of S
+    w, w_rate, a = _ZERO, _ZERO, _less(_ZERO, triple(joint.gravity))  # of the present body; at the origin
     for body in range(3):
         e, p = axes[body], points[body]
         at_hinge, own = _acceleration(w, w_rate, a, p), _scaled(e, qdot[body])

@@ -329,7 +329,7 @@ def _chain_terms(model: mujoco.MjModel, states: States) -> _Terms:
     return _Terms(R, states.torque_q + _times(axes, states.torque_S), M, C, bias, G)
 
 
-def _chain_row(chain: JointChain, q: Triple, qdot: Array) -> tuple[Any, ...]:
+def _chain_row(chain: Any, q: Triple, qdot: Array) -> tuple[Any, ...]:
     """Return R, the axes of the hinges, M, C, bias and G at a state.
 
     The bias without gravity is ``C(q, qdot) qdot`` with Christoffel's C, bilinear and symmetric in the rates:
