@@ -18,12 +18,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from spheretwin.models.base.compiled import inlined
+from spheretwin.models.base.compiled import allocation_free, inlined
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.base.record import Record, Rows, field
-from spheretwin.models.joint_chain import JointChain, inertia_at
-from spheretwin.models.kinematics import Triple, triple
-from spheretwin.models.lagrangian import InertiaEntries, solve_inertia
+from spheretwin.models.joint_chain import JointChain, general_inertia
+from spheretwin.models.kinematics import Triple, triple, turns
+from spheretwin.models.lagrangian import InertiaEntries, inertia_entries, solve_inertia
 
 Array = NDArray[np.float64]
 
@@ -127,10 +127,42 @@ def slow_hinges(
     R is the real part of ``(1 - i) / (1 + p x)`` with ``p = (1 + i) / 2``: one complex system
     ``(M + p t K) u = M v``, of the same zeros as M.
     """
+    if joint.on:
+        _slow_general(joint, viscous, coulomb, smoothing, step_s, q, qdot, mean_torque_q)
+    else:
+        M = inertia_entries(turns(triple(q)), inertia)
+        _slow(M, False, viscous, coulomb, smoothing, step_s, qdot, mean_torque_q)
+
+
+@allocation_free  # not inlined: a rotor with an ideal joint has it in no place
+def _slow_general(
+    joint: JointChain,
+    viscous: Triple,
+    coulomb: Triple,
+    smoothing: float,
+    step_s: float,
+    q: Array,
+    qdot: Array,
+    mean_torque_q: Array,
+) -> None:
+    M = general_inertia(joint, triple(q))
+    _slow(M, True, viscous, coulomb, smoothing, step_s, qdot, mean_torque_q)
+
+
+@inlined
+def _slow(
+    M: InertiaEntries,
+    general: bool,
+    viscous: Triple,
+    coulomb: Triple,
+    smoothing: float,
+    step_s: float,
+    qdot: Array,
+    mean_torque_q: Array,
+) -> None:
     v = triple(qdot)
-    M = inertia_at(joint, inertia, triple(q))
-    qdot[0], qdot[1], qdot[2] = slowed(M, v, viscous, coulomb, smoothing, 0.5 * step_s, joint.on)
-    gained = momentum(M, (qdot[0] - v[0], qdot[1] - v[1], qdot[2] - v[2]), joint.on)
+    qdot[0], qdot[1], qdot[2] = slowed(M, v, viscous, coulomb, smoothing, 0.5 * step_s, general)
+    gained = momentum(M, (qdot[0] - v[0], qdot[1] - v[1], qdot[2] - v[2]), general)
     for i in range(3):
         mean_torque_q[i] += gained[i] / step_s
 
