@@ -19,6 +19,9 @@ GAP_PERIODS = 2.5
 """Periods of a stream from which an interval is a gap."""
 
 _SHORT, _MISSING = 0.7, 1.5  # periods: of a row between others, and where an angle is missing
+_COUNTED = 0.5  # share of equal successive angles from which a sensor counts: it is held, not interpolated
+_MOST_MISSING = 1000  # periods of the angles in which rows without them are inserted
+_MANY_FALLS = 0.05  # of the rows
 _MOST_SHORT = 0.01  # of the rows, more after sorting than before
 
 
@@ -29,7 +32,7 @@ def sorted_rows(t_s: Array, angles: Array, currents: Array) -> tuple[NDArray[np.
     clock was set back, which the check of the log reports.
     """
     rows = np.arange(len(t_s))
-    if np.all(np.diff(t_s) >= 0):
+    if np.all(np.diff(t_s[np.isfinite(t_s)]) >= 0):
         return rows, ()
     order = np.argsort(t_s, kind="stable")
     moved = 0
@@ -37,12 +40,18 @@ def sorted_rows(t_s: Array, angles: Array, currents: Array) -> tuple[NDArray[np.
         place = np.isfinite(t_s) & np.any(np.isfinite(values), axis=1)
         before, after = t_s[place], t_s[order][place[order]]
         moved += int(np.count_nonzero(np.diff(before) < 0))
-        steps = np.diff(before)
-        period_s = float(np.median(steps[steps > 0])) if np.any(steps > 0) else 0.0
+        period_s = _period_s(before, after)
         (short, gaps), (short_before, gaps_before) = (_faults(one, period_s) for one in (after, before))
         if short > short_before + _MOST_SHORT * len(before) or gaps > gaps_before:
             return rows, ()
     return order, (f"{moved} rows sorted by time" if moved else "rows of two topics sorted by time",)
+
+
+def _period_s(before: Array, after: Array) -> float:
+    """Return the median interval of times, of the sorted ones if they fall often."""
+    steps = np.diff(before)
+    steps = np.diff(after) if np.count_nonzero(steps < 0) > _MANY_FALLS * len(before) else steps
+    return float(np.median(steps[steps > 0])) if np.any(steps > 0) else 0.0
 
 
 def _faults(t_s: Array, period_s: float) -> tuple[int, int]:
@@ -59,38 +68,63 @@ def aligned(log: Log) -> Log:
     currents count in the mean over the interval of a row if they were commanded, about its time if they were
     measured. Where the currents have a gap they are NaN.
     """
-    log = _merged(log)
+    log = _of_one_sensor(_merged(log))
     has_angles = np.isfinite(log.angle_rad).any(axis=1)
+    has_currents = np.isfinite(log.current_A).any(axis=1)
     angle_s = log.t_s[has_angles]
     if len(angle_s) < 2 or not np.all(np.diff(log.t_s) > 0):
         return log
     period_s = float(np.median(np.diff(angle_s)))
-    # Of a row between angles their distance; of one before or after all of them, twice that to the next.
-    place = np.clip(np.searchsorted(angle_s, log.t_s), 1, len(angle_s) - 1)
-    distance_s = (angle_s[place] - angle_s[place - 1]).copy()
-    for is_outside, end_s in ((log.t_s < angle_s[0], angle_s[0]), (log.t_s > angle_s[-1], angle_s[-1])):
-        distance_s[is_outside] = 2 * np.abs(log.t_s[is_outside] - end_s)
-    is_kept = has_angles | (distance_s > _MISSING * period_s)
-    if np.all(is_kept):
+    is_between = ~has_angles & (_distance_s(log.t_s, angle_s) < _MISSING * period_s)
+    if not np.any(is_between):
         return log
-    has_currents = np.isfinite(log.current_A).any(axis=1)
-    if not np.any(has_currents & ~is_kept):
-        return replace(
-            log, t_s=log.t_s[is_kept], current_A=log.current_A[is_kept], angle_rad=log.angle_rad[is_kept]
-        )
-    t_s, period_s = log.t_s[is_kept], float(np.median(np.diff(log.t_s[is_kept])))
-    ends = t_s + np.minimum(np.diff(t_s, append=t_s[-1] + period_s), GAP_PERIODS * period_s)
-    if log.currents == COMMANDED:
-        current_A = _means(log.t_s[has_currents], log.current_A[has_currents], t_s, ends, held=True)
-    else:
-        half_s = 0.5 * (ends - t_s)
-        current_A = _means(
-            log.t_s[has_currents], log.current_A[has_currents], t_s - half_s, t_s + half_s, held=False
-        )
-    note = "currents at times of their own, as means at the times of the angles"
-    return replace(
-        log, t_s=t_s, current_A=current_A, angle_rad=log.angle_rad[is_kept], notes=(*log.notes, note)
+    if not np.any(is_between & has_currents):
+        rows = ~is_between
+        return replace(log, t_s=log.t_s[rows], current_A=log.current_A[rows], angle_rad=log.angle_rad[rows])
+    # Where angles are missing, rows without them at the times of the missing ones.
+    steps = np.diff(angle_s)
+    counts = np.where(steps < _MOST_MISSING * period_s, np.maximum(np.rint(steps / period_s), 1), 1).astype(
+        int
     )
+    places = np.repeat(np.arange(len(steps)), counts)
+    parts = np.arange(len(places)) - np.repeat(np.cumsum(counts) - counts, counts)
+    t_s = np.append(angle_s[places] + steps[places] * (parts / counts[places]), angle_s[-1])
+    is_measured = np.append(parts == 0, True)
+    angle_rad = np.full((len(t_s), 3), np.nan)
+    angle_rad[is_measured] = log.angle_rad[has_angles]
+    ends = t_s + np.minimum(np.diff(t_s, append=t_s[-1] + period_s), GAP_PERIODS * period_s)
+    held = log.currents == COMMANDED
+    early_s = 0.0 if held else 0.5 * (ends - t_s)
+    current_A = _means(log.t_s, log.current_A, t_s - early_s, ends - early_s, held=held)
+    note = "currents at times of their own, as means at the times of the angles"
+    return replace(log, t_s=t_s, current_A=current_A, angle_rad=angle_rad, notes=(*log.notes, note))
+
+
+def _distance_s(t_s: Array, angle_s: Array) -> Array:
+    """Return the distance of the angles around each time; outside of all, twice that to the next."""
+    place = np.clip(np.searchsorted(angle_s, t_s), 1, len(angle_s) - 1)
+    outside_s = np.maximum(np.maximum(angle_s[0] - t_s, t_s - angle_s[-1]), 0.0)
+    return np.where(outside_s > 0, 2 * outside_s, angle_s[place] - angle_s[place - 1])
+
+
+def _of_one_sensor(log: Log) -> Log:
+    """Return a log with the angles at the times of that with most rows, if others have other times."""
+    known = np.isfinite(log.angle_rad)
+    reference = known[:, int(np.argmax(known.sum(axis=0)))]
+    others = [i for i in range(3) if np.count_nonzero(known[:, i] & reference) < 0.5 * known[:, i].sum()]
+    if not others or not np.all(np.diff(log.t_s) > 0):
+        return log
+    angle_rad = np.where(reference[:, None], log.angle_rad, np.nan)
+    for i in others:
+        at, values = log.t_s[known[:, i]], log.angle_rad[known[:, i], i]
+        after = np.clip(np.searchsorted(at, log.t_s), 1, len(at) - 1)
+        counts = np.mean(np.diff(values) == 0) > _COUNTED
+        interpolated = values[after - 1] if counts else np.interp(log.t_s, at, values)
+        is_gap = at[after] - at[after - 1] > GAP_PERIODS * np.median(np.diff(at))
+        is_known = reference & ~is_gap & (log.t_s >= at[0]) & (log.t_s <= at[-1])
+        angle_rad[:, i] = np.where(is_known, interpolated, np.nan)
+    note = "angles at times of their own, interpolated to those of the most frequent one"
+    return replace(log, angle_rad=angle_rad, notes=(*log.notes, note))
 
 
 def _means(sample_s: Array, samples: Array, starts: Array, ends: Array, *, held: bool) -> Array:

@@ -91,13 +91,39 @@ def test_rows_of_one_time_that_differ_stay():
     assert len(aligned(replace(same, angle_rad=angles))) == 201
 
 
-@pytest.mark.parametrize("order", ["swapped", "topics", "chunks"])
+def test_a_lost_angle_has_a_row_with_its_currents():
+    log = two_topics(3e-4)
+    lost = np.isin(log.t_s, TIMES[[50, 51, 120]])
+    rows = aligned(Log(log.t_s[~lost], log.current_A[~lost], log.angle_rad[~lost]))
+    assert rows.t_s == pytest.approx(TIMES)
+    assert np.flatnonzero(np.isnan(rows.angle_rad[:, 0])).tolist() == [50, 51, 120]
+    assert rows.current_A == pytest.approx(aligned(log).current_A)
+
+
+@pytest.mark.parametrize("counts", [False, True])
+def test_angles_of_two_topics_are_at_the_times_of_one(counts):
+    t_s = np.concatenate([TIMES, TIMES + 3e-4])
+    angles, currents = np.full((400, 3), np.nan), np.full((400, 2), np.nan)
+    angles[:200, :2], currents[:200] = ANGLES[:, :2], CURRENTS
+    count = np.floor(TIMES / 0.01) if counts else 3 * TIMES  # read 0.3 ms later
+    angles[200:, 2] = count
+    order = np.argsort(t_s)
+    log = aligned(Log(t_s[order], currents[order], angles[order]))
+    assert np.array_equal(log.t_s, TIMES)
+    assert np.array_equal(log.angle_rad[:, :2], ANGLES[:, :2])
+    expected = count[:-1] if counts else 3 * (TIMES[1:] - 3e-4)  # held if it counts, else interpolated
+    assert log.angle_rad[1:, 2] == pytest.approx(expected)
+
+
+@pytest.mark.parametrize("order", ["swapped", "topics", "chunks", "random"])
 def test_messages_out_of_order_are_sorted(order):
     rows = np.arange(200)
     if order == "swapped":
         rows[[20, 21, 90, 95]] = rows[[21, 20, 95, 90]]
     elif order == "chunks":
         rows = np.concatenate([rows[120:], rows[:120]])
+    elif order == "random":
+        rows = np.random.default_rng(0).permutation(200)
     else:
         log = two_topics(5e-4, order=np.arange(400))
         places, notes = sorted_rows(log.t_s, log.angle_rad, log.current_A)
