@@ -32,12 +32,6 @@ EVERY = "*"
 
 ANGLE_UNITS = {"rad": 1.0, "mrad": 1e-3, "deg": math.pi / 180, "turn": 2 * math.pi}
 CURRENT_UNITS = {"A": 1.0, "mA": 1e-3}
-FILE_UNITS = {
-    "°": "deg", "degree": "deg", "degrees": "deg", "turns": "turn", "rev": "turn", "amp": "A", "amps": "A",
-    "ampere": "A", "a": "A", "ma": "mA", "sec": "s", "second": "s", "seconds": "s", "msec": "ms", "µs": "us",
-    "μs": "us",
-}  # fmt: skip
-"""Units by other names that a file may state."""
 
 
 class TimeColumn(BaseModel):
@@ -122,7 +116,9 @@ class Channels(BaseModel):
                     f" received {len(given)}"
                 )
             entries[field] = [*given] * len(names) if len(given) == 1 else given
-        entries["unit"] = entries["unit"] or [_stated_unit(table, name, units) for name in names]
+        entries["unit"] = entries["unit"] or [
+            table.unit(name, tuple(units)) or next(iter(units)) for name in names
+        ]
         values = np.stack([table.numbers(name)[rows] for name in names], axis=1)
         for place, (offset, wrap) in enumerate(zip(entries["offset"], entries["wrap"], strict=True)):
             if wrap:
@@ -153,13 +149,6 @@ def _numbered(pattern: str, available: Sequence[str]) -> list[str]:
             f" {before}{lacking[0]}{after}: list the columns in the order of the groups"
         )
     return [numbered[number] for number in expected]
-
-
-def _stated_unit(table: RawTable, name: str, units: Mapping[str, float]) -> str:
-    """Return the unit that a file states for a column, or that of the package."""
-    stated = table.units.get(name, "")
-    stated = stated if stated in units else FILE_UNITS.get(stated.lower(), "")
-    return stated if stated in units else next(iter(units))
 
 
 def _unwrapped(raw: Array, offset: float, wrap: float) -> Array:
@@ -224,8 +213,7 @@ class ColumnMap(BaseModel):
         InputError
             A column is missing, or has something else than numbers.
         """
-        unit = self.time.unit or FILE_UNITS.get(table.units.get(self.time.column, "").lower())
-        t_s, notes = table.times(self.time.column, unit, self.time.wrap)
+        t_s, notes = table.times(self.time.column, self.time.unit, self.time.wrap)
         raw = [
             np.stack([table.numbers(name) for name in channels.names(tuple(table.columns))], axis=1)
             for channels in (self.angles, self.currents)

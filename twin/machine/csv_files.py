@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import codecs
 import csv
+import gzip
 import io
 import re
 from collections import Counter
@@ -17,6 +18,7 @@ from spheretwin.machine.raw_table import MISSING, RawTable, named, unique
 from spheretwin.models.base.errors import InputError, shown
 from spheretwin.models.base.files import regular_file
 
+_GZIP = b"\x1f\x8b"
 WHITESPACE = "whitespace"
 DELIMITERS = (",", ";", "\t", "|", WHITESPACE)
 _NAMES_OF_DELIMITERS = {"\t": "tab", " ": "blank", WHITESPACE: WHITESPACE}
@@ -111,6 +113,11 @@ def _decoded(path: Path, encoding: str | None) -> tuple[str, str, tuple[str, ...
         content = regular_file(path).read_bytes()
     except OSError as error:
         raise InputError(f"log {path}: expected a readable CSV file, {error.strerror}") from None
+    if content.startswith(_GZIP):
+        try:
+            content = gzip.decompress(content)
+        except (OSError, EOFError) as error:
+            raise InputError(f"log {path}: expected a complete gzip file, {error}") from None
     stripped = content.rstrip(b"\0") if encoding is None else content
     if content.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
         encodings, stripped = ["utf-16"], content[: len(content) - len(content) % 2]
@@ -180,7 +187,7 @@ def _score(lines: Sequence[str], delimiter: str, decimal: str | None) -> tuple[f
     return round(numbers / max(len(cells), 1), 2) if width > 1 else 0.0, width, mark
 
 
-_NUMBER = r"[+-]?(?:\d+{0}?\d*|{0}\d+)(?:[eE][+-]?\d+)?"
+_NUMBER = r"[+-]?(?:\d+{0}?\d*|{0}\d+)(?:[eEdD][+-]?\d+)?"
 _POINT, _COMMA = (re.compile(_NUMBER.format(mark)) for mark in (r"\.", ","))
 
 

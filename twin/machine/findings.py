@@ -153,7 +153,11 @@ def _time_order(evidence: Evidence) -> Iterator[Stated]:
         back = np.flatnonzero(np.diff(t_s) < 0)
         if len(back):
             where = f"{name}: {len(back)} times, first after {t_s[back[0]]:.6g} s"
-            yield Stated(ERROR, where, "sort the rows, or record with one monotonic clock")
+            yield Stated(
+                ERROR,
+                where,
+                "record with one monotonic clock; state time.wrap for a counter that starts again",
+            )
     if lost := np.count_nonzero(~np.isfinite(evidence.log.t_s)):
         yield Stated(ERROR, f"t_s: {lost} rows without a time", "remove these rows")
 

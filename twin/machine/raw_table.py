@@ -21,6 +21,13 @@ Array = NDArray[np.float64]
 
 TIME_UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 
+_OTHER_NAMES = {
+    "°": "deg", "degree": "deg", "degrees": "deg", "turns": "turn", "rev": "turn", "amp": "A", "amps": "A",
+    "ampere": "A", "a": "A", "ma": "mA", "sec": "s", "second": "s", "seconds": "s", "msec": "ms", "µs": "us",
+    "μs": "us", "usec": "us", "milliseconds": "ms",
+}  # fmt: skip
+"""Units by other names that a file may state."""
+
 MISSING = ("", "nan", "na", "n/a", "#n/a", "null", "none", "-", "--", "1.#qnan", "-1.#ind", "1.#ind")
 """Texts, in lower case, that stand for a missing number."""
 
@@ -81,6 +88,12 @@ class RawTable:
             )
         return self.columns[name]
 
+    def unit(self, name: str, known: Sequence[str]) -> str | None:
+        """Return the unit that the file states for a column; None for none, or one that is not known."""
+        stated = self.units.get(name, "")
+        stated = stated if stated in known else _OTHER_NAMES.get(stated.lower(), "")
+        return stated if stated in known else None
+
     def numbers(self, name: str) -> Array:
         """Return the numbers of a column; NaN for a missing one.
 
@@ -113,6 +126,10 @@ class RawTable:
         try:
             return _as_float(plain)
         except pa.ArrowInvalid:
+            plain = _of_fortran(plain)
+        try:
+            return _as_float(plain)
+        except pa.ArrowInvalid:
             row, text = next(_not_numbers(plain))
             raise self.cell_error(name, "numbers", row, str(texts[row]) or text) from None
 
@@ -141,9 +158,9 @@ class RawTable:
         InputError
             There is no such column, or it has something else than times.
         """
-        column = self.column(name)
+        column, unit = self.column(name), unit or self.unit(name, tuple(TIME_UNITS))
         if isinstance(column, np.ndarray):
-            return _seconds(column, unit or self.units.get(name), wrap)
+            return _seconds(column, unit, wrap)
         import pyarrow.types as types
 
         if types.is_temporal(column.type) and not types.is_date(column.type):
@@ -152,19 +169,22 @@ class RawTable:
             day = _SECONDS_OF_A_DAY / TIME_UNITS[column.type.unit] if is_clock else 0.0
             return _seconds(ticks, column.type.unit, wrap or day, is_date=types.is_timestamp(column.type))
         if types.is_decimal(column.type):
-            return self._exact(name, column, unit, wrap)
+            return self._exact(column, unit, wrap)
         if _is_text(column.type):
             return self._times_of_texts(name, _texts(column), unit, wrap)
         if types.is_integer(column.type):
-            return _seconds(_ticks(column), unit or self.units.get(name), wrap)
-        return _seconds(self.numbers(name), unit or self.units.get(name), wrap)
+            return _seconds(_ticks(column), unit, wrap)
+        if not (types.is_floating(column.type) or types.is_null(column.type)):
+            raise InputError(
+                f"log {self.name}: column {name}: expected times, received values of type {column.type}"
+            )
+        return _seconds(self.numbers(name), unit, wrap)
 
-    def _exact(self, name: str, column: Any, unit: str | None, wrap: float) -> tuple[Array, tuple[str, ...]]:
+    def _exact(self, column: Any, unit: str | None, wrap: float) -> tuple[Array, tuple[str, ...]]:
         """Return the times of decimals: the digits beyond those of a float64 count."""
         import pyarrow as pa
         import pyarrow.compute as pc
 
-        unit = unit or self.units.get(name)
         values = _as_float(column)
         finite = np.flatnonzero(np.isfinite(values))
         if not len(finite) or wrap:
@@ -184,15 +204,14 @@ class RawTable:
         import pyarrow as pa
         import pyarrow.compute as pc
 
-        unit = unit or self.units.get(name)
         plain = pc.replace_substring(texts, ",", ".") if self.decimal == "," else texts
         try:
             return _seconds(_ticks(plain.cast(pa.int64())), unit, wrap)
         except pa.ArrowInvalid:
             pass
-        for kind in (pa.decimal128(38, 12), pa.float64()):
+        for kind, numbers in ((pa.decimal128(38, 12), plain), (pa.float64(), _of_fortran(plain))):
             try:
-                return self._exact(name, plain.cast(kind), unit, wrap)
+                return self._exact(numbers.cast(kind), unit, wrap)
             except pa.ArrowInvalid:
                 continue
         for kind in (pa.timestamp("ns"), pa.timestamp("ns", "UTC")):
@@ -202,6 +221,8 @@ class RawTable:
                 continue
         values, row, is_clock = seconds_of_texts(texts.to_pylist())
         if row is not None:
+            others = [row for row, _ in _not_numbers(plain)]  # if most are numbers, the first other is named
+            row = others[0] if len(others) < 0.5 * len(texts) else row
             raise self.cell_error(name, "times", row, str(texts[row]))
         return _seconds(values, "us", 1e6 * _SECONDS_OF_A_DAY if is_clock else 0.0)
 
@@ -228,6 +249,13 @@ def _texts(column: pa.ChunkedArray) -> pa.ChunkedArray:
     texts = pc.utf8_trim_whitespace(column.cast(pa.string()))
     is_missing = pc.is_in(pc.utf8_lower(texts), value_set=pa.array(MISSING))
     return pc.if_else(is_missing, None, texts)
+
+
+def _of_fortran(texts: pa.ChunkedArray) -> pa.ChunkedArray:
+    """Return numbers such as 1.0D-3 with the exponent of other languages."""
+    import pyarrow.compute as pc
+
+    return pc.replace_substring_regex(texts, r"^([+-]?[0-9.]+)[dD]([+-]?[0-9]+)$", r"\1e\2")
 
 
 def _as_float(column: pa.ChunkedArray) -> Array:

@@ -1,5 +1,7 @@
 """CSV files as they come: the same numbers, whatever delimiter, header, units and encoding."""
 
+import gzip
+
 import numpy as np
 import pytest
 
@@ -39,6 +41,7 @@ DIALECTS = {
     "a delimiter at the end": table(end=",\n"),
     "a delimiter at the end of rows": table(end=",\n").replace("t_s,a,b,", "t_s,a,b"),
     "signs": table().replace("0.125", "+0.125").replace(",0.25", ",+0.25"),
+    "exponents of Fortran": table().replace("0.125", "1.25D-1"),
     "texts for missing numbers": table().replace("0.25,", "0.25,NaN"),
     "nothing after the last row": table().rstrip("\n"),
     "a line that was not complete": table() + "0.004,5",
@@ -67,6 +70,14 @@ def test_columns_between_blanks_and_rows_of_another_program(tmp_path):
     read = csv_files.read(path)
     assert read.numbers("column_1").tolist() == [1.0, 3.0]
     assert "no names, so column_0, column_1, ..." in read.notes
+
+
+def test_a_compressed_file_is_read(tmp_path):
+    (path := tmp_path / "log.csv.gz").write_bytes(content := gzip.compress(table().encode()))
+    assert np.array_equal(csv_files.read(path).numbers("a"), VALUES[:, 1])
+    path.write_bytes(content[:-12])
+    with pytest.raises(InputError, match="expected a complete gzip file"):
+        csv_files.read(path)
 
 
 def test_units_and_what_was_guessed_are_stated(tmp_path):

@@ -103,5 +103,8 @@ def test_only_columns_that_are_asked_for_are_converted():
         table.numbers("when")
     with pytest.raises(InputError, match="column flag: expected times, received 'a' in row 0"):
         table.times("flag", None, 0.0)
+    numbers = pa.chunked_array([[str(number) for number in range(9)] + ["ERR"]])
+    with pytest.raises(InputError, match="column t: expected times, received 'ERR' in row 9"):
+        RawTable("a", {"t": numbers}).times("t", "ns", 0.0)
     with pytest.raises(InputError, match=r"expected a column y, received id, flag, x, when"):
         table.numbers("y")
