@@ -31,7 +31,7 @@ from spheretwin.models.telemetry.signals import Signal, common_signals, width
 from spheretwin.plant.bristle_friction import BristleFriction, fill_bristles
 from spheretwin.plant.end_stops import fill_end_stops
 from spheretwin.plant.friction import Friction, fill_friction
-from spheretwin.plant.magnet_heat import MagnetHeat, magnet_heat
+from spheretwin.plant.magnet_heat import MagnetHeat, fill_heat
 from spheretwin.plant.mass_properties import mass_errors
 from spheretwin.plant.part_scatter import scatter_of
 from spheretwin.plant.plant_tick import ENGINES, Plant
@@ -180,7 +180,7 @@ def plant_of(scenario: ResolvedScenario, files: Files, rotor: Any, buffers: Shar
     middle_q, middle_qdot, coil_q, coil_qdot = np.empty((4, 3))
     magnetics = true_magnetics(section, scenario.seed, actuator)
     drive, group_gain = drive_of(scenario, actuator, buffers), np.array(section.group_gain)
-    heat = _heat(scenario, drive)
+    chain = drive if isinstance(drive, DriveChain) else None
     return Plant(
         rotor=rotor,
         joint=joint,
@@ -192,9 +192,12 @@ def plant_of(scenario: ResolvedScenario, files: Files, rotor: Any, buffers: Shar
         bristles=BristleFriction.filled(
             _fill_bristles, section, actuator.hinge_range_rad, joint["inertia"], scenario.seed
         ),
-        heat=heat,
+        heat=MagnetHeat.filled(_fill_heat, scenario, drive, groups=groups),
+        winding_degC=chain.coil.temperature_degC if chain else np.zeros(groups),
+        copper_J=chain.flow.copper_J if chain else np.zeros(groups),
+        surroundings_degC=chain.coil.surroundings_degC if chain else np.zeros(1),
         group_gain=group_gain,
-        present_gain=group_gain.copy() if heat else group_gain,
+        present_gain=np.empty(groups),
         unmodelled_torque=np.array(section.modelling_torque_Nm),
         hinge_range=actuator.hinge_range_rad,
         substeps=scenario.substeps,
@@ -231,11 +234,11 @@ def _fill_bristles(rows: Rows, section: ResolvedPlant, range_rad: Array, inertia
     fill_bristles(rows, stiction, section.coulomb_Nm, section.cable, inertia, step_s, seed)
 
 
-def _heat(scenario: ResolvedScenario, drive: DriveModel) -> MagnetHeat | None:
-    if not (scenario.plant.thermal.on and isinstance(drive, DriveChain)):
-        return None
-    coil = scenario.drive
-    return magnet_heat(scenario.plant.thermal, drive, coil.ambient_degC, coil.heat_capacity_J_K)
+def _fill_heat(rows: Rows, scenario: ResolvedScenario, drive: DriveModel) -> None:
+    if isinstance(drive, DriveChain):
+        section, coil = scenario.drive, drive.coil
+        winding = section.heat_capacity_J_K, coil.settled
+        fill_heat(rows, scenario.plant.thermal, section.ambient_degC, coil.period_s, *winding)
 
 
 def rotor_of(scenario: ResolvedScenario, files: Files) -> Rotor:

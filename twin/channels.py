@@ -221,7 +221,7 @@ HEAT_SIGNALS = (
 @part_of_its_caller
 def write_heat(row: NDArray, plant: Any) -> None:
     """Write the columns of one tick."""
-    log_heat(plant.heat, row)
+    log_heat(plant.heat[0], row)
 
 
 HEAT = Channel(lambda groups: HEAT_SIGNALS, lambda scenario: scenario.plant.thermal.on, write_heat)

@@ -12,16 +12,16 @@ bearings are neglected: eddy currents are below 1 mW at 1 rad/s, friction is bel
 
 from __future__ import annotations
 
-from typing import Annotated, NamedTuple
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field
 
 from spheretwin.electronics.coil import REFERENCE_degC
-from spheretwin.electronics.drive_chain import DriveChain
 from spheretwin.models.base.compiled import inlined
 from spheretwin.models.base.errors import InputError
+from spheretwin.models.base.record import Record, Rows, field
 from spheretwin.models.coil_group import PerGroup, of_each_group
 
 Array = NDArray[np.float64]
@@ -87,40 +87,45 @@ class ResolvedThermal(ThermalSection):
     rotor_to_ambient_K_W: float
 
 
-class MagnetHeat(NamedTuple):
-    """Heat of stator and rotor with its state, for compiled code."""
+class MagnetHeat(Record):
+    """Heat of stator and rotor with its state."""
 
-    remanence_per_K: float
-    ambient_degC: float
-    winding_J_K: Array  # (n,) heat capacity of the winding of each group
-    period_s: float
-    matrix_W_K: Array  # (2, 2) C / h + conductances, of stator and rotor
-    capacity_W_K: Array  # (2,) C / h
-    to_ambient_W_K: Array  # (2,)
-    stator_degC: Array  # (1,) state: surroundings of the windings
-    rotor_degC: Array  # (1,) state
-    last_degC: Array  # (n,) state: windings at the end of the last period
-    winding_degC: Array  # (n,) of the drive
-    copper_J: Array  # (n,) of the drive: loss in this period
-
-    def state_arrays(self) -> tuple[Array, ...]:
-        """Return the arrays with the state."""
-        return self.stator_degC, self.rotor_degC, self.last_degC
+    on: bool = field("whether temperatures are computed")
+    remanence_per_K: float = field("relative change of the remanence", "1/K")
+    ambient_degC: float = field("temperature of the surroundings", "°C")
+    winding_J_K: Array = field("heat capacity of the winding of each group", "J/K", "groups")
+    period_s: float = field("control period", "s")
+    matrix_W_K: Array = field("C / h and conductances, of stator and rotor", "W/K", (2, 2))
+    capacity_W_K: Array = field("C / h", "W/K", 2)
+    to_ambient_W_K: Array = field("conductance to the surroundings", "W/K", 2)
+    stator_degC: float = field(
+        "temperature of the stator, the surroundings of the windings", "°C", state=True
+    )
+    rotor_degC: float = field("temperature of the rotor", "°C", state=True)
+    last_degC: Array = field("windings at the end of the last period", "°C", "groups", state=True)
 
 
-def magnet_heat(
-    section: ResolvedThermal, drive: DriveChain, ambient_degC: float, winding_J_K: PerGroup
-) -> MagnetHeat:
-    """Return the heat of a plant; the stator becomes the surroundings of the drive's windings.
+def fill_heat(
+    heats: Rows,
+    section: ResolvedThermal,
+    ambient_degC: float,
+    period_s: float,
+    winding_J_K: PerGroup,
+    settled: Array,
+) -> None:
+    """Fill the heat of plants, which may be off; all is at the ambient temperature but the rotor.
 
     Parameters
     ----------
+    heats : array of MagnetHeat
     section : ResolvedThermal
-    drive : DriveChain
-        With a supply; at rest.
     ambient_degC : float, °C
+    period_s : float, s
+        Control period.
     winding_J_K : float or one for each group, J/K
         Heat capacity of the winding of a group.
+    settled : (groups,) array
+        Share of a step of the power that the temperature of each winding reaches in a period.
 
     Raises
     ------
@@ -128,9 +133,10 @@ def magnet_heat(
         The windings exchange more heat with the stator in a period than it can store: the stator and the
         windings take their steps in turn.
     """
-    period_s, coil = drive.coil.period_s, drive.coil
-    windings_J_K = of_each_group(winding_J_K, len(coil.settled))
-    exchanged_J_K = float(np.sum(coil.settled * windings_J_K))
+    if not section.on:
+        return
+    windings_J_K = of_each_group(winding_J_K, len(settled))
+    exchanged_J_K = float(np.sum(settled * windings_J_K))
     if not exchanged_J_K < section.stator_heat_capacity_J_K:
         raise InputError(
             f"scenario: expected a plant.thermal.stator_heat_capacity_J_K above {exchanged_J_K:g} J/K, which"
@@ -140,20 +146,12 @@ def magnet_heat(
     capacity = np.array([section.stator_heat_capacity_J_K, section.rotor_heat_capacity_J_K]) / period_s
     outer = 1 / np.array([section.stator_to_ambient_K_W, section.rotor_to_ambient_K_W])
     gap = 1 / section.air_gap_K_W
-    return MagnetHeat(
-        remanence_per_K=section.remanence_per_K,
-        ambient_degC=ambient_degC,
-        winding_J_K=windings_J_K,
-        period_s=period_s,
-        matrix_W_K=np.diag(capacity + outer + gap) + gap * np.array([[0.0, -1.0], [-1.0, 0.0]]),
-        capacity_W_K=capacity,
-        to_ambient_W_K=outer,
-        stator_degC=coil.surroundings_degC,
-        rotor_degC=np.array([initial_degC(section, ambient_degC)]),
-        last_degC=coil.temperature_degC.copy(),
-        winding_degC=coil.temperature_degC,
-        copper_J=drive.flow.copper_J,
-    )
+    heats["on"], heats["remanence_per_K"], heats["ambient_degC"] = 1, section.remanence_per_K, ambient_degC
+    heats["winding_J_K"], heats["period_s"] = windings_J_K, period_s
+    heats["matrix_W_K"] = np.diag(capacity + outer + gap) + gap * np.array([[0.0, -1.0], [-1.0, 0.0]])
+    heats["capacity_W_K"], heats["to_ambient_W_K"] = capacity, outer
+    heats["stator_degC"] = heats["last_degC"] = ambient_degC
+    heats["rotor_degC"] = initial_degC(section, ambient_degC)
 
 
 def initial_degC(section: ThermalSection, ambient_degC: float) -> float:
@@ -168,39 +166,47 @@ def remanence(section: ResolvedThermal, ambient_degC: float) -> float:
 
 
 @inlined
-def update_gain(heat: MagnetHeat | None, group_gain: Array, present: Array) -> None:
-    """Compute the gains (n,) of the groups with the present remanence; without heat both are one array."""
-    if heat is None:
-        return
-    factor = 1.0 + heat.remanence_per_K * (heat.rotor_degC[0] - REFERENCE_degC)
+def begin_heat(heat: MagnetHeat, group_gain: Array, present: Array, surroundings_degC: Array) -> None:
+    """Compute the gains (n,) with the present remanence and, with heat, the windings' surroundings (1,)."""
+    factor = 1.0
+    if heat.on:
+        factor += heat.remanence_per_K * (heat.rotor_degC - REFERENCE_degC)
+        surroundings_degC[0] = heat.stator_degC
     for j in range(group_gain.shape[0]):
         present[j] = factor * group_gain[j]
 
 
 @inlined
-def advance_heat(heat: MagnetHeat | None) -> None:
+def advance_heat(heat: MagnetHeat, winding_degC: Array, copper_J: Array) -> None:
     """Advance the temperatures of stator and rotor by one control period, after those of the windings.
 
     The implicit Euler step is of first order; a period is some 1e-6 of a time constant. What the windings
     lose and do not store is released: energy is conserved to rounding.
+
+    Parameters
+    ----------
+    heat : MagnetHeat
+    winding_degC : (groups,) array, °C
+        Present temperatures of the windings.
+    copper_J : (groups,) array, J
+        Losses of the windings in this period.
     """
-    if heat is None:
+    if not heat.on:
         return
     released_J = 0.0
-    for j in range(heat.copper_J.shape[0]):
-        released_J += heat.copper_J[j] - heat.winding_J_K[j] * (heat.winding_degC[j] - heat.last_degC[j])
-        heat.last_degC[j] = heat.winding_degC[j]
+    for j in range(copper_J.shape[0]):
+        released_J += copper_J[j] - heat.winding_J_K[j] * (winding_degC[j] - heat.last_degC[j])
+        heat.last_degC[j] = winding_degC[j]
     matrix, ambient = heat.matrix_W_K, heat.ambient_degC
-    stator = heat.capacity_W_K[0] * heat.stator_degC[0] + heat.to_ambient_W_K[0] * ambient
+    stator = heat.capacity_W_K[0] * heat.stator_degC + heat.to_ambient_W_K[0] * ambient
     stator += released_J / heat.period_s
-    rotor = heat.capacity_W_K[1] * heat.rotor_degC[0] + heat.to_ambient_W_K[1] * ambient
+    rotor = heat.capacity_W_K[1] * heat.rotor_degC + heat.to_ambient_W_K[1] * ambient
     determinant = matrix[0, 0] * matrix[1, 1] - matrix[0, 1] * matrix[1, 0]
-    heat.stator_degC[0] = (matrix[1, 1] * stator - matrix[0, 1] * rotor) / determinant
-    heat.rotor_degC[0] = (matrix[0, 0] * rotor - matrix[1, 0] * stator) / determinant
+    heat.stator_degC = (matrix[1, 1] * stator - matrix[0, 1] * rotor) / determinant
+    heat.rotor_degC = (matrix[0, 0] * rotor - matrix[1, 0] * stator) / determinant
 
 
 @inlined
-def log_heat(heat: MagnetHeat | None, row: Array) -> None:
+def log_heat(heat: MagnetHeat, row: Array) -> None:
     """Write the temperatures of stator and rotor into the beginning of a row."""
-    if heat is not None:
-        row[0], row[1] = heat.stator_degC[0], heat.rotor_degC[0]
+    row[0], row[1] = heat.stator_degC, heat.rotor_degC

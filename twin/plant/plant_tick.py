@@ -17,7 +17,7 @@ from spheretwin.models.magnetics import TorqueModel, fill_torque_matrix, rotor_t
 from spheretwin.plant import lagrangian_rotor, mujoco_rotor
 from spheretwin.plant.bristle_friction import apply_bristles, begin_bristles, log_bristles
 from spheretwin.plant.friction import slow_down
-from spheretwin.plant.magnet_heat import MagnetHeat, advance_heat, update_gain
+from spheretwin.plant.magnet_heat import advance_heat, begin_heat
 from spheretwin.plant.rotor import EngineKind
 
 ENGINES: dict[str, EngineKind] = {
@@ -72,9 +72,12 @@ class Plant(NamedTuple):
     drive: DriveModel
     friction: Rows  # array of one Friction
     bristles: Rows  # array of one BristleFriction
-    heat: MagnetHeat | None
+    heat: Rows  # array of one MagnetHeat
+    winding_degC: NDArray[np.float64]  # (n,) of the drive
+    copper_J: NDArray[np.float64]  # (n,) of the drive: loss in this period
+    surroundings_degC: NDArray[np.float64]  # (1,) of the windings
     group_gain: NDArray[np.float64]  # (n,) torque per ampere over that of the torque matrix
-    present_gain: NDArray[np.float64]  # (n,) the same with the present remanence; without heat that array
+    present_gain: NDArray[np.float64]  # (n,) the same with the present remanence
     unmodelled_torque: NDArray[np.float64]  # (3,) N·m on the hinges (paper: ΔG)
     hinge_range: NDArray[np.float64]  # (3, 2) rad
     substeps: int
@@ -140,7 +143,7 @@ def plant_tick(
     gain, unmodelled, friction_q = plant.present_gain, plant.unmodelled_torque, plant.friction_q
     drive, friction, bristles, joint = plant.drive, plant.friction[0], plant.bristles[0], plant.joint[0]
     coil_q, coil_qdot = plant.coil_q, plant.coil_qdot
-    update_gain(plant.heat, plant.group_gain, gain)
+    begin_heat(plant.heat[0], plant.group_gain, gain, plant.surroundings_degC)
     begin(drive, command)
     for substep in range(plant.substeps):
         for i in range(3):
@@ -175,7 +178,7 @@ def plant_tick(
             if not hinge_range[i, 0] <= q[i] <= hinge_range[i, 1]:
                 return LEFT_WORKSPACE
     is_cool = end(drive)
-    advance_heat(plant.heat)
+    advance_heat(plant.heat[0], plant.winding_degC, plant.copper_J)
     if not is_cool:
         return FAILSAFE
     for kind in range(rotor.warnings.shape[0]):

@@ -13,7 +13,7 @@ from spheretwin.electronics.drive_chain import drive_chain
 from spheretwin.electronics.drive_section import ResolvedDrive
 from spheretwin.models.actuator import load
 from spheretwin.models.base.errors import InputError
-from spheretwin.plant.magnet_heat import ResolvedThermal, advance_heat, magnet_heat, update_gain
+from spheretwin.plant.magnet_heat import MagnetHeat, ResolvedThermal, advance_heat, begin_heat, fill_heat
 from spheretwin.reduction import PlannedRun
 from spheretwin.run import Figures
 from spheretwin.scenario.hardware import MACHINE
@@ -40,19 +40,21 @@ def heat_of(period_s, section=SECTION):
     coils = {"supply_V": 24.0, "resistance_ohm": 1.3, "inductance_H": 9e-4, "current_limit_A": 8.0}
     heat = {"heat_capacity_J_K": WINDING_J_K, "thermal_resistance_K_W": WINDING_K_W}
     drive = ResolvedDrive(resistance_per_K=0.0, ambient_degC=AMBIENT_degC, **coils, **heat)
-    chain = drive_chain(drive, period_s, 1, GROUPS, 0)
-    return chain.coil, magnet_heat(section, chain, AMBIENT_degC, WINDING_J_K)
+    coil = drive_chain(drive, period_s, 1, GROUPS, 0).coil
+    fields = section, AMBIENT_degC, period_s, WINDING_J_K, coil.settled
+    return coil, MagnetHeat.filled(fill_heat, *fields, groups=GROUPS)[0]
 
 
 def heated(duration_s, period_s, section=SECTION):
     """Return the temperatures of stator and rotor at the end of each period, with constant losses."""
     coil, heat = heat_of(period_s, section)
-    heat.copper_J[:] = LOSS_W * period_s
+    copper_J, gain = LOSS_W * period_s, np.ones(GROUPS)
     degC = np.empty((round(duration_s / period_s), 2))
     for row in degC:
-        advance_temperature(coil, heat.copper_J)
-        advance_heat(heat)
-        row[:] = heat.stator_degC[0], heat.rotor_degC[0]
+        begin_heat(heat, gain, gain.copy(), coil.surroundings_degC)
+        advance_temperature(coil, copper_J)
+        advance_heat(heat, coil.temperature_degC, copper_J)
+        row[:] = heat.stator_degC, heat.rotor_degC
     return degC, coil, heat
 
 
@@ -106,9 +108,9 @@ def test_energy_is_conserved(stator_J_K, rotor_J_K, stator_K_W, gap_K_W, rotor_K
 
 def test_gains_fall_with_the_remanence():
     gains = np.array([1.0, 0.9, 1.1, 1.0])
-    _, heat = heat_of(1e-3, thermal(rotor_degC=60.0))
+    coil, heat = heat_of(1e-3, thermal(rotor_degC=60.0))
     present = np.empty(GROUPS)
-    update_gain(heat, gains, present)
+    begin_heat(heat, gains, present, coil.surroundings_degC)
     np.testing.assert_allclose(present, gains * (1 - 0.0011 * 40), rtol=1e-15)
 
 
