@@ -49,6 +49,9 @@ class TimeColumn(BaseModel):
     wrap: Annotated[float, Field(ge=0)] = Field(
         0.0, description="number after which the clock starts again, such as 4294967296; 0 for none"
     )
+    period_s: Annotated[float, Field(gt=0)] | None = Field(
+        None, description="interval of the rows of a file without times, s; the column is not read then"
+    )
 
 
 class Channels(BaseModel):
@@ -213,7 +216,11 @@ class ColumnMap(BaseModel):
         InputError
             A column is missing, or has something else than numbers.
         """
-        t_s, notes = table.times(self.time.column, self.time.unit, self.time.wrap)
+        notes: tuple[str, ...] = ()
+        if self.time.period_s is None:
+            t_s, notes = table.times(self.time.column, self.time.unit, self.time.wrap)
+        else:
+            t_s = self.time.period_s * np.arange(table.rows)
         raw = [
             np.stack([table.numbers(name) for name in channels.names(tuple(table.columns))], axis=1)
             for channels in (self.angles, self.currents)

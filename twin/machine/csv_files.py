@@ -28,6 +28,8 @@ _LEAST_SHARE = 0.3
 """Share of the values that are numbers under the right delimiter; others may be texts and times."""
 _MOST_OF_A_ROW = 0.6
 """Share of the values of a row of numbers that are some; another may be an error of a sensor."""
+_MOST_OF_NAMES = 0.2
+"""The same of a row of names."""
 
 _MOST_INVALID = 0.01
 """Share of lines of another length that are left out; with more of them the file is refused."""
@@ -150,14 +152,9 @@ def _layout(path: Path, lines: Sequence[str], given: CsvFormat) -> _Layout:
     best = max(scores, key=lambda one: scores[one][:2])
     share, width, decimal = scores[best]
     numeric = _numeric_columns(sample[len(sample) // 2 :], best, width, decimal)
-    firsts = (
-        place
-        for place, line in enumerate(lines)
-        if place >= skipped
-        and not line.lstrip().startswith(comment)
-        and _is_data(_cells(line, best), numeric, decimal)
-    )
-    first = next(firsts, None) if given.header_rows is None else given.header_rows
+    first = given.header_rows
+    if first is None:
+        first = _first_row(lines, skipped, best, _Columns(numeric, decimal), comment)
     if share < _LEAST_SHARE or first is None:
         raise InputError(
             f"log {path}: expected rows of numbers between {_shown_delimiters(candidates)},"
@@ -210,11 +207,41 @@ def _numeric_columns(lines: Sequence[str], delimiter: str, width: int, decimal: 
     return [any(_is_number(cell, decimal) for cell in column) for column in zip(*rows, strict=True)]
 
 
-def _is_data(cells: Sequence[str], numeric: Sequence[bool], decimal: str) -> bool:
-    """True for a row of which most values are numbers in the columns of numbers."""
-    values = [cell for cell, is_numeric in zip(cells, numeric, strict=False) if cell and is_numeric]
-    numbers = sum(_is_number(cell, decimal) for cell in values)
-    return abs(len(cells) - len(numeric)) <= 1 and 0 < numbers >= _MOST_OF_A_ROW * len(values)
+class _Columns(NamedTuple):
+    """Which columns have numbers, and their decimal mark."""
+
+    numeric: Sequence[bool]
+    decimal: str
+
+    def share(self, cells: Sequence[str]) -> float | None:
+        """Return the share of numbers of a row in these columns; None for a row of another length."""
+        values = [cell for cell, is_numeric in zip(cells, self.numeric, strict=False) if cell and is_numeric]
+        if abs(len(cells) - len(self.numeric)) > 1 or not values:
+            return None
+        return sum(_is_number(cell, self.decimal) for cell in values) / len(values)
+
+
+def _first_row(
+    lines: Sequence[str], skipped: int, delimiter: str, columns: _Columns, comment: tuple[str, ...]
+) -> int | None:
+    """Return the place of the first row of numbers below the names; None if there is none."""
+    rows, names = [], []
+    for place, line in enumerate(lines[:_SAMPLE_LINES]):
+        if place < skipped or line.lstrip().startswith(comment):
+            continue
+        share = columns.share(_cells(line, delimiter))
+        if share is not None and share >= _MOST_OF_A_ROW:
+            rows.append(place)
+        elif share is not None and share <= _MOST_OF_NAMES:
+            names.append(place)
+    for place in reversed(names):
+        below = [row for row in rows if row > place]
+        # A logger that was started again repeats its names.
+        if len(below) >= 0.5 * len(rows) and lines[place] not in (
+            lines[other] for other in names if other < place
+        ):
+            return below[0] if below else None
+    return rows[0] if rows else None
 
 
 def _cells(line: str, delimiter: str) -> list[str]:

@@ -71,6 +71,11 @@ class RawTable:
     decimal: str = "."
     line: Callable[[int], int] | None = None
 
+    @property
+    def rows(self) -> int:
+        """Number of rows."""
+        return len(next(iter(self.columns.values()))) if self.columns else 0
+
     def column(self, name: str) -> pa.ChunkedArray | NDArray[Any]:
         """Return a column.
 

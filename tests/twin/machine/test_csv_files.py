@@ -36,6 +36,7 @@ DIALECTS = {
     "units in brackets below": table().replace("\n", "\n[s],[xy],[z]\n", 1),
     "a title for groups": "motor,motor,motor\n" + table(),
     "a preamble as wide as the table": "Model,X1,\nFirmware,2.0,\n,,\n" + table(),
+    "numbers in the preamble": "x0,0.0,0.0\nstep,0.001,0.001\n" + table(),
     "line of a spreadsheet": "sep=;\n" + table(";"),
     "carriage returns": table(end="\r\n"),
     "a delimiter at the end": table(end=",\n"),
