@@ -152,11 +152,9 @@ def _read_table(path: Path, column_map: ColumnMap | None) -> RawTable:
         return _read_mcap(path, column_map)
     if start.startswith(_PARQUET):
         return _read_parquet(path)
-    if start.startswith(_ZIP):
-        raise InputError(
-            f"log {path}: expected CSV, Parquet or MCAP, received a ZIP archive, such as a workbook of Excel:"
-            " save it as CSV"
-        )
+    for beginning, (what, advice) in OTHER_FORMATS.items():
+        if start.startswith(beginning):
+            raise InputError(f"log {path}: expected CSV, Parquet or MCAP, received {what}: {advice}")
     if path.suffix == ".rrd":
         raise unreadable(path, ValueError("received other bytes"), "a log")
     if path.suffix.lower() in (".mcap", ".parquet"):
@@ -164,7 +162,20 @@ def _read_table(path: Path, column_map: ColumnMap | None) -> RawTable:
     return csv_files.read(path, column_map.csv if column_map else None)
 
 
-_MCAP, _PARQUET, _ZIP = b"\x89MCAP0\r\n", b"PAR1", b"PK\x03\x04"
+_MCAP, _PARQUET = b"\x89MCAP0\r\n", b"PAR1"
+
+OTHER_FORMATS = {
+    b"PK\x03\x04": ("a ZIP archive, such as a workbook of Excel", "save it as CSV"),
+    b"\xd0\xcf\x11\xe0": ("an old workbook of Excel", "save it as CSV"),
+    b"SQLite f": ("an SQLite database, such as a bag of ROS 2", "`ros2 bag convert` writes MCAP"),
+    b"#ROSBAG": ("a bag of ROS 1", "`mcap convert` writes MCAP"),
+    b"\x89HDF": ("HDF5, such as a file of MATLAB", "`writetimetable` or pandas write CSV or Parquet"),
+    b"MATLAB": ("a file of MATLAB", "`writetimetable` writes CSV"),
+    b"MDF  ": ("a measurement file MDF", "asammdf exports CSV and Parquet"),
+    b"TDSm": ("a file TDMS of LabVIEW", "npTDMS and DIAdem export CSV"),
+    b"ARROW1": ("an Arrow file", "`pyarrow.parquet.write_table` writes Parquet"),
+}
+"""Formats of other programs by their first bytes, and how to convert them."""
 
 
 def _read_mcap(path: Path, column_map: ColumnMap | None) -> RawTable:
@@ -189,9 +200,20 @@ def _read_parquet(path: Path) -> RawTable:
         }
         columns = [part for field in table.schema for part in _scalars(field, table[field.name])]
     except (OSError, pa.ArrowException, UnicodeDecodeError) as error:
+        if not _has_end(path):
+            raise InputError(
+                f"log {path}: expected Parquet with its end, received none: its writer was killed, and its"
+                " rows cannot be read without it"
+            ) from None
         raise unreadable(path, error, "columns of numbers") from None
     names = [name for name, _ in columns]
     return RawTable(str(path), dict(columns), {}, metadata, (), unique(names))
+
+
+def _has_end(path: Path) -> bool:
+    with path.open("rb") as file:
+        file.seek(-len(_PARQUET), 2)
+        return file.read() == _PARQUET
 
 
 MOST_ENTRIES = 1024
@@ -214,7 +236,7 @@ def _scalars(field: pa.Field, column: pa.ChunkedArray) -> Iterator[tuple[str, An
         if not (types.is_integer(kind.value_type) or types.is_floating(kind.value_type)):
             return
         lengths = pc.fill_null(pc.list_value_length(column), 0).to_numpy()
-        size = int(lengths.max(initial=0))
+        size = kind.list_size if types.is_fixed_size_list(kind) else int(lengths.max(initial=0))
         if not 0 < size <= MOST_ENTRIES:
             return
         labels = (field.metadata or {}).get(b"labels", b"").decode()

@@ -62,12 +62,16 @@ def _faults(t_s: Array, period_s: float) -> tuple[int, int]:
 
 
 def aligned(log: Log) -> Log:
-    """Return a log with one row for each sample of the angles.
+    """Return a log with one row for each sample of the angles, in the order of time.
 
     Rows of one time that complete each other are merged. Rows between those of the angles are left out: their
     currents count in the mean over the interval of a row if they were commanded, about its time if they were
     measured. Where the currents have a gap they are NaN.
     """
+    order, notes = sorted_rows(log.t_s, log.angle_rad, log.current_A)
+    if notes:
+        columns = {name: getattr(log, name)[order] for name in ("t_s", "angle_rad", "current_A")}
+        log = replace(log, **columns, notes=(*log.notes, *notes))
     log = _of_one_sensor(_merged(log))
     has_angles = np.isfinite(log.angle_rad).any(axis=1)
     has_currents = np.isfinite(log.current_A).any(axis=1)

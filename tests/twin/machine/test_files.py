@@ -13,6 +13,7 @@ import pytest
 import spheretwin as st
 from spheretwin import machine
 from spheretwin.machine import Log
+from spheretwin.machine.files import OTHER_FORMATS
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.telemetry import joint_states
 from spheretwin.models.telemetry.joint_states import Topic
@@ -146,6 +147,29 @@ def test_a_file_that_cannot_be_read_is_refused(tmp_path, suffix):
     for file in (path, tmp_path / f"missing{suffix}"):
         with pytest.raises(InputError, match="expected"):
             machine.read(file)
+
+
+@pytest.mark.parametrize("start", OTHER_FORMATS, ids=lambda start: start[:4].hex())
+def test_files_of_other_formats_are_named(start, tmp_path):
+    (path := tmp_path / "log.csv").write_bytes(start + bytes(100))
+    with pytest.raises(InputError, match=r"expected CSV, Parquet or MCAP, received .*: "):
+        machine.read(path)
+
+
+def test_parquet_of_a_killed_writer_says_so(tmp_path):
+    machine.write(LOG, path := tmp_path / "log.parquet")
+    path.write_bytes(path.read_bytes()[:-100])
+    with pytest.raises(
+        InputError, match="expected Parquet with its end, received none: its writer was killed"
+    ):
+        machine.read(path)
+
+
+def test_the_first_bytes_tell_the_format(tmp_path):
+    for suffix in (".parquet", ".mcap", ".csv"):
+        machine.write(LOG, path := tmp_path / f"log{suffix}")
+        path = path.rename(tmp_path / f"log{suffix.upper()}.dat")
+        assert np.array_equal(machine.read(path).current_A, LOG.current_A)
 
 
 def test_another_suffix_is_refused(tmp_path):

@@ -49,6 +49,13 @@ def test_topics_of_any_offset_have_the_rows_of_the_angles(late_s, kind):
     assert aligned(log) is log
 
 
+def test_rows_of_two_topics_in_any_order_are_the_same_log():
+    log = aligned(two_topics(1e-4))
+    for order in (np.arange(400), np.random.default_rng(0).permutation(400)):
+        other = aligned(two_topics(1e-4, order=order))
+        assert other.digest == log.digest
+
+
 def test_faster_currents_count_with_their_mean():
     t_s = 2.5e-4 * np.arange(800)
     angles = np.full((800, 3), np.nan)
