@@ -168,12 +168,23 @@ def test_a_dead_group_is_never_accepted(empty):
     assert abs(low + high) / 2 < high - low < 0.2
 
 
-def test_a_result_that_is_no_better_is_not_accepted(empty):
-    """The scenario already has the true values."""
+def test_a_scenario_that_has_the_true_values_gives_a_covariance(empty):
     outcome = identify(empty, SCENARIO, ["plant.coulomb_Nm"], {**KNOWN, **TRUE})
-    assert not outcome.accepted
-    assert any("held-out error" in reason for reason in outcome.reasons)
+    assert outcome.accepted
+    assert outcome.nothing_to_correct
+    assert outcome.improvement < 0.05
     assert outcome.held_out.chi2 == pytest.approx(1.0, abs=0.1)
+    assert np.all(np.diag(outcome.covariance) > 0)
+
+
+def test_other_values_that_are_hardly_better_are_not_accepted(empty):
+    """The scenario differs by many standard deviations, which matter little for the angles."""
+    known = {**KNOWN, **TRUE, "plant.coulomb_Nm": [0.0031, 0.0026, 0.0016]}
+    outcome = identify(empty, SCENARIO, ["plant.coulomb_Nm"], known)
+    assert not outcome.accepted
+    assert not outcome.nothing_to_correct
+    assert outcome.held_out.chi2 == pytest.approx(1.0, abs=0.1)
+    assert any("held-out error" in reason for reason in outcome.reasons)
 
 
 def test_the_gradient_is_that_of_the_cost_with_the_best_starts(empty):
