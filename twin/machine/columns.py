@@ -305,9 +305,12 @@ def default(table: RawTable, kind: str | None = None) -> ColumnMap:
     InputError
         The columns have other names.
     """
-    labels = [*(prefix + axis for prefix in ANGLE_PREFIXES for axis in ANGLE_NAMES), "angle_rad_0"]
-    angles = next((label for label in labels if label in table.columns), None)
-    currents = next((prefix for prefix in CURRENT_PREFIXES if f"{prefix}0" in table.columns), None)
+    # Also as a spreadsheet may have saved them: in capitals, with units in brackets.
+    names = {re.sub(r"\s*[\[(].*", "", name).lower(): name for name in table.columns}
+    triples = [[prefix + axis for axis in ANGLE_NAMES] for prefix in ANGLE_PREFIXES]
+    triples.append([f"{ANGLE_PREFIXES[0]}{place}" for place in range(3)])
+    angles = next((triple for triple in triples if triple[0] in names), None)
+    currents = next((prefix for prefix in CURRENT_PREFIXES if f"{prefix}0".lower() in names), None)
     if not (angles and currents):
         raise InputError(
             f"log {table.name}: expected a column map (--columns MAP.toml), or the columns"
@@ -315,11 +318,14 @@ def default(table: RawTable, kind: str | None = None) -> ColumnMap:
             f" {next(iter(CURRENT_PREFIXES))}0 to the last group, received {listed(tuple(table.columns))}"
             f"{''.join(f'; {note}' for note in table.notes)}"
         )
-    prefix = next(prefix for prefix in ANGLE_PREFIXES if angles.startswith(prefix))
-    axes = ("0", "1", "2") if angles.endswith("0") else ANGLE_NAMES
+    groups = _numbered(currents.lower() + EVERY, tuple(names))
     return of_fields(
         {
-            "angles": {"columns": [prefix + axis for axis in axes]},
-            "currents": {"columns": [currents + EVERY], "kind": kind or CURRENT_PREFIXES[currents]},
+            "time": {"column": names.get("t_s", "t_s")},
+            "angles": {"columns": [names.get(name, name) for name in angles]},
+            "currents": {
+                "columns": [names[name] for name in groups],
+                "kind": kind or CURRENT_PREFIXES[currents],
+            },
         }
     )

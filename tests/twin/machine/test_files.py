@@ -57,6 +57,17 @@ def test_columns_are_scalars_with_plain_names(tmp_path):
     assert set(schema.types) == {pa.float64()}
 
 
+def test_a_log_that_a_spreadsheet_has_saved_is_read_without_a_column_map(tmp_path):
+    machine.write(LOG, path := tmp_path / "log.csv")
+    head, rows = path.read_text().split("\n", 1)
+    units = (
+        dict.fromkeys(head.split(","), "A") | {"t_s": "s"} | dict.fromkeys(head.split(",")[1:4], "rad")
+    )
+    path.write_text(",".join(f"{name.upper()} [{unit}]" for name, unit in units.items()) + "\n" + rows)
+    log = machine.read(path)
+    assert (log.digest, log.currents) == (LOG.digest, "measured")
+
+
 def test_telemetry_is_a_log(tmp_path):
     run = st.simulate("hold", {"duration": 0.1})
     run.save(path := tmp_path / "run.parquet")
