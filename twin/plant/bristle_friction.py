@@ -361,7 +361,7 @@ def _element(
         return sign * torque, stiffness * (1.0 - g) if share < 1.0 else 0.0, sign * slip
     else:  # it begins to slip
         free = max(free, 0.0)
-        share = free / length
+        share = free / length if length > 0.0 else 0.0  # at rest, below a limit that has fallen
         torque = stiffness * (slip - (1.0 - g) * free * share) + damping * free
         slope, end = stiffness * (1.0 - g) * share * share, slip
     if torque > stiffness * slip:

@@ -181,12 +181,17 @@ three = st.tuples(finite, finite, finite).map(np.array)
 exponent = st.floats(0, 1)
 
 
-# The iteration cycles between two branches, and then converges slowly.
+# The iteration cycles between two branches, and then converges slowly; a limit falls below a deflection at rest.
 @pytest.mark.release("1.2 s; test_static_friction.py has the balance of a run")
 @example(SimpleNamespace(
     pose=np.array([0.0, 1.0, 1.0]), direction=np.array([0.0, 0.5, 1.0]), step=-3.0, speed=-1.75,
     deflection=[np.zeros(3), np.zeros(3), np.array([0.0, 0.125, 0.0])], ratio=3.0, presliding=-6.0,
     damping=0.0, stribeck=0.0, levels=(0.0, 0.59375, 1.0), ahead=np.zeros(3), slips=False,
+))  # fmt: skip
+@example(SimpleNamespace(
+    pose=np.zeros(3), direction=np.zeros(3), step=-2.0, speed=0.0, ratio=2.0, presliding=0.0, damping=0.0,
+    stribeck=0.0, levels=(0.0, 0.0, 0.0), ahead=np.array([1.0, 0.0, 0.0]), slips=False,
+    deflection=[np.array([0.75, 0.0, 0.0]), np.array([1.0, 0.0, 0.0]), np.zeros(3)],
 ))  # fmt: skip
 @given(st.builds(
     SimpleNamespace, pose=three, direction=three, deflection=st.lists(three, min_size=3, max_size=3),
