@@ -24,7 +24,6 @@ from spheretwin.models.actuator import Actuator
 from spheretwin.models.base.errors import InputError, SpheretwinError, exception_text, shown
 from spheretwin.models.base.record import Rows
 from spheretwin.models.base.reuse import reused
-from spheretwin.models.joint_chain import JointChain
 from spheretwin.models.magnetics import TorqueModel, scaled, scratch_of, torque_model
 from spheretwin.models.scatter import scattered_model
 from spheretwin.models.telemetry.signals import Signal, common_signals, width
@@ -173,24 +172,22 @@ def true_magnetics(section: ResolvedPlant, seed: int, actuator: Actuator) -> Tor
     return scattered_model(actuator, scatter) if scatter else torque_model(actuator)
 
 
-def plant_of(scenario: ResolvedScenario, files: Files, rotor: Any, buffers: SharedBuffers) -> Plant:
+def plant_of(scenario: ResolvedScenario, files: Files, rotor: Rows, buffers: SharedBuffers) -> Plant:
     """Return the plant of a resolved scenario with a started rotor and zero currents."""
     section, actuator, groups = scenario.plant, files.actuator, len(files.actuator.groups)
-    joint = JointChain.filled(_rotor_settings(scenario, files).fill_joint)
     middle_q, middle_qdot, coil_q, coil_qdot = np.empty((4, 3))
     magnetics = true_magnetics(section, scenario.seed, actuator)
     drive, group_gain = drive_of(scenario, actuator, buffers), np.array(section.group_gain)
     chain = drive if isinstance(drive, DriveChain) else None
     return Plant(
         rotor=rotor,
-        joint=joint,
         magnetics=magnetics,
         G=np.empty((3, groups)),
         scratch=scratch_of(magnetics),
         drive=drive,
         friction=Friction.filled(_fill_friction, section),
         bristles=BristleFriction.filled(
-            _fill_bristles, section, actuator.hinge_range_rad, joint["inertia"], scenario.seed
+            _fill_bristles, section, actuator.hinge_range_rad, rotor["joint"]["inertia"], scenario.seed
         ),
         heat=MagnetHeat.filled(_fill_heat, scenario, drive, groups=groups),
         winding_degC=chain.coil.temperature_degC if chain else np.zeros(groups),
@@ -206,7 +203,7 @@ def plant_of(scenario: ResolvedScenario, files: Files, rotor: Any, buffers: Shar
         middle_qdot=middle_qdot,
         coil_q=coil_q,
         coil_qdot=coil_qdot,
-        last_qdot=rotor.qdot.copy(),
+        last_qdot=rotor["qdot"][0].copy(),
         current=np.zeros(groups),
         mean_current=np.zeros(groups),
         effective_current=np.zeros(groups),

@@ -64,13 +64,6 @@ class RuntimeState(NamedTuple):
     last: LastTick
 
 
-class StartedRotor(NamedTuple):
-    """A started rotor and the data that compiled code steps."""
-
-    rotor: Rotor
-    data: Any
-
-
 class Runtime:
     """Controller, sensors and plant of a scenario, and the loop that runs them.
 
@@ -81,8 +74,8 @@ class Runtime:
         Model and torque curves.
     law : Law
         Active law.
-    rotor : StartedRotor, optional
-        Default: a rotor that starts at the initial pose and rates of the scenario.
+    rotor : Rotor, optional
+        Started; default: one that starts at the initial pose and rates of the scenario.
     external : ExternalController or ExternalPlant, optional
         Replaces the controller or the plant of the scenario.
 
@@ -108,7 +101,7 @@ class Runtime:
         scenario: ResolvedScenario,
         files: Files,
         law: Law,
-        rotor: StartedRotor | None = None,
+        rotor: Rotor | None = None,
         external: ExternalController | ExternalPlant | None = None,
     ) -> None:
         self._scenario, self._external = scenario, external
@@ -126,7 +119,7 @@ class Runtime:
             self._data["manual"]["on"] = True
         supervision = self._data["supervision"]
         buffers = shared_buffers(scenario, len(files.actuator.groups), supervision["watchdog"]["halt"])
-        self._plant = assembly.plant_of(scenario, files, self._rotor.data, buffers)
+        self._plant = assembly.plant_of(scenario, files, self._rotor.rows, buffers)
         self._sensors = sensors_of(scenario, buffers)
         self._faults = faults_of(scenario, self._plant, self._sensors, supervision["groups"])
         # The loop holds only addresses of its functions: this object keeps the functions alive.
@@ -157,12 +150,12 @@ class Runtime:
     @property
     def q_rad(self) -> NDArray[np.float64]:
         """Current hinge angles, (3,) in rad."""
-        return self._rotor.data.q.copy()
+        return self._rotor.rows["q"][0].copy()
 
     @property
     def qdot_rad_s(self) -> NDArray[np.float64]:
         """Current hinge rates, (3,) in rad/s."""
-        return self._rotor.data.qdot.copy()
+        return self._rotor.rows["qdot"][0].copy()
 
     @property
     def _watchdog(self) -> Any:
@@ -176,7 +169,9 @@ class Runtime:
     @cached_property
     def loop(self) -> Callable[[loops.Inputs, NDArray[np.float64]], tuple[int, int]]:
         """Loop of the components, a function of inputs and rows; the first access compiles it."""
-        stages, memory = compiled_stages(self._controller, self._sensors, self._plant, self.signals)
+        stages, memory = compiled_stages(
+            self._controller, self._sensors, self._plant, self._scenario.plant.engine, self.signals
+        )
         parts = (
             self._functions.law,
             self._functions.allocate,
@@ -284,7 +279,7 @@ class Runtime:
 
     def set_state(self, change: StateChange) -> None:
         """Set the given parts of the state of the plant."""
-        plant, rotor = self._plant, self._rotor.data
+        plant, rotor = self._plant, self._rotor.rows[0]
         for part, given in (
             (rotor.q, change.q_rad),
             (rotor.qdot, change.qdot_rad_s),
@@ -297,7 +292,7 @@ class Runtime:
     def state(self) -> RuntimeState:
         """Return the complete state."""
         parts = {name: save_state(part) for name, part in self.parts.items()}
-        return RuntimeState(self._rotor.rotor.state(), parts, self._last)
+        return RuntimeState(self._rotor.state(), parts, self._last)
 
     @property
     def parts(self) -> dict[str, Any]:
@@ -335,21 +330,22 @@ class Runtime:
             check_length(name, state.parts.get(name, np.empty(0)), len(numbers))
         check_length("the last command", last.command, len(self._plant.current))
         check_length("the last pose", last.q, 3 if len(last.q) else 0)
-        self._rotor.rotor.restore(state.rotor)
+        self._rotor.restore(state.rotor)
         for name, part in self.parts.items():
             restore_state(part, state.parts[name], name)
         self._last = last
 
 
-def _start_rotor(scenario: ResolvedScenario, files: Files) -> StartedRotor:
+def _start_rotor(scenario: ResolvedScenario, files: Files) -> Rotor:
     rotor, section = assembly.rotor_of(scenario, files), scenario.plant
-    return StartedRotor(rotor, rotor.start(np.array(section.initial_rad), np.array(section.initial_rad_s)))
+    rotor.start(np.array(section.initial_rad), np.array(section.initial_rad_s))
+    return rotor
 
 
-def _transfer_rotor(rotor: StartedRotor, scenario: ResolvedScenario, files: Files) -> StartedRotor:
+def _transfer_rotor(rotor: Rotor, scenario: ResolvedScenario, files: Files) -> Rotor:
     """Return the rotor of another scenario in the state of a started one."""
-    other, state = assembly.rotor_of(scenario, files), rotor.rotor.state()
-    data = other.start(rotor.data.q, rotor.data.qdot)
+    other, state = assembly.rotor_of(scenario, files), rotor.state()
+    other.start(rotor.rows["q"][0], rotor.rows["qdot"][0])
     if len(other.state()) == len(state):  # otherwise a body was added or removed: only pose and rates remain
         other.restore(state)
-    return StartedRotor(other, data)
+    return other

@@ -17,10 +17,10 @@ from spheretwin.channels import CHANNELS, Channel
 from spheretwin.control.controller import Controller
 from spheretwin.electronics.sensors import Sensors, sense
 from spheretwin.electronics.transducers import CurrentSensors
-from spheretwin.models.base.compiled import COMPILES, stage_address
+from spheretwin.models.base.compiled import COMPILES, inlined, stage_address
 from spheretwin.models.base.numba_internals.addresses import function_at, in_memory
 from spheretwin.models.telemetry.signals import Signal, offsets
-from spheretwin.plant.plant_tick import Plant, PlantOutput, plant_tick
+from spheretwin.plant.plant_tick import ENGINES, Plant, PlantOutput, plant_tick
 
 Array = NDArray[np.float64]
 
@@ -62,14 +62,14 @@ class Stage(NamedTuple):
     memory: Any
 
 
-def plant_stage(plant: Plant) -> Stage:
+def plant_stage(plant: Plant, engine: str) -> Stage:
     """Compile the stage of a plant, which `advance_at` calls."""
     memory, data = _data(plant)
-    return Stage(_function(_ADVANCE, _advance, plant), data, memory)
+    return Stage(_function(_ADVANCE, _advance(ENGINES[engine].step), plant), data, memory)
 
 
 def compiled_stages(
-    controller: Controller, sensors: Sensors, plant: Plant, signals: tuple[Signal, ...]
+    controller: Controller, sensors: Sensors, plant: Plant, engine: str, signals: tuple[Signal, ...]
 ) -> tuple[Stages, list[Any]]:
     """Compile the stages of a run; return them and the memory that they have addresses of.
 
@@ -78,6 +78,8 @@ def compiled_stages(
     controller : Controller
     sensors : Sensors
     plant : Plant
+    engine : str
+        Of its rotor.
     signals : tuple of Signal
         Columns of the run: its channels are among them.
     """
@@ -95,14 +97,14 @@ def compiled_stages(
     stages = Stages(
         _function(_SENSE, _sense, sensors),
         data["sensors"],
-        _function(_ADVANCE, _advance, plant),
+        _function(_ADVANCE, _advance(ENGINES[engine].step), plant),
         data["plant"],
         sequence(writers),
         sequence([data[names[0]] for names in reads]),
         sequence([data[names[-1]] for names in reads]),
         np.array([first[name] for name in logged.values()], np.intp),
-        plant.rotor.q,
-        plant.rotor.qdot,
+        plant.rotor["q"][0],
+        plant.rotor["qdot"][0],
         plant.current,
         plant.draws,
         plant.current_sensors,
@@ -124,10 +126,18 @@ def _sense(sensors: Any, q: Array, qdot: Array, noise: Array, measurement: Array
     return sense(sensors[0], q, qdot, noise, measurement)
 
 
-def _advance(
-    plant: Any, command: Array, disturbance: Array, current: Array, mean_current: Array, torque_S: Array
-) -> int:
-    return plant_tick(plant[0], command, disturbance, PlantOutput(current, mean_current, torque_S))
+@cache
+def _advance(step_rotor: Callable[[Any], None]) -> Callable[..., int]:
+    @inlined
+    def tick(plant: Plant, command: Array, disturbance: Array, output: PlantOutput) -> int:
+        return plant_tick(step_rotor, plant, command, disturbance, output)
+
+    def advance(
+        plant: Any, command: Array, disturbance: Array, current: Array, mean_current: Array, torque_S: Array
+    ) -> int:
+        return tick(plant[0], command, disturbance, PlantOutput(current, mean_current, torque_S))
+
+    return advance
 
 
 @cache

@@ -11,10 +11,10 @@ from measuring import fastest, options_of, ratio, report, seconds_of
 
 from spheretwin import plant
 from spheretwin.envs import TwinVectorEnv
+from spheretwin.models import actuator as actuators
 from spheretwin.models.base.compiled import allocation_free, compiled
-from spheretwin.models.joint_chain import JointChain, fill_ideal
 from spheretwin.plant.friction import Friction, fill_friction, slow_down
-from spheretwin.plant.lagrangian_rotor import LagrangianData
+from spheretwin.plant.lagrangian_rotor import LagrangianRotor
 from spheretwin.plant.lagrangian_rotor import step as step_rotor
 from spheretwin.plant.plant_step import step
 
@@ -39,13 +39,13 @@ def lockstep(changes):
 def single_without_field():
     """Time of a step of rotor and friction of one plant, s."""
     parameters, steps = plant.parameters("nutation", FRICTION), PLANTS * STEPS * CALLS
-    joint, warnings = JointChain.filled(fill_ideal, parameters.inertia_kg_m2), np.zeros(1, np.int32)
+    rotor = LagrangianRotor(actuators.load(), dt)
     coefficients = parameters.coulomb_Nm, parameters.viscous_Nm_s, parameters.friction_smoothing_rad_s
     resistance = Friction.filled(fill_friction, *coefficients, dt)[0]
 
     def work():
-        rotor = LagrangianData(dt, joint, STATE.q_rad.copy(), STATE.qdot_rad_s.copy(), np.zeros(3), warnings)
-        return seconds_of(lambda: _coast_without_field(steps, rotor, resistance, np.zeros(3))) / steps
+        data = rotor.start(*STATE)
+        return seconds_of(lambda: _coast_without_field(steps, data, resistance, np.zeros(3))) / steps
 
     return work
 
@@ -81,9 +81,9 @@ def _coast(calls, state, currents, disturbance, parameters):
 @allocation_free
 def _coast_without_field(calls, rotor, resistance, friction_q):
     for _ in range(calls):
-        slow_down(resistance, rotor.joint[0], rotor.q, rotor.qdot, friction_q)
+        slow_down(resistance, rotor.joint, rotor.q, rotor.qdot, friction_q)
         step_rotor(rotor)
-        slow_down(resistance, rotor.joint[0], rotor.q, rotor.qdot, friction_q)
+        slow_down(resistance, rotor.joint, rotor.q, rotor.qdot, friction_q)
 
 
 def environment(actions):

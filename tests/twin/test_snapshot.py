@@ -64,7 +64,7 @@ def test_the_solver_s_warm_start_is_restored(sticky):
     original.advance(237)
     restored(original, other)
     # Equal rows alone do not show it: on some processors the solver reaches the same bits from any start.
-    one, another = (each._runtime._rotor.rotor.data.qacc_warmstart for each in (original, other))
+    one, another = (each._runtime._rotor.data.qacc_warmstart for each in (original, other))
     assert np.any(one)
     assert np.array_equal(one, another)
     assert cases.same_future(original, other)

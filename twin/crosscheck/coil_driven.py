@@ -238,10 +238,13 @@ def drive_plant(
     rotor = assembly.rotor_of(scenario, begun.files)  # keep it: the stepped plant has addresses within it
     stepped = rotor.start(np.array(section.initial_rad), np.array(section.initial_rad_s))
     buffers = shared_buffers(scenario, groups, np.zeros(1, dtype=np.int64))
-    plant = assembly.plant_of(scenario, begun.files, stepped, buffers)
+    plant = assembly.plant_of(scenario, begun.files, rotor.rows, buffers)
     states = np.full((len(disturbance) // every + 1, 6), np.nan)
     states[0] = [*section.initial_rad, *section.initial_rad_s]
-    stage, output = plant_stage(plant), PlantOutput(np.empty(groups), np.empty(groups), np.empty(3))
+    stage, output = (
+        plant_stage(plant, section.engine),
+        PlantOutput(np.empty(groups), np.empty(groups), np.empty(3)),
+    )
     motion = stepped.q, stepped.qdot
     _drive(stage.function, stage.data, motion, commands(groups), disturbance, output, every, states)
     return states

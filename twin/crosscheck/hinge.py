@@ -17,6 +17,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from copy import copy
 from dataclasses import replace
+from functools import cache
 from math import ceil, inf, log1p
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -29,12 +30,12 @@ from spheretwin.crosscheck.equations import ideal_file
 from spheretwin.models.actuator import Actuator
 from spheretwin.models.base.compiled import compiled
 from spheretwin.models.base.record import Rows
-from spheretwin.models.joint_chain import JointChain
 from spheretwin.models.mjcf import ROTOR, Mjcf, read
+from spheretwin.plant import lagrangian_rotor, mujoco_rotor
 from spheretwin.plant.friction import Friction, fill_friction, slow_down
 from spheretwin.plant.lagrangian_rotor import LagrangianRotor
 from spheretwin.plant.mujoco_rotor import MujocoRotor
-from spheretwin.plant.plant_tick import step_rotor
+from spheretwin.plant.rotor import RotorData
 
 Array = NDArray[np.float64]
 
@@ -173,7 +174,8 @@ def by_stage(actuator: Actuator, hinge: Hinge, rate_rad_s: float, torque_Nm: Arr
     rotor = LagrangianRotor(actuator, STEP_s)
     coulomb, viscous = _on_gamma(hinge.coulomb_Nm), _on_gamma(hinge.viscous_Nm_s)
     bearing = Friction.filled(fill_friction, coulomb, viscous, hinge.smoothing_rad_s, STEP_s)
-    return _motion(rotor.start(np.zeros(3), _on_gamma(rate_rad_s)), bearing, rotor.joint, torque_Nm)
+    plant = rotor.start(np.zeros(3), _on_gamma(rate_rad_s))
+    return _motion(lagrangian_rotor.step, plant, bearing, torque_Nm)
 
 
 def by_mujoco(mjcf: Path, actuator: Actuator, hinge: Hinge, rate_rad_s: float, torque_Nm: Array) -> Motion:
@@ -186,8 +188,8 @@ def by_mujoco(mjcf: Path, actuator: Actuator, hinge: Hinge, rate_rad_s: float, t
     """
     model = _with_bearing(read(ideal_file(mjcf, actuator)), actuator, hinge)
     rotor = MujocoRotor(model, STEP_s, "RK4", 0.0, 0.0, gravity_m_s2=0.0)
-    none, joint = Friction.zeros(), JointChain.zeros()
-    return _motion(rotor.start(np.zeros(3), _on_gamma(rate_rad_s)), none, joint, torque_Nm)
+    plant = rotor.start(np.zeros(3), _on_gamma(rate_rad_s))
+    return _motion(mujoco_rotor.step, plant, Friction.zeros(), torque_Nm)
 
 
 def _with_bearing(mjcf: Mjcf, actuator: Actuator, hinge: Hinge) -> Mjcf:
@@ -206,24 +208,26 @@ def _with_bearing(mjcf: Mjcf, actuator: Actuator, hinge: Hinge) -> Mjcf:
     return replace(mjcf, bare=model)
 
 
-def _motion(plant: Any, bearing: Rows, joint: Rows, torque_Nm: Array) -> Motion:
+def _motion(step: Any, plant: Any, bearing: Rows, torque_Nm: Array) -> Motion:
     q, qdot = np.empty((2, len(torque_Nm) + 1))
-    _follow(plant, bearing[0], joint[0], torque_Nm, q, qdot)
+    _follower(step)(plant, bearing[0], torque_Nm, q, qdot)
     return Motion(q, qdot)
 
 
-@compiled
-def _follow(
-    plant: Any, bearing: Friction, joint: JointChain, torque_Nm: Array, q: Array, qdot: Array
-) -> None:
-    on_hinges = np.zeros(3)
-    q[0], qdot[0] = plant.q[GAMMA], plant.qdot[GAMMA]
-    for row in range(torque_Nm.shape[0]):
-        plant.torque_q[GAMMA] = torque_Nm[row]
-        slow_down(bearing, joint, plant.q, plant.qdot, on_hinges)
-        step_rotor(plant)
-        slow_down(bearing, joint, plant.q, plant.qdot, on_hinges)
-        q[row + 1], qdot[row + 1] = plant.q[GAMMA], plant.qdot[GAMMA]
+@cache
+def _follower(step_rotor: Callable[[Any], None]) -> Callable[..., None]:
+    @compiled
+    def follow(plant: RotorData, bearing: Friction, torque_Nm: Array, q: Array, qdot: Array) -> None:
+        on_hinges = np.zeros(3)
+        q[0], qdot[0] = plant.q[GAMMA], plant.qdot[GAMMA]
+        for row in range(torque_Nm.shape[0]):
+            plant.torque_q[GAMMA] = torque_Nm[row]
+            slow_down(bearing, plant.joint, plant.q, plant.qdot, on_hinges)
+            step_rotor(plant)
+            slow_down(bearing, plant.joint, plant.q, plant.qdot, on_hinges)
+            q[row + 1], qdot[row + 1] = plant.q[GAMMA], plant.qdot[GAMMA]
+
+    return follow
 
 
 def _on_gamma(value: float) -> Array:

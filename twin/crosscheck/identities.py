@@ -205,11 +205,12 @@ def fly(mjcf: Path, inertia: Array, spin_rad_s: float) -> Motion:
     rotor = MujocoRotor(read(mjcf), STEP_s, "RK4", 0.0, 0.0)
     rotor.model.body("rotor").inertia = inertia
     mujoco.mj_setConst(rotor.model, rotor.data)
-    plant = rotor.start(START_rad, spin_rad_s * NODDING)
+    rotor.start(START_rad, spin_rad_s * NODDING)
+    q, qdot = rotor.data.qpos, rotor.data.qvel
     count = round(DURATION_s / SAMPLE_s)
     R_SR, w_SR_R = np.empty((count + 1, 3, 3)), np.empty((count + 1, 3))
     for i in range(count + 1):
-        R_SR[i], w_SR_R[i] = rotation(plant.q), rotor_rate_jacobian(plant.q) @ plant.qdot
+        R_SR[i], w_SR_R[i] = rotation(q), rotor_rate_jacobian(q) @ qdot
         mujoco.mj_step(rotor.model, rotor.data, nstep=round(SAMPLE_s / STEP_s))
     return Motion(SAMPLE_s * np.arange(count + 1, dtype=np.float64), R_SR, w_SR_R, inertia)
 

@@ -153,12 +153,12 @@ def integrate(pieces: Pieces, motion: Equations) -> Array:
 def by_mujoco(mjcf: Path, pieces: Pieces, integrator: str, step_s: float) -> Array:
     """States at the ends of the pieces by MuJoCo."""
     rotor = MujocoRotor(read(mjcf), step_s, integrator, 0.0, 0.0, gravity_m_s2=0.0)
-    plant = rotor.start(pieces.start[:3], pieces.start[3:])
+    rotor.start(pieces.start[:3], pieces.start[3:])
     states = [pieces.start]
     for torque in pieces.torque:
-        plant.torque_q[:] = torque
+        rotor.data.qfrc_applied[:] = torque
         mujoco.mj_step(rotor.model, rotor.data, nstep=round(HOLD_s / step_s))
-        states.append(np.concatenate([plant.q, plant.qdot]))
+        states.append(np.concatenate([rotor.data.qpos, rotor.data.qvel]))
     return np.array(states)
 
 

@@ -5,7 +5,7 @@ It is independent of MuJoCo, so that a closed loop on both engines shows the err
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,20 +18,9 @@ from spheretwin.models.base.record import Rows
 from spheretwin.models.joint_chain import JointChain, acceleration_at, fill_ideal
 from spheretwin.models.kinematics import Triple, triple
 from spheretwin.models.lagrangian import GRAVITY_m_s2, loaded_inertia
-from spheretwin.plant.rotor import EngineKind, RotorSettings
+from spheretwin.plant.rotor import EngineKind, RotorData, RotorSettings
 
 Array = NDArray[np.float64]
-
-
-class LagrangianData(NamedTuple):
-    """Equations of motion for compiled code; the loop reads and writes the last four."""
-
-    step_s: float
-    joint: Rows  # array of one JointChain
-    q: NDArray[np.float64]  # (3,) rad
-    qdot: NDArray[np.float64]  # (3,) rad/s
-    torque_q: NDArray[np.float64]  # (3,) N·m on the hinges
-    warnings: NDArray[np.int32]  # always 0: errors are visible in the state
 
 
 class LagrangianRotor:
@@ -56,7 +45,7 @@ class LagrangianRotor:
 
     Attributes
     ----------
-    joint : array of one JointChain
+    rows : array of one RotorData
 
     Raises
     ------
@@ -82,14 +71,19 @@ class LagrangianRotor:
                 "Lagrangian plant: expected a payload mount on the rotor's third axis,"
                 f" received one at ({x:g}, {y:g}, {height:g}) m"
             )
-        self._step_s = step_s
+        self.rows = RotorData.zeros()
         if joint is None:
             inertia = loaded_inertia((1 + modelling_error) * actuator.inertia, payload_kg, height)
             joint = JointChain.filled(fill_ideal, inertia, payload_kg * gravity_m_s2 * height)
-        self.joint = joint
+        self.rows["step_s"], self.rows["joint"] = step_s, joint
 
-    def start(self, q: NDArray[np.float64], qdot: NDArray[np.float64]) -> LagrangianData:
-        """Set pose and rates at time 0; return the data that compiled code steps.
+    @property
+    def joint(self) -> Rows:
+        """Array of one JointChain."""
+        return self.rows["joint"]
+
+    def start(self, q: Array, qdot: Array) -> Any:
+        """Set pose and rates at time 0; return the record that compiled code steps.
 
         Parameters
         ----------
@@ -98,32 +92,24 @@ class LagrangianRotor:
         qdot : (3,) array, rad/s
             Hinge rates.
         """
-        pose, rates = np.array(q, dtype=np.float64), np.array(qdot, dtype=np.float64)
-        self._state = pose, rates
-        return LagrangianData(
-            step_s=self._step_s,
-            joint=self.joint,
-            q=pose,
-            qdot=rates,
-            torque_q=np.zeros(3),
-            warnings=np.zeros(1, np.int32),
-        )
+        self.rows["q"], self.rows["qdot"], self.rows["torque_q"] = q, qdot, 0.0
+        return self.rows[0]
 
-    def state(self) -> NDArray[np.float64]:
+    def state(self) -> Array:
         """Return the complete state."""
-        return np.concatenate(self._state)
+        return np.concatenate([self.rows["q"][0], self.rows["qdot"][0]])
 
-    def restore(self, state: NDArray[np.float64]) -> None:
-        """Restore a state; the data of `start` stays valid."""
-        self._state[0][:], self._state[1][:] = state[:3], state[3:]
+    def restore(self, state: Array) -> None:
+        """Restore a state."""
+        self.rows["q"], self.rows["qdot"] = state[:3], state[3:]
 
 
 @allocation_free  # inlined, it makes the loop 7 % slower
-def step(rotor: LagrangianData) -> None:
+def step(rotor: RotorData) -> None:
     """Advance by one physics step; the torque on the hinges is held over it, as in MuJoCo."""
-    joint = rotor.joint[0]
+    joint, torque_q = rotor.joint, triple(rotor.torque_q)
     inertia, moment = triple(joint.inertia), joint.weight_moment
-    runge_kutta(rotor.step_s, joint, inertia, moment, triple(rotor.torque_q), rotor.q, rotor.qdot)
+    runge_kutta(rotor.step_s, joint, inertia, moment, torque_q, rotor.q, rotor.qdot)
 
 
 @inlined
@@ -166,4 +152,4 @@ def _set_up(settings: RotorSettings) -> LagrangianRotor:
     )
 
 
-LAGRANGIAN = EngineKind("lagrangian", _set_up, LagrangianData, step)
+LAGRANGIAN = EngineKind("lagrangian", _set_up, step)

@@ -3,19 +3,22 @@
 from __future__ import annotations
 
 import ctypes
-from typing import Any, NamedTuple
+from typing import Any
 
 import mujoco
 import numpy as np
 from numba import types
+from numba.extending import intrinsic
 from numpy.typing import NDArray
 
-from spheretwin.models.base.compiled import COMPILES, compiled
+from spheretwin.models.base.compiled import COMPILES, allocation_free
 from spheretwin.models.base.mujoco_library import addresses, step_address
 from spheretwin.models.base.numba_internals.addresses import external_function
 from spheretwin.models.mjcf import Mjcf, idle_stages
 from spheretwin.plant.mass_properties import MassErrors, true_model
-from spheretwin.plant.rotor import EngineKind
+from spheretwin.plant.rotor import EngineKind, RotorData, RotorSettings
+
+Array = NDArray[np.float64]
 
 INTEGRATORS = {
     "RK4": mujoco.mjtIntegrator.mjINT_RK4,
@@ -28,17 +31,6 @@ def integrator_name(number: int) -> str:
     """Return the MJCF name of an integrator of MuJoCo."""
     names = {int(integrator): name for name, integrator in INTEGRATORS.items()}
     return names.get(number, mujoco.mjtIntegrator(number).name.removeprefix("mjINT_").lower())
-
-
-class MujocoData(NamedTuple):
-    """Data of MuJoCo for compiled code: two addresses, and views of MuJoCo's arrays."""
-
-    model_address: int
-    data_address: int
-    q: NDArray[np.float64]  # (3,) rad
-    qdot: NDArray[np.float64]  # (3,) rad/s
-    torque_q: NDArray[np.float64]  # (3,) N·m on the hinges
-    warnings: NDArray[np.int32]  # count of warnings of the engine, of each kind
 
 
 class MujocoRotor:
@@ -80,8 +72,10 @@ class MujocoRotor:
         self.data = mujoco.MjData(self.model)
         mujoco.mj_setConst(self.model, self.data)
 
-    def start(self, q: NDArray[np.float64], qdot: NDArray[np.float64]) -> MujocoData:
-        """Set pose and rates at time 0; return the data that compiled code steps.
+        self.rows = RotorData.zeros()
+
+    def start(self, q: Array, qdot: Array) -> Any:
+        """Set pose and rates at time 0; return the record that compiled code steps.
 
         Parameters
         ----------
@@ -91,27 +85,39 @@ class MujocoRotor:
             Hinge rates.
         """
         mujoco.mj_resetData(self.model, self.data)
-        self.data.qpos[:], self.data.qvel[:] = q, qdot
-        return MujocoData(
-            *addresses(self.model, self.data),
-            self.data.qpos,
-            self.data.qvel,
-            self.data.qfrc_applied,
-            self.data.warning.number,
-        )
+        data = self.data
+        arrays = data.qpos, data.qvel, data.qfrc_applied, data.warning.lastinfo
+        places = [array.ctypes.data for array in arrays]
+        self.rows["addresses"] = *addresses(self.model, data), *places
+        self.rows["q"], self.rows["qdot"], self.rows["torque_q"], self.rows["warnings"] = q, qdot, 0.0, 0
+        self._write_pose()
+        return self.rows[0]
 
-    def state(self) -> NDArray[np.float64]:
+    def state(self) -> Array:
         """Return the complete state, including the warm start of the solver."""
+        self._write_pose()
         state = np.empty(mujoco.mj_stateSize(self.model, _STATE))
         mujoco.mj_getState(self.model, self.data, state, _STATE)
         return state
 
-    def restore(self, state: NDArray[np.float64]) -> None:
-        """Restore a state of a rotor with the same model; the data of `start` stays valid."""
+    def restore(self, state: Array) -> None:
+        """Restore a state of a rotor with the same model."""
         mujoco.mj_setState(self.model, self.data, state, _STATE)
+        self.rows["q"], self.rows["qdot"] = self.data.qpos, self.data.qvel
+        self.rows["torque_q"] = self.data.qfrc_applied
+
+    def _write_pose(self) -> None:
+        """Write pose and rates of the record to MuJoCo, as a step does."""
+        self.data.qpos[:], self.data.qvel[:] = self.rows["q"][0], self.rows["qdot"][0]
 
 
 _STATE = int(mujoco.mjtState.mjSTATE_INTEGRATION)
+
+MODEL, DATA, POSE, RATES, TORQUE, COUNTS = range(6)
+"""Places in `RotorData.addresses`."""
+
+WARNINGS = int(mujoco.mjtWarning.mjNWARNING)
+"""Kinds of warnings; of each MuJoCo has two integers of four bytes, the second of which is a count."""
 
 
 _mj_step: Any
@@ -121,15 +127,64 @@ else:
     _mj_step = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p)(step_address())
 
 
-@compiled
-def step(data: MujocoData) -> None:
-    """Advance MuJoCo by one physics step, from compiled code or from Python."""
-    _mj_step(data.model_address, data.data_address)
+def _read(address: int, place: int) -> float:
+    """Return a number of an array of MuJoCo, in compiled code or in Python."""
+    return ctypes.c_double.from_address(int(address) + 8 * place).value
 
 
-MUJOCO = EngineKind(
-    "mujoco",
-    lambda settings: MujocoRotor(
+def _write(address: int, place: int, value: float) -> None:
+    """Write a number of an array of MuJoCo, in compiled code or in Python."""
+    ctypes.c_double.from_address(int(address) + 8 * place).value = value
+
+
+def _count(address: int, place: int) -> int:
+    """Return a count of MuJoCo, an integer of four bytes, in compiled code or in Python."""
+    return ctypes.c_int32.from_address(int(address) + 4 * place).value
+
+
+def _access(number: Any, is_read: bool) -> Any:
+    """Return the intrinsic that reads or writes a number of an array at an address."""
+
+    def build(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        pointer = builder.inttoptr(arguments[0], context.get_value_type(number).as_pointer())
+        entry = builder.gep(pointer, [arguments[1]])
+        if is_read:
+            return builder.load(entry)
+        builder.store(arguments[2], entry)
+        return context.get_dummy_value()
+
+    def read(_: Any, address: Any, place: Any) -> tuple[Any, Any]:
+        return number(types.int64, types.int64), build
+
+    def write(_: Any, address: Any, place: Any, value: Any) -> tuple[Any, Any]:
+        return types.void(types.int64, types.int64, number), build
+
+    return intrinsic(read if is_read else write)
+
+
+if COMPILES:
+    _read, _write = _access(types.float64, True), _access(types.float64, False)
+    _count = _access(types.int32, True)
+
+
+@allocation_free
+def step(rotor: RotorData) -> None:
+    """Advance MuJoCo by one physics step from the pose, rates and torque of a rotor."""
+    addresses = rotor.addresses
+    for i in range(3):
+        _write(addresses[POSE], i, rotor.q[i])
+        _write(addresses[RATES], i, rotor.qdot[i])
+        _write(addresses[TORQUE], i, rotor.torque_q[i])
+    _mj_step(int(addresses[MODEL]), int(addresses[DATA]))
+    for i in range(3):
+        rotor.q[i], rotor.qdot[i] = _read(addresses[POSE], i), _read(addresses[RATES], i)
+    rotor.warnings = 0
+    for kind in range(WARNINGS):
+        rotor.warnings += _count(addresses[COUNTS], 2 * kind + 1)
+
+
+def _set_up(settings: RotorSettings) -> MujocoRotor:
+    rotor = MujocoRotor(
         settings.model,
         settings.step_s,
         settings.integrator,
@@ -137,7 +192,9 @@ MUJOCO = EngineKind(
         settings.payload_kg,
         settings.gravity_m_s2,
         settings.mass,
-    ),
-    MujocoData,
-    step,
-)
+    )
+    settings.fill_joint(rotor.rows["joint"])
+    return rotor
+
+
+MUJOCO = EngineKind("mujoco", _set_up, step)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from spheretwin.electronics.drive import DriveModel, advance_currents, begin, end
 from spheretwin.electronics.transducers import CurrentSensors
-from spheretwin.models.base.compiled import copy_into, implements, inlined
+from spheretwin.models.base.compiled import copy_into, inlined, part_of_its_caller
 from spheretwin.models.base.record import Rows
 from spheretwin.models.joint_chain import torque_on_hinges, update_ideal_motion
 from spheretwin.models.magnetics import TorqueModel, fill_torque_matrix, rotor_torque
@@ -29,28 +29,6 @@ ENGINES: dict[str, EngineKind] = {
 }
 
 
-_STEPS: dict[type, Callable[[Any], None]] = {row.data: row.step for row in ENGINES.values()}
-
-
-def step_rotor(rotor: Any) -> None:
-    """Advance the data of `Rotor.start` by one physics step, from compiled code or from Python."""
-    _STEPS[type(rotor)](rotor)
-
-
-@implements(step_rotor)
-def _compiled_step(rotor: Any) -> Callable[[Any], None] | None:
-    """Select the step for numba by the class of the named tuple."""
-    kind: Any = getattr(rotor, "instance_class", None)
-    if kind not in _STEPS:
-        return None
-    step_of_kind = _STEPS[kind]
-
-    def call(rotor: Any) -> None:
-        step_of_kind(rotor)
-
-    return call
-
-
 GOING, LEFT_WORKSPACE, DIVERGED, FAILSAFE = 0, 1, 2, 3
 
 # The fastest motion of the rotor within the workspace is some hundred rad/s. A rate above this bound, which
@@ -64,8 +42,7 @@ Array = NDArray[np.float64]
 class Plant(NamedTuple):
     """True plant; the controller knows nothing of it."""
 
-    rotor: Any  # data of `Rotor.start`
-    joint: Rows  # array of one JointChain
+    rotor: Rows  # array of one RotorData
     magnetics: TorqueModel  # true
     G: NDArray[np.float64]  # (3, n) N·m/A, true torque matrix in the middle of the physics step
     scratch: NDArray[np.float64]  # of `fill_torque_matrix`
@@ -107,9 +84,9 @@ class PlantOutput(NamedTuple):
     torque_S: NDArray[np.float64]  # (3,) N·m, in the first physics step
 
 
-@inlined
+@part_of_its_caller
 def plant_tick(
-    plant: Plant, command: NDArray[np.float64], disturbance: NDArray[np.float64], output: PlantOutput
+    step_rotor: Callable[[Any], None], plant: Plant, command: Array, disturbance: Array, output: PlantOutput
 ) -> int:
     """Advance the plant by one control period.
 
@@ -120,6 +97,8 @@ def plant_tick(
 
     Parameters
     ----------
+    step_rotor : callable
+        Step of the engine.
     plant : Plant
         Changed in place.
     command : (n,) array, A
@@ -134,14 +113,15 @@ def plant_tick(
     int
         `GOING`, `LEFT_WORKSPACE`, `DIVERGED`, or `FAILSAFE` if a coil is too hot.
     """
-    # Read from the tuple once, because each access counts a reference.
-    rotor, magnetics, G, scratch = plant.rotor, plant.magnetics, plant.G, plant.scratch
+    # Read from the tuple once, because each access counts a reference. Numba has no tuples of records.
+    rotor = plant.rotor[0]
+    friction, bristles, joint = plant.friction[0], plant.bristles[0], rotor.joint
+    drive, magnetics, G, scratch = plant.drive, plant.magnetics, plant.G, plant.scratch
     q, qdot, torque_q, torque_S = rotor.q, rotor.qdot, rotor.torque_q, plant.torque_S
     middle_q, middle_qdot, last_qdot = plant.middle_q, plant.middle_qdot, plant.last_qdot
     hinge_range, half_step_s = plant.hinge_range, 0.5 * plant.step_s
     current, mean_current, effective_current = plant.current, plant.mean_current, plant.effective_current
     gain, unmodelled, friction_q = plant.present_gain, plant.unmodelled_torque, plant.friction_q
-    drive, friction, bristles, joint = plant.drive, plant.friction[0], plant.bristles[0], plant.joint[0]
     coil_q, coil_qdot = plant.coil_q, plant.coil_qdot
     begin_heat(plant.heat[0], plant.group_gain, gain, plant.surroundings_degC)
     begin(drive, command)
@@ -181,10 +161,7 @@ def plant_tick(
     advance_heat(plant.heat[0], plant.winding_degC, plant.copper_J)
     if not is_cool:
         return FAILSAFE
-    for kind in range(rotor.warnings.shape[0]):
-        if rotor.warnings[kind] > 0:
-            return DIVERGED
-    return GOING
+    return DIVERGED if rotor.warnings > 0 else GOING
 
 
 @inlined

@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, NamedTuple, Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from spheretwin.models.actuator import Actuator
-from spheretwin.models.base.record import Rows
-from spheretwin.models.joint_chain import fill_chain, fill_ideal
+from spheretwin.models.base.record import Record, Rows, field
+from spheretwin.models.joint_chain import JointChain, fill_chain, fill_ideal
 from spheretwin.models.lagrangian import loaded_inertia
 from spheretwin.models.mjcf import Mjcf
 from spheretwin.plant.mass_properties import MassErrors, true_model
+
+Array = NDArray[np.float64]
 
 
 class RotorSettings(NamedTuple):
@@ -46,11 +48,26 @@ class RotorSettings(NamedTuple):
             fill_chain(joints, true_model(self.model, error, payload_kg, gravity_m_s2, self.mass))
 
 
+class RotorData(Record):
+    """Rotor of a run; compiled code reads and writes its pose, rates and torque."""
+
+    step_s: float = field("physics step", "s")
+    joint: JointChain = field("hinges and masses")
+    q: Array = field("hinge angles", "rad", 3)
+    qdot: Array = field("hinge rates", "rad/s", 3)
+    torque_q: Array = field("torque on the hinges, held over a step", "N·m", 3)
+    warnings: int = field("warnings of the engine: a run ends at the first one")
+    addresses: NDArray[np.int64] = field("of MuJoCo's model, data, pose, rates, torque, warnings", "", 6)
+
+
 class Rotor(Protocol):
     """Rotor of one run."""
 
-    def start(self, q: NDArray[np.float64], qdot: NDArray[np.float64]) -> Any:
-        """Set pose and rates; return the named tuple that compiled code steps.
+    rows: Rows
+    """Array of one RotorData."""
+
+    def start(self, q: Array, qdot: Array) -> RotorData:
+        """Set pose and rates; return the record of `rows`.
 
         Parameters
         ----------
@@ -58,21 +75,15 @@ class Rotor(Protocol):
             Hinge angles.
         qdot : (3,) array, rad/s
             Their rates.
-
-        Returns
-        -------
-        named tuple
-            Fields `q`, `qdot` (3,), `torque_q` (3,) on the hinges, and `warnings` (n,): a run ends when one
-            of these counts rises.
         """
         ...
 
-    def state(self) -> NDArray[np.float64]:
+    def state(self) -> Array:
         """Return the complete state."""
         ...
 
-    def restore(self, state: NDArray[np.float64]) -> None:
-        """Restore a state; the tuple that `start` returned stays valid."""
+    def restore(self, state: Array) -> None:
+        """Restore a state."""
         ...
 
 
@@ -83,7 +94,5 @@ class EngineKind(NamedTuple):
     """Name in `plant.engine`."""
     set_up: Callable[[RotorSettings], Rotor]
     """Build a rotor; raises InputError for a model that the engine does not support."""
-    data: type
-    """Class of the named tuple that `Rotor.start` returns."""
-    step: Callable[[Any], None]
-    """Compiled function that advances this tuple by one physics step."""
+    step: Callable[[RotorData], None]
+    """Compiled function that advances a rotor by one physics step."""

@@ -74,7 +74,7 @@ def test_work_at_the_coils_is_heat_motion_and_field():
         with Session(prototype(duration=0.06, **still, **{"plant.step_s": step_s})) as session:
             table, inertia = session.advance(60), session.actuator.inertia
             current = session._runtime._plant.current
-            q, qdot = session.q_rad, session._runtime._rotor.data.qdot
+            q, qdot = session.q_rad, session._runtime.qdot_rad_s
             work = table["coil_power_W"].sum() * 1e-3
             heat = table["copper_loss_W"].sum() * 1e-3
             kinetic = 0.5 * qdot @ inertia_matrix(q, inertia) @ qdot

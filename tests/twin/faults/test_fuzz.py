@@ -84,8 +84,8 @@ BAD = st.sampled_from([np.nan, np.inf, -np.inf, 1e308, -1e308, 1e200, 1e12, 5e-3
 
 # Whatever a tick goes on from, by what it belongs to.
 INPUTS = {
-    "angle": lambda machine: machine._rotor.data.q,
-    "rate": lambda machine: machine._rotor.data.qdot,
+    "angle": lambda machine: machine._rotor.rows["q"][0],
+    "rate": lambda machine: machine._rotor.rows["qdot"][0],
     "current": lambda machine: machine._plant.current,
     "temperature": lambda machine: machine._plant.drive.coil.temperature_degC,
     "resistance": lambda machine: machine._plant.drive.coil.resistance_ohm,

@@ -6,7 +6,7 @@ from spheretwin.models.base.compiled import compiled
 from spheretwin.models.kinematics import rate_jacobian, rotation, rotor_rate_jacobian
 from spheretwin.plant.bristle_friction import BristleFriction, apply_bristles, begin_bristles
 from spheretwin.plant.friction import Friction, fill_friction, slow_down
-from spheretwin.plant.plant_tick import step_rotor
+from spheretwin.plant.lagrangian_rotor import step as step_rotor
 
 STEP_s = 5e-4
 UPRIGHT, STILL, NONE = np.zeros((3, 3))
@@ -18,7 +18,7 @@ def on_gamma(values):
 
 
 @compiled
-def moving(plant, joint, bristles, viscous, torque, q, qdot, bearing, every):
+def moving(plant, bristles, viscous, torque, q, qdot, bearing, every):
     """Steps of the plant as `plant_tick` takes them; states before each step, torque of the bearing in it."""
     middle_q, middle_qdot, last_qdot, unused = np.zeros(3), np.zeros(3), plant.qdot.copy(), np.zeros(3)
     for row in range(torque.shape[0]):
@@ -29,11 +29,11 @@ def moving(plant, joint, bristles, viscous, torque, q, qdot, bearing, every):
             middle_qdot[i] = plant.qdot[i] + 0.5 * (plant.qdot[i] - last_qdot[i])
             last_qdot[i] = plant.qdot[i]
             plant.torque_q[i] = torque[row, i]
-        slow_down(viscous, joint, plant.q, plant.qdot, unused)
+        slow_down(viscous, plant.joint, plant.q, plant.qdot, unused)
         begin_bristles(bristles, middle_q, plant.q, plant.qdot, plant.torque_q)
         step_rotor(plant)
-        apply_bristles(bristles, joint, middle_q, middle_qdot, last_qdot, plant.q, plant.qdot)
-        slow_down(viscous, joint, plant.q, plant.qdot, unused)
+        apply_bristles(bristles, plant.joint, middle_q, middle_qdot, last_qdot, plant.q, plant.qdot)
+        slow_down(viscous, plant.joint, plant.q, plant.qdot, unused)
         for i in range(3):
             bearing[row // every, i] = bristles.torque_q[0, i]
 
@@ -51,7 +51,7 @@ def friction(*arguments):
 def steps(rotor, bristles, resistance, torque, start, rates, every=1):
     q, qdot, bearing = np.zeros((3, -(-len(torque) // every), 3))
     elements = BristleFriction.zeros()[0] if bristles is None else bristles
-    moving(rotor.start(start, rates), rotor.joint[0], elements, resistance, torque, q, qdot, bearing, every)
+    moving(rotor.start(start, rates), elements, resistance, torque, q, qdot, bearing, every)
     return q, qdot, bearing
 
 

@@ -5,7 +5,7 @@ import pytest
 
 from spheretwin.models import actuator as actuators
 from spheretwin.models import mjcf
-from spheretwin.plant.plant_tick import ENGINES, step_rotor
+from spheretwin.plant.plant_tick import ENGINES
 from spheretwin.plant.rotor import RotorSettings
 
 
@@ -16,12 +16,12 @@ def test_every_engine_s_state_is_all_that_its_steps_depend_on(name, actuator):
     settings = RotorSettings(mjcf.read(actuators.MJCF_PATH), actuator, 5e-4, "RK4", 0.1, 0.0, None)
     rotor = row.set_up(settings)
     data = rotor.start(np.array([0.1, -0.2, 0.3]), np.array([1.0, 2.0, -3.0]))
-    assert isinstance(data, row.data)
+    assert data.joint.inertia == pytest.approx(1.1 * actuator.inertia)
 
     def after_steps():
         data.torque_q[:] = [0.01, -0.02, 0.03]
         for _ in range(5):
-            step_rotor(data)
+            row.step(data)
         return np.concatenate([data.q, data.qdot]).tobytes()
 
     before = rotor.state().copy()

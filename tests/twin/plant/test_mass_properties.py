@@ -12,12 +12,12 @@ from spheretwin.models import mjcf
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.joint_chain import JointChain, equations, fill_chain
 from spheretwin.plant import bristle_friction as bearing
+from spheretwin.plant import lagrangian_rotor, mujoco_rotor
 from spheretwin.plant.cable import CableSection
 from spheretwin.plant.friction import slow_down
 from spheretwin.plant.lagrangian_rotor import LagrangianRotor
 from spheretwin.plant.mass_properties import MassSection, mass_errors, true_model
 from spheretwin.plant.mujoco_rotor import MujocoRotor
-from spheretwin.plant.plant_tick import step_rotor
 from spheretwin.session import Session
 from spheretwin.simulation import simulate
 from tests.models.model_files import edited, edited_text
@@ -63,7 +63,8 @@ def test_the_plant_has_general_parts_only_if_it_needs_them(engine, fields, gener
     changes = fields | {"plant.engine": engine, "plant.payload_kg": 0.05}
     with Session(scenarios.load("hold", changes)) as session:
         plant = session._runtime._plant
-    assert (plant.joint["is_tilted"][0], plant.joint["on"][0]) == (skewed, general)
+    joint = plant.rotor["joint"][0]
+    assert (joint.is_tilted, joint.on) == (skewed, general)
 
 
 def test_inertia_of_the_rotor_upright_is_the_sum_of_its_parts(actuator):
@@ -117,10 +118,10 @@ def test_the_stream_of_a_quantity_does_not_depend_on_the_others():
 def assert_same_steps(first, second, start):
     """Compare 400 steps of a rotor of MuJoCo and one of the equations of motion."""
     data = [rotor.start(*map(np.array, start)) for rotor in (first, second)]
-    for one in data:
+    for one, step in zip(data, (mujoco_rotor.step, lagrangian_rotor.step), strict=True):
         one.torque_q[:] = 0.02, -0.05, 0.03
         for _ in range(400):
-            step_rotor(one)
+            step(one)
     # Rounding over 400 steps of the same method, on rates of some rad/s.
     np.testing.assert_allclose(data[1].q, data[0].q, rtol=0, atol=1e-12)
     np.testing.assert_allclose(data[1].qdot, data[0].qdot, rtol=0, atol=1e-11)
