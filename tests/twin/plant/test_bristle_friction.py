@@ -181,7 +181,7 @@ three = st.tuples(finite, finite, finite).map(np.array)
 exponent = st.floats(0, 1)
 
 
-# The iteration cycles between two branches, and then converges slowly; a limit falls below a deflection at rest.
+# The iteration cycles between two branches, and then converges slowly; a limit falls at rest.
 @pytest.mark.release("1.2 s; test_static_friction.py has the balance of a run")
 @example(SimpleNamespace(
     pose=np.array([0.0, 1.0, 1.0]), direction=np.array([0.0, 0.5, 1.0]), step=-3.0, speed=-1.75,
