@@ -6,9 +6,10 @@ Rerun, Foxglove and PlotJuggler show their numbers by name; messages in JSON or 
 from __future__ import annotations
 
 import io
+import json
 import struct
 import zlib
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -19,6 +20,7 @@ from numpy.typing import NDArray
 from spheretwin.models.base.errors import InputError, without_breaks
 from spheretwin.models.base.extras import missing
 from spheretwin.models.base.files import regular_file, whole_file
+from spheretwin.models.telemetry import ros_messages
 
 Array = NDArray[np.float64]
 
@@ -41,7 +43,6 @@ uint32 nanosec
 """
 METADATA = "spheretwin"
 ANGLE_NAMES = ("alpha", "beta", "gamma")
-_SECOND_ns = 10**9
 _FOOTER_BYTES, _CRC_AND_MAGIC_BYTES = 37, 12
 _LITTLE_ENDIAN = b"\x00\x01\x00\x00"
 
@@ -70,7 +71,7 @@ def write(path: Path, t_s: Array, topics: Mapping[str, Topic], metadata: Mapping
 
     if not np.all((t_s >= 0) & (t_s < 2**31)):
         raise InputError(f"MCAP {path}: expected times from 0 to 2**31 s, received others")
-    stamps = np.rint(t_s * _SECOND_ns).astype(np.int64).tolist()
+    stamps = np.rint(t_s * ros_messages.SECOND_ns).astype(np.int64).tolist()
     with whole_file(path) as temporary, temporary.open("wb") as file:
         writer = Writer(file, enable_data_crcs=True)
         writer.start(profile="ros2", library="spheretwin")
@@ -111,7 +112,7 @@ class Encoder:
 
     def message(self, row: int, stamp_ns: int) -> bytes:
         """Return the message of a row at a time, ns."""
-        body = struct.pack("<iI", *divmod(stamp_ns, _SECOND_ns)) + self._head
+        body = struct.pack("<iI", *divmod(stamp_ns, ros_messages.SECOND_ns)) + self._head
         for values in self._fields:
             body = _aligned(body, 4) + struct.pack("<I", values.shape[1])
             if values.size:
@@ -132,15 +133,25 @@ class JointStates(NamedTuple):
 
     time_ns: NDArray[np.int64]
     columns: dict[str, Array]
-    """Numbers by ``topic/field/name``, NaN in rows without a message of it."""
+    """Numbers by ``topic/field/name``, of other messages by ``topic/field``; NaN in rows without one."""
     metadata: dict[str, str]
     """Metadata that `write` stored; empty for a file of another program."""
     notes: tuple[str, ...]
     """What was unusual."""
 
 
-def read(path: Path, time: str = STAMPS) -> JointStates:
-    """Read every number of the joint states of a file.
+class _Channel(NamedTuple):
+    """Channel of a file that is read."""
+
+    name: str
+    decode: Callable[[bytes], dict[str, Any]]
+    is_state: bool
+
+
+def read(path: Path, time: str = STAMPS, names: Sequence[str] = ()) -> JointStates:
+    """Read every number of the joint states of a file, and of other messages in CDR (ros2msg) or JSON.
+
+    Messages without a header have the log time as their stamp.
 
     A file without an end, which a killed recorder leaves, is read up to its last complete message.
 
@@ -149,6 +160,8 @@ def read(path: Path, time: str = STAMPS) -> JointStates:
     path : Path
     time : str
         Time of the rows: ``t_s``, ``log_time`` or ``publish_time``. If all stamps are 0, it is the log time.
+    names : sequence of str
+        Columns that are needed: other topics are not decoded. All are if it is empty, or has no topic.
 
     Raises
     ------
@@ -161,7 +174,7 @@ def read(path: Path, time: str = STAMPS) -> JointStates:
     messages: list[tuple[tuple[int, ...], dict[str, float]]] = []
     metadata: dict[str, str] = {}
     schemas: dict[int, Schema] = {}
-    topics: dict[int, str | None] = {}  # None for messages of another type
+    topics: dict[int, _Channel | None] = {}  # None for messages that are not read
     in_summary = False  # which repeats schemas and channels
     try:
         content, notes = _content(path)
@@ -175,18 +188,28 @@ def read(path: Path, time: str = STAMPS) -> JointStates:
                     schemas[record.id] = record
                 case Channel() if not in_summary:
                     schema = schemas.get(record.schema_id)
-                    is_read = schema and schema.name == TYPE and record.message_encoding == ENCODING
-                    topics[record.id] = record.topic.strip("/") if is_read else None
+                    decode = _decoder(schema, record.message_encoding)
+                    is_state = schema is not None and schema.name == TYPE
+                    topic = record.topic.strip("/")
+                    is_needed = not names or any(name.startswith(f"{topic}/") for name in names)
+                    topics[record.id] = _Channel(topic, decode, is_state) if decode and is_needed else None
                 case Message(channel_id=channel) if channel not in topics:
                     raise ValueError(f"it has a message of channel {channel}, but not the channel")
-                case Message(channel_id=channel) if (topic := topics[channel]) is not None:
-                    stamp_ns, numbers = _decode(topic, record.data)
-                    messages.append(((stamp_ns, record.log_time, record.publish_time), numbers))
+                case Message(channel_id=channel) if (of_topic := topics[channel]) is not None:
+                    message = of_topic.decode(record.data)
+                    stamp_ns = ros_messages.stamp_ns(message)
+                    stamps = record.log_time if stamp_ns is None else stamp_ns
+                    numbers = _numbers(of_topic.name, message, is_state=of_topic.is_state)
+                    messages.append(((stamps, record.log_time, record.publish_time), numbers))
     # The packages of MCAP, zstd and LZ4 raise errors of their own, and lack of memory, for a damaged file.
     except Exception as error:
         raise InputError(f"MCAP {path}: expected a readable file, {without_breaks(error)}") from None
+    if not messages and names:
+        return read(path, time)
     if not messages:
-        raise InputError(f"MCAP {path}: expected messages {TYPE} in CDR, received none")
+        raise InputError(
+            f"MCAP {path}: expected messages in CDR with their definition, or in JSON, received none"
+        )
     if time == STAMPS and not any(times[0] for times, _ in messages) and messages[-1][0][1]:
         time, notes = LOG_TIME, (*notes, "no stamps, so log times")
     rows: list[dict[str, float]] = []
@@ -197,8 +220,8 @@ def read(path: Path, time: str = STAMPS) -> JointStates:
             rows.append({})
             time_ns.append(times[place])
         rows[-1] |= numbers
-    names = dict.fromkeys(name for row in rows for name in row)
-    columns = {name: np.array([row.get(name, np.nan) for row in rows]) for name in names}
+    received = dict.fromkeys(name for row in rows for name in row)
+    columns = {name: np.array([row.get(name, np.nan) for row in rows]) for name in received}
     return JointStates(np.array(time_ns, np.int64), columns, metadata, notes)
 
 
@@ -276,34 +299,32 @@ def _records(content: bytes) -> Iterator[Any]:
             raise ValueError("the checksum of its summary differs")
 
 
-def _decode(topic: str, data: bytes) -> tuple[int, dict[str, float]]:
-    """Return the stamp, ns, and the numbers of a message by ``topic/field/name``."""
-    if data[1] > 1:
-        raise ValueError(f"topic {topic}: expected CDR of version 1, received another encoding")
-    order, place = "<" if data[1] else ">", 4
+def _decoder(schema: Any, encoding: str) -> Callable[[bytes], dict[str, Any]] | None:
+    """Return the decoder of messages in CDR or JSON; None for others."""
+    if encoding == "json":
+        return _of_json
+    if schema is None or encoding != ENCODING:
+        return None
+    try:
+        return ros_messages.Definition(schema.name, schema.data.decode() or DEFINITION).decode
+    except ValueError:
+        return None
 
-    def number(code: str, count: int = 1) -> tuple[Any, ...]:
-        nonlocal place
-        size = struct.calcsize(code)
-        place += -(place - 4) % size if count else 0
-        values = struct.unpack_from(f"{order}{count}{code}", data, place)
-        place += size * count
-        return values
 
-    def text() -> str:
-        nonlocal place
-        (length,) = number("I")
-        place += length
-        return data[place - length : place - 1].decode()
+def _of_json(data: bytes) -> dict[str, Any]:
+    content = json.loads(data)
+    return content if isinstance(content, dict) else {}
 
-    stamp_ns = number("i")[0] * _SECOND_ns + number("I")[0]
-    text()  # frame_id
-    names = [text() for _ in range(number("I")[0])]
-    numbers: dict[str, float] = {}
-    for field in FIELDS:
-        values = number("d", number("I")[0])
-        numbers |= {f"{topic}/{field}/{name}": value for name, value in zip(names, values, strict=False)}
-    return stamp_ns, numbers
+
+def _numbers(topic: str, message: dict[str, Any], *, is_state: bool) -> dict[str, float]:
+    """Return the numbers of a message: by ``topic/field/name`` of joint states, else by ``topic/field``."""
+    if not is_state:
+        return dict(ros_messages.numbers(message, topic))
+    return {
+        f"{topic}/{field}/{name}": value
+        for field in FIELDS
+        for name, value in zip(message["name"], message[field], strict=False)
+    }
 
 
 def _package() -> None:
