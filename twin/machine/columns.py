@@ -101,13 +101,23 @@ class Channels(BaseModel):
         """
         return [name for pattern in self.columns for name in (_numbered(pattern, available) or [pattern])]
 
-    def values(self, table: RawTable, units: Mapping[str, float], rows: slice | NDArray[np.int64]) -> Array:
-        """Return the values of some rows of a file, (n, columns).
+    def raw(self, table: RawTable) -> Array:
+        """Return the numbers of a file, (n, columns).
 
         Raises
         ------
         InputError
-            A column is missing or has no numbers, or the file has another number of them than the map.
+            A column is missing, or has no numbers.
+        """
+        return np.stack([table.numbers(name) for name in self.names(tuple(table.columns))], axis=1)
+
+    def values(self, table: RawTable, units: Mapping[str, float], raw: Array) -> Array:
+        """Return the values of raw numbers of a file, (n, columns).
+
+        Raises
+        ------
+        InputError
+            The file has another number of columns than an entry of the map.
         """
         names = self.names(tuple(table.columns))
         entries = {}
@@ -122,7 +132,7 @@ class Channels(BaseModel):
         entries["unit"] = entries["unit"] or [
             table.unit(name, tuple(units)) or next(iter(units)) for name in names
         ]
-        values = np.stack([table.numbers(name)[rows] for name in names], axis=1)
+        values = raw.copy()
         for place, (offset, wrap) in enumerate(zip(entries["offset"], entries["wrap"], strict=True)):
             if wrap:
                 values[:, place] = _unwrapped(values[:, place], offset, wrap)
@@ -220,16 +230,13 @@ class ColumnMap(BaseModel):
         if self.time.period_s is None:
             t_s, notes = table.times(self.time.column, self.time.unit, self.time.wrap)
         else:
-            t_s = self.time.period_s * np.arange(table.rows)
-        raw = [
-            np.stack([table.numbers(name) for name in channels.names(tuple(table.columns))], axis=1)
-            for channels in (self.angles, self.currents)
-        ]
-        rows, order = sorted_rows(t_s, *raw)
+            t_s = self.time.period_s * np.arange(table.rows, dtype=np.float64)
+        angles, currents = self.angles.raw(table), self.currents.raw(table)
+        rows, order = sorted_rows(t_s, angles, currents)
         log = Log(
             t_s[rows],
-            self.currents.values(table, CURRENT_UNITS, rows),
-            self.angles.values(table, ANGLE_UNITS, rows),
+            self.currents.values(table, CURRENT_UNITS, currents[rows]),
+            self.angles.values(table, ANGLE_UNITS, angles[rows]),
             self.currents.kind,
             table.name,
             self.conditions,
@@ -289,6 +296,9 @@ CURRENT_PREFIXES = {
     "currents/effort/": COMMANDED,
     "current_A_": COMMANDED,
 }
+
+
+MCAP_TOPICS = ("angles/", "currents/")
 
 
 def default(table: RawTable, kind: str | None = None) -> ColumnMap:

@@ -182,7 +182,10 @@ def _read_mcap(path: Path, column_map: ColumnMap | None) -> RawTable:
     time = column_map.time.column if column_map else joint_states.STAMPS
     if time not in (times := (joint_states.STAMPS, joint_states.LOG_TIME, joint_states.PUBLISH_TIME)):
         raise InputError(f"log {path}: expected time.column as one of {', '.join(times)}, received {time}")
-    states = joint_states.read(path, time)
+    names: tuple[str, ...] = column_maps.MCAP_TOPICS
+    if column_map:
+        names = (*column_map.angles.columns, *column_map.currents.columns)
+    states = joint_states.read(path, time, names)
     columns = {time: states.time_ns, **states.columns}
     return RawTable(str(path), columns, {time: "ns"}, states.metadata, states.notes)
 
