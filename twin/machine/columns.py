@@ -21,6 +21,7 @@ from spheretwin.machine.row_order import aligned, sorted_rows
 from spheretwin.models.base.errors import InputError, without_breaks
 from spheretwin.models.base.files import regular_file
 from spheretwin.models.telemetry.joint_states import ANGLE_NAMES
+from spheretwin.models.telemetry.signals import ANGLES
 from spheretwin.scenario.fields import explain
 
 Array = NDArray[np.float64]
@@ -301,6 +302,16 @@ CURRENT_PREFIXES = {
 MCAP_TOPICS = ("angles/", "currents/")
 
 
+def _scalar_name(name: str) -> str:
+    """Return the name of a column as a log has it: without a unit in brackets, with a label as part."""
+    match = re.fullmatch(r"(\w+)\[(.+)\]", name)
+    label = match[2].removeprefix("group ") if match else ""
+    axes = dict(zip(ANGLES, ANGLE_NAMES, strict=True))
+    if match and (label in axes or label.isdigit()):
+        return f"{match[1]}_{axes.get(label, label)}"
+    return re.sub(r"\s*[\[(].*", "", name)
+
+
 def default(table: RawTable, kind: str | None = None) -> ColumnMap:
     """Return the column map of a file that this package wrote.
 
@@ -315,8 +326,7 @@ def default(table: RawTable, kind: str | None = None) -> ColumnMap:
     InputError
         The columns have other names.
     """
-    # Also as a spreadsheet may have saved them: in capitals, with units in brackets.
-    names = {re.sub(r"\s*[\[(].*", "", name).lower(): name for name in table.columns}
+    names = {_scalar_name(name).lower(): name for name in table.columns}
     triples = [[prefix + axis for axis in ANGLE_NAMES] for prefix in ANGLE_PREFIXES]
     triples.append([f"{ANGLE_PREFIXES[0]}{place}" for place in range(3)])
     angles = next((triple for triple in triples if triple[0] in names), None)

@@ -282,7 +282,7 @@ def _header(
     place, names = max(rows, key=lambda row: (_names_share(row[1]), row[0]))
     bracketed = [_BRACKETED.fullmatch(name) for name in names]
     if not units and any(bracketed):
-        units = [match["unit"] if match else "" for match in bracketed]
+        units = [match["unit"] if match and match["unit"].lower() in _UNITS else "" for match in bracketed]
     return names, [unit.strip("[]() ") for unit in units], place
 
 

@@ -13,7 +13,7 @@ import pytest
 import spheretwin as st
 from spheretwin import machine
 from spheretwin.machine import Log
-from spheretwin.machine.files import OTHER_FORMATS
+from spheretwin.machine.files import OTHER_FORMATS, log_signals
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.telemetry import joint_states
 from spheretwin.models.telemetry.joint_states import Topic
@@ -60,9 +60,7 @@ def test_columns_are_scalars_with_plain_names(tmp_path):
 def test_a_log_that_a_spreadsheet_has_saved_is_read_without_a_column_map(tmp_path):
     machine.write(LOG, path := tmp_path / "log.csv")
     head, rows = path.read_text().split("\n", 1)
-    units = (
-        dict.fromkeys(head.split(","), "A") | {"t_s": "s"} | dict.fromkeys(head.split(",")[1:4], "rad")
-    )
+    units = dict.fromkeys(head.split(","), "A") | {"t_s": "s"} | dict.fromkeys(head.split(",")[1:4], "rad")
     path.write_text(",".join(f"{name.upper()} [{unit}]" for name, unit in units.items()) + "\n" + rows)
     log = machine.read(path)
     assert (log.digest, log.currents) == (LOG.digest, "measured")
@@ -74,6 +72,18 @@ def test_telemetry_is_a_log(tmp_path):
     log = machine.read(path)
     assert np.array_equal(log.angle_rad, run.telemetry["q_rad"])
     assert np.array_equal(log.current_A, run.telemetry["current_command_A"])
+
+
+def test_headings_of_telemetry_are_names_of_a_log(tmp_path):
+    """As `review --export run.csv` writes them."""
+    signals = log_signals(18, ("measured",))
+    heads = [heading for signal in signals for heading in signal.headings()]
+    rows = np.column_stack([LOG.t_s, LOG.angle_rad, LOG.current_A])
+    path = tmp_path / "run.csv"
+    heads = [head.replace("[", "[group ") if "current" in head else head for head in heads]
+    path.write_text("\n".join([",".join(heads), *(",".join(map(repr, row)) for row in rows.tolist())]))
+    log = machine.read(path)
+    assert (log.digest, log.currents, log.notes) == (LOG.digest, "measured", ())
 
 
 def test_tables_of_other_programs_are_read(tmp_path):
