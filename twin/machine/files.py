@@ -173,6 +173,10 @@ OTHER_FORMATS = {
     b"MATLAB": ("a file of MATLAB", "`writetimetable` writes CSV"),
     b"MDF  ": ("a measurement file MDF", "asammdf exports CSV and Parquet"),
     b"TDSm": ("a file TDMS of LabVIEW", "npTDMS and DIAdem export CSV"),
+    b"\xff\xff\xff\xff": (
+        "an Arrow stream, such as a part of a killed run",
+        "`spheretwin recover` merges parts",
+    ),
     b"ARROW1": ("an Arrow file", "`pyarrow.parquet.write_table` writes Parquet"),
 }
 """Formats of other programs by their first bytes, and how to convert them."""

@@ -22,6 +22,7 @@ _SHORT, _MISSING = 0.7, 1.5  # periods: of a row between others, and where an an
 _COUNTED = 0.5  # share of equal successive angles from which a sensor counts: it is held, not interpolated
 _MOST_MISSING = 1000  # periods of the angles in which rows without them are inserted
 _MANY_FALLS = 0.05  # of the rows
+_UNEVEN, _MOST_UNEVEN = 0.2, 0.1  # departure of a step from the period; share of such steps in a table
 _MOST_SHORT = 0.01  # of the rows, more after sorting than before
 
 
@@ -76,7 +77,7 @@ def aligned(log: Log) -> Log:
     has_angles = np.isfinite(log.angle_rad).any(axis=1)
     has_currents = np.isfinite(log.current_A).any(axis=1)
     angle_s = log.t_s[has_angles]
-    if len(angle_s) < 2 or not np.all(np.diff(log.t_s) > 0):
+    if len(angle_s) < 2 or not np.all(np.diff(log.t_s) > 0) or _is_table(log.t_s, has_angles, has_currents):
         return log
     period_s = float(np.median(np.diff(angle_s)))
     is_between = ~has_angles & (_distance_s(log.t_s, angle_s) < _MISSING * period_s)
@@ -102,6 +103,13 @@ def aligned(log: Log) -> Log:
     current_A = _means(log.t_s, log.current_A, t_s - early_s, ends - early_s, held=held)
     note = "currents at times of their own, as means at the times of the angles"
     return replace(log, t_s=t_s, current_A=current_A, angle_rad=angle_rad, notes=(*log.notes, note))
+
+
+def _is_table(t_s: Array, has_angles: NDArray[np.bool_], has_currents: NDArray[np.bool_]) -> bool:
+    """True for even rows that mostly have angles and currents together: a missing one is a lost sample."""
+    steps = np.diff(t_s)
+    even = np.mean(np.abs(steps / np.median(steps) - 1) < _UNEVEN)
+    return bool(even > 1 - _MOST_UNEVEN and np.mean(has_currents[has_angles]) > 0.5)
 
 
 def _distance_s(t_s: Array, angle_s: Array) -> Array:

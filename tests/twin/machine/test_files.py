@@ -60,7 +60,8 @@ def test_columns_are_scalars_with_plain_names(tmp_path):
 def test_a_log_that_a_spreadsheet_has_saved_is_read_without_a_column_map(tmp_path):
     machine.write(LOG, path := tmp_path / "log.csv")
     head, rows = path.read_text().split("\n", 1)
-    units = dict.fromkeys(head.split(","), "A") | {"t_s": "s"} | dict.fromkeys(head.split(",")[1:4], "rad")
+    names = head.split(",")
+    units = dict.fromkeys(names, "A") | {"t_s": "s"} | dict.fromkeys(names[1:4], "rad")
     path.write_text(",".join(f"{name.upper()} [{unit}]" for name, unit in units.items()) + "\n" + rows)
     log = machine.read(path)
     assert (log.digest, log.currents) == (LOG.digest, "measured")
@@ -84,6 +85,27 @@ def test_headings_of_telemetry_are_names_of_a_log(tmp_path):
     path.write_text("\n".join([",".join(heads), *(",".join(map(repr, row)) for row in rows.tolist())]))
     log = machine.read(path)
     assert (log.digest, log.currents, log.notes) == (LOG.digest, "measured", ())
+
+
+@pytest.mark.parametrize("size", [3, -1])
+def test_vectors_with_missing_rows_and_structures_are_read(size, tmp_path):
+    """A vector of fixed or variable length that is missing, or shorter than others; a structure."""
+    vectors = [[1.0, 2.0, 3.0], None, [4.0, 5.0, 6.0], None if size == 3 else [7.0]]
+    columns = {
+        "t_s": pa.array([0.0, 0.1, 0.2, 0.3]),
+        "q": pa.array(vectors, pa.list_(pa.float64(), size)),
+        "i": pa.array([{"a": 1.0, "b": [2, 3]}] * 3 + [None]),
+    }
+    pyarrow.parquet.write_table(pa.table(columns), path := tmp_path / "log.parquet")
+    fields = {
+        "angles": {"columns": ["q_0", "q_1", "q_2"]},
+        "currents": {"columns": ["i.a", "i.b_0", "i.b_1"]},
+    }
+    log = machine.read(path, fields)
+    last = np.nan if size == 3 else 7.0
+    expected = [[1, 2, 3], [np.nan] * 3, [4, 5, 6], [last, np.nan, np.nan]]
+    assert np.array_equal(log.angle_rad, expected, equal_nan=True)
+    assert np.array_equal(log.current_A, [[1, 2, 3]] * 3 + [[np.nan] * 3], equal_nan=True)
 
 
 def test_tables_of_other_programs_are_read(tmp_path):

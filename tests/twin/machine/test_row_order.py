@@ -57,12 +57,21 @@ def test_rows_of_two_topics_in_any_order_are_the_same_log():
 
 
 def test_faster_currents_count_with_their_mean():
-    t_s = 2.5e-4 * np.arange(800)
-    angles = np.full((800, 3), np.nan)
-    angles[::4] = ANGLES
-    log = aligned(Log(t_s, np.tile([[0.0], [1.0], [2.0], [3.0]], (200, 1)), angles))
+    t_s = np.concatenate([TIMES, 2.5e-4 * np.arange(800) + 1e-5])
+    angles, currents = np.full((1000, 3), np.nan), np.full((1000, 1), np.nan)
+    angles[:200], currents[200:] = ANGLES, np.tile([[0.0], [1.0], [2.0], [3.0]], (200, 1))
+    log = aligned(Log(t_s, currents, angles))
     assert len(log) == 200
-    assert log.current_A[:-1] == pytest.approx(1.5)
+    assert log.current_A[1:-1] == pytest.approx(1.5)
+
+
+@pytest.mark.parametrize("share", [0.3, 0.7])
+def test_an_even_table_stays_as_it_is(share):
+    """Angles in some rows only: of a slower sensor, or as most of them are late."""
+    angles = ANGLES.copy()
+    angles[np.random.default_rng(0).random(200) > share] = np.nan
+    log = replace(LOG, angle_rad=angles)
+    assert aligned(log) is log
 
 
 def test_a_table_with_late_angles_stays_as_it_is():
