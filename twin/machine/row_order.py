@@ -74,8 +74,9 @@ def aligned(log: Log) -> Log:
         columns = {name: getattr(log, name)[order] for name in ("t_s", "angle_rad", "current_A")}
         log = replace(log, **columns, notes=(*log.notes, *notes))
     log = _of_one_sensor(_merged(log))
-    has_angles = np.isfinite(log.angle_rad).any(axis=1)
-    has_currents = np.isfinite(log.current_A).any(axis=1)
+    has_angles, has_currents = (
+        np.asarray(np.any(np.isfinite(values), axis=1)) for values in (log.angle_rad, log.current_A)
+    )
     angle_s = log.t_s[has_angles]
     if len(angle_s) < 2 or not np.all(np.diff(log.t_s) > 0) or _is_table(log.t_s, has_angles, has_currents):
         return log
