@@ -16,8 +16,8 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationEr
 
 from spheretwin.machine.csv_files import CsvFormat
 from spheretwin.machine.log import COMMANDED, MEASURED, Log
-from spheretwin.machine.raw_table import RawTable, listed
-from spheretwin.machine.row_order import aligned, sorted_rows
+from spheretwin.machine.raw_table import RawTable, name_list
+from spheretwin.machine.row_order import align_rows, row_order
 from spheretwin.models.base.errors import InputError, without_breaks
 from spheretwin.models.base.files import regular_file
 from spheretwin.models.telemetry.joint_states import ANGLE_NAMES
@@ -100,7 +100,9 @@ class Channels(BaseModel):
         InputError
             A pattern has a number between others that the file lacks.
         """
-        return [name for pattern in self.columns for name in (_numbered(pattern, available) or [pattern])]
+        return [
+            name for pattern in self.columns for name in (_pattern_columns(pattern, available) or [pattern])
+        ]
 
     def raw(self, table: RawTable) -> Array:
         """Return the numbers of a file, (n, columns).
@@ -136,7 +138,7 @@ class Channels(BaseModel):
         values = raw.copy()
         for place, (offset, wrap) in enumerate(zip(entries["offset"], entries["wrap"], strict=True)):
             if wrap:
-                values[:, place] = _unwrapped(values[:, place], offset, wrap)
+                values[:, place] = _unwrap(values[:, place], offset, wrap)
         factors = [units[unit] for unit in entries["unit"]]
         return (
             np.array(entries["sign"])
@@ -146,7 +148,7 @@ class Channels(BaseModel):
         )
 
 
-def _numbered(pattern: str, available: Sequence[str]) -> list[str]:
+def _pattern_columns(pattern: str, available: Sequence[str]) -> list[str]:
     """Return the available names that a pattern stands for, by their numbers; none for a plain name."""
     before, every, after = pattern.partition(EVERY)
     if not every:
@@ -165,7 +167,7 @@ def _numbered(pattern: str, available: Sequence[str]) -> list[str]:
     return [numbered[number] for number in expected]
 
 
-def _unwrapped(raw: Array, offset: float, wrap: float) -> Array:
+def _unwrap(raw: Array, offset: float, wrap: float) -> Array:
     """Return a continuous count, whose first number is within half a revolution of the offset."""
     values, finite = raw.copy(), np.flatnonzero(np.isfinite(raw))
     if len(finite):
@@ -174,7 +176,7 @@ def _unwrapped(raw: Array, offset: float, wrap: float) -> Array:
     return values
 
 
-def _entries(value: Any) -> Any:
+def _as_tuple(value: Any) -> Any:
     """Return entries, or one, as a tuple."""
     return (value,) if isinstance(value, str) else tuple(value) if isinstance(value, list) else value
 
@@ -183,7 +185,7 @@ class AngleColumns(Channels):
     """Columns of the angles alpha, beta, gamma, in this order."""
 
     section = "angles"
-    unit: Annotated[tuple[Literal["rad", "mrad", "deg", "turn"], ...], BeforeValidator(_entries)] = Field(
+    unit: Annotated[tuple[Literal["rad", "mrad", "deg", "turn"], ...], BeforeValidator(_as_tuple)] = Field(
         (), description="unit of numbers times scale, or one for each; unless given, that of the file, or rad"
     )
 
@@ -198,7 +200,7 @@ class CurrentColumns(Channels):
     """Columns of the currents of the coil groups, in their order."""
 
     section = "currents"
-    unit: Annotated[tuple[Literal["A", "mA"], ...], BeforeValidator(_entries)] = Field(
+    unit: Annotated[tuple[Literal["A", "mA"], ...], BeforeValidator(_as_tuple)] = Field(
         (), description="unit of numbers times scale, or one for each; unless given, that of the file, or A"
     )
     kind: Literal["commanded", "measured"] = Field(
@@ -233,7 +235,7 @@ class ColumnMap(BaseModel):
         else:
             t_s = self.time.period_s * np.arange(table.rows, dtype=np.float64)
         angles, currents = self.angles.raw(table), self.currents.raw(table)
-        rows, order = sorted_rows(t_s, angles, currents)
+        rows, order = row_order(t_s, angles, currents)
         log = Log(
             t_s[rows],
             self.currents.values(table, CURRENT_UNITS, currents[rows]),
@@ -244,7 +246,7 @@ class ColumnMap(BaseModel):
             accepted,
             (*table.notes, *notes, *order),
         )
-        return aligned(log)
+        return align_rows(log)
 
 
 def load(source: str | Path) -> ColumnMap:
@@ -335,10 +337,10 @@ def default(table: RawTable, kind: str | None = None) -> ColumnMap:
         raise InputError(
             f"log {table.name}: expected a column map (--columns MAP.toml), or the columns"
             f" {', '.join(ANGLE_PREFIXES[0] + axis for axis in ANGLE_NAMES)} and"
-            f" {next(iter(CURRENT_PREFIXES))}0 to the last group, received {listed(tuple(table.columns))}"
+            f" {next(iter(CURRENT_PREFIXES))}0 to the last group, received {name_list(tuple(table.columns))}"
             f"{''.join(f'; {note}' for note in table.notes)}"
         )
-    groups = _numbered(currents.lower() + EVERY, tuple(names))
+    groups = _pattern_columns(currents.lower() + EVERY, tuple(names))
     return of_fields(
         {
             "time": {"column": names.get("t_s", "t_s")},

@@ -14,7 +14,7 @@ from typing import Annotated, Literal, NamedTuple
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from spheretwin.machine.raw_table import MISSING, RawTable, named, unique
+from spheretwin.machine.raw_table import MISSING, RawTable, column_names, repeated_names
 from spheretwin.models.base.errors import InputError, shown
 from spheretwin.models.base.files import regular_file
 
@@ -77,7 +77,7 @@ def read(path: Path, given: CsvFormat | None = None) -> RawTable:
         It cannot be read or decoded, no delimiter gives columns of numbers, or lines differ in their length.
     """
     given = given or CsvFormat()
-    text, encoding, notes = _decoded(path, given.encoding)
+    text, encoding, notes = _decode(path, given.encoding)
     lines = text.splitlines()
     layout = _layout(path, lines, given)
     rows = lines[layout.first :]
@@ -103,13 +103,13 @@ def read(path: Path, given: CsvFormat | None = None) -> RawTable:
         dict(zip(layout.names, layout.units, strict=False)),
         {},
         (*_notes(layout, encoding), *notes),
-        unique(layout.names),
+        repeated_names(layout.names),
         layout.decimal,
         lambda row: layout.first + places[row] + 1,
     )
 
 
-def _decoded(path: Path, encoding: str | None) -> tuple[str, str, tuple[str, ...]]:
+def _decode(path: Path, encoding: str | None) -> tuple[str, str, tuple[str, ...]]:
     """Return text and encoding of a file, and notes; zeros that a killed recorder left are no text."""
     try:
         content = regular_file(path).read_bytes()
@@ -165,7 +165,7 @@ def _layout(path: Path, lines: Sequence[str], given: CsvFormat) -> _Layout:
     if first < len(lines) and len(names) < width:  # the names of R lack that of the row numbers
         ends_empty = not _cells(lines[first], best)[-1]
         names = [*names, ""] if ends_empty else ["", *names]
-    names = named(names)[:width]
+    names = column_names(names)[:width]
     line = None if names_line is None else names_line + skipped
     return _Layout(best, decimal, comment, names, units, line, first)
 
@@ -271,7 +271,7 @@ def _header(
         if not line.strip():
             continue
         is_comment = line.lstrip().startswith(comment)
-        cells = _cells(_uncommented(line, comment), delimiter)
+        cells = _cells(_without_comment(line, comment), delimiter)
         if abs(len(cells) - width) > (0 if is_comment else 1):
             break
         rows.append((place, cells))
@@ -289,7 +289,7 @@ def _header(
 _BRACKETED = re.compile(r".*[\[(](?P<unit>[^\])]*)[\])]\s*")
 
 
-def _uncommented(line: str, comment: tuple[str, ...]) -> str:
+def _without_comment(line: str, comment: tuple[str, ...]) -> str:
     mark = next((mark for mark in comment if line.lstrip().startswith(mark)), "")
     return line.lstrip().removeprefix(mark).lstrip(" #%") if mark else line
 

@@ -15,7 +15,7 @@ from spheretwin.machine import columns as column_maps
 from spheretwin.machine import csv_files
 from spheretwin.machine.columns import ColumnMap
 from spheretwin.machine.log import COMMANDED, MEASURED, Log
-from spheretwin.machine.raw_table import RawTable, unique
+from spheretwin.machine.raw_table import RawTable, repeated_names
 from spheretwin.models.base.errors import InputError, shown
 from spheretwin.models.base.files import regular_file, whole_file
 from spheretwin.models.telemetry import joint_states
@@ -214,7 +214,7 @@ def _read_parquet(path: Path) -> RawTable:
             ) from None
         raise unreadable(path, error, "columns of numbers") from None
     names = [name for name, _ in columns]
-    return RawTable(str(path), dict(columns), {}, metadata, (), unique(names))
+    return RawTable(str(path), dict(columns), {}, metadata, (), repeated_names(names))
 
 
 def _has_end(path: Path) -> bool:

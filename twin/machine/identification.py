@@ -15,7 +15,7 @@ from scipy.stats import chi2
 from spheretwin.machine.intervals import Cost, Uncertainty, interval
 from spheretwin.machine.log import Log
 from spheretwin.machine.parameters import Machine, Parameter, priors, selected, short_names
-from spheretwin.machine.row_order import aligned
+from spheretwin.machine.row_order import align_rows
 from spheretwin.machine.windows import Part, Shooting, Window, windows_of
 from spheretwin.models.base.errors import InputError
 from spheretwin.scenario.fields import SettingsModel
@@ -189,7 +189,7 @@ class Problem:
         settings: IdentifySettings | None = None,
     ) -> None:
         self.settings = settings = settings or IdentifySettings()
-        logs = [aligned(log) for log in logs]
+        logs = [align_rows(log) for log in logs]
         machines = [Machine(scenario, {**changes, **log.conditions}) for log in logs]
         self._machines, self.machine = machines, machines[0]
         self.requested = selected(names, self.machine.model.actuator)

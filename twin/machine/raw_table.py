@@ -88,7 +88,7 @@ class RawTable:
             raise InputError(f"log {self.name}: expected each column once, received {name} twice")
         if name not in self.columns:
             raise InputError(
-                f"log {self.name}: expected a column {name}, received {listed(tuple(self.columns))}"
+                f"log {self.name}: expected a column {name}, received {name_list(tuple(self.columns))}"
                 f"{did_you_mean(name, self.columns)}"
             )
         return self.columns[name]
@@ -232,7 +232,7 @@ class RawTable:
         return _seconds(values, "us", 1e6 * _SECONDS_OF_A_DAY if is_clock else 0.0)
 
 
-def listed(names: Sequence[str]) -> str:
+def name_list(names: Sequence[str]) -> str:
     """Return names of columns, at most `MOST_NAMES` of them."""
     if not names:
         return "no column"
@@ -350,12 +350,12 @@ def _date(first_s: float) -> str:
     return f"{first_s:.10g} s"
 
 
-def unique(names: Sequence[str]) -> frozenset[str]:
+def repeated_names(names: Sequence[str]) -> frozenset[str]:
     """Return the names that occur more than once."""
     return frozenset(name for name in names if names.count(name) > 1)
 
 
-def named(names: Sequence[str]) -> list[str]:
+def column_names(names: Sequence[str]) -> list[str]:
     """Return names of columns without blanks around them; a number for one that is empty."""
     places = count()
     return [name.strip() or f"column_{place}" for name, place in zip(names, places, strict=False)]

@@ -26,7 +26,7 @@ _UNEVEN, _MOST_UNEVEN = 0.2, 0.1  # departure of a step from the period; share o
 _MOST_SHORT = 0.01  # of the rows, more after sorting than before
 
 
-def sorted_rows(t_s: Array, angles: Array, currents: Array) -> tuple[NDArray[np.int64], tuple[str, ...]]:
+def row_order(t_s: Array, angles: Array, currents: Array) -> tuple[NDArray[np.int64], tuple[str, ...]]:
     """Return the rows of a file in the order of time, and a note if it is another one.
 
     The order stays if sorting would leave more gaps or short intervals in the angles or the currents: then a
@@ -42,7 +42,7 @@ def sorted_rows(t_s: Array, angles: Array, currents: Array) -> tuple[NDArray[np.
         before, after = t_s[place], t_s[order][place[order]]
         moved += int(np.count_nonzero(np.diff(before) < 0))
         period_s = _period_s(before, after)
-        (short, gaps), (short_before, gaps_before) = (_faults(one, period_s) for one in (after, before))
+        (short, gaps), (short_before, gaps_before) = (_count_faults(one, period_s) for one in (after, before))
         if short > short_before + _MOST_SHORT * len(before) or gaps > gaps_before:
             return rows, ()
     return order, (f"{moved} rows sorted by time" if moved else "rows of two topics sorted by time",)
@@ -55,25 +55,25 @@ def _period_s(before: Array, after: Array) -> float:
     return float(np.median(steps[steps > 0])) if np.any(steps > 0) else 0.0
 
 
-def _faults(t_s: Array, period_s: float) -> tuple[int, int]:
+def _count_faults(t_s: Array, period_s: float) -> tuple[int, int]:
     """Return the numbers of short intervals, 0 included, and of gaps."""
     steps = np.diff(t_s)
     short = np.count_nonzero((steps >= 0) & (steps < _SHORT * period_s))
     return int(short), int(np.count_nonzero(steps > GAP_PERIODS * period_s))
 
 
-def aligned(log: Log) -> Log:
+def align_rows(log: Log) -> Log:
     """Return a log with one row for each sample of the angles, in the order of time.
 
     Rows of one time that complete each other are merged. Rows between those of the angles are left out: their
     currents count in the mean over the interval of a row if they were commanded, about its time if they were
     measured. Where the currents have a gap they are NaN.
     """
-    order, notes = sorted_rows(log.t_s, log.angle_rad, log.current_A)
+    order, notes = row_order(log.t_s, log.angle_rad, log.current_A)
     if notes:
         columns = {name: getattr(log, name)[order] for name in ("t_s", "angle_rad", "current_A")}
         log = replace(log, **columns, notes=(*log.notes, *notes))
-    log = _of_one_sensor(_merged(log))
+    log = _merge_sensors(_merge_rows(log))
     has_angles, has_currents = (
         np.asarray(np.any(np.isfinite(values), axis=1)) for values in (log.angle_rad, log.current_A)
     )
@@ -101,7 +101,7 @@ def aligned(log: Log) -> Log:
     ends = t_s + np.minimum(np.diff(t_s, append=t_s[-1] + period_s), GAP_PERIODS * period_s)
     held = log.currents == COMMANDED
     early_s = 0.0 if held else 0.5 * (ends - t_s)
-    current_A = _means(log.t_s, log.current_A, t_s - early_s, ends - early_s, held=held)
+    current_A = _interval_means(log.t_s, log.current_A, t_s - early_s, ends - early_s, held=held)
     note = "currents at times of their own, as means at the times of the angles"
     return replace(log, t_s=t_s, current_A=current_A, angle_rad=angle_rad, notes=(*log.notes, note))
 
@@ -120,7 +120,7 @@ def _distance_s(t_s: Array, angle_s: Array) -> Array:
     return np.where(outside_s > 0, 2 * outside_s, angle_s[place] - angle_s[place - 1])
 
 
-def _of_one_sensor(log: Log) -> Log:
+def _merge_sensors(log: Log) -> Log:
     """Return a log with the angles at the times of that with most rows, if others have other times."""
     known = np.isfinite(log.angle_rad)
     reference = known[:, int(np.argmax(known.sum(axis=0)))]
@@ -140,7 +140,7 @@ def _of_one_sensor(log: Log) -> Log:
     return replace(log, angle_rad=angle_rad, notes=(*log.notes, note))
 
 
-def _means(sample_s: Array, samples: Array, starts: Array, ends: Array, *, held: bool) -> Array:
+def _interval_means(sample_s: Array, samples: Array, starts: Array, ends: Array, *, held: bool) -> Array:
     """Return the means of samples over intervals, held or interpolated; NaN in a gap."""
     columns = []
     for column in samples.T:
@@ -162,7 +162,7 @@ def _means(sample_s: Array, samples: Array, starts: Array, ends: Array, *, held:
     return np.stack(columns, axis=1)
 
 
-def _merged(log: Log) -> Log:
+def _merge_rows(log: Log) -> Log:
     """Return a log whose rows of one time are one, if no number of them differs."""
     steps = np.diff(log.t_s)
     if not np.any(steps == 0):

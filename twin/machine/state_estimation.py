@@ -13,7 +13,7 @@ from pydantic import Field
 from spheretwin.electronics.logged_currents import mean_currents
 from spheretwin.machine.log import MEASURED, Log, check_numbers, joined
 from spheretwin.machine.model import EDGE_SHARE, Model, model_of
-from spheretwin.machine.row_order import aligned
+from spheretwin.machine.row_order import align_rows
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.coil_group import of_each_group
 from spheretwin.models.telemetry.signals import ANGLES, Signal
@@ -250,7 +250,7 @@ def shadow(
         The scenario cannot be used, the log has another number of groups, or its times do not rise.
     """
     model = scenario if isinstance(scenario, Model) else _model(scenario, log, changes)
-    return followed([aligned(log)], model, settings)[1]
+    return followed([align_rows(log)], model, settings)[1]
 
 
 def followed(

@@ -12,7 +12,7 @@ from scipy.stats import norm
 from spheretwin.machine.intervals import Uncertainty
 from spheretwin.machine.log import Log
 from spheretwin.machine.parameters import Machine, selected
-from spheretwin.machine.row_order import aligned
+from spheretwin.machine.row_order import align_rows
 from spheretwin.machine.state_estimation import HINGE_NAMES
 from spheretwin.machine.windows import Shooting, Window, windows_of
 
@@ -110,7 +110,7 @@ def validate(
     suspects = selected(SUSPECTS, machine.model.actuator)
     identified = selected(uncertainty.names, machine.model.actuator) if uncertainty else []
     varied = [*suspects, *(one for one in identified if one not in suspects)]
-    windows = windows_of(aligned(log), machine, window_s)
+    windows = windows_of(align_rows(log), machine, window_s)
     shooting = Shooting(windows, varied)
     values = np.array([machine.nominal(parameter) for parameter in varied])
     parts = shooting.parts(values, slopes=True)
