@@ -51,9 +51,9 @@ SLIP_SHARES = 0.5, 1.0
 LAST, CABLE, ELEMENTS = 1, 2, 3
 """Elements: the slider of the bearing that slips last, and the cable; their number."""
 
-# Rows of `BristleFriction.trial`: pose and rates at the start of the rotor's step; Stribeck factors, rates
-# and rotation at its end.
-START, START_RATE, FACTOR, RATE, TRAVEL = range(5)
+# Rows of `BristleFriction.trial`: pose and rates at the start of the rotor's step; Stribeck factors, rates,
+# rotations at its end; torques against these and their slopes.
+START, START_RATE, FACTOR, RATE, TRAVEL, TORQUE, SLOPE = range(7)
 
 # Newton's method ends after one or two steps; where it cycles between two branches, steps with secants, which
 # cannot cycle, replace it. These converge by a constant factor: for a break-away torque of 3 N·m in 1 µrad
@@ -105,7 +105,7 @@ class BristleFriction(Record):
     torque_q: Array = field("against bearing and cable, mean over the last step", "N·m", (2, 3), state=True)
     spring_q: Array = field("spring and constant torque of the cable on the hinges", "N·m", 3)
     first_cable_q: Array = field("cable on the hinges, in the first step of the control period", "N·m", 3)
-    trial: Array = field("rows of the present step: START and following", "", (5, 3))
+    trial: Array = field("rows of the present step: START and following", "", (7, 3))
     stops: EndStops = field("end stops, solved together with the elements")
 
 
@@ -248,9 +248,9 @@ def solve_bristles(
             implicit = (g - 0.5) * (trial[RATE, i] - trial[START_RATE, i])
             correction = 0.5 * (trial[RATE, i] - qdot[i]) + implicit
             trial[TRAVEL, i] = q[i] - trial[START, i] + h * correction
-        F0, k0 = _hinge_torque(bristles, 0, iteration >= NEWTON_STEPS)
-        F1, k1 = _hinge_torque(bristles, 1, iteration >= NEWTON_STEPS)
-        F2, k2 = _hinge_torque(bristles, 2, iteration >= NEWTON_STEPS)
+            trial[TORQUE, i], trial[SLOPE, i] = _hinge_torque(bristles, i, iteration >= NEWTON_STEPS)
+        F0, F1, F2 = trial[TORQUE, 0], trial[TORQUE, 1], trial[TORQUE, 2]
+        k0, k1, k2 = trial[SLOPE, 0], trial[SLOPE, 1], trial[SLOPE, 2]
         behind = qdot[0] - trial[RATE, 0], qdot[1] - trial[RATE, 1], qdot[2] - trial[RATE, 2]
         p = momentum(M, behind, joint.on)
         residual = (
