@@ -204,11 +204,19 @@ EXPERIMENT = Experiment("holding", "Holding on", "Laws that hold on.", cases, te
     "sensor stage": Addition(
         "",
         '''from spheretwin.electronics.random_streams import errors
-from spheretwin.electronics.stages import FaultLine, fault_line, through
+from spheretwin.electronics.stages import FaultLine, fill_fault_line, through
+
+
+class Gear(Record):
+    on: bool = field("whether a ratio has an error")
+    ratio: NDArray[np.float64] = field("ratio of each gear", "", 3)
+    line: FaultLine = field("of the turned angles, rad", channels=3)
 
 
 class GearSection(SensorStage):
     """Gears between the joints and their sensors, of which each has an error of its ratio."""
+
+    record: ClassVar[type[Record]] = Gear
 
     ratio_error: float = Field(0.0, description="largest error of a ratio, drawn from the seed")
 
@@ -216,19 +224,14 @@ class GearSection(SensorStage):
     def ideal(self):
         return self.ratio_error == 0
 
-    def build(self, setup):
-        ratio = 1 + self.ratio_error * errors(setup.seed, setup.name, 3, 1)[:, 0]
-        return Gear(not self.ideal or setup.faults, tuple(ratio.tolist()), fault_line(3))
+    def fill(self, rows, setup):
+        rows["on"] = not self.ideal or setup.faults
+        rows["ratio"] = 1 + self.ratio_error * errors(setup.seed, setup.name, 3, 1)[:, 0]
+        fill_fault_line(rows["line"])
 
     @classmethod
     def function(cls):
         return turn
-
-
-class Gear(NamedTuple):
-    on: bool
-    ratio: tuple[float, float, float]
-    line: FaultLine
 
 
 @inlined
@@ -246,17 +249,24 @@ def turn(stage, measurement, noise):
     ),
     "drive stage": Addition(
         "",
-        '''from typing import ClassVar, NamedTuple
+        '''from typing import ClassVar
 
-from spheretwin.electronics.stages import pass_line
-from spheretwin.electronics.stages import FaultLine, fault_line
+from spheretwin.electronics.stages import FaultLine, fill_fault_line, pass_line
 from spheretwin.models.base.compiled import inlined
+from spheretwin.models.base.record import Record, field
+
+
+class Filter(Record):
+    on: bool = field("whether it attenuates")
+    gain: float = field("gain")
+    line: FaultLine = field("of the setpoint, A", channels="groups")
 
 
 class FilterSection(DriveStage):
     """Filter in front of the converter, which attenuates."""
 
     stage: ClassVar[str] = "filter"
+    record: ClassVar[type[Record]] = Filter
     filter_gain: float = Field(1.0, description="gain of the filter")
 
     @staticmethod
@@ -264,19 +274,13 @@ class FilterSection(DriveStage):
         return section.filter_gain == 1
 
     @staticmethod
-    def build(section, setup):
-        on = section.filter_gain != 1 or setup.faults
-        return Filter(on, section.filter_gain, fault_line(setup.groups * setup.faults, 0.0))
+    def fill(rows, section, setup):
+        rows["on"], rows["gain"] = section.filter_gain != 1 or setup.faults, section.filter_gain
+        fill_fault_line(rows["line"], 0.0)
 
     @staticmethod
     def advance():
         return attenuate
-
-
-class Filter(NamedTuple):
-    on: bool
-    gain: float
-    line: FaultLine
 
 
 @inlined
@@ -306,7 +310,7 @@ FUSE = Target("fuse", {"blown": Mode(_blow)}, each_group=True)
     "sensor stage's fault": Addition(
         "",
         """
-GEAR_SIGNAL = FaultSignal(lambda effects: effects.sensors.stage("gear").line, "rad")
+GEAR_SIGNAL = FaultSignal(lambda effects: effects.sensors.stages["gear"].line, "rad")
 GEAR = Target("gear", signal_modes(GEAR_SIGNAL), places=("alpha", "beta", "gamma"), measured=True)
 """,
         "twin/faults/targets.py",
@@ -315,7 +319,7 @@ GEAR = Target("gear", signal_modes(GEAR_SIGNAL), places=("alpha", "beta", "gamma
     "drive stage's fault": Addition(
         "",
         """
-FILTER_SIGNAL = FaultSignal(lambda effects: effects.drive.stage("filter").line, "A")
+FILTER_SIGNAL = FaultSignal(lambda effects: effects.drive.stages["filter"].line, "A")
 FILTER_MODES = {**signal_modes(FILTER_SIGNAL), **silent_modes(FILTER_SIGNAL)}
 FILTER = Target("filter", FILTER_MODES, each_group=True)
 """,

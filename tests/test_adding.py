@@ -37,9 +37,9 @@ import numpy as np
 
 def drawn_numbers():
     from spheretwin import scenario as scenarios
-    from spheretwin.electronics.drive_chain import drive_chain
+    from spheretwin.electronics.drive_chain import build_drive
     from spheretwin.electronics.random_streams import noise_table
-    from spheretwin.electronics.sensor_chain import noise_streams, sense, sensor_chain
+    from spheretwin.electronics.sensor_chain import build_sensors, noise_streams, sense
     from spheretwin.faults.schedule import FaultSchedule
     from spheretwin.shared_buffers import fault_streams
     from spheretwin.session import Session
@@ -53,13 +53,14 @@ def drawn_numbers():
     with Session(scenario) as session:
         scenario = session.scenario
     plan = FaultSchedule(scenario.fault, 18, 1e-3, 3)
-    sensors = sensor_chain(scenario.sensors, 3)
-    drive = drive_chain(scenario.drive, 5e-4, 2, 18, 3)
+    sensors = build_sensors(scenario.sensors, 3)[0]
+    drive = build_drive(scenario.drive, 5e-4, 2, 18, 3)[0]
     noise, measurement = noise_table(3, 0, 5, noise_streams(scenario.sensors)), np.empty((3, 3))
-    sense(sensors, np.array([0.1, -0.2, 0.3]), np.zeros(3), noise[0], measurement)
+    sense(sensors, np.array([0.1, -0.2, 0.3]), np.zeros(3), noise[0], np.zeros(0), measurement)
     return {
-        "tracks": sensors.stage("potentiometer").channels, "converters": sensors.stage("adc").channels,
-        "dac": drive.stage("dac").dac.offset_V.tolist(), "amplifiers": drive.amplifier.offset_A.tolist(),
+        "tracks": sensors.stages["potentiometer"].channels.tobytes().hex(),
+        "converters": sensors.stages["adc"].channels.tobytes().hex(),
+        "dac": drive.stages["dac"].dac.offset_V.tolist(), "amplifiers": drive.amplifier.offset_A.tolist(),
         "noise": noise.tolist(), "measured": measurement[0].tolist(),
         "fault noise": noise_table(3, 0, 5, fault_streams(scenario, 18)).tolist(),
         "supply": [2 in plan.active(tick) for tick in range(0, 100, 2)],

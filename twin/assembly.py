@@ -16,8 +16,6 @@ from spheretwin.control.controller import Controller, controller
 from spheretwin.control.estimators.estimator import Estimator, Sampling
 from spheretwin.control.law import Law, NominalModel
 from spheretwin.control.laws import LAWS
-from spheretwin.electronics.drive import DriveModel
-from spheretwin.electronics.drive_chain import DriveChain
 from spheretwin.electronics.transducers import CurrentSensors
 from spheretwin.faults.schedule import part_names
 from spheretwin.models.actuator import Actuator
@@ -38,7 +36,7 @@ from spheretwin.plant.rotor import Rotor, RotorSettings
 from spheretwin.scenario.files import Files
 from spheretwin.scenario.plant_sections import ResolvedNominal, ResolvedPlant
 from spheretwin.scenario.sections import ResolvedScenario
-from spheretwin.shared_buffers import SharedBuffers, drive_of, fill_supervision
+from spheretwin.shared_buffers import draws_of, drive_of, fill_supervision
 
 Array = NDArray[np.float64]
 
@@ -172,13 +170,15 @@ def true_magnetics(section: ResolvedPlant, seed: int, actuator: Actuator) -> Tor
     return scattered_model(actuator, scatter) if scatter else torque_model(actuator)
 
 
-def plant_of(scenario: ResolvedScenario, files: Files, rotor: Rows, buffers: SharedBuffers) -> Plant:
-    """Return the plant of a resolved scenario with a started rotor and zero currents."""
+def plant_of(scenario: ResolvedScenario, files: Files, rotor: Rows, halt: NDArray[np.int64]) -> Plant:
+    """Return the plant of a resolved scenario with a started rotor, the `halt` of its watchdog, at rest."""
     section, actuator, groups = scenario.plant, files.actuator, len(files.actuator.groups)
     middle_q, middle_qdot, coil_q, coil_qdot = np.empty((4, 3))
     magnetics = true_magnetics(section, scenario.seed, actuator)
-    drive, group_gain = drive_of(scenario, actuator, buffers), np.array(section.group_gain)
-    chain = drive if isinstance(drive, DriveChain) else None
+    drive, group_gain = drive_of(scenario, actuator), np.array(section.group_gain)
+    current_sensors = CurrentSensors.zeros(groups=groups)
+    current_sensors["on"] = scenario.senses_currents
+    current_sensors["noise_A"] = scenario.sensors.current.noise_A
     return Plant(
         rotor=rotor,
         magnetics=magnetics,
@@ -190,9 +190,6 @@ def plant_of(scenario: ResolvedScenario, files: Files, rotor: Rows, buffers: Sha
             _fill_bristles, section, actuator.hinge_range_rad, rotor["joint"]["inertia"], scenario.seed
         ),
         heat=MagnetHeat.filled(_fill_heat, scenario, drive, groups=groups),
-        winding_degC=chain.coil.temperature_degC if chain else np.zeros(groups),
-        copper_J=chain.flow.copper_J if chain else np.zeros(groups),
-        surroundings_degC=chain.coil.surroundings_degC if chain else np.zeros(1),
         group_gain=group_gain,
         present_gain=np.empty(groups),
         unmodelled_torque=np.array(section.modelling_torque_Nm),
@@ -210,10 +207,9 @@ def plant_of(scenario: ResolvedScenario, files: Files, rotor: Rows, buffers: Sha
         torque_S=np.zeros(3),
         friction_q=np.zeros(3),
         first_friction_q=np.zeros(3),
-        draws=buffers.draws,
-        current_sensors=CurrentSensors(
-            scenario.senses_currents, scenario.sensors.current.noise_A, np.zeros(groups)
-        ),
+        draws=draws_of(scenario, groups),
+        halt=halt,
+        current_sensors=current_sensors,
         fault_modes=np.zeros(len(part_names(groups))),
         fault_start_s=np.full(groups, -1.0),
     )
@@ -231,11 +227,10 @@ def _fill_bristles(rows: Rows, section: ResolvedPlant, range_rad: Array, inertia
     fill_bristles(rows, stiction, section.coulomb_Nm, section.cable, inertia, step_s, seed)
 
 
-def _fill_heat(rows: Rows, scenario: ResolvedScenario, drive: DriveModel) -> None:
-    if isinstance(drive, DriveChain):
-        section, coil = scenario.drive, drive.coil
-        winding = section.heat_capacity_J_K, coil.settled
-        fill_heat(rows, scenario.plant.thermal, section.ambient_degC, coil.period_s, *winding)
+def _fill_heat(rows: Rows, scenario: ResolvedScenario, drive: Rows) -> None:
+    section, period_s = scenario.drive, scenario.controller.period_s
+    winding = section.heat_capacity_J_K, drive["coil"]["settled"][0]
+    fill_heat(rows, scenario.plant.thermal, section.ambient_degC, period_s, *winding)
 
 
 def rotor_of(scenario: ResolvedScenario, files: Files) -> Rotor:

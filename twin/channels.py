@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from spheretwin.control.supervision.enabled_groups import IN_USE, STATES
 from spheretwin.control.supervision.watchdog import REASONS
-from spheretwin.electronics.drive import write_telemetry as write_drive_telemetry
-from spheretwin.electronics.sensors import write_telemetry as write_sensor_telemetry
+from spheretwin.electronics.drive_chain import write_telemetry as write_drive_telemetry
+from spheretwin.electronics.sensor_chain import write_telemetry as write_sensor_telemetry
 from spheretwin.faults.fault import MODES
 from spheretwin.faults.schedule import part_names
 from spheretwin.models.base.compiled import part_of_its_caller, uncompiled
@@ -51,7 +51,7 @@ def current_signals(groups: int) -> tuple[Signal, ...]:
 @part_of_its_caller
 def write_currents(row: NDArray, plant: Any) -> None:
     """Write the columns of one tick."""
-    measured_A = plant.current_sensors.measured_A
+    measured_A = plant.current_sensors[0].measured_A
     for j in range(measured_A.shape[0]):
         row[j] = measured_A[j]
 
@@ -76,7 +76,7 @@ def drive_signals(groups: int) -> tuple[Signal, ...]:
 @part_of_its_caller
 def write_drive(row: NDArray, plant: Any) -> None:
     """Write the columns of one tick."""
-    write_drive_telemetry(plant.drive, row)
+    write_drive_telemetry(plant.drive[0], row)
 
 
 DRIVE = Channel(drive_signals, lambda scenario: scenario.drive.supply_V is not None, write_drive)
@@ -288,7 +288,7 @@ SENSOR_STATE_SIGNALS = (
 @part_of_its_caller
 def write_sensor_states(row: NDArray, sensors: Any) -> None:
     """Write the columns of one tick."""
-    write_sensor_telemetry(sensors, row)
+    write_sensor_telemetry(sensors[0], row)
 
 
 def _logs_sensor_states(scenario: Scenario) -> bool:

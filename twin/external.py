@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 
 from spheretwin.control.controller import Controller
 from spheretwin.control.supervision.watchdog import Reason, trip
-from spheretwin.electronics.drive_chain import DriveChain
 from spheretwin.loop import INTERRUPTED, NO_EXTERNAL, External
 from spheretwin.models.base.compiled import COMPILES, uncompiled
 from spheretwin.plant.plant_tick import GOING, Plant
@@ -120,12 +119,12 @@ class Connection:
 
     def _command(self, t_s: float) -> int:
         plant, data = self._plant, self._data[0]
-        sensors, drive = plant.current_sensors, plant.drive
+        sensors, drive = plant.current_sensors[0], plant.drive[0]
         measurement = Measurement(
             data.measurement[0],
             None if data.estimator_on else data.measurement[1],
             sensors.measured_A if sensors.on else plant.current,
-            drive.coil.temperature_degC.max() if isinstance(drive, DriveChain) else None,
+            drive.coil.temperature_degC.max() if drive.supplied or drive.converts else None,
         )
         command = self._part.command(t_s, measurement)
         if command is None:

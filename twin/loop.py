@@ -137,17 +137,18 @@ def loop(
         row, t, disturbance = log[tick], inputs.t[tick], inputs.disturbance[tick]
         copy_into(stages.draws, 0, inputs.fault_noise[tick], stages.draws.shape[0])
         is_finite = sense_at(stages.sense)(
-            stages.sensors, stages.q, stages.qdot, inputs.noise[tick], measurement
+            stages.sensors, stages.q, stages.qdot, inputs.noise[tick], stages.draws, measurement
         )
         copy_rows(inputs.reference[tick], reference)
         # Logged before the law is called, because the law may overwrite its arguments.
         write_motion(row, t, reference, stages.q, stages.qdot, disturbance)
         if not (is_finite or replace_invalid(watchdog, measurement)):
             return tick, DIVERGED
-        if stages.current_sensors.on:
-            sense_currents(stages.current_sensors, stages.current, stages.draws)
+        current_sensors = stages.current_sensors[0]
+        if current_sensors.on:
+            sense_currents(current_sensors, stages.current, stages.draws)
             if detector.on:
-                copy_into(detector.measured_A, 0, stages.current_sensors.measured_A, groups)
+                copy_into(detector.measured_A, 0, current_sensors.measured_A, groups)
         copy_into(data.manual.current_A, 0, inputs.manual_A[tick], manual_currents)
         if external.controller != 0:
             code = external_at(external.controller)(t)

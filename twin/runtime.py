@@ -15,8 +15,8 @@ from spheretwin import loop as loops
 from spheretwin.control.allocation import ALLOCATIONS
 from spheretwin.control.law import Law
 from spheretwin.control.supervision.watchdog import REASONS, Reason, transfer_trip
-from spheretwin.electronics.drive import transfer_drive
-from spheretwin.electronics.sensors import measure_again
+from spheretwin.electronics.drive_chain import transfer_drive
+from spheretwin.electronics.sensor_chain import measure_again
 from spheretwin.external import Connection, ExternalController, ExternalPlant
 from spheretwin.loop import dispatch, is_python_law, is_user_law, step_that_writes
 from spheretwin.models.base.compiled import COMPILES, for_types_of
@@ -29,7 +29,7 @@ from spheretwin.plant.rotor import Rotor
 from spheretwin.scenario.changes import StateChange
 from spheretwin.scenario.files import Files
 from spheretwin.scenario.sections import ResolvedScenario
-from spheretwin.shared_buffers import faults_of, sensors_of, shared_buffers
+from spheretwin.shared_buffers import faults_of, sensors_of
 from spheretwin.stages import compiled_stages
 
 # Only for the types.
@@ -114,13 +114,12 @@ class Runtime:
         magnetics = assembly.nominal_magnetics(scenario, files)
         estimator = assembly.estimator_of(scenario)
         self._controller = assembly.controller_of(scenario, self.law, magnetics, estimator, files.nominal)
-        self._data = self._controller.data
+        self._data, self._sensors = self._controller.data, sensors_of(scenario)
         if hasattr(external, "command"):
             self._data["manual"]["on"] = True
         supervision = self._data["supervision"]
-        buffers = shared_buffers(scenario, len(files.actuator.groups), supervision["watchdog"]["halt"])
-        self._plant = assembly.plant_of(scenario, files, self._rotor.rows, buffers)
-        self._sensors = sensors_of(scenario, buffers)
+        halt = supervision["watchdog"]["halt"]
+        self._plant = assembly.plant_of(scenario, files, self._rotor.rows, halt)
         self._faults = faults_of(scenario, self._plant, self._sensors, supervision["groups"])
         # The loop holds only addresses of its functions: this object keeps the functions alive.
         self._functions = dispatch(
@@ -130,7 +129,7 @@ class Runtime:
             check_bounds=scenario.controller.check_bounds,
         )
         self._may_raise = is_user_law(law) or scenario.controller.check_bounds
-        self._fresh = buffers.fresh
+        self._fresh = self._sensors["fresh"][0]
         if COMPILES and is_python_law(law):
             self._python_law = _PYTHON_LAW(self._call_law(step_that_writes(law)))
             self._data["python_law"] = ctypes.cast(self._python_law, ctypes.c_void_p).value or 0

@@ -1,20 +1,17 @@
-"""Buffers that controller and plant share; stages that faults can modify; supervision."""
+"""Stages of a scenario that faults can modify, and the supervision."""
 
 from __future__ import annotations
 
 from math import inf
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from spheretwin.control.supervision.fault_detector import NominalCurrents, fill_detector
 from spheretwin.control.supervision.watchdog import MeasurementLimits, fill_watchdog
-from spheretwin.electronics.drive import DriveModel, build_drive
-from spheretwin.electronics.drive_chain import DriveChain, DriveFaults
+from spheretwin.electronics.drive_chain import DriveFaults, build_drive
 from spheretwin.electronics.random_streams import Streams, width_of
-from spheretwin.electronics.sensor_chain import SensorChain, SensorFaults
-from spheretwin.electronics.sensors import Sensors, build_sensors
+from spheretwin.electronics.sensor_chain import build_sensors
 from spheretwin.faults.effects import Effects
 from spheretwin.faults.fault_injector import FaultInjector
 from spheretwin.faults.schedule import FaultSchedule, noise_streams
@@ -28,21 +25,9 @@ from spheretwin.scenario.sections import ResolvedScenario, Scenario
 Array = NDArray[np.float64]
 
 
-class SharedBuffers(NamedTuple):
-    """Buffers that controller and plant share in addition to measurements and commands."""
-
-    fresh: Array
-    """(3,) flags of new angles: written by the sensors, read by a watchdog."""
-    halt: NDArray[np.int64]
-    """(1,) state of the currents: written by a watchdog, read by the drive."""
-    draws: Array
-    """Standard normal numbers of a tick, for faults and for the current sensors."""
-
-
-def shared_buffers(scenario: Scenario, groups: int, halt: NDArray[np.int64]) -> SharedBuffers:
-    """Return the shared buffers of the loop of a scenario; `halt` is that of its watchdog."""
-    draws = np.zeros(width_of(fault_streams(scenario, groups)))
-    return SharedBuffers(np.ones(3), halt, draws)
+def draws_of(scenario: Scenario, groups: int) -> Array:
+    """Return the array of the standard normal numbers of a tick, for faults and current sensors."""
+    return np.zeros(width_of(fault_streams(scenario, groups)))
 
 
 def fault_streams(scenario: Scenario, groups: int) -> Streams:
@@ -51,13 +36,10 @@ def fault_streams(scenario: Scenario, groups: int) -> Streams:
     return (*noise_streams(scenario.fault, groups), *sensors)
 
 
-def sensors_of(scenario: Scenario, buffers: SharedBuffers) -> Sensors:
+def sensors_of(scenario: Scenario) -> Rows:
     """Return the sensors of a scenario, with errors drawn from its seed."""
-    if not scenario.fault:
-        return build_sensors(scenario.sensors, scenario.seed)
     longest_delay = sum(_delays_s(scenario, "adc")) / scenario.controller.period_s
-    faults = SensorFaults(round(longest_delay), buffers.fresh, buffers.draws)
-    return build_sensors(scenario.sensors, scenario.seed, faults)
+    return build_sensors(scenario.sensors, scenario.seed, bool(scenario.fault), round(longest_delay))
 
 
 def _delays_s(scenario: Scenario, target: str) -> list[float]:
@@ -69,16 +51,16 @@ def _delays_s(scenario: Scenario, target: str) -> list[float]:
     ]
 
 
-def drive_of(scenario: ResolvedScenario, actuator: Actuator, buffers: SharedBuffers) -> DriveModel:
+def drive_of(scenario: ResolvedScenario, actuator: Actuator) -> Rows:
     """Return the drive of a resolved scenario, at rest; with fault inputs if faults are scheduled.
 
     A watchdog acts on the drive itself, so that it does not wait for delayed commands.
     """
-    step_s, faults, groups = scenario.plant.step_s, None, len(actuator.groups)
-    if scenario.fault or scenario.watchdog.on:
-        longest_delay = round(sum(_delays_s(scenario, "controller")) / step_s)
-        faults = DriveFaults(bool(scenario.fault), longest_delay, buffers.halt, buffers.draws)
+    step_s = scenario.plant.step_s
+    longest_delay = round(sum(_delays_s(scenario, "controller")) / step_s)
+    faults = DriveFaults(bool(scenario.fault), longest_delay, scenario.watchdog.on)
     mutual_H = mutual_inductance(actuator) if scenario.drive.coil_coupling else None
+    groups = len(actuator.groups)
     return build_drive(scenario.drive, step_s, scenario.substeps, groups, scenario.seed, faults, mutual_H)
 
 
@@ -106,11 +88,11 @@ def _nominal_currents(nominal: ResolvedNominal, period_s: float) -> NominalCurre
     )
 
 
-def faults_of(scenario: ResolvedScenario, plant: Plant, sensors: Sensors, groups: Rows) -> FaultInjector:
+def faults_of(scenario: ResolvedScenario, plant: Plant, sensors: Rows, groups: Rows) -> FaultInjector:
     """Return the fault injector of a scenario with the stages of its loop that faults modify."""
     period_s, count = scenario.controller.period_s, len(plant.current)
     schedule = FaultSchedule(scenario.fault, count, period_s, scenario.seed)
     effects = None
-    if scenario.fault and isinstance(plant.drive, DriveChain) and isinstance(sensors, SensorChain):
+    if scenario.fault:
         effects = Effects(plant.drive, sensors, plant.group_gain, period_s, scenario.plant.step_s)
     return FaultInjector(schedule, effects, groups, plant.fault_modes, plant.fault_start_s)

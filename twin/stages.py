@@ -15,17 +15,17 @@ from numpy.typing import NDArray
 
 from spheretwin.channels import CHANNELS, Channel
 from spheretwin.control.controller import Controller
-from spheretwin.electronics.sensors import Sensors, sense
-from spheretwin.electronics.transducers import CurrentSensors
+from spheretwin.electronics.sensor_chain import sense
 from spheretwin.models.base.compiled import COMPILES, inlined, stage_address
 from spheretwin.models.base.numba_internals.addresses import function_at, in_memory
+from spheretwin.models.base.record import Rows
 from spheretwin.models.telemetry.signals import Signal, offsets
 from spheretwin.plant.plant_tick import ENGINES, Plant, PlantOutput, plant_tick
 
 Array = NDArray[np.float64]
 
 _ROW, _ROWS = types.float64[::1], types.float64[:, ::1]
-_SENSE = types.boolean(types.intp, _ROW, _ROW, _ROW, _ROWS)
+_SENSE = types.boolean(types.intp, _ROW, _ROW, _ROW, _ROW, _ROWS)
 _ADVANCE = types.int64(types.intp, _ROW, _ROW, _ROW, _ROW, _ROW)
 _WRITE = types.void(types.intp, types.intp, _ROW)
 
@@ -39,7 +39,7 @@ class Stages(NamedTuple):
     are functions and tuples with one entry.
     """
 
-    sense: Any  # (sensors, q, qdot, noise, measurement): true if the measurement is finite
+    sense: Any  # (sensors, q, qdot, noise, draws, measurement): true if the measurement is finite
     sensors: Any
     advance: Any  # (plant, command, disturbance, current, mean current, torque): code of a status
     plant: Any
@@ -51,7 +51,7 @@ class Stages(NamedTuple):
     qdot: Array  # (3,) rad/s
     current: Array  # (n,) A
     draws: Array
-    current_sensors: CurrentSensors
+    current_sensors: Rows  # of CurrentSensors
 
 
 class Stage(NamedTuple):
@@ -69,14 +69,14 @@ def plant_stage(plant: Plant, engine: str) -> Stage:
 
 
 def compiled_stages(
-    controller: Controller, sensors: Sensors, plant: Plant, engine: str, signals: tuple[Signal, ...]
+    controller: Controller, sensors: Rows, plant: Plant, engine: str, signals: tuple[Signal, ...]
 ) -> tuple[Stages, list[Any]]:
     """Compile the stages of a run; return them and the memory that they have addresses of.
 
     Parameters
     ----------
     controller : Controller
-    sensors : Sensors
+    sensors : array of SensorChain
     plant : Plant
     engine : str
         Of its rotor.
@@ -122,8 +122,8 @@ def _data(part: Any) -> tuple[Any, Any]:
     return memory, memory.ctypes.data if isinstance(memory, np.ndarray) else memory
 
 
-def _sense(sensors: Any, q: Array, qdot: Array, noise: Array, measurement: Array) -> bool:
-    return sense(sensors[0], q, qdot, noise, measurement)
+def _sense(sensors: Any, q: Array, qdot: Array, noise: Array, draws: Array, measurement: Array) -> bool:
+    return bool(sense(sensors[0][0], q, qdot, noise, draws, measurement))
 
 
 @cache

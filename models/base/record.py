@@ -188,3 +188,14 @@ def _of_length(history: NDArray[Any], length: tuple[int, ...]) -> NDArray[Any]:
     if history.shape[1:2] == length:
         return history
     return history[:, np.minimum(np.arange(*length), history.shape[1] - 1)]
+
+
+def capacity(entries: int) -> int:
+    """Return the length of a history that holds some entries: 8, 16, 32 …, so that types are few."""
+    return max(8, 1 << (entries - 1).bit_length())
+
+
+def record_of(name: str, meaning: str, kinds: dict[str, type[Record]]) -> type[Record]:
+    """Return a declaration whose fields are the records of a family, by name."""
+    members = {member: field(member) for member in kinds}
+    return type(name, (Record,), {"__doc__": meaning, "__annotations__": dict(kinds), **members})

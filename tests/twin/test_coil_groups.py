@@ -6,7 +6,7 @@ import pytest
 from spheretwin import scenario as scenarios
 from spheretwin.active_config import initial_config
 from spheretwin.electronics.coil import SHORTED
-from spheretwin.electronics.drive_chain import advance, begin, drive_chain, end
+from spheretwin.electronics.drive_chain import advance, begin, build_drive, end
 from spheretwin.machine.parameters import KINDS, Machine, Parameter
 from spheretwin.models.base.errors import InputError
 from spheretwin.session import Session
@@ -23,15 +23,16 @@ def resolved(path, **changes):
 
 
 def chain_of(drive):
-    return drive_chain(drive, STEP_s, round(TICK_s / STEP_s), GROUPS, 0)
+    return build_drive(drive, STEP_s, round(TICK_s / STEP_s), GROUPS, 0)[0]
 
 
 def step(chain, command, current, substep=0):
     """Advance currents at rest, so that there is no back-EMF; return their means."""
-    mean, ones = np.empty(GROUPS), np.ones(GROUPS)
+    mean, ones, none = np.empty(GROUPS), np.ones(GROUPS), np.zeros(0)
     if not substep:
-        begin(chain, command)
-    advance(chain, command, substep, np.zeros(3), np.zeros(3), np.zeros((3, GROUPS)), ones, current, mean)
+        begin(chain, command, 0, none)
+    at_rest = np.zeros(3), np.zeros(3), np.zeros((3, GROUPS))
+    advance(chain, substep, *at_rest, ones, none, current, mean)
     return mean
 
 
@@ -68,7 +69,7 @@ def test_each_group_heats_by_its_own_loss_and_thermal_data(tmp_path):
     chain.amplifier.offset_A[:] = 0.0
     command, current, ticks = np.full(GROUPS, 0.5), np.full(GROUPS, 0.5), 100
     chain.delay.history[:] = command
-    chain = chain._replace(converts=False)
+    chain.converts = False
     for _ in range(ticks):
         step(chain, command, current)
         step(chain, command, current, 1)

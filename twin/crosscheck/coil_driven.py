@@ -35,7 +35,6 @@ from spheretwin.models.base.checks import Check
 from spheretwin.models.base.compiled import compiled
 from spheretwin.models.mjcf import read
 from spheretwin.plant.plant_tick import GOING, PlantOutput
-from spheretwin.shared_buffers import shared_buffers
 from spheretwin.stages import advance_at, plant_stage
 
 Array = NDArray[np.float64]
@@ -237,8 +236,7 @@ def drive_plant(
     groups, section = len(actuator.groups), scenario.plant
     rotor = assembly.rotor_of(scenario, begun.files)  # keep it: the stepped plant has addresses within it
     stepped = rotor.start(np.array(section.initial_rad), np.array(section.initial_rad_s))
-    buffers = shared_buffers(scenario, groups, np.zeros(1, dtype=np.int64))
-    plant = assembly.plant_of(scenario, begun.files, rotor.rows, buffers)
+    plant = assembly.plant_of(scenario, begun.files, rotor.rows, np.zeros(1, dtype=np.int64))
     states = np.full((len(disturbance) // every + 1, 6), np.nan)
     states[0] = [*section.initial_rad, *section.initial_rad_s]
     stage, output = (

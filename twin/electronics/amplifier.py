@@ -33,18 +33,29 @@ from pydantic import Field, model_validator
 
 from spheretwin.electronics.coil import OPEN, GroupCoils, Relaxation, relaxation
 from spheretwin.electronics.random_streams import UNIFORM, errors
-from spheretwin.electronics.stages import DriveSetup, DriveStage, FaultLine, fault_line
+from spheretwin.electronics.stages import DriveSetup, DriveStage, FaultLine, fill_fault_line
 from spheretwin.models.base.compiled import inlined
+from spheretwin.models.base.record import Record, Rows, field
 from spheretwin.models.base.vectors import WIDTH, Vector, load, store, within
+
+Array = NDArray[np.float64]
 
 # No motion of the rotor induces as much; the bound keeps squares of currents finite.
 LARGEST_EMF_V = 1e9
+
+
+class AmplifierStage(Record):
+    """Inputs of the amplifiers as a stage of the drive."""
+
+    on: bool = field("whether a fault may occur")
+    line: FaultLine = field("of the setpoint, A", channels="groups")
 
 
 class AmplifierSection(DriveStage):
     """Parameters of the amplifiers; without a supply they are not used."""
 
     stage: ClassVar[str] = "amplifier"
+    record: ClassVar[type[Record]] = AmplifierStage
     supply_V: Annotated[float, Field(ge=1e-3, le=1e6)] | None = Field(
         None,
         description="supply, plus and minus, V; without one the current follows with time_constant_s only"
@@ -89,84 +100,71 @@ class AmplifierSection(DriveStage):
         return True
 
     @staticmethod
-    def build(section: Any, setup: DriveSetup) -> Any:
-        """Return the inputs of the amplifiers, which only faults change."""
-        return AmplifierStage(setup.faults, fault_line(setup.groups * setup.faults, 0.0))
+    def fill(rows: Rows, section: Any, setup: DriveSetup) -> None:
+        """Fill the inputs of the amplifiers, which only faults change."""
+        rows["on"] = setup.faults
+        fill_fault_line(rows["line"], 0.0)
 
 
-class AmplifierStage(NamedTuple):
-    """Inputs of the amplifiers as a stage of the drive."""
+class Step(Record):
+    """Physics step of the amplifiers, or a part of one."""
 
-    on: bool
-    line: FaultLine  # of the setpoint, A
-
-
-class Amplifier(NamedTuple):
-    """Amplifiers of all groups, for compiled code."""
-
-    supplied: bool  # true if there is a supply; without one no voltage is too large
-    highest_V: float
-    lowest_V: float
-    bandwidth_rad_s: float
-    current_limit_A: float
-    step_s: float
-    following: Relaxation  # over a whole physics step
-    offset_A: NDArray[np.float64]  # (n,)
+    step_s: float = field("duration", "s")
+    following: Array = field("shares of a group that follows its target, as in `Relaxation`", "", 5)
 
 
-class Flow(NamedTuple):
+class Amplifier(Record):
+    """Amplifiers of all groups."""
+
+    supply_V: float = field("supply, plus and minus; infinite without one", "V")
+    drop_up_V: float = field("supply less the largest voltage", "V")
+    drop_down_V: float = field("lowest voltage less the negative supply", "V")
+    highest_V: float = field("largest voltage in this control period", "V")
+    lowest_V: float = field("lowest voltage in this control period", "V")
+    bandwidth_rad_s: float = field("bandwidth of the closed current loop", "rad/s")
+    current_limit_A: float = field("largest target", "A")
+    whole: Step = field("physics step")
+    offset_A: Array = field("offset at the input", "A", "groups")
+
+
+class Flow(Record):
     """Currents and energies of the coils: the mean of the last step, and sums until they are reset."""
 
-    mean_current_A: NDArray[np.float64]  # (n,) over the last physics step; acts on the rotor
-    copper_J: NDArray[np.float64]  # (n,) loss in the coils
-    work_J: NDArray[np.float64]  # (n,) electrical energy at the terminals of the coils
-    voltage_limited_s: NDArray[np.float64]  # (n,) time with the voltage at a limit
-    current_limited_s: NDArray[np.float64]  # (n,) time with a setpoint beyond the current limit
+    mean_current_A: Array = field("over the last physics step; acts on the rotor", "A", "groups")
+    copper_J: Array = field("loss in the coils", "J", "groups")
+    work_J: Array = field("electrical energy at the terminals of the coils", "J", "groups")
+    voltage_limited_s: Array = field("time with the voltage at a limit", "s", "groups")
+    current_limited_s: Array = field("time with a setpoint beyond the current limit", "s", "groups")
 
 
-def amplifier(
-    section: AmplifierSection, current_limit_A: float, step_s: float, groups: int, seed: int
-) -> Amplifier:
-    """Return the amplifiers of all groups for a current limit (A) and a physics step (s).
+def fill_amplifier(
+    rows: Rows, section: AmplifierSection, current_limit_A: float, step_s: float, seed: int
+) -> None:
+    """Fill the amplifiers of all groups for a current limit (A) and a physics step (s).
 
     Offsets are drawn uniformly within their bound, each from a separate stream.
     """
-    drawn = (
-        errors(seed, "drive.amplifier", groups, 1)[:, 0] if section.amplifier_offset_V else np.zeros(groups)
-    )
-    supply_V = inf if section.supply_V is None else section.supply_V
-    return Amplifier(
-        supplied=section.supply_V is not None,
-        highest_V=supply_V - section.drop_up_V,
-        lowest_V=section.drop_down_V - supply_V,
-        bandwidth_rad_s=section.bandwidth_rad_s,
-        current_limit_A=current_limit_A,
-        step_s=step_s,
-        following=relaxation(section.bandwidth_rad_s * step_s),
-        offset_A=section.amplifier_offset_V * section.transconductance_A_V * drawn,
-    )
+    if section.amplifier_offset_V:
+        drawn = errors(seed, "drive.amplifier", rows["offset_A"].shape[1], 1)[:, 0]
+        rows["offset_A"] = section.amplifier_offset_V * section.transconductance_A_V * drawn
+    rows["supply_V"] = inf if section.supply_V is None else section.supply_V
+    rows["drop_up_V"], rows["drop_down_V"] = section.drop_up_V, section.drop_down_V
+    rows["bandwidth_rad_s"], rows["current_limit_A"] = section.bandwidth_rad_s, current_limit_A
+    fill_step(rows["whole"], section, step_s)
+    for amplifier in rows:
+        set_supply(amplifier, amplifier.supply_V)
+
+
+def fill_step(rows: Rows, section: AmplifierSection, step_s: float) -> None:
+    """Fill a step of the amplifiers."""
+    rows["step_s"], rows["following"] = step_s, relaxation(section.bandwidth_rad_s * step_s)
 
 
 @inlined
-def with_supply(amplifier: Amplifier, more_V: float) -> Amplifier:
-    """Return amplifiers with a supply that is higher by `more_V`; without a swing below their drops."""
-    if more_V == 0.0:
-        return amplifier
-    return Amplifier(
-        amplifier.supplied,
-        max(amplifier.highest_V + more_V, 0.0),
-        min(amplifier.lowest_V - more_V, 0.0),
-        amplifier.bandwidth_rad_s,
-        amplifier.current_limit_A,
-        amplifier.step_s,
-        amplifier.following,
-        amplifier.offset_A,
-    )
-
-
-def zero_flow(groups: int) -> Flow:
-    """Return a flow with all sums at 0."""
-    return Flow(*np.zeros((len(Flow._fields), groups)))
+def set_supply(amplifier: Amplifier, supply_V: float) -> None:
+    """Set the supply of a control period; below the drops there is no swing."""
+    amplifier.highest_V = max(supply_V - amplifier.drop_up_V, 0.0)
+    amplifier.lowest_V = min(amplifier.drop_down_V - supply_V, 0.0)
 
 
 @inlined
@@ -189,17 +187,19 @@ class Phase(NamedTuple):
 @inlined
 def drive_coils(
     amplifier: Amplifier,
+    step: Step,
     coil: GroupCoils,
-    setpoint: NDArray[np.float64],
-    emf: NDArray[np.float64],
-    current: NDArray[np.float64],
+    setpoint: Array,
+    emf: Array,
+    current: Array,
     flow: Flow,
 ) -> None:
-    """Advance the currents by one physics step.
+    """Advance the currents by one step.
 
     Parameters
     ----------
     amplifier : Amplifier
+    step : Step
     coil : GroupCoils
         Temperatures do not change here: `coil.advance_temperature` advances them.
     asked : (n,) array, A
@@ -215,19 +215,27 @@ def drive_coils(
     groups = current.shape[0]
     left = groups % WIDTH
     for j in range(0, groups - left, WIDTH):
-        if not _follow_four(amplifier, coil, setpoint, emf, current, flow, j):
+        if not _follow_four(amplifier, step, coil, setpoint, emf, current, flow, j):
             for group in range(j, j + WIDTH):
-                _drive_group(amplifier, coil, setpoint, emf, current, flow, group)
+                _drive_group(amplifier, step, coil, setpoint, emf, current, flow, group)
     for group in range(groups - left, groups):
-        _drive_group(amplifier, coil, setpoint, emf, current, flow, group)
+        _drive_group(amplifier, step, coil, setpoint, emf, current, flow, group)
 
 
 @inlined
 def _follow_four(
-    amplifier: Amplifier, coil: GroupCoils, setpoint: Array, emf: Array, current: Array, flow: Flow, j: int
+    amplifier: Amplifier,
+    step: Step,
+    coil: GroupCoils,
+    setpoint: Array,
+    emf: Array,
+    current: Array,
+    flow: Flow,
+    j: int,
 ) -> bool:
     """Advance four groups from j on if none of them reaches a limit; otherwise return False."""
-    h, limit, highest, lowest = _step_and_limits(amplifier)
+    h, limit = step.step_s, amplifier.current_limit_A
+    highest, lowest = amplifier.highest_V, amplifier.lowest_V
     start, R, e = load(current, j), load(coil.resistance_ohm, j), load(emf, j)
     target = load(setpoint, j) + load(amplifier.offset_A, j)
     volts = R * start + load(coil.inductance_H, j) * amplifier.bandwidth_rad_s * (target - start) + e
@@ -239,7 +247,7 @@ def _follow_four(
         and within(last_volts, lowest, highest)
     ):
         return False
-    whole = _phase(amplifier.following, h, start, target, volts, last_volts)
+    whole = _phase(_following(step), h, start, target, volts, last_volts)
     store(whole.current_A, current, j)
     store(whole.charge_As * (1.0 / h), flow.mean_current_A, j)
     store(load(flow.copper_J, j) + R * whole.square_A2s, flow.copper_J, j)
@@ -249,10 +257,18 @@ def _follow_four(
 
 @inlined
 def _drive_group(
-    amplifier: Amplifier, coil: GroupCoils, setpoint: Array, emf: Array, current: Array, flow: Flow, j: int
+    amplifier: Amplifier,
+    step: Step,
+    coil: GroupCoils,
+    setpoint: Array,
+    emf: Array,
+    current: Array,
+    flow: Flow,
+    j: int,
 ) -> None:
     """Advance one group."""
-    h, limit, highest, lowest = _step_and_limits(amplifier)
+    h, limit = step.step_s, amplifier.current_limit_A
+    highest, lowest = amplifier.highest_V, amplifier.lowest_V
     unlimited = setpoint[j] + amplifier.offset_A[j]
     target = min(max(unlimited, -limit), limit)
     e = min(max(emf[j], -LARGEST_EMF_V), LARGEST_EMF_V)
@@ -260,9 +276,9 @@ def _drive_group(
     volts = R * start + coil.inductance_H[j] * amplifier.bandwidth_rad_s * (target - start) + e
     last_volts = R * target + e
     if lowest <= volts <= highest and lowest <= last_volts <= highest:
-        whole = _phase(amplifier.following, h, start, target, volts, last_volts)
+        whole = _phase(_following(step), h, start, target, volts, last_volts)
     else:
-        whole, limited_s = _within_limits(amplifier, coil.inductance_H[j], R, e, target, start)
+        whole, limited_s = _within_limits(amplifier, step, coil.inductance_H[j], R, e, target, start)
         flow.voltage_limited_s[j] += limited_s
     current[j] = whole.current_A
     flow.mean_current_A[j] = whole.charge_As * (1.0 / h)
@@ -273,8 +289,9 @@ def _drive_group(
 
 
 @inlined
-def _step_and_limits(amplifier: Amplifier) -> tuple[float, float, float, float]:
-    return amplifier.step_s, amplifier.current_limit_A, amplifier.highest_V, amplifier.lowest_V
+def _following(step: Step) -> Relaxation:
+    shares = step.following
+    return Relaxation(shares[0], shares[1], shares[2], shares[3], shares[4])
 
 
 @inlined
@@ -304,12 +321,18 @@ def _phase(
 
 @inlined
 def _within_limits(
-    amplifier: Amplifier, inductance_H: float, R: float, e: float, target: float, start: float
+    amplifier: Amplifier,
+    step: Step,
+    inductance_H: float,
+    R: float,
+    e: float,
+    target: float,
+    start: float,
 ) -> tuple[Phase, float]:
     """Return one step of a group, phase by phase, and its time with the voltage at a limit."""
     rate, highest, lowest = amplifier.bandwidth_rad_s, amplifier.highest_V, amplifier.lowest_V
     stiffness = inductance_H * rate
-    left, limited = amplifier.step_s, 0.0
+    left, limited = step.step_s, 0.0
     volts = R * start + stiffness * (target - start) + e
     last_volts = R * target + e
     if isnan(volts + last_volts):  # while following, the current would not depend on the back-EMF
@@ -330,7 +353,7 @@ def _within_limits(
     duration = left
     if last_volts > highest or last_volts < lowest:
         duration = _time_to_zero(volts - limit, last_volts - limit, 1.0 / rate, left)
-    shares = amplifier.following if duration == amplifier.step_s else relaxation(rate * duration)
+    shares = _following(step) if duration == step.step_s else relaxation(rate * duration)
     passed = _added(passed, _phase(shares, duration, passed.current_A, target, volts, last_volts))
     left -= duration
 
@@ -369,9 +392,6 @@ def _added(passed: Phase, more: Phase) -> Phase:
         passed.square_A2s + more.square_A2s,
         passed.work_J + more.work_J,
     )
-
-
-Array = NDArray[np.float64]
 
 
 @inlined

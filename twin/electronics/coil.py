@@ -17,7 +17,11 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from spheretwin.control.applied_torque import lag_step
 from spheretwin.models.base.compiled import inlined
+from spheretwin.models.base.record import Record, Rows, field
 from spheretwin.models.coil_group import PerGroup, of_each_group
+
+Array = NDArray[np.float64]
+Integers = NDArray[np.int64]
 
 # Terms -(-x)**n / (n + 1)! and (-x)**n (2**n - 2) / (n + 1)!, without (-x)**n and with the sign of the first;
 # up to x = 1/4, the omitted terms are beyond the last digit.
@@ -136,59 +140,49 @@ class CoilSection(BaseModel):
     )
 
 
-class GroupCoils(NamedTuple):
-    """Coils of all groups, for compiled code."""
+class GroupCoils(Record):
+    """Coils of all groups."""
 
-    inductance_H: NDArray[np.float64]  # (n,)
-    cold_resistance_ohm: NDArray[np.float64]  # (n,) at `REFERENCE_degC`
-    resistance_per_K: NDArray[np.float64]  # (n,)
-    thermal_resistance_K_W: NDArray[np.float64]  # (n,)
-    shutdown_degC: NDArray[np.float64]  # (n,) infinite if there is none
-    settled: NDArray[np.float64]  # (n,) share of the way to the final temperature in a control period
-    period_s: float
-    temperature_degC: NDArray[np.float64]  # (n,) present temperature
-    resistance_ohm: NDArray[np.float64]  # (n,) at that temperature
-    surroundings_degC: NDArray[np.float64]  # (1,) ambient temperature, or that of a stator
-    contact: NDArray[np.int64]  # (n,) `DRIVEN`, `OPEN` or `SHORTED`, by faults
-
-    def state_arrays(self) -> tuple[NDArray[Any], ...]:
-        """Return the arrays with the state."""
-        return self.temperature_degC, self.resistance_ohm
-
-    def fault_arrays(self) -> tuple[NDArray[Any], ...]:
-        """Return the arrays that faults write."""
-        return (self.contact,)
+    inductance_H: Array = field("inductance", "H", "groups")
+    cold_resistance_ohm: Array = field("resistance at `REFERENCE_degC`", "ohm", "groups")
+    resistance_per_K: Array = field("relative rise of the resistance", "1/K", "groups")
+    thermal_resistance_K_W: Array = field("from a group to its surroundings", "K/W", "groups")
+    shutdown_degC: Array = field("temperature of a shutdown; infinite if there is none", "°C", "groups")
+    settled: Array = field("share of the way to the final temperature in a control period", "", "groups")
+    period_s: float = field("control period", "s")
+    temperature_degC: Array = field("present temperature", "°C", "groups", state=True)
+    resistance_ohm: Array = field("resistance at that temperature", "ohm", "groups", state=True)
+    surroundings_degC: float = field("ambient temperature, or that of a stator", "°C")
+    contact: Integers = field("`DRIVEN`, `OPEN` or `SHORTED`", "", "groups", fault=True)
 
 
-def group_coils(section: Any, period_s: float, groups: int) -> GroupCoils:
-    """Return coils at ambient temperature.
+def fill_coils(rows: Rows, section: Any, period_s: float) -> None:
+    """Fill the coils, at ambient temperature.
 
     Parameters
     ----------
+    rows : array of GroupCoils
     section : CoilSection
         With every value given, except that of no shutdown.
     period_s : float, s
         Control period, in which the temperature advances once.
-    groups : int
     """
+    groups = rows["settled"].shape[1]
     thermal_K_W = of_each_group(section.thermal_resistance_K_W, groups)
     time_constants_s = thermal_K_W * of_each_group(section.heat_capacity_J_K, groups)
-    shares = [relaxation(period_s / time_s).settled if time_s > 0 else 1.0 for time_s in time_constants_s]
-    coils = GroupCoils(
-        inductance_H=of_each_group(section.inductance_H, groups),
-        cold_resistance_ohm=of_each_group(section.resistance_ohm, groups),
-        resistance_per_K=of_each_group(section.resistance_per_K, groups),
-        thermal_resistance_K_W=thermal_K_W,
-        shutdown_degC=of_each_group(inf if section.shutdown_degC is None else section.shutdown_degC, groups),
-        settled=np.array(shares),
-        period_s=period_s,
-        temperature_degC=np.full(groups, section.ambient_degC),
-        resistance_ohm=np.empty(groups),
-        surroundings_degC=np.full(1, section.ambient_degC),
-        contact=np.full(groups, DRIVEN, dtype=np.int64),
-    )
-    update_resistance(coils)
-    return coils
+    rows["settled"] = [
+        relaxation(period_s / time_s).settled if time_s > 0 else 1.0 for time_s in time_constants_s
+    ]
+    for name in ("inductance_H", "resistance_per_K"):
+        rows[name] = of_each_group(getattr(section, name), groups)
+    rows["cold_resistance_ohm"] = of_each_group(section.resistance_ohm, groups)
+    rows["thermal_resistance_K_W"] = thermal_K_W
+    shutdown_degC = inf if section.shutdown_degC is None else section.shutdown_degC
+    rows["shutdown_degC"] = of_each_group(shutdown_degC, groups)
+    rows["period_s"] = period_s
+    rows["temperature_degC"] = rows["surroundings_degC"][:, None] = section.ambient_degC
+    for coils in rows:
+        update_resistance(coils)
 
 
 @inlined
@@ -200,7 +194,7 @@ def update_resistance(coil: GroupCoils) -> None:
 
 
 @inlined
-def advance_temperature(coil: GroupCoils, copper_J: NDArray[np.float64]) -> None:
+def advance_temperature(coil: GroupCoils, copper_J: Array) -> None:
     """Advance temperature and resistance by one control period, exactly for the mean power in it.
 
     Parameters
@@ -212,7 +206,7 @@ def advance_temperature(coil: GroupCoils, copper_J: NDArray[np.float64]) -> None
     """
     for j in range(copper_J.shape[0]):
         power = copper_J[j] / coil.period_s
-        last = coil.surroundings_degC[0] + coil.thermal_resistance_K_W[j] * power
+        last = coil.surroundings_degC + coil.thermal_resistance_K_W[j] * power
         coil.temperature_degC[j] += (last - coil.temperature_degC[j]) * coil.settled[j]
     update_resistance(coil)
 
@@ -228,10 +222,10 @@ def is_overheated(coil: GroupCoils) -> bool:
 
 @inlined
 def back_emf(
-    torque_matrix: NDArray[np.float64],
-    gain: NDArray[np.float64],
-    rate_S: NDArray[np.float64],
-    emf: NDArray[np.float64],
+    torque_matrix: Array,
+    gain: Array,
+    rate_S: Array,
+    emf: Array,
 ) -> None:
     """Compute the back-EMF ``e = G_t^T w`` with the true torque matrix.
 
@@ -251,28 +245,27 @@ def back_emf(
         emf[j] = gain[j] * (torque_matrix[0, j] * x + torque_matrix[1, j] * y + torque_matrix[2, j] * z)
 
 
-class CurrentLag(NamedTuple):
+class CurrentLag(Record):
     """First-order lag, solved exactly over one physics step with the command held."""
 
-    decay: NDArray[np.float64]
-    """(n,) share of the distance to the command that remains after a step."""
-    mean_share: NDArray[np.float64]
-    """(n,) share of that distance that remains on average over the step."""
-    current_limit_A: float
-    """Limit of the amplifiers, for any command."""
+    decay: Array = field("share of the distance to the command that remains after a step", "", "groups")
+    mean_share: Array = field("share of it that remains on average over the step", "", "groups")
+    current_limit_A: float = field("limit of the amplifiers, for any command", "A")
 
 
-def current_lag(time_constant_s: PerGroup, step_s: float, current_limit_A: float, groups: int) -> CurrentLag:
-    """Return the lag for time constants L/R (s; 0: ideal amplifiers), a physics step (s) and a limit (A)."""
-    return CurrentLag(*lag_step(step_s, time_constant_s, groups), current_limit_A)
+def fill_lag(rows: Rows, time_constant_s: PerGroup, step_s: float, current_limit_A: float) -> None:
+    """Fill the lag for time constants L/R (s; 0: ideal amplifiers), a physics step (s) and a limit (A)."""
+    groups = rows["decay"].shape[1]
+    rows["decay"], rows["mean_share"] = lag_step(step_s, time_constant_s, groups)
+    rows["current_limit_A"] = current_limit_A
 
 
 @inlined
 def advance_lag(
     lag: CurrentLag,
-    command: NDArray[np.float64],
-    current: NDArray[np.float64],
-    mean: NDArray[np.float64],
+    command: Array,
+    current: Array,
+    mean: Array,
 ) -> None:
     """Advance the currents by one physics step.
 

@@ -21,16 +21,15 @@ took 27 to 65 times as long: under `afsm_eso` on the prototype some group is at 
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 from numpy.typing import NDArray
 
-from spheretwin.electronics.amplifier import Amplifier
-from spheretwin.electronics.coil import GroupCoils, relaxation
+from spheretwin.electronics.amplifier import Amplifier, Step, fill_step
+from spheretwin.electronics.coil import GroupCoils
 from spheretwin.electronics.drive_section import ResolvedDrive
 from spheretwin.models.base.compiled import inlined
 from spheretwin.models.base.errors import InputError, distinct_texts
+from spheretwin.models.base.record import Record, Rows, field
 from spheretwin.models.coil_group import of_each_group
 
 Array = NDArray[np.float64]
@@ -46,29 +45,26 @@ TOLERANCE_A = 1e-6
 MOST_SWEEPS = 30
 
 
-class Coupling(NamedTuple):
-    """Coupling of all groups, for compiled code."""
+class Coupling(Record):
+    """Coupling of all groups."""
 
-    amplifiers: tuple[Amplifier, Amplifier]  # for the two parts of a physics step
-    mutual_H: Array  # (n, n)
-    own_emf: Array  # (n,) V, by the motion of the rotor
-    change_A: Array  # (n,) changes of the currents in a part that the induced voltages belong to
-    charge_As: Array  # (n,) of the parts of this step
-
-
-def coupling(section: ResolvedDrive, mutual_H: Array | None, amplifier: Amplifier) -> Coupling | None:
-    """Return the coupling of the groups of a drive; None without mutual inductance (n, n), H."""
-    if mutual_H is None:
-        return None
-    check_coupling(section, mutual_H)
-    rate, step_s = amplifier.bandwidth_rad_s, amplifier.step_s
-    first_s = min(FIRST_PART / rate, step_s / 2)
-    first, second = (
-        amplifier._replace(step_s=part_s, following=relaxation(rate * part_s))
-        for part_s in (first_s, step_s - first_s)
+    on: bool = field("whether the groups are coupled")
+    parts: Step = field("the two parts of a physics step", shape=2)
+    mutual_H: Array = field("mutual inductances", "H", ("groups", "groups"))
+    own_emf: Array = field("EMF by the motion of the rotor", "V", "groups")
+    change_A: Array = field(
+        "changes of the currents in a part that the induced voltages belong to", "A", "groups"
     )
-    mutual = section.coil_coupling * mutual_H
-    return Coupling((first, second), mutual, *np.zeros((3, len(mutual))))
+    charge_As: Array = field("of the parts of this step", "As", "groups")
+
+
+def fill_coupling(rows: Rows, section: ResolvedDrive, mutual_H: Array, step_s: float) -> None:
+    """Fill the coupling of the groups of a drive with mutual inductances (n, n), H."""
+    check_coupling(section, mutual_H)
+    first_s = min(FIRST_PART / section.bandwidth_rad_s, step_s / 2)
+    fill_step(rows["parts"][:, 0], section, first_s)
+    fill_step(rows["parts"][:, 1], section, step_s - first_s)
+    rows["on"], rows["mutual_H"] = True, section.coil_coupling * mutual_H
 
 
 def check_coupling(section: ResolvedDrive, mutual_H: Array) -> None:
@@ -93,15 +89,20 @@ def check_coupling(section: ResolvedDrive, mutual_H: Array) -> None:
 
 @inlined
 def predict_changes(
-    coupling: Coupling, amplifier: Amplifier, coil: GroupCoils, setpoint: Array, current: Array
+    coupling: Coupling,
+    amplifier: Amplifier,
+    step: Step,
+    coil: GroupCoils,
+    setpoint: Array,
+    current: Array,
 ) -> None:
     """Predict the changes of the currents: those of uncoupled groups that are at a limit never or always."""
     limit = amplifier.current_limit_A
     for j in range(current.shape[0]):
-        per_volt = amplifier.step_s / coil.inductance_H[j]
+        per_volt = step.step_s / coil.inductance_H[j]
         target = min(max(setpoint[j] + amplifier.offset_A[j], -limit), limit)
         opposed = coil.resistance_ohm[j] * current[j] + coupling.own_emf[j]
-        change = amplifier.following.settled * (target - current[j])
+        change = step.following[0] * (target - current[j])
         change = min(change, per_volt * max(amplifier.highest_V - opposed, 0.0))
         coupling.change_A[j] = max(change, per_volt * min(amplifier.lowest_V - opposed, 0.0))
 

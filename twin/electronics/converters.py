@@ -17,7 +17,7 @@ Settling (20 µs) and glitches are neglected: a few hundredths of a physics step
 from __future__ import annotations
 
 from math import hypot, isnan, nan
-from typing import Annotated, Any, ClassVar, NamedTuple
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,20 +31,46 @@ from spheretwin.electronics.stages import (
     SensorSetup,
     SensorStage,
     TickNoise,
-    fault_line,
+    fill_fault_line,
     through,
 )
 from spheretwin.electronics.transducers import CHANNELS
 from spheretwin.models.base.compiled import inlined
+from spheretwin.models.base.record import Record, Rows, field
 from spheretwin.models.base.state import push
 
+Array = NDArray[np.float64]
+
 HARMONICS = 3
+
+
+class Dac(Record):
+    """Converter of the commands, one channel for each group."""
+
+    converts: bool = field("false if a command passes unchanged")
+    transconductance_A_V: float = field("of the amplifiers that follow", "A/V")
+    span_A: float = field("twice the range as a current: beyond every code", "A")
+    lsb_V: float = field("voltage of a code", "V")
+    lowest: float = field("lowest code")
+    highest: float = field("highest code")
+    offset_V: Array = field("offset of a channel", "V", "groups")
+    gain: Array = field("gain of a channel; 1 without an error", "", "groups")
+    inl_lsb: Array = field("amplitudes of the integral nonlinearity", "LSB", ("groups", HARMONICS))
+
+
+class DacStage(Record):
+    """Converter as a stage of the drive."""
+
+    on: bool = field("whether the stage changes a command")
+    dac: Dac = field("converter")
+    line: FaultLine = field("of the setpoint, A", channels="groups")
 
 
 class DacSection(DriveStage):
     """Parameters of the converter of the commands, one channel for each group; ideal with 0 bits."""
 
     stage: ClassVar[str] = "dac"
+    record: ClassVar[type[Record]] = DacStage
     dac_bits: Annotated[int, Field(ge=0, le=32)] = Field(
         0,
         description="bits of a code; with 0 the converter is ideal, without range and errors"
@@ -78,12 +104,11 @@ class DacSection(DriveStage):
         return bool(section.dac_bits == 0)
 
     @staticmethod
-    def build(section: Any, setup: DriveSetup) -> Any:
-        """Return the converter for amplifiers of the transconductance of the section."""
-        converter = dac(section, section.transconductance_A_V, setup.groups, setup.seed)
-        return DacStage(
-            converter.converts or setup.faults, converter, fault_line(setup.groups * setup.faults, 0.0)
-        )
+    def fill(rows: Rows, section: Any, setup: DriveSetup) -> None:
+        """Fill the converter, for amplifiers of the transconductance of the section."""
+        fill_dac(rows["dac"], section, section.transconductance_A_V, setup.seed)
+        rows["on"] = section.dac_bits > 0 or setup.faults
+        fill_fault_line(rows["line"], 0.0)
 
     @staticmethod
     def convert() -> Any:
@@ -91,60 +116,35 @@ class DacSection(DriveStage):
         return convert_command
 
 
-class DacStage(NamedTuple):
-    """Converter as a stage of the drive."""
-
-    on: bool
-    dac: Dac
-    line: FaultLine  # of the setpoint, A
-
-
 @inlined
-def convert_command(stage: DacStage, setpoint: NDArray[np.float64], draws: NDArray[np.float64]) -> None:
+def convert_command(stage: DacStage, setpoint: Array, draws: Array) -> None:
     """Convert a command (n,), A, in place."""
     convert(stage.dac, setpoint, setpoint)
 
 
-class Dac(NamedTuple):
-    """Converter of a run, for compiled code."""
-
-    converts: bool  # false if a command passes unchanged
-    transconductance_A_V: float
-    span_A: float  # twice the range as a current: beyond every code
-    lsb_V: float
-    lowest: float  # code
-    highest: float
-    offset_V: NDArray[np.float64]  # (n,)
-    gain: NDArray[np.float64]  # (n,) 1 without an error
-    inl_lsb: NDArray[np.float64]  # (n, HARMONICS) a_n
-
-
-def dac(section: DacSection, transconductance_A_V: float, groups: int, seed: int) -> Dac:
-    """Return the converter for amplifiers of a transconductance (A/V), one channel for each group.
+def fill_dac(rows: Rows, section: DacSection, transconductance_A_V: float, seed: int) -> None:
+    """Fill the converter for amplifiers of a transconductance (A/V), one channel for each group.
 
     The errors of a channel are drawn uniformly within their bounds; the INL curve stays within its bound for
     every code. Each channel has its own stream: no field, group or other stage changes its numbers.
     """
+    groups = rows["gain"].shape[1]
     drawn = np.zeros((groups, 2 + HARMONICS))
     if section.dac_bits:  # an ideal converter needs no numbers
         drawn = errors(seed, "drive.dac", groups, 2 + HARMONICS)
     harmonics = drawn[:, 2:] / np.maximum(1.0, np.abs(drawn[:, 2:]).sum(axis=1, keepdims=True))
     codes = 2.0**section.dac_bits
-    return Dac(
-        converts=section.dac_bits > 0,
-        transconductance_A_V=transconductance_A_V,
-        span_A=2 * section.dac_range_V * transconductance_A_V,
-        lsb_V=2 * section.dac_range_V / codes,
-        lowest=-codes / 2,
-        highest=codes / 2 - 1,
-        offset_V=section.dac_offset_V * drawn[:, 0],
-        gain=1 + section.dac_gain_error * drawn[:, 1],
-        inl_lsb=section.dac_inl_lsb * harmonics,
-    )
+    rows["converts"], rows["transconductance_A_V"] = section.dac_bits > 0, transconductance_A_V
+    rows["span_A"] = 2 * section.dac_range_V * transconductance_A_V
+    rows["lsb_V"] = 2 * section.dac_range_V / codes
+    rows["lowest"], rows["highest"] = -codes / 2, codes / 2 - 1
+    rows["offset_V"] = section.dac_offset_V * drawn[:, 0]
+    rows["gain"] = 1 + section.dac_gain_error * drawn[:, 1]
+    rows["inl_lsb"] = section.dac_inl_lsb * harmonics
 
 
 @inlined
-def convert(dac: Dac, command: NDArray[np.float64], setpoint: NDArray[np.float64]) -> None:
+def convert(dac: Dac, command: Array, setpoint: Array) -> None:
     """Convert a command.
 
     The result depends only on the command: the function may be called when a command becomes active, or once
@@ -172,7 +172,7 @@ def convert(dac: Dac, command: NDArray[np.float64], setpoint: NDArray[np.float64
 
 
 @inlined
-def _inl(amplitudes: NDArray[np.float64], place: float) -> float:
+def _inl(amplitudes: Array, place: float) -> float:
     """Return ``sum(a_n sin(p) sin(n p))`` with cos(p) the position of a code, -1 to 1.
 
     ``sin(n p) / sin(p)`` is Chebyshev's polynomial of the second kind, here by its recurrence.
@@ -194,12 +194,44 @@ CONVERSION_s = 4e-6
 MOST_CONVERSIONS = 250
 
 
+class Adc(Record):
+    """Channel of the converter of the measured voltages."""
+
+    step_V: float = field("voltage of a code; 0 without steps", "V")
+    lowest: float = field("lowest code")
+    highest: float = field("highest code")
+    gain: float = field("gain; 1 without an error")
+    offset_V: float = field("offset at the input", "V")
+
+
+class Adcs(Record):
+    """Converter of the measured voltages."""
+
+    on: bool = field("whether the stage changes the angles")
+    converts: bool = field("false if the converter is ideal")
+    volts_per_rad: float = field("nominal slope of the tracks", "V/rad")
+    channels: Adc = field("of α and β", shape=CHANNELS)
+    noise_V: float = field("of wiper and conversion together, rms, at the input", "V")
+    first_draw: int = field("first random number")
+    end_draw: int = field("end of the random numbers")
+    line: FaultLine = field("of the converted angle, in rad of the nominal slope", channels=CHANNELS)
+    delayed_rad: Array = field(
+        "angles of the last ticks, newest first; NaN at first",
+        "rad",
+        ("delays", CHANNELS),
+        state=True,
+    )
+    delay_ticks: int = field("additional delay of a fault", "control periods", fault=True)
+
+
 class AdcSection(SensorStage):
     """Parameters of the converter of α and β; ideal if bits, offset, gain error, noise and skew are 0.
 
     All channels and the count of the encoder are sampled at the control tick, unless there is a skew; the
     samples are converted once or several times within the period.
     """
+
+    record: ClassVar[type[Record]] = Adcs
 
     bits: Annotated[int, Field(ge=0, le=32)] = Field(
         0, description="resolution; 0 for neither steps nor limits (ADS8364's sheet: 16)"
@@ -239,23 +271,19 @@ class AdcSection(SensorStage):
         errors = (self.bits, self.offset_V, self.gain_error, self.noise_V, self.skew_s)
         return not any(errors)
 
-    def build(self, setup: SensorSetup) -> Adcs:
-        """Return the channels with errors from the seed; they also convert if the tracks have errors."""
-        track, longest_delay = setup.sensors.potentiometer, setup.longest_delay_ticks
+    def fill(self, rows: Rows, setup: SensorSetup) -> None:
+        """Fill the channels, with errors from the seed; they also convert if the tracks have errors."""
+        track = setup.sensors.potentiometer
         converts = not (self.ideal and track.ideal)
         shares = errors(setup.seed, setup.name, CHANNELS, ERRORS)
-        return Adcs(
-            converts or setup.faults,
-            converts,
-            track.volts_per_rad,
-            (adc(self, shares[0]), adc(self, shares[1])),
-            self.input_noise_V(setup.sensors),
-            setup.first_draw,
-            setup.first_draw + self.draws(setup.sensors),
-            fault_line(CHANNELS),
-            np.full((longest_delay + 1, CHANNELS), nan),
-            np.zeros(1, dtype=np.int64),
-        )
+        rows["on"], rows["converts"] = converts or setup.faults, converts
+        rows["volts_per_rad"], rows["noise_V"] = track.volts_per_rad, self.input_noise_V(setup.sensors)
+        for channel in range(CHANNELS):
+            fill_adc(rows["channels"][:, channel], self, shares[channel])
+        rows["first_draw"] = setup.first_draw
+        rows["end_draw"] = setup.first_draw + self.draws(setup.sensors)
+        fill_fault_line(rows["line"])
+        rows["delayed_rad"] = nan
 
     @classmethod
     def function(cls) -> Any:
@@ -277,31 +305,8 @@ class AdcSection(SensorStage):
         return 2 * self.range_V / 2**self.bits if self.bits else 0.0
 
 
-class Adcs(NamedTuple):
-    """Analogue-to-digital converter, for compiled code."""
-
-    on: bool
-    converts: bool  # false if the converter is ideal
-    volts_per_rad: float
-    channels: tuple[Adc, Adc]
-    noise_V: float  # of the wiper and of the conversion together, rms, at the input
-    first_draw: int
-    end_draw: int
-    line: FaultLine  # of the converted angle, in rad of the nominal slope
-    delayed_rad: NDArray[np.float64]  # (m, 2) of the last ticks, newest first; NaN before the first
-    delay_ticks: NDArray[np.int64]  # (1,) additional delay of a fault
-
-    def state_arrays(self) -> tuple[Any, ...]:
-        """Return the arrays with the state."""
-        return self.line, self.delayed_rad
-
-    def fault_arrays(self) -> tuple[Any, ...]:
-        """Return the arrays that faults write."""
-        return self.line, self.delay_ticks
-
-
 @inlined
-def pass_adcs(stage: Adcs, measurement: NDArray[np.float64], noise: TickNoise) -> None:
+def pass_adcs(stage: Adcs, measurement: Array, noise: TickNoise) -> None:
     """Replace α and β by the angles, rad, that the controller computes from the converted voltages."""
     for channel in range(CHANNELS):
         angle = measurement[0, channel]
@@ -319,43 +324,26 @@ def _delayed(stage: Adcs, channel: int, angle: float) -> float:
     history = stage.delayed_rad
     for _ in range(history.shape[0] if isnan(history[0, channel]) else 1):  # the first angle fills all rows
         push(history, channel, angle)
-    return history[stage.delay_ticks[0], channel]
+    return history[stage.delay_ticks, channel]
 
 
-class Adc(NamedTuple):
-    """Channel of the analogue-to-digital converter, for compiled code."""
-
-    step_V: float  # 0 without steps
-    lowest: float  # code
-    highest: float
-    gain: float
-    offset_V: float
-
-
-def adc(section: AdcSection, shares: NDArray[np.float64]) -> Adc:
-    """Return a channel with its own offset and gain error.
+def fill_adc(rows: Rows, section: AdcSection, shares: Array) -> None:
+    """Fill a channel with its own offset and gain error.
 
     Parameters
     ----------
+    rows : array of Adc
     section : AdcSection
     shares : (`ERRORS`,) array
         Shares of the largest offset and of the largest gain error, -1 to 1, drawn for this channel.
     """
-    offset, gain = shares.tolist()
     half = 2.0 ** (section.bits - 1)
-    return Adc(
-        section.step_V,
-        -half,
-        half - 1,
-        1 + section.gain_error * gain,
-        section.offset_V * offset,
-    )
+    rows["step_V"], rows["lowest"], rows["highest"] = section.step_V, -half, half - 1
+    rows["offset_V"], rows["gain"] = section.offset_V * shares[0], 1 + section.gain_error * shares[1]
 
 
 @inlined
-def converted(
-    adc: Adc, held_V: float, noise_V: float, draws: NDArray[np.float64], first: int, stride: int
-) -> float:
+def converted(adc: Adc, held_V: float, noise_V: float, draws: Array, first: int, stride: int) -> float:
     """Return the mean voltage (V) of the codes of some conversions.
 
     Codes are mid-tread: the middle of a step is a whole number of LSB, and 0 V is a code. The codes are

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
-from typing import Annotated, NamedTuple
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field
 
 from spheretwin.models.base.compiled import inlined
+from spheretwin.models.base.record import Record, field
 from spheretwin.models.base.state import push_all
+
+Array = NDArray[np.float64]
 
 # Clock times are decimal fractions: a delay is a multiple of a step only up to rounding.
 WHOLE = 1e-9
@@ -30,30 +33,16 @@ class DelaySection(BaseModel):
     )
 
 
-class Delay(NamedTuple):
+class Delay(Record):
     """Delayed commands."""
 
-    history: NDArray[np.float64]  # (commands, n) A, newest first
-    steps: int  # of physics, from sample to output
-    substeps: int  # physics steps in a control period
-
-    def state_arrays(self) -> tuple[NDArray[np.float64], ...]:
-        """Return the arrays with the state."""
-        return (self.history,)
+    history: Array = field("commands, newest first", "A", ("delays", "groups"), state=True)
+    steps: int = field("physics steps from sample to output")
+    substeps: int = field("physics steps in a control period")
 
 
-def delay(section: DelaySection, step_s: float, substeps: int, groups: int) -> Delay:
-    """Return a delay; the output before the first command is 0 A.
-
-    Parameters
-    ----------
-    section : DelaySection
-    step_s : float, s
-        Physics step.
-    substeps : int
-        Physics steps in a control period.
-    groups : int
-        Length of a command.
+def steps_of(section: DelaySection, step_s: float, substeps: int) -> int:
+    """Return the physics steps (of step_s) of a delay.
 
     Raises
     ------
@@ -67,18 +56,22 @@ def delay(section: DelaySection, step_s: float, substeps: int, groups: int) -> D
             f"expected drive.delay_s a whole multiple of plant.step_s, at most {MOST_PERIODS} control"
             f" periods, received {section.delay_s!r} and {step_s!r} s"
         )
-    commands = -(-steps // substeps) + 1
-    return Delay(np.zeros((commands, groups)), steps, substeps)
+    return steps
+
+
+def stored_commands(steps: int, substeps: int) -> int:
+    """Return the commands that a delay of some physics steps stores."""
+    return -(-steps // substeps) + 1
 
 
 @inlined
-def latch(delay: Delay, command: NDArray[np.float64]) -> None:
+def latch(delay: Delay, command: Array) -> None:
     """Store the command (n,), A, that was computed from the sample of this control tick."""
     push_all(delay.history, command)
 
 
 @inlined
-def due(delay: Delay, substep: int, out: NDArray[np.float64]) -> None:
+def due(delay: Delay, more_steps: int, substep: int, out: Array) -> None:
     """Write the active command at a physics step of the period.
 
     The command of k periods ago is active from step ``steps - k substeps`` of this period on, until the next
@@ -88,12 +81,14 @@ def due(delay: Delay, substep: int, out: NDArray[np.float64]) -> None:
     ----------
     delay : Delay
         After `latch` of this control tick.
+    more_steps : int
+        Additional delay.
     substep : int
         From 0 to the number of physics steps of a period minus 1.
     out : (n,) array, A
         Result.
     """
-    missing = delay.steps - substep
+    missing = delay.steps + more_steps - substep
     ago = (missing + delay.substeps - 1) // delay.substeps if missing > 0 else 0
     for j in range(out.shape[0]):
         out[j] = delay.history[ago, j]

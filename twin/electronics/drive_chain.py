@@ -9,8 +9,7 @@ the controller its output.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,12 +17,12 @@ from numpy.typing import NDArray
 from spheretwin.electronics.amplifier import (
     Amplifier,
     Flow,
+    Step,
     advance_open_short,
-    amplifier,
     drive_coils,
+    fill_amplifier,
     reset_sums,
-    with_supply,
-    zero_flow,
+    set_supply,
 )
 from spheretwin.electronics.coil import (
     DRIVEN,
@@ -34,24 +33,24 @@ from spheretwin.electronics.coil import (
     advance_lag,
     advance_temperature,
     back_emf,
-    current_lag,
-    group_coils,
+    fill_coils,
+    fill_lag,
     is_overheated,
     update_resistance,
 )
 from spheretwin.electronics.coil_coupling import (
     MOST_SWEEPS,
     Coupling,
-    coupling,
+    fill_coupling,
     induce_voltages,
     predict_changes,
     update_changes,
 )
-from spheretwin.electronics.delay import Delay, delay, due, latch
+from spheretwin.electronics.delay import Delay, due, latch, steps_of, stored_commands
 from spheretwin.electronics.drive_section import STAGES, ResolvedDrive
-from spheretwin.electronics.stages import DriveSetup, FaultLine, chained, fault_line, through
-from spheretwin.models.base.compiled import copy_into, implements, inlined
-from spheretwin.models.base.state import transfer_state
+from spheretwin.electronics.stages import DriveSetup, FaultLine, chained, fill_fault_line, through
+from spheretwin.models.base.compiled import allocation_free, copy_into, inlined
+from spheretwin.models.base.record import Record, Rows, capacity, field, record_of, transfer_rows
 from spheretwin.models.kinematics import angular_velocity
 
 Array = NDArray[np.float64]
@@ -62,79 +61,70 @@ NORMAL, STUCK, SILENT = 0, 1, 2
 RELEASED, BRAKED = 1, 2
 """Requests of a watchdog: no currents, or shorted coils."""
 
-_NAMES = tuple(STAGES)
-_convert = chained([kind.convert() for kind in STAGES.values()])
-_advance = chained([kind.advance() for kind in STAGES.values()])
+DriveStages = record_of("DriveStages", "Stages of the drive.", {n: kind.record for n, kind in STAGES.items()})
+_convert = chained({name: kind.convert() for name, kind in STAGES.items()})
+_advance = chained({name: kind.advance() for name, kind in STAGES.items()})
 
 
-class ControllerOutput(NamedTuple):
+class ControllerOutput(Record):
     """Output of the controller, which faults and a watchdog act on."""
 
-    state: NDArray[np.int64]  # (1,) `NORMAL`, `STUCK` or `SILENT`
-    delay_steps: NDArray[np.int64]  # (1,) additional delay in physics steps
-    halt: NDArray[np.int64]  # (1,) request of a watchdog
-
-    def fault_arrays(self) -> tuple[NDArray[Any], ...]:
-        """Return the arrays that faults write."""
-        return self.state, self.delay_steps
+    state: int = field("`NORMAL`, `STUCK` or `SILENT`", fault=True)
+    delay_steps: int = field("additional delay", "physics steps", fault=True)
+    halt: int = field("request of a watchdog in this control period")
 
 
-class DriveChain(NamedTuple):
-    """All stages of the drive, for compiled code."""
+class Period(Record):
+    """Quantities of a control period."""
 
-    converts: bool  # true if the setpoint can differ from the command
-    supplied: bool  # true if the amplifiers have a supply, and the coils a voltage
-    supply_V: float
-    lag: CurrentLag
-    output: ControllerOutput
-    stages: tuple[Any, ...]  # in the order of `STAGES`
-    delay: Delay
-    supply: FaultLine  # of the supply voltage
-    amplifier: Amplifier
-    coil: GroupCoils
-    coupling: Coupling | None
-    flow: Flow
-    draws: Array  # standard normal numbers of this tick, of faults
-    setpoint: Array  # (n,) A, command at the input of the amplifiers
-    emf: Array  # (n,) V
-    rate_S: Array  # (3,) rad/s of the rotor, stator frame
-    period: (
-        Array  # (3,) of this control period: charge drawn in As, supply in V, 1 for an open or shorted group
-    )
-    before: Array  # (5, n) current and sums of the groups at step start
-
-    def stage(self, name: str) -> Any:
-        """Return the stage of a name."""
-        return self.stages[_NAMES.index(name)]
+    drawn_As: float = field("charge drawn from the supply", "As")
+    supply_V: float = field("supply", "V")
+    any_open_short: bool = field("whether a group is open or shorted")
 
 
-DRAWN_As, SUPPLY_V, OPEN_SHORT = 0, 1, 2
-"""Places in `DriveChain.period`."""
+class DriveChain(Record):
+    """All stages of the drive."""
+
+    converts: bool = field("whether the setpoint can differ from the command")
+    supplied: bool = field("whether the amplifiers have a supply, and the coils a voltage")
+    supply_V: float = field("supply without a fault; 0 without one", "V")
+    lag: CurrentLag = field("current lag of amplifiers without a supply")
+    output: ControllerOutput = field("output of the controller")
+    stages: DriveStages = field("in the order of `STAGES`")  # type: ignore[valid-type]
+    delay: Delay = field("delay of the commands")
+    supply: FaultLine = field("of the supply voltage", channels=1)
+    amplifier: Amplifier = field("amplifiers")
+    coil: GroupCoils = field("coils")
+    coupling: Coupling = field("coupling of the groups")
+    flow: Flow = field("currents and energies")
+    setpoint: Array = field("command at the input of the amplifiers", "A", "groups")
+    emf: Array = field("back-EMF", "V", "groups")
+    rate_S: Array = field("angular velocity of the rotor, stator frame", "rad/s", 3)
+    period: Period = field("of this control period")
+    before: Array = field("current and sums of the groups at step start", "", (5, "groups"))
 
 
 class DriveFaults(NamedTuple):
-    """Inputs of a drive chain with faults or a watchdog."""
+    """What can change the output of the controller besides its delay."""
 
-    scheduled: bool
-    """True if faults may occur; False if there is only a watchdog."""
-    longest_delay_steps: int
+    scheduled: bool = False
+    """True if faults may occur."""
+    longest_delay_steps: int = 0
     """Longest additional delay by faults, in physics steps."""
-    halt: NDArray[np.int64]
-    """(1,) written by a watchdog."""
-    draws: Array
-    """Random numbers of each tick, written by the loop."""
+    watchdog: bool = False
+    """True if a watchdog may halt the drive."""
 
 
-def drive_chain(
+def build_drive(
     section: ResolvedDrive,
     step_s: float,
     substeps: int,
     groups: int,
     seed: int,
-    faults: DriveFaults | None = None,
+    faults: DriveFaults = DriveFaults(),  # noqa: B008, it cannot change
     mutual_H: Array | None = None,
-) -> DriveChain:
-    """Return the drive chain at rest, with errors drawn from the seed.
+) -> Rows:
+    """Return the drive at rest, an array of one record, with errors drawn from the seed.
 
     Parameters
     ----------
@@ -146,8 +136,7 @@ def drive_chain(
     groups : int
     seed : int
         Seed of the run: the same seed gives the same prototype.
-    faults : DriveFaults, optional
-        None if nothing can fail.
+    faults : DriveFaults
     mutual_H : (n, n) array, H, optional
         Mutual inductance of the groups by the geometry; None without coupling.
 
@@ -156,70 +145,71 @@ def drive_chain(
     ValueError
         The delay is not a whole number of physics steps.
     """
-    command_delay = delay(section, step_s, substeps, groups)
-    setup = DriveSetup(seed, step_s, groups, faults is not None and faults.scheduled)
-    if faults:
-        more = -(-faults.longest_delay_steps // substeps)
-        command_delay = command_delay._replace(history=np.zeros((len(command_delay.history) + more, groups)))
-    amplifiers = amplifier(section, section.current_limit_A, step_s, groups, seed)
-    chain = DriveChain(
-        converts=section.converts or faults is not None,
-        supplied=section.supply_V is not None,
-        supply_V=0.0 if section.supply_V is None else section.supply_V,
-        lag=current_lag(section.lag_s, step_s, section.current_limit_A, groups),
-        output=ControllerOutput(
-            np.full(1, NORMAL), np.zeros(1, dtype=np.int64), faults.halt if faults else np.full(1, NORMAL)
-        ),
-        stages=tuple(kind.build(section, setup) for kind in STAGES.values()),
-        delay=command_delay,
-        supply=fault_line(1),
-        amplifier=amplifiers,
-        coil=group_coils(section, substeps * step_s, groups),
-        coupling=coupling(section, mutual_H, amplifiers),
-        flow=zero_flow(groups),
-        draws=faults.draws if faults else np.empty(0),
-        setpoint=np.zeros(groups),
-        emf=np.zeros(groups),
-        rate_S=np.zeros(3),
-        period=np.zeros(3),
-        before=np.zeros((5, groups)),
-    )
-    chain.period[SUPPLY_V] = chain.supply_V
-    return chain
+    steps = steps_of(section, step_s, substeps)
+    stored = stored_commands(steps, substeps) - -faults.longest_delay_steps // -substeps
+    rows, period_s = DriveChain.zeros(groups=groups, delays=capacity(stored)), substeps * step_s
+    setup = DriveSetup(seed, step_s, groups, faults.scheduled)
+    rows["converts"] = section.converts or faults.scheduled or faults.watchdog
+    rows["supplied"] = section.supply_V is not None
+    rows["supply_V"] = rows["period"]["supply_V"] = section.supply_V or 0.0
+    fill_lag(rows["lag"], section.lag_s, step_s, section.current_limit_A)
+    for name, kind in STAGES.items():
+        kind.fill(rows["stages"][name], section, setup)
+    rows["delay"]["steps"], rows["delay"]["substeps"] = steps, substeps
+    fill_fault_line(rows["supply"])
+    fill_amplifier(rows["amplifier"], section, section.current_limit_A, step_s, seed)
+    fill_coils(rows["coil"], section, period_s)
+    if mutual_H is not None:
+        fill_coupling(rows["coupling"], section, mutual_H, step_s)
+    return rows
 
 
 @inlined
-def begin(chain: DriveChain, command: Array) -> None:
-    """Accept the commands of a control period from the output of the controller, and reset the sums."""
+def begin(chain: DriveChain, command: Array, halt: int, draws: Array) -> None:
+    """Accept the commands of a control period from the output of the controller, and reset the sums.
+
+    Parameters
+    ----------
+    chain : DriveChain
+    command : (n,) array, A
+    halt : int
+        Request of a watchdog.
+    draws : array
+        Standard normal numbers of this tick, of faults.
+    """
     setpoint, output, period = chain.setpoint, chain.output, chain.period
+    output.halt, period.drawn_As, period.any_open_short = halt, 0.0, 0
+    for j in range(setpoint.shape[0]):
+        setpoint[j] = command[j]
     if chain.converts:
-        if output.state[0] == STUCK:
+        if output.state == STUCK:
             for j in range(setpoint.shape[0]):
                 setpoint[j] = chain.delay.history[0, j]
         else:
-            for j in range(setpoint.shape[0]):
-                setpoint[j] = 0.0 if output.state[0] == SILENT else command[j]
-            _convert(chain.stages, setpoint, chain.draws)
+            if output.state == SILENT:
+                for j in range(setpoint.shape[0]):
+                    setpoint[j] = 0.0
+            _convert(chain.stages, setpoint, draws)
         latch(chain.delay, setpoint)
-    reset_sums(chain.flow)
-    period[DRAWN_As] = 0.0
-    if chain.supplied:
-        period[SUPPLY_V] = max(through(chain.supply, 0, chain.supply_V, chain.draws), 0.0)
-    period[OPEN_SHORT] = 0.0
     for j in range(setpoint.shape[0]):
         if _contact(chain, j) != DRIVEN:
-            period[OPEN_SHORT] = 1.0
+            period.any_open_short = 1
+    if chain.supplied:
+        period.supply_V = max(through(chain.supply, 0, chain.supply_V, draws), 0.0)
+        set_supply(chain.amplifier, period.supply_V)
+    if chain.supplied or period.any_open_short:
+        reset_sums(chain.flow)
 
 
 @inlined
 def advance(
     chain: DriveChain,
-    command: Array,
     substep: int,
     q: Array,
     qdot: Array,
     G: Array,
     gain: Array,
+    draws: Array,
     current: Array,
     mean: Array,
 ) -> None:
@@ -228,8 +218,7 @@ def advance(
     Parameters
     ----------
     chain : DriveChain
-    command : (n,) array, A
-        Commands of this control period.
+        After `begin` of this control period.
     substep : int
         Physics step of the period, from 0.
     q, qdot : (3,) arrays, rad and rad/s
@@ -238,131 +227,87 @@ def advance(
         True torque matrix at this pose.
     gain : (n,) array
         Torque per ampere of each group over that of the matrix.
+    draws : array
+        Standard normal numbers of this tick, of faults.
     current : (n,) array, A
         At the start of the step; on return, at its end.
     mean : (n,) array, A
         Result: mean over the step.
     """
-    setpoint, any_open_short = chain.setpoint if chain.converts else command, chain.period[OPEN_SHORT] != 0.0
     if chain.converts:
-        update_setpoint(chain, substep)
-    if chain.supplied or any_open_short:
+        update_setpoint(chain, substep, draws)
+    if chain.supplied or chain.period.any_open_short:
         angular_velocity(q, qdot, chain.rate_S)
         back_emf(G, gain, chain.rate_S, chain.emf)
-    _advance_all_groups(chain.coupling, chain, setpoint, any_open_short, current, mean)
+    if chain.coupling.on:
+        _advance_coupled_groups(chain, current, mean)
+    else:
+        _advance_groups(chain, chain.amplifier.whole, current, mean)
     if chain.supplied:
-        _add_supply_charge(chain, setpoint, mean)
+        _add_supply_charge(chain, mean)
 
 
 @inlined
-def _advance_groups(
-    chain: DriveChain,
-    amplifier: Amplifier,
-    setpoint: Array,
-    any_open_short: bool,
-    current: Array,
-    mean: Array,
-) -> None:
-    """Advance the currents by the step of the amplifiers, with the present EMF."""
+def _advance_groups(chain: DriveChain, step: Step, current: Array, mean: Array) -> None:
+    """Advance the currents by a step of the amplifiers, with the present EMF."""
+    any_open_short, flow = chain.period.any_open_short, chain.flow
     if any_open_short:
         _save_groups(chain, current)
     if chain.supplied:
-        drive_coils(amplifier, chain.coil, setpoint, chain.emf, current, chain.flow)
+        drive_coils(chain.amplifier, step, chain.coil, chain.setpoint, chain.emf, current, flow)
         for j in range(mean.shape[0]):
-            mean[j] = chain.flow.mean_current_A[j]
+            mean[j] = flow.mean_current_A[j]
     else:
-        advance_lag(chain.lag, setpoint, current, mean)
+        advance_lag(chain.lag, chain.setpoint, current, mean)
     if any_open_short:
-        _advance_open_short_groups(chain, amplifier.step_s, current, mean)
+        _advance_open_short_groups(chain, step.step_s, current, mean)
 
 
-@inlined
-def _advance_uncoupled_groups(
-    coupling: None, chain: DriveChain, setpoint: Array, any_open_short: bool, current: Array, mean: Array
-) -> None:
-    """Advance the currents of groups without coupling by one physics step."""
-    amplifier = with_supply(chain.amplifier, chain.period[SUPPLY_V] - chain.supply_V)
-    _advance_groups(chain, amplifier, setpoint, any_open_short, current, mean)
-
-
-@inlined
-def _advance_coupled_groups(
-    coupling: Coupling, chain: DriveChain, setpoint: Array, any_open_short: bool, current: Array, mean: Array
-) -> None:
+@allocation_free  # its own copy of the step of the groups
+def _advance_coupled_groups(chain: DriveChain, current: Array, mean: Array) -> None:
     """Advance the currents of coupled groups by one physics step, in two parts."""
-    groups = current.shape[0]
+    groups, coupling = current.shape[0], chain.coupling
     for j in range(groups):
         coupling.own_emf[j], coupling.charge_As[j] = chain.emf[j], 0.0
-    for part in range(len(coupling.amplifiers)):
-        amplifier = with_supply(coupling.amplifiers[part], chain.period[SUPPLY_V] - chain.supply_V)
+    for part in range(2):
+        step = coupling.parts[part]
         _save_groups(chain, current)
-        predict_changes(coupling, amplifier, chain.coil, setpoint, current)
+        predict_changes(coupling, chain.amplifier, step, chain.coil, chain.setpoint, current)
         for _ in range(MOST_SWEEPS):
-            induce_voltages(coupling, amplifier.step_s, chain.emf)
+            induce_voltages(coupling, step.step_s, chain.emf)
             for j in range(groups):
                 _restore_group(chain, j, current)
-            _advance_groups(chain, amplifier, setpoint, any_open_short, current, mean)
+            _advance_groups(chain, step, current, mean)
             if update_changes(coupling, chain.before[0], current):
                 break
         for j in range(groups):
-            coupling.charge_As[j] += amplifier.step_s * mean[j]
+            coupling.charge_As[j] += step.step_s * mean[j]
     for j in range(groups):
-        mean[j] = coupling.charge_As[j] / chain.amplifier.step_s
-
-
-def _advance_all_groups(
-    coupling: Coupling | None,
-    chain: DriveChain,
-    setpoint: Array,
-    any_open_short: bool,
-    current: Array,
-    mean: Array,
-) -> None:
-    """Advance the currents by one physics step; only the code that a run needs is compiled."""
-    advance_all: Any = _advance_coupled_groups if coupling else _advance_uncoupled_groups
-    advance_all(coupling, chain, setpoint, any_open_short, current, mean)
-
-
-@implements(_advance_all_groups, inline=True)
-def _compiled_advance_all(
-    coupling: Any, chain: Any, setpoint: Any, any_open_short: Any, current: Any, mean: Any
-) -> Callable[..., Any]:
-    implementation = (
-        _advance_coupled_groups if hasattr(coupling, "instance_class") else _advance_uncoupled_groups
-    )
-
-    def call(coupling: Any, chain: Any, setpoint: Any, any_open_short: Any, current: Any, mean: Any) -> None:
-        implementation(coupling, chain, setpoint, any_open_short, current, mean)
-
-    return call
+        mean[j] = coupling.charge_As[j] / chain.amplifier.whole.step_s
 
 
 @inlined
-def update_setpoint(chain: DriveChain, substep: int) -> None:
+def update_setpoint(chain: DriveChain, substep: int, draws: Array) -> None:
     """Compute the setpoint of the amplifiers for a physics step."""
-    setpoint, fixed, output = chain.setpoint, chain.delay, chain.output
-    due(
-        Delay(fixed.history, fixed.steps + output.delay_steps[0], fixed.substeps),
-        substep,
-        setpoint,
-    )
-    if output.halt[0] != NORMAL:
+    setpoint, output = chain.setpoint, chain.output
+    due(chain.delay, output.delay_steps, substep, setpoint)
+    if output.halt != NORMAL:
         for j in range(setpoint.shape[0]):
             setpoint[j] = 0.0
-    _advance(chain.stages, setpoint, chain.draws)
+    _advance(chain.stages, setpoint, draws)
 
 
 @inlined
-def _add_supply_charge(chain: DriveChain, setpoint: Array, mean: Array) -> None:
+def _add_supply_charge(chain: DriveChain, mean: Array) -> None:
     """Add the charge that the amplifiers draw from the supply in a physics step."""
     amplifier, period = chain.amplifier, chain.period
     for j in range(mean.shape[0]):
         drawn = mean[j]
-        if period[OPEN_SHORT] != 0.0 and _contact(chain, j) == SHORTED:
+        if period.any_open_short and _contact(chain, j) == SHORTED:
             # The current that circulates in the coil is not drawn; the amplifier drives its target.
             limit = amplifier.current_limit_A
-            drawn = min(max(setpoint[j] + amplifier.offset_A[j], -limit), limit)
-        period[DRAWN_As] += abs(drawn) * amplifier.step_s
+            drawn = min(max(chain.setpoint[j] + amplifier.offset_A[j], -limit), limit)
+        period.drawn_As += abs(drawn) * amplifier.whole.step_s
 
 
 @inlined
@@ -396,7 +341,7 @@ def _advance_open_short_groups(chain: DriveChain, step_s: float, current: Array,
 def _contact(chain: DriveChain, group: int) -> int:
     """Return the connection of a group: a brake shorts all groups that are not open."""
     contact = chain.coil.contact[group]
-    return SHORTED if contact != OPEN and chain.output.halt[0] == BRAKED else contact
+    return SHORTED if contact != OPEN and chain.output.halt == BRAKED else contact
 
 
 @inlined
@@ -412,7 +357,7 @@ def end(chain: DriveChain) -> bool:
 def write_telemetry(chain: DriveChain, row: Array) -> None:
     """Write power, losses, temperatures and limits of the control period into the beginning of `row`."""
     flow, per_s, groups = chain.flow, 1.0 / chain.coil.period_s, chain.emf.shape[0]
-    row[0] = chain.period[SUPPLY_V] * chain.period[DRAWN_As] * per_s
+    row[0] = chain.period.supply_V * chain.period.drawn_As * per_s
     _write_scaled(flow.work_J, per_s, row, 1)
     _write_scaled(flow.copper_J, per_s, row, 1 + groups)
     copy_into(row, 1 + 2 * groups, chain.coil.temperature_degC, groups)
@@ -426,24 +371,24 @@ def _write_scaled(values: Array, factor: float, row: Array, first: int) -> None:
         row[first + j] = values[j] * factor
 
 
-def transfer(before: DriveChain | None, after: DriveChain, command: Array) -> None:
-    """Transfer the state to a chain with other parameters.
+def transfer_drive(before: Rows, after: Rows, command: Array) -> None:
+    """Transfer the state to a drive with other parameters, without a fault.
 
     Parameters
     ----------
-    before : DriveChain or None
-        None for a `LagDrive`, which stores no commands.
-    after : DriveChain
-        Chain without a fault.
+    before, after : arrays of DriveChain
     command : (n,) array, A
         Last command.
     """
-    if before is None:
-        after.delay.history[:] = command
+    ideal = not (before["converts"].any() or before["supplied"].any())  # it stores no commands
+    if ideal:
+        after["delay"]["history"] = command
     else:
-        transfer_state(before.delay, after.delay)
-    if after.converts:  # the stored values are those that this chain would have had
-        update_setpoint(after, after.delay.substeps - 1)
-    if before is not None:
-        transfer_state(before, after)
-        update_resistance(after.coil)
+        transfer_rows(before["delay"], after["delay"])
+    for chain in after:
+        if chain.converts:  # the stored values are those that this drive would have had
+            update_setpoint(chain, chain.delay.substeps - 1, np.zeros(0))
+    if not ideal:
+        transfer_rows(before, after)
+        for chain in after:
+            update_resistance(chain.coil)

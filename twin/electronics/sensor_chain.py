@@ -8,22 +8,18 @@ the last angle again, with a flag that it is not new.
 from __future__ import annotations
 
 from math import isfinite, isnan, nan
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, Field
 
 from spheretwin.electronics.converters import AdcSection
-from spheretwin.electronics.random_streams import Streams
+from spheretwin.electronics.random_streams import Streams, width_of
 from spheretwin.electronics.stages import SensorSetup, SensorStage, TickNoise, chained
-from spheretwin.electronics.transducers import (
-    LAG,
-    CurrentSection,
-    EncoderSection,
-    PotentiometerSection,
-)
-from spheretwin.models.base.compiled import inlined
+from spheretwin.electronics.transducers import CurrentSection, EncoderSection, PotentiometerSection
+from spheretwin.models.base.compiled import copy_into, inlined
+from spheretwin.models.base.record import Record, Rows, capacity, field, record_of
 from spheretwin.trajectories.rounding import CONFIG, Triple
 
 
@@ -59,50 +55,31 @@ STAGES: dict[str, type[SensorStage]] = {
 
 
 Array = NDArray[np.float64]
+Integers = NDArray[np.int64]
 
 _NAMES = tuple(STAGES)
-_POTENTIOMETER, _ENCODER = _NAMES.index("potentiometer"), _NAMES.index("encoder")
-_pass_stages = chained([kind.function() for kind in STAGES.values()])
+SensorStages = record_of(
+    "SensorStages", "Stages of the sensors.", {n: kind.record for n, kind in STAGES.items()}
+)
+_pass_stages = chained({name: kind.function() for name, kind in STAGES.items()})
 
 
-class SensorChain(NamedTuple):
-    """All angle sensors, for compiled code."""
+class SensorChain(Record):
+    """All angle sensors."""
 
-    offset_rad: Array  # (3,)
-    skew_s: Array  # (3,) time of the sample after the tick
-    shifts: bool  # true if any offset or skew is not 0
-    stages: tuple[Any, ...]  # in the order of `STAGES`
-    silent: NDArray[np.bool_]  # (3,) true if a fault suppresses new angles
-    fresh: Array  # (3,) result: 1 for a new angle, 0 for a repeated one
-    output_rad: Array  # (3,) angles of the last tick; NaN before the first
-    draws: Array  # standard normal numbers of faults of this tick
-
-    def stage(self, name: str) -> Any:
-        """Return the stage of a name."""
-        return self.stages[_NAMES.index(name)]
-
-    def state_arrays(self) -> tuple[Any, ...]:
-        """Return the arrays with the state."""
-        return self.stages, self.output_rad
-
-    def fault_arrays(self) -> tuple[Any, ...]:
-        """Return the arrays that faults write."""
-        return self.stages, self.silent
+    offset_rad: Array = field("constant mounting errors", "rad", 3)
+    skew_s: Array = field("time of the sample after the tick", "s", 3)
+    shifts: bool = field("whether any offset or skew is not 0")
+    stages: SensorStages = field("in the order of `STAGES`")  # type: ignore[valid-type]
+    silent: Integers = field("1 if a fault suppresses new angles", "", 3, fault=True)
+    fresh: Array = field("1 for a new angle, 0 for a repeated one", "", 3)
+    output_rad: Array = field("angles of the last tick; NaN before the first", "rad", 3, state=True)
 
 
-class SensorFaults(NamedTuple):
-    """Inputs of a sensor chain with faults."""
-
-    longest_delay_ticks: int
-    """Longest additional delay of the converter by faults."""
-    fresh: Array
-    """(3,) flags of new angles, written at each tick."""
-    draws: Array
-    """Random numbers of each tick, written by the loop."""
-
-
-def sensor_chain(section: SensorsSection, seed: int, faults: SensorFaults | None = None) -> SensorChain:
-    """Return the sensor chain with errors drawn from the seed.
+def build_sensors(
+    section: SensorsSection, seed: int, faults: bool = False, longest_delay_ticks: int = 0
+) -> Rows:
+    """Return the sensors, an array of one record, with errors drawn from the seed.
 
     Each stage and channel has its own stream, keyed by its name: no other stage changes its numbers.
 
@@ -111,25 +88,22 @@ def sensor_chain(section: SensorsSection, seed: int, faults: SensorFaults | None
     section : SensorsSection
     seed : int
         Seed of the run: the same seed gives the same prototype.
-    faults : SensorFaults, optional
-        None if no fault can occur.
+    faults : bool
+        Whether a fault may occur.
+    longest_delay_ticks : int
+        Longest additional delay of the converter by faults.
     """
-    stages, first_draw = [], 0
+    rows, first_draw = SensorChain.zeros(delays=capacity(longest_delay_ticks + 1)), 0
+    rows["offset_rad"], rows["skew_s"] = section.angle_offset_rad, (0.0, section.adc.skew_s, 0.0)
+    rows["shifts"] = any(section.angle_offset_rad) or section.adc.skew_s > 0
     for name in _NAMES:
-        parameters, longest_delay = getattr(section, name), faults.longest_delay_ticks if faults else 0
-        setup = SensorSetup(section, seed, f"sensors.{name}", first_draw, faults is not None, longest_delay)
-        stages.append(parameters.build(setup))
+        parameters = getattr(section, name)
+        parameters.fill(
+            rows["stages"][name], SensorSetup(section, seed, f"sensors.{name}", first_draw, faults)
+        )
         first_draw += parameters.draws(section)
-    return SensorChain(
-        np.array(section.angle_offset_rad, dtype=np.float64),
-        section.adc.skew_s * np.array([0.0, 1.0, 0.0]),
-        any(section.angle_offset_rad) or section.adc.skew_s > 0,
-        tuple(stages),
-        np.zeros(3, dtype=np.bool_),
-        faults.fresh if faults else np.ones(3),
-        np.full(3, nan),
-        faults.draws if faults else np.empty(0),
-    )
+    rows["fresh"], rows["output_rad"] = 1.0, nan
+    return rows
 
 
 def noise_streams(section: SensorsSection) -> Streams:
@@ -169,14 +143,15 @@ def sensor_sheet(sensors: SensorsSection) -> dict[str, Any]:
 @inlined
 def write_telemetry(chain: SensorChain, row: Array) -> None:
     """Write the errors of the angles that are states of the sensors into the beginning of `row`, rad."""
-    tracks, encoder = chain.stages[_POTENTIOMETER], chain.stages[_ENCODER]
-    for channel in range(tracks.play.shape[0]):
-        row[channel] = tracks.play[channel, LAG]
-    row[2] = encoder.counter[0] * (2 * np.pi / encoder.counts_per_turn) if encoder.starts_with_error else 0.0
+    tracks, encoder = chain.stages.potentiometer, chain.stages.encoder  # type: ignore[attr-defined]
+    copy_into(row, 0, tracks.lead_rad, tracks.lead_rad.shape[0])
+    row[2] = 0.0
+    if encoder.starts_with_error:
+        row[2] = encoder.error_counts * (2 * np.pi / encoder.counts_per_turn)
 
 
 @inlined
-def sense(chain: SensorChain, q: Array, qdot: Array, noise: Array, measurement: Array) -> bool:
+def sense(chain: SensorChain, q: Array, qdot: Array, noise: Array, draws: Array, measurement: Array) -> bool:
     """Write measured angles (rad) and true rates (rad/s) into the first rows of `measurement` (3, 3).
 
     The measured pose is that at the tick, also for all conversions of an oversampling converter. With a skew
@@ -191,6 +166,8 @@ def sense(chain: SensorChain, q: Array, qdot: Array, noise: Array, measurement: 
         True pose and rates.
     noise : array
         Standard normal numbers of this tick, of the streams of `noise_streams`.
+    draws : array
+        Standard normal numbers of this tick, of faults.
     measurement : (3, 3) array
         Result.
 
@@ -204,7 +181,7 @@ def sense(chain: SensorChain, q: Array, qdot: Array, noise: Array, measurement: 
         measurement[0, i], measurement[1, i] = q[i], qdot[i]
         if chain.shifts:
             measurement[0, i] += chain.offset_rad[i] + chain.skew_s[i] * qdot[i]
-    _pass_stages(chain.stages, measurement, TickNoise(noise, chain.draws))
+    _pass_stages(chain.stages, measurement, TickNoise(noise, draws))
     finite = True
     for i in range(3):
         repeats = chain.silent[i] and not isnan(chain.output_rad[i])
@@ -214,3 +191,24 @@ def sense(chain: SensorChain, q: Array, qdot: Array, noise: Array, measurement: 
         chain.output_rad[i] = measurement[0, i]
         finite = finite and isfinite(measurement[0, i]) and isfinite(measurement[1, i])
     return finite
+
+
+def measure_again(sensors: Rows, section: SensorsSection, q: Array, noise: Array) -> None:
+    """Fill the stored values of new sensors: those that they would have had at the last tick.
+
+    Parameters
+    ----------
+    sensors : array of SensorChain
+    section : SensorsSection
+        Section of the sensors.
+    q : (3,) array, rad
+        Pose at the last tick; empty before the first one.
+    noise : array
+        Random numbers of the last tick.
+    """
+    if len(q):
+        numbers = width_of(noise_streams(section))
+        # Random numbers of sensors with another width do not apply to these.
+        last_noise = noise if len(noise) == numbers else np.zeros(numbers)
+        for chain in sensors:
+            sense(chain, q, np.zeros(3), last_noise, np.zeros(0), np.empty((3, 3)))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Sequence
+from collections.abc import Mapping
 from math import isnan, nan
 from typing import Any, ClassVar, NamedTuple
 
@@ -12,7 +12,11 @@ from numpy.typing import NDArray
 from pydantic import BaseModel
 
 from spheretwin.models.base.compiled import inlined
+from spheretwin.models.base.record import Record, Rows, field
 from spheretwin.trajectories.rounding import CONFIG
+
+Array = NDArray[np.float64]
+Integers = NDArray[np.int64]
 
 
 @inlined
@@ -20,67 +24,57 @@ def pass_nothing(stages: Any, values: Any, draws: Any) -> None:
     """Leave the values as they are."""
 
 
-def chained(functions: Sequence[Any], place: int = 0) -> Any:
+def chained(functions: Mapping[str, Any]) -> Any:
     """Return the compiled function ``f(stages, values, draws)`` that calls those of all stages.
 
     Parameters
     ----------
-    functions : sequence of compiled functions
-        ``f(stage, values, draws)`` each, in the order of `stages`. A stage is a named tuple; its field ``on``
-        is false if it has no effect. A stage that is off costs only a branch.
-    place : int
-        Index of the first stage that is called.
+    functions : mapping
+        Compiled ``f(stage, values, draws)`` of each stage by the name of its field in the record `stages`, in
+        the order of the calls. A stage has a field `on`, which is 0 if it has no effect: it then costs only a
+        branch.
     """
-    if place == len(functions):
+    if not functions:
         return pass_nothing
-    function, others = functions[place], chained(functions, place + 1)
+    (name, function), *others = functions.items()
+    rest = chained(dict(others))
 
     @inlined
     def pass_and_continue(stages: Any, values: Any, draws: Any) -> None:
-        stage = stages[place]
+        stage = stages[name]
         if stage.on:
             function(stage, values, draws)
-        others(stages, values, draws)
+        rest(stages, values, draws)
 
     return pass_and_continue
 
 
-ACTS, GAIN, OFFSET, NOISE, COLUMN, HOLDS, LAST = range(7)
-"""Columns of a fault line: 1 if a fault acts, gain, offset, rms of the noise, column of its random number,
-1 if the last value is held, last value."""
+class FaultLine(Record):
+    """Fault line of the channels of a stage."""
+
+    acts: Integers = field("1 if a fault acts", "", "channels", fault=True)
+    gain: Array = field("factor on the value", "", "channels", fault=True)
+    offset: Array = field("added to the value", "of the stage", "channels", fault=True)
+    noise: Array = field("noise added to the value, rms", "of the stage", "channels", fault=True)
+    column: Integers = field("random number of the noise, of those of a tick", "", "channels", fault=True)
+    holds: Integers = field("1 if the last value is held", "", "channels", fault=True)
+    last: Array = field("last value; NaN before the first", "of the stage", "channels", state=True)
 
 
-class FaultLine(NamedTuple):
-    """Fault line of the channels of a stage, for compiled code."""
-
-    table: NDArray[np.float64]  # (channels, 7), one array, as each argument costs time
-
-    def state_arrays(self) -> tuple[NDArray[np.float64], ...]:
-        """Return the arrays with the state."""
-        return (self.table[:, LAST],)
-
-    def fault_arrays(self) -> tuple[NDArray[np.float64], ...]:
-        """Return the arrays that faults write."""
-        return (self.table[:, :LAST],)
-
-
-def fault_line(channels: int, last: float = nan) -> FaultLine:
-    """Return the fault line of a stage without a fault.
+def fill_fault_line(rows: Rows, last: float = nan) -> None:
+    """Fill the fault line of a stage without a fault.
 
     Parameters
     ----------
-    channels : int
-        0 if no fault can occur.
+    rows : array of FaultLine
     last : float
         Value that is held if a fault occurs before the first value; NaN to hold the first value.
     """
-    table = np.zeros((channels, 7))
-    table[:, GAIN], table[:, LAST] = 1.0, last
-    return FaultLine(table)
+    rows["gain"], rows["last"] = 1.0, last
 
 
 @inlined
-def through(line: FaultLine, channel: int, value: float, draws: NDArray[np.float64]) -> float:
+def through(line: FaultLine, channel: int, value: float, draws: Array) -> float:
     """Return the value of a channel after its fault line, and store it.
 
     Parameters
@@ -92,15 +86,14 @@ def through(line: FaultLine, channel: int, value: float, draws: NDArray[np.float
     draws : array
         Standard normal numbers of this tick.
     """
-    table = line.table
-    if table[channel, ACTS] != 0.0:
-        if table[channel, HOLDS] != 0.0 and not isnan(table[channel, LAST]):
-            value = table[channel, LAST]
+    if line.acts[channel] != 0:
+        if line.holds[channel] != 0 and not isnan(line.last[channel]):
+            value = line.last[channel]
         else:
-            value = table[channel, GAIN] * value + table[channel, OFFSET]
-            if table[channel, NOISE] > 0.0:
-                value += table[channel, NOISE] * draws[int(table[channel, COLUMN])]
-    table[channel, LAST] = value
+            value = line.gain[channel] * value + line.offset[channel]
+            if line.noise[channel] > 0.0:
+                value += line.noise[channel] * draws[line.column[channel]]
+    line.last[channel] = value
     return value
 
 
@@ -116,8 +109,6 @@ class SensorSetup(NamedTuple):
     """Column of its first random number."""
     faults: bool
     """True if a fault may occur."""
-    longest_delay_ticks: int
-    """Longest additional delay by faults."""
 
 
 class TickNoise(NamedTuple):
@@ -131,11 +122,12 @@ class SensorStage(BaseModel):
     """Parameters of one stage; ideal by default.
 
     A new stage is a subclass and a field of `sensor_chain.SensorsSection`, whose fields are the list of all
-    stages, in the order in which angles pass them. `build` returns a named tuple that has a field ``on`` and
-    a `FaultLine` for its faults.
+    stages, in the order in which angles pass them.
     """
 
     model_config = CONFIG
+    record: ClassVar[type[Record]]
+    """Data of the stage: with a field `on`, and a `FaultLine` for its faults."""
 
     @property
     @abstractmethod
@@ -143,8 +135,8 @@ class SensorStage(BaseModel):
         """True if the stage does not change the angles."""
 
     @abstractmethod
-    def build(self, setup: SensorSetup) -> Any:
-        """Return the named tuple for compiled code; it is on if it is not ideal or a fault may occur."""
+    def fill(self, rows: Rows, setup: SensorSetup) -> None:
+        """Fill the records, in which every number is 0; they are on if not ideal or if a fault may occur."""
 
     @classmethod
     @abstractmethod
@@ -171,12 +163,13 @@ class DriveStage(BaseModel):
     """Parameters of one stage; ideal by default.
 
     A new stage is a subclass and a base of `drive_section.DriveSection`, whose bases are the list of all
-    stages, in the order in which commands pass them. `build` returns a named tuple that has a field ``on``
-    and a `FaultLine` ``line`` for its faults. All stages share one section: methods are called on the
+    stages, in the order in which commands pass them. All stages share one section: methods are called on the
     class of a stage, with that section as argument.
     """
 
     model_config = CONFIG
+    record: ClassVar[type[Record]]
+    """Data of the stage: with a field `on`, and a `FaultLine` `line` for its faults."""
     stage: ClassVar[str]
     """Name of the stage, which keys its random streams."""
 
@@ -187,8 +180,8 @@ class DriveStage(BaseModel):
 
     @staticmethod
     @abstractmethod
-    def build(section: Any, setup: DriveSetup) -> Any:
-        """Return the named tuple for compiled code; it is on if it is not ideal or a fault may occur."""
+    def fill(rows: Rows, section: Any, setup: DriveSetup) -> None:
+        """Fill the records, in which every number is 0; they are on if not ideal or if a fault may occur."""
 
     @staticmethod
     def convert() -> Any:
@@ -205,7 +198,7 @@ class DriveStage(BaseModel):
 
 
 @inlined
-def pass_line(stage: Any, setpoint: NDArray, draws: NDArray) -> None:
+def pass_line(stage: Any, setpoint: Array, draws: Array) -> None:
     """Pass the setpoint of each group, A, through the fault line of a stage."""
-    for j in range(stage.line.table.shape[0]):
+    for j in range(setpoint.shape[0]):
         setpoint[j] = through(stage.line, j, setpoint[j], draws)

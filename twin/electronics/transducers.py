@@ -3,16 +3,26 @@
 from __future__ import annotations
 
 from math import cos, floor, isnan, nan, pi, sin
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, Field, model_validator
 
 from spheretwin.electronics.random_streams import NORMAL, PHASE, REVERSAL, SMOOTH, UNIFORM, errors, uniforms
-from spheretwin.electronics.stages import FaultLine, SensorSetup, SensorStage, TickNoise, fault_line, through
+from spheretwin.electronics.stages import (
+    FaultLine,
+    SensorSetup,
+    SensorStage,
+    TickNoise,
+    fill_fault_line,
+    through,
+)
 from spheretwin.models.base.compiled import inlined
+from spheretwin.models.base.record import Record, Rows, field
 from spheretwin.trajectories.rounding import CONFIG
+
+Array = NDArray[np.float64]
 
 CHANNELS = 2
 """Number of angles that are measured as voltages: α and β."""
@@ -25,6 +35,35 @@ HARMONICS = 4
 LARGEST_SHARE = 0.06
 
 
+class Potentiometer(Record):
+    """One potentiometer."""
+
+    volts_per_rad: float = field("slope of the straight line", "V/rad")
+    half_angle_rad: float = field("half of the track", "rad")
+    half_supply_V: float = field("half of the voltage across the track", "V")
+    turns: float = field("phase of the first harmonic per radian of the joint", "rad")
+    cosine_rad: Array = field("of the residual, from the first harmonic on", "rad", HARMONICS)
+    sine_rad: Array = field("of the residual, from the first harmonic on", "rad", HARMONICS)
+
+
+class Potentiometers(Record):
+    """Both potentiometers."""
+
+    on: bool = field("whether the stage changes the angles")
+    converts: bool = field("false if they are straight lines")
+    volts_per_rad: float = field("slope of the straight line", "V/rad")
+    channels: Potentiometer = field("of α and β", shape=CHANNELS)
+    line: FaultLine = field("of the wipers, in rad of the nominal slope", channels=CHANNELS)
+    half_play_rad: float = field("half of the play", "rad")
+    repeatability_rad: float = field("largest deviation of the play on a side", "rad")
+    first_draw: int = field("first random number")
+    wiper_rad: Array = field("angle of the wiper; NaN before the first tick", "rad", CHANNELS, state=True)
+    lead_rad: Array = field("lead of the wiper over the joint", "rad", CHANNELS, state=True)
+    direction: Array = field("last direction of the wiper", "", CHANNELS, state=True)
+    up: Array = field("deviation of the upper play over the repeatability", "", CHANNELS, state=True)
+    down: Array = field("deviation of the lower play over the repeatability", "", CHANNELS, state=True)
+
+
 class PotentiometerSection(SensorStage):
     """Parameters of the potentiometers of α and β; ideal if residual, noise and hysteresis are 0.
 
@@ -32,6 +71,8 @@ class PotentiometerSection(SensorStage):
     is the spread of readings at one angle that is approached from one side again and again: the play on each
     side changes at each reversal. The voltage is continuous, as the wiper never jumps.
     """
+
+    record: ClassVar[type[Record]] = Potentiometers
 
     electrical_angle_rad: Annotated[float, Field(ge=1e-2, le=100)] = Field(
         5 * pi / 3,
@@ -84,23 +125,17 @@ class PotentiometerSection(SensorStage):
         """True if the stage does not change the angle."""
         return self.nonlinearity_rad == 0 and self.noise_rad == 0 and self.hysteresis_rad == 0
 
-    def build(self, setup: SensorSetup) -> Potentiometers:
-        """Return the potentiometers with residuals from the seed; with ends if the converter is not ideal."""
+    def fill(self, rows: Rows, setup: SensorSetup) -> None:
+        """Fill the potentiometers, with residuals from the seed; with ends if the converter is not ideal."""
         converts = not (self.ideal and setup.sensors.adc.ideal)
         phases = uniforms(setup.seed, setup.name, CHANNELS, HARMONICS)
-        play = np.zeros((CHANNELS, PLAY_COLUMNS))
-        play[:, WIPER] = nan
-        return Potentiometers(
-            converts or setup.faults,
-            converts,
-            self.volts_per_rad,
-            (potentiometer(self, phases[0]), potentiometer(self, phases[1])),
-            fault_line(CHANNELS),
-            self.hysteresis_rad / 2,
-            self.repeatability_rad,
-            setup.first_draw,
-            play,
-        )
+        rows["on"], rows["converts"] = converts or setup.faults, converts
+        rows["volts_per_rad"] = self.volts_per_rad
+        for channel in range(CHANNELS):
+            fill_potentiometer(rows["channels"][:, channel], self, phases[channel])
+        fill_fault_line(rows["line"])
+        rows["half_play_rad"], rows["repeatability_rad"] = self.hysteresis_rad / 2, self.repeatability_rad
+        rows["first_draw"], rows["wiper_rad"] = setup.first_draw, nan
 
     def draws(self, sensors: Any) -> int:
         """Return one number for each channel, used at a reversal; 0 if the play is constant."""
@@ -117,31 +152,8 @@ class PotentiometerSection(SensorStage):
         return self.supply_V / self.electrical_angle_rad
 
 
-WIPER, LAG, DIRECTION, UP, DOWN, PLAY_COLUMNS = range(6)
-"""Columns of the play: angle of the wiper (NaN before the first tick), its lead over the joint, its last
-direction, and the deviation of the play on each side as a share of the repeatability."""
-
-
-class Potentiometers(NamedTuple):
-    """Both potentiometers, for compiled code."""
-
-    on: bool
-    converts: bool  # false if they are straight lines
-    volts_per_rad: float
-    channels: tuple[Potentiometer, Potentiometer]
-    line: FaultLine  # of the wipers, in rad of the nominal slope
-    half_play_rad: float
-    repeatability_rad: float
-    first_draw: int
-    play: NDArray[np.float64]  # (2, PLAY_COLUMNS)
-
-    def state_arrays(self) -> tuple[Any, ...]:
-        """Return the arrays with the state."""
-        return self.line, self.play
-
-
 @inlined
-def pass_potentiometers(stage: Potentiometers, measurement: NDArray[np.float64], noise: TickNoise) -> None:
+def pass_potentiometers(stage: Potentiometers, measurement: Array, noise: TickNoise) -> None:
     """Replace α and β by the angles, rad, of the voltages of the wipers."""
     for channel in range(CHANNELS):
         angle = measurement[0, channel]
@@ -153,47 +165,40 @@ def pass_potentiometers(stage: Potentiometers, measurement: NDArray[np.float64],
 
 
 @inlined
-def wiper_angle(stage: Potentiometers, channel: int, angle_rad: float, draws: NDArray[np.float64]) -> float:
+def wiper_angle(stage: Potentiometers, channel: int, angle_rad: float, draws: Array) -> float:
     """Return the angle of a wiper (rad) at an angle of its joint (rad), and store it; NaN stays NaN.
 
     At the first tick the wiper is in the middle of its play.
     """
-    play, spread = stage.play, stage.repeatability_rad
-    if isnan(angle_rad) or isnan(play[channel, WIPER]):
-        play[channel, WIPER] = angle_rad
+    spread, last_rad, direction = stage.repeatability_rad, stage.wiper_rad[channel], stage.direction[channel]
+    if isnan(angle_rad) or isnan(last_rad):
+        stage.wiper_rad[channel] = angle_rad
         return angle_rad
-    lowest = angle_rad - (stage.half_play_rad + spread * play[channel, UP])
-    highest = angle_rad + (stage.half_play_rad + spread * play[channel, DOWN])
-    wiper = min(max(play[channel, WIPER], lowest), highest)
-    moved = wiper - play[channel, WIPER]
-    if moved * play[channel, DIRECTION] < 0.0 or (moved != 0.0 and play[channel, DIRECTION] == 0.0):
-        play[channel, DIRECTION] = 1.0 if moved > 0.0 else -1.0
+    lowest = angle_rad - (stage.half_play_rad + spread * stage.up[channel])
+    highest = angle_rad + (stage.half_play_rad + spread * stage.down[channel])
+    wiper = min(max(last_rad, lowest), highest)
+    moved = wiper - last_rad
+    if moved * direction < 0.0 or (moved != 0.0 and direction == 0.0):
+        stage.direction[channel] = 1.0 if moved > 0.0 else -1.0
         if spread > 0.0:  # the play of the next reversal
             deviation = min(max(draws[stage.first_draw + channel] / 3.0, -1.0), 1.0)
-            play[channel, DOWN if moved > 0.0 else UP] = deviation
-    play[channel, WIPER], play[channel, LAG] = wiper, wiper - angle_rad
+            if moved > 0.0:
+                stage.down[channel] = deviation
+            else:
+                stage.up[channel] = deviation
+    stage.wiper_rad[channel], stage.lead_rad[channel] = wiper, wiper - angle_rad
     return wiper
 
 
-class Potentiometer(NamedTuple):
-    """One potentiometer, for compiled code."""
-
-    volts_per_rad: float
-    half_angle_rad: float
-    half_supply_V: float
-    turns: float  # phase of the first harmonic per radian of the joint, rad
-    cosine_rad: tuple[float, ...]  # (HARMONICS,) of the residual, from the first harmonic on
-    sine_rad: tuple[float, ...]  # (HARMONICS,)
-
-
-def potentiometer(section: PotentiometerSection, shares: NDArray[np.float64]) -> Potentiometer:
-    """Return a potentiometer with its own residual.
+def fill_potentiometer(rows: Rows, section: PotentiometerSection, shares: Array) -> None:
+    """Fill a potentiometer with its own residual.
 
     The residual is a sum of the first harmonics of the track, the k-th with an amplitude of 1/k² and a phase
     drawn at random, scaled so that its largest magnitude on the track is the stated one.
 
     Parameters
     ----------
+    rows : array of Potentiometer
     section : PotentiometerSection
     shares : (HARMONICS,) array
         Phases of the harmonics as shares of a turn, 0 to 1, drawn for this channel.
@@ -201,14 +206,10 @@ def potentiometer(section: PotentiometerSection, shares: NDArray[np.float64]) ->
     order = np.arange(1, HARMONICS + 1)
     shape = np.exp(1j * (2 * pi * shares)) / order**2
     residual = section.nonlinearity_rad / _peak(shape) * shape
-    return Potentiometer(
-        section.volts_per_rad,
-        section.electrical_angle_rad / 2,
-        section.supply_V / 2,
-        2 * pi / section.electrical_angle_rad,
-        tuple(residual.real.tolist()),
-        tuple((-residual.imag).tolist()),
-    )
+    rows["volts_per_rad"] = section.volts_per_rad
+    rows["half_angle_rad"], rows["half_supply_V"] = section.electrical_angle_rad / 2, section.supply_V / 2
+    rows["turns"] = 2 * pi / section.electrical_angle_rad
+    rows["cosine_rad"], rows["sine_rad"] = residual.real, -residual.imag
 
 
 @inlined
@@ -251,6 +252,20 @@ def _peak(shape: NDArray[np.complex128]) -> float:
     return float(np.abs((np.exp(1j * np.outer(np.angle(roots), order)) @ shape).real).max())
 
 
+class Encoder(Record):
+    """Encoder of γ."""
+
+    on: bool = field("whether the stage changes the angle")
+    counts_per_turn: float = field("0 for none")
+    line: FaultLine = field("of the angle, rad, before it is counted", channels=1)
+    eccentricity_rad: float = field("amplitude of the error of a disc off its axis", "rad")
+    phase_rad: float = field("phase of that error", "rad")
+    starts_with_error: bool = field("whether the counter was not referenced before the run")
+    index_count: float = field("count of the index")
+    error_counts: float = field("error of the counter", state=True)
+    turns: float = field("turns from the index at the last tick; NaN before the first", state=True)
+
+
 class EncoderSection(SensorStage):
     """Parameters of the incremental encoder of γ; ideal if it has neither counts nor eccentricity.
 
@@ -258,6 +273,8 @@ class EncoderSection(SensorStage):
     plus the error that it starts with. The index, once per turn, is one line of the grid. When it passes, the
     counter is set to the angle of the index in this turn, and the error of the start is gone.
     """
+
+    record: ClassVar[type[Record]] = Encoder
 
     counts: Annotated[int, Field(ge=0, le=2**31)] = Field(
         0,
@@ -293,20 +310,16 @@ class EncoderSection(SensorStage):
         """True if the stage does not change the angle."""
         return self.counts == 0 and self.eccentricity_rad == 0
 
-    def build(self, setup: SensorSetup) -> Encoder:
-        """Return the encoder, with a phase of the eccentricity and an error of the start from the seed."""
+    def fill(self, rows: Rows, setup: SensorSetup) -> None:
+        """Fill the encoder, with a phase of the eccentricity and an error of the start from the seed."""
         phase, start = errors(setup.seed, setup.name, 1, 2)[0].tolist()
-        start_counts = np.rint(start * self.start_error_rad * self.counts / (2 * pi))
-        return Encoder(
-            not self.ideal or setup.faults,
-            float(self.counts),
-            fault_line(1),
-            self.eccentricity_rad,
-            pi * phase,
-            self.start_error_rad > 0,
-            np.rint(self.index_rad * self.counts / (2 * pi)),
-            np.array([start_counts, nan]),
-        )
+        rows["on"], rows["counts_per_turn"] = not self.ideal or setup.faults, self.counts
+        fill_fault_line(rows["line"])
+        rows["eccentricity_rad"], rows["phase_rad"] = self.eccentricity_rad, pi * phase
+        rows["starts_with_error"] = self.start_error_rad > 0
+        rows["index_count"] = np.rint(self.index_rad * self.counts / (2 * pi))
+        rows["error_counts"] = np.rint(start * self.start_error_rad * self.counts / (2 * pi))
+        rows["turns"] = nan
 
     @classmethod
     def function(cls) -> Any:
@@ -314,25 +327,8 @@ class EncoderSection(SensorStage):
         return pass_encoder
 
 
-class Encoder(NamedTuple):
-    """Encoder, for compiled code."""
-
-    on: bool
-    counts_per_turn: float  # 0 for none
-    line: FaultLine  # of the angle, rad, before it is counted
-    eccentricity_rad: float
-    phase_rad: float
-    starts_with_error: bool
-    index_count: float
-    counter: NDArray[np.float64]  # (2,) error in counts, and turns from the index at the last tick or NaN
-
-    def state_arrays(self) -> tuple[Any, ...]:
-        """Return the arrays with the state."""
-        return self.line, self.counter
-
-
 @inlined
-def pass_encoder(encoder: Encoder, measurement: NDArray[np.float64], noise: TickNoise) -> None:
+def pass_encoder(encoder: Encoder, measurement: Array, noise: TickNoise) -> None:
     """Count γ, rad, after eccentricity and fault line."""
     angle_rad = measurement[0, 2]
     if encoder.eccentricity_rad > 0.0:
@@ -341,16 +337,16 @@ def pass_encoder(encoder: Encoder, measurement: NDArray[np.float64], noise: Tick
     if encoder.starts_with_error:
         line_rad = 2 * pi / encoder.counts_per_turn
         update_reference(encoder, np.rint(measurement[0, 2] / line_rad))
-        measurement[0, 2] += encoder.counter[0] * line_rad
+        measurement[0, 2] += encoder.error_counts * line_rad
 
 
 @inlined
 def update_reference(encoder: Encoder, count: float) -> None:
     """Remove the error of the start if the count is at the index or has passed it since the last tick."""
     turns = (count - encoder.index_count) / encoder.counts_per_turn
-    if turns == floor(turns) or abs(floor(turns) - encoder.counter[1]) > 0.0:
-        encoder.counter[0] = 0.0
-    encoder.counter[1] = floor(turns)
+    if turns == floor(turns) or abs(floor(turns) - encoder.turns) > 0.0:
+        encoder.error_counts = 0.0
+    encoder.turns = floor(turns)
 
 
 @inlined
@@ -380,16 +376,16 @@ class CurrentSection(BaseModel):
     )
 
 
-class CurrentSensors(NamedTuple):
-    """Current sensors, for compiled code."""
+class CurrentSensors(Record):
+    """Current sensors."""
 
-    on: bool
-    noise_A: float  # standard deviation
-    measured_A: NDArray[np.float64]  # (n,) at the last control tick
+    on: bool = field("whether the currents are measured")
+    noise_A: float = field("standard deviation of the noise", "A")
+    measured_A: Array = field("currents at the last control tick", "A", "groups")
 
 
 @inlined
-def sense_currents(sensors: CurrentSensors, current: NDArray[np.float64], draws: NDArray[np.float64]) -> None:
+def sense_currents(sensors: CurrentSensors, current: Array, draws: Array) -> None:
     """Measure the group currents at a control tick.
 
     Parameters

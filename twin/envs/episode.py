@@ -8,8 +8,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from spheretwin.electronics.coil import CurrentLag, advance_lag
+from spheretwin.electronics.coil import advance_lag
 from spheretwin.models.base.compiled import allocation_free
+from spheretwin.models.base.record import Rows
 from spheretwin.plant.lanes import HELD, LANES, QDOT, LaneField, Q, advance
 from spheretwin.plant.plant_tick import FASTEST_RATE_rad_s
 
@@ -53,7 +54,7 @@ class Episodes(NamedTuple):
     weights: Array  # (4,) of the terms of the reward
     current: Array  # (n, groups) A
     mean_current: Array  # (n, groups) A, over a physics step
-    lag: CurrentLag
+    lag: Rows  # of CurrentLag
     squares: Array  # (n,) rad², sum of squares of the error
     largest: Array  # (n,) rad, largest error
 
@@ -110,7 +111,7 @@ def advance_episodes(
     if physics.by_current:
         for _ in range(physics.substeps):
             for i in range(n):
-                advance_lag(episodes.lag, actions[i], episodes.current[i], episodes.mean_current[i])
+                advance_lag(episodes.lag[0], actions[i], episodes.current[i], episodes.mean_current[i])
             advance(blocks, field, episodes.mean_current, physics.step_s, 1, physics.slows)
     else:
         no_currents = episodes.mean_current[:0]

@@ -10,10 +10,11 @@ from numpy.typing import NDArray
 
 from spheretwin import scenario as scenarios
 from spheretwin.active_config import initial_config
-from spheretwin.electronics.coil import CurrentLag, current_lag
+from spheretwin.electronics.coil import CurrentLag, fill_lag
 from spheretwin.envs.settings import Settings
 from spheretwin.inputs import InputGenerator
 from spheretwin.models.base.errors import InputError
+from spheretwin.models.base.record import Rows
 from spheretwin.plant.plant_step import Parameters
 from spheretwin.plant_model import parameters
 from spheretwin.scenario.sections import Scenario
@@ -35,7 +36,7 @@ class Variants(NamedTuple):
     disturbance: Array  # (v, ticks, 3) N·m
     hinge_range: Array  # (3, 2) rad
     period_s: float
-    lag: CurrentLag
+    lag: Rows  # of CurrentLag
 
 
 def build_variants(settings: Settings) -> Variants:
@@ -71,7 +72,13 @@ def build_variants(settings: Settings) -> Variants:
         disturbance=np.array([disturbance[:ticks] for _, disturbance in inputs]),
         hinge_range=np.array(configs[0].files.actuator.hinge_range_rad),
         period_s=first.controller.period_s,
-        lag=current_lag(drive.lag_s, settings.step_s, drive.current_limit_A, len(plants[0].group_gain)),
+        lag=CurrentLag.filled(
+            fill_lag,
+            drive.lag_s,
+            settings.step_s,
+            drive.current_limit_A,
+            groups=len(plants[0].group_gain),
+        ),
     )
 
 

@@ -84,7 +84,7 @@ class TwinVectorEnv(VectorEnv[Any, Any, Any]):
             substeps=round(variants.period_s / self.settings.step_s),
             slows=any(np.any(one.coulomb_Nm) or np.any(one.viscous_Nm_s) for one in variants.parameters),
             by_current=by_current,
-            limit=variants.lag.current_limit_A if by_current else self.settings.torque_limit_Nm,
+            limit=float(variants.lag["current_limit_A"][0]) if by_current else self.settings.torque_limit_Nm,
         )
         weights = self.settings.reward
         self._episodes = Episodes(

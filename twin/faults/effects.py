@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from spheretwin.electronics.drive_chain import DriveChain
 from spheretwin.electronics.sensor_chain import SensorChain
-from spheretwin.electronics.stages import ACTS, COLUMN, HOLDS, NOISE, OFFSET, FaultLine
-from spheretwin.electronics.stages import GAIN as LINE_GAIN
+from spheretwin.electronics.stages import FaultLine
+from spheretwin.models.base.record import Rows
 
 # Far beyond any voltage, current or angle of the electronics; its square remains finite.
 LARGEST = 1e6
@@ -36,15 +36,27 @@ class Value(NamedTuple):
 class Effects(NamedTuple):
     """Stages that faults modify, in arrays that compiled code reads."""
 
-    drive: DriveChain
-    sensors: SensorChain
+    drive_rows: Rows  # of DriveChain
+    sensor_rows: Rows  # of SensorChain
     group_gain: NDArray[np.float64]  # (n,) torque and back-EMF per ampere over those of the torque matrix
     period_s: float
     step_s: float
 
     def fault_arrays(self) -> tuple[Any, ...]:
         """Return the arrays that faults write."""
-        return self.drive, self.sensors, self.group_gain
+        return self.drive_rows, self.sensor_rows, self.group_gain
+
+    @property
+    def drive(self) -> DriveChain:
+        """Drive of the run."""
+        drive: DriveChain = self.drive_rows[0]
+        return drive
+
+    @property
+    def sensors(self) -> SensorChain:
+        """Sensors of the run."""
+        sensors: SensorChain = self.sensor_rows[0]
+        return sensors
 
 
 class ActiveFault(NamedTuple):
@@ -133,8 +145,8 @@ def signal_modes(signal: FaultSignal) -> dict[str, Mode]:
 
     def offset(effects: Effects, fault: ActiveFault) -> None:
         for line, channel in _channels(signal, effects, fault):
-            line.table[channel, ACTS] = 1.0
-            line.table[channel, OFFSET] += signal.to_line_unit(effects) * fault.value
+            line.acts[channel] = 1
+            line.offset[channel] += signal.to_line_unit(effects) * fault.value
 
     def gain(effects: Effects, fault: ActiveFault) -> None:
         for line, channel in _channels(signal, effects, fault):
@@ -164,33 +176,33 @@ def silent_modes(signal: FaultSignal) -> dict[str, Mode]:
 
 def fix(line: FaultLine, channel: int, value: float) -> None:
     """Set the channel to a constant value, in the unit of the line."""
-    line.table[channel, ACTS] = 1.0
-    line.table[channel, [LINE_GAIN, OFFSET, NOISE]] = 0.0, value, 0.0
+    line.acts[channel], line.gain[channel] = 1, 0.0
+    line.offset[channel], line.noise[channel] = value, 0.0
 
 
 def hold(line: FaultLine, channel: int, value: float, unit: float) -> None:
     """Let the channel keep a value, stated in a unit, or its last value."""
     if keeps_last_value(value):
-        line.table[channel, [ACTS, HOLDS]] = 1.0
+        line.acts[channel] = line.holds[channel] = 1
     else:
         fix(line, channel, unit * value)
 
 
 def scale(line: FaultLine, channel: int, factor: float) -> None:
     """Multiply the channel and everything that earlier faults added."""
-    line.table[channel, ACTS] = 1.0
-    line.table[channel, [LINE_GAIN, OFFSET]] *= factor
-    line.table[channel, NOISE] *= abs(factor)
+    line.acts[channel] = 1
+    line.gain[channel] *= factor
+    line.offset[channel] *= factor
+    line.noise[channel] *= abs(factor)
 
 
 def add_noise(line: FaultLine, channel: int, deviation: float, column: int) -> None:
     """Add noise to the channel; noise of several faults adds as the root of the sum of squares."""
-    line.table[channel, ACTS] = 1.0
-    line.table[channel, NOISE] = (line.table[channel, NOISE] ** 2 + deviation**2) ** 0.5
-    line.table[channel, COLUMN] = column
+    line.acts[channel], line.column[channel] = 1, column
+    line.noise[channel] = (line.noise[channel] ** 2 + deviation**2) ** 0.5
 
 
 def _channels(signal: FaultSignal, effects: Effects, fault: ActiveFault) -> list[tuple[FaultLine, int]]:
     line = signal.line(effects)
-    places = range(len(line.table)) if signal.every_channel else (fault.place,)
+    places = range(len(line.acts)) if signal.every_channel else (fault.place,)
     return [(line, channel) for channel in places]

@@ -20,17 +20,17 @@ from spheretwin.faults.effects import (
 
 
 def _silence_adc(effects: Effects, fault: ActiveFault) -> None:
-    effects.sensors.silent[:2] = True
+    effects.sensors.silent[:2] = 1
 
 
 def _delay_adc(effects: Effects, fault: ActiveFault) -> None:
-    effects.sensors.stage("adc").delay_ticks[0] += round(fault.value / effects.period_s)
+    effects.sensors.stages["adc"].delay_ticks += round(fault.value / effects.period_s)
 
 
 ADC_SIGNAL = FaultSignal(
-    lambda effects: effects.sensors.stage("adc").line,
+    lambda effects: effects.sensors.stages["adc"].line,
     "V",
-    lambda effects: 1.0 / effects.sensors.stage("adc").volts_per_rad,
+    lambda effects: 1.0 / effects.sensors.stages["adc"].volts_per_rad,
     every_channel=True,
 )
 
@@ -50,7 +50,7 @@ def _open_circuit(effects: Effects, fault: ActiveFault) -> None:
     effects.drive.coil.contact[fault.place] = OPEN
 
 
-AMPLIFIER_SIGNAL = FaultSignal(lambda effects: effects.drive.stage("amplifier").line, "A")
+AMPLIFIER_SIGNAL = FaultSignal(lambda effects: effects.drive.stages["amplifier"].line, "A")
 
 AMPLIFIER = Target(
     "amplifier",
@@ -91,16 +91,16 @@ COIL = Target(
 
 
 def _stick_output(effects: Effects, fault: ActiveFault) -> None:
-    if effects.drive.output.state[0] != SILENT:
-        effects.drive.output.state[0] = STUCK
+    if effects.drive.output.state != SILENT:
+        effects.drive.output.state = STUCK
 
 
 def _silence_output(effects: Effects, fault: ActiveFault) -> None:
-    effects.drive.output.state[0] = SILENT
+    effects.drive.output.state = SILENT
 
 
 def _delay_controller(effects: Effects, fault: ActiveFault) -> None:
-    effects.drive.output.delay_steps[0] += round(fault.value / effects.step_s)
+    effects.drive.output.delay_steps += round(fault.value / effects.step_s)
 
 
 CONTROLLER = Target(
@@ -117,22 +117,22 @@ CONTROLLER = Target(
 
 
 DAC_SIGNAL = FaultSignal(
-    lambda effects: effects.drive.stage("dac").line,
+    lambda effects: effects.drive.stages["dac"].line,
     "V",
-    lambda effects: float(effects.drive.stage("dac").dac.transconductance_A_V),
+    lambda effects: float(effects.drive.stages["dac"].dac.transconductance_A_V),
 )
 
 DAC = Target("dac", {**signal_modes(DAC_SIGNAL), **silent_modes(DAC_SIGNAL)}, each_group=True)
 
 
 def _silence_encoder(effects: Effects, fault: ActiveFault) -> None:
-    effects.sensors.silent[2] = True
+    effects.sensors.silent[2] = 1
 
 
 ENCODER = Target(
     "encoder",
     {
-        **signal_modes(FaultSignal(lambda effects: effects.sensors.stage("encoder").line, "rad")),
+        **signal_modes(FaultSignal(lambda effects: effects.sensors.stages["encoder"].line, "rad")),
         "dropout": Mode(_silence_encoder),
         "intermittent": Mode(_silence_encoder, INTERVAL, intermittent=True),
     },
@@ -142,7 +142,7 @@ ENCODER = Target(
 
 
 def _stage(effects: Effects) -> Potentiometers:
-    stage: Potentiometers = effects.sensors.stage("potentiometer")
+    stage: Potentiometers = effects.sensors.stages["potentiometer"]
     return stage
 
 

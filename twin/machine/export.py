@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from spheretwin.electronics.drive import build_drive
-from spheretwin.electronics.sensor_chain import sensor_chain
+from spheretwin.electronics.drive_chain import build_drive
+from spheretwin.electronics.sensor_chain import build_sensors
 from spheretwin.machine.files import CONDITIONS, CURRENTS, conditions_of, log_signals
 from spheretwin.machine.log import COMMANDED, MEASURED
 from spheretwin.models.base.errors import SpheretwinError
@@ -164,8 +164,8 @@ def _true_values(session: Session) -> dict[str, Any]:
     return {
         "scenario": scenario.model_dump(mode="json"),
         "plant": _plain(parameters_of(scenario, files_of(scenario))),
-        "drive": _plain(drive),
-        "sensors": _plain(sensor_chain(scenario.sensors, scenario.seed)),
+        "drive": _plain(drive[0]),
+        "sensors": _plain(build_sensors(scenario.sensors, scenario.seed)[0]),
         "states": TRUE_STATES,
         "versions": versions(),
     }
@@ -175,6 +175,10 @@ def _plain(value: Any) -> Any:
     """Return a value in JSON types; null for a number that is not finite."""
     if hasattr(value, "_asdict"):
         return _plain(value._asdict())
+    if isinstance(value, np.void):
+        return {name: _plain(value[name]) for name in value.dtype.names or ()}
+    if isinstance(value, np.ndarray) and value.dtype.names:
+        return [_plain(entry) for entry in value]
     if isinstance(value, Mapping):
         return {name: _plain(entry) for name, entry in value.items()}
     if isinstance(value, np.ndarray | np.generic):

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field
 
-from spheretwin.electronics.coil import REFERENCE_degC
+from spheretwin.electronics.coil import GroupCoils, REFERENCE_degC
 from spheretwin.models.base.compiled import inlined
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.base.record import Record, Rows, field
@@ -166,12 +166,12 @@ def remanence(section: ResolvedThermal, ambient_degC: float) -> float:
 
 
 @inlined
-def begin_heat(heat: MagnetHeat, group_gain: Array, present: Array, surroundings_degC: Array) -> None:
-    """Compute the gains (n,) with the present remanence and, with heat, the windings' surroundings (1,)."""
+def begin_heat(heat: MagnetHeat, group_gain: Array, present: Array, coil: GroupCoils) -> None:
+    """Compute the gains (n,) with the present remanence and, with heat, the coils' surroundings."""
     factor = 1.0
     if heat.on:
         factor += heat.remanence_per_K * (heat.rotor_degC - REFERENCE_degC)
-        surroundings_degC[0] = heat.stator_degC
+        coil.surroundings_degC = heat.stator_degC
     for j in range(group_gain.shape[0]):
         present[j] = factor * group_gain[j]
 

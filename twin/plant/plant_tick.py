@@ -8,8 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from spheretwin.electronics.drive import DriveModel, advance_currents, begin, end
-from spheretwin.electronics.transducers import CurrentSensors
+from spheretwin.electronics.drive_chain import advance, begin, end
 from spheretwin.models.base.compiled import copy_into, inlined, part_of_its_caller
 from spheretwin.models.base.record import Rows
 from spheretwin.models.joint_chain import torque_on_hinges, update_ideal_motion
@@ -46,13 +45,10 @@ class Plant(NamedTuple):
     magnetics: TorqueModel  # true
     G: NDArray[np.float64]  # (3, n) N·m/A, true torque matrix in the middle of the physics step
     scratch: NDArray[np.float64]  # of `fill_torque_matrix`
-    drive: DriveModel
+    drive: Rows  # array of one DriveChain
     friction: Rows  # array of one Friction
     bristles: Rows  # array of one BristleFriction
     heat: Rows  # array of one MagnetHeat
-    winding_degC: NDArray[np.float64]  # (n,) of the drive
-    copper_J: NDArray[np.float64]  # (n,) of the drive: loss in this period
-    surroundings_degC: NDArray[np.float64]  # (1,) of the windings
     group_gain: NDArray[np.float64]  # (n,) torque per ampere over that of the torque matrix
     present_gain: NDArray[np.float64]  # (n,) the same with the present remanence
     unmodelled_torque: NDArray[np.float64]  # (3,) N·m on the hinges (paper: ΔG)
@@ -71,7 +67,8 @@ class Plant(NamedTuple):
     friction_q: NDArray[np.float64]  # (3,) N·m on the hinges, mean over the physics step
     first_friction_q: NDArray[np.float64]  # (3,) the same in the first one of the control period
     draws: NDArray[np.float64]  # standard normal numbers of the tick, of faults and current sensors
-    current_sensors: CurrentSensors
+    halt: NDArray[np.int64]  # (1,) request of a watchdog to the drive
+    current_sensors: Rows  # of CurrentSensors
     fault_modes: NDArray[np.float64]  # of every part that can fail: number of its failure mode, or 0
     fault_start_s: NDArray[np.float64]  # (n,) start of the last fault of each group, s; below 0: none
 
@@ -116,15 +113,16 @@ def plant_tick(
     # Read from the tuple once, because each access counts a reference. Numba has no tuples of records.
     rotor = plant.rotor[0]
     friction, bristles, joint = plant.friction[0], plant.bristles[0], rotor.joint
-    drive, magnetics, G, scratch = plant.drive, plant.magnetics, plant.G, plant.scratch
+    drive, magnetics = plant.drive[0], plant.magnetics
+    G, scratch = plant.G, plant.scratch
     q, qdot, torque_q, torque_S = rotor.q, rotor.qdot, rotor.torque_q, plant.torque_S
     middle_q, middle_qdot, last_qdot = plant.middle_q, plant.middle_qdot, plant.last_qdot
     hinge_range, half_step_s = plant.hinge_range, 0.5 * plant.step_s
     current, mean_current, effective_current = plant.current, plant.mean_current, plant.effective_current
     gain, unmodelled, friction_q = plant.present_gain, plant.unmodelled_torque, plant.friction_q
-    coil_q, coil_qdot = plant.coil_q, plant.coil_qdot
-    begin_heat(plant.heat[0], plant.group_gain, gain, plant.surroundings_degC)
-    begin(drive, command)
+    coil_q, coil_qdot, draws = plant.coil_q, plant.coil_qdot, plant.draws
+    begin_heat(plant.heat[0], plant.group_gain, gain, drive.coil)
+    begin(drive, command, plant.halt[0], draws)
     for substep in range(plant.substeps):
         for i in range(3):
             middle_q[i] = q[i] + half_step_s * qdot[i]
@@ -134,7 +132,7 @@ def plant_tick(
         slow_down(friction, joint, q, qdot, friction_q)
         update_ideal_motion(joint, middle_q, middle_qdot, coil_q, coil_qdot)
         fill_torque_matrix(coil_q, magnetics, G, scratch)
-        advance_currents(drive, command, substep, coil_q, coil_qdot, G, gain, current, mean_current)
+        advance(drive, substep, coil_q, coil_qdot, G, gain, draws, current, mean_current)
         log_mean_current(mean_current, substep, output.mean_current)
         for j in range(effective_current.shape[0]):
             effective_current[j] = gain[j] * mean_current[j]
@@ -158,7 +156,7 @@ def plant_tick(
             if not hinge_range[i, 0] <= q[i] <= hinge_range[i, 1]:
                 return LEFT_WORKSPACE
     is_cool = end(drive)
-    advance_heat(plant.heat[0], plant.winding_degC, plant.copper_J)
+    advance_heat(plant.heat[0], drive.coil.temperature_degC, drive.flow.copper_J)
     if not is_cool:
         return FAILSAFE
     return DIVERGED if rotor.warnings > 0 else GOING

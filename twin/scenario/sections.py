@@ -19,7 +19,7 @@ from spheretwin.control.supervision.fault_detector import DetectorSection
 from spheretwin.control.supervision.watchdog import WatchdogSection
 from spheretwin.control.user_law import parameters_of
 from spheretwin.disturbances import Disturbance
-from spheretwin.electronics.delay import delay
+from spheretwin.electronics.delay import steps_of
 from spheretwin.electronics.drive_section import DriveSection, ResolvedDrive
 from spheretwin.electronics.sensor_chain import SensorsSection
 from spheretwin.faults.fault import Fault, check_gains
@@ -133,7 +133,7 @@ class Scenario(Section):
                 f"expected sensors.adc.skew_s below controller.period_s of {period_s!r} s,"
                 f" received {skew_s!r} s"
             )
-        delay(self.drive, self.plant.step_s, self.substeps, 1)  # a whole number of physics steps
+        steps_of(self.drive, self.plant.step_s, self.substeps)  # a whole number of physics steps
         if self.ticks < 1:
             raise ValueError(
                 f"expected a duration of at least one control period, received {self.duration!r} s"

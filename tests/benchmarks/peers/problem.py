@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from spheretwin.disturbances import Draws
-from spheretwin.electronics.coil import CurrentLag, current_lag
+from spheretwin.electronics.coil import CurrentLag, fill_lag
 from spheretwin.models import actuator as actuators
 from spheretwin.models import mjcf
 from spheretwin.models.actuator import Actuator
@@ -52,12 +52,13 @@ def problem(scenario: Scenario) -> Problem:
         nominal_inertia=np.array(actuator.inertia),
         inertia=(1 + plant.modelling_error) * actuator.inertia,
         magnetics=torque_model(actuator),
-        drive=current_lag(
+        drive=CurrentLag.filled(
+            fill_lag,
             group.inductance_H / group.resistance_ohm,
             plant.step_s,
             group.current_limit_A,
-            len(actuator.groups),
-        ),
+            groups=len(actuator.groups),
+        )[0],
         period_s=period_s,
         step_s=plant.step_s,
         substeps=scenario.substeps,

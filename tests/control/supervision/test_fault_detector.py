@@ -21,9 +21,9 @@ from spheretwin.control.supervision.fault_detector import (
     detect_faults,
     fill_detector,
 )
-from spheretwin.electronics.amplifier import AmplifierSection, amplifier, drive_coils, zero_flow
-from spheretwin.electronics.coil import CoilSection, group_coils
-from spheretwin.electronics.converters import convert, dac
+from spheretwin.electronics.amplifier import Amplifier, AmplifierSection, Flow, drive_coils, fill_amplifier
+from spheretwin.electronics.coil import CoilSection, GroupCoils, fill_coils
+from spheretwin.electronics.converters import Dac, convert, fill_dac
 from spheretwin.electronics.drive_section import DriveSection, ResolvedDrive, drive_sheet
 from spheretwin.models.base.state import restore_state, save_state
 from spheretwin.models.kinematics import rate_jacobian
@@ -102,8 +102,9 @@ def test_no_command_of_a_healthy_drive_is_further_off_than_the_static_error():
     section = DriveSection(**{name.removeprefix("drive."): value for name, value in PROTOTYPE_DRIVE.items()})
     worst = 0.0
     for seed in range(40):
-        converter = dac(section, section.transconductance_A_V, COUNT, seed)
-        offsets = amplifier(section, 8.0, PERIOD_S, COUNT, seed).offset_A
+        transconductance_A_V = section.transconductance_A_V
+        converter = Dac.filled(fill_dac, section, transconductance_A_V, seed, groups=COUNT)[0]
+        offsets = Amplifier.filled(fill_amplifier, section, 8.0, PERIOD_S, seed, groups=COUNT)[0].offset_A
         for command in np.linspace(-8, 8, 41):
             asked = np.empty(COUNT)
             convert(converter, np.full(COUNT, command), asked)
@@ -129,15 +130,14 @@ def test_a_healthy_current_looks_like_none_for_fewer_ticks(
         time_constant_s=1 / bandwidth_rad_s,
     )  # fmt: skip
     watcher = made(nominal)
-    stage = amplifier(
-        AmplifierSection(supply_V=swing_V, bandwidth_rad_s=bandwidth_rad_s), 8.0, period_s, 1, 0
-    )  # fmt: skip
+    supplied = AmplifierSection(supply_V=swing_V, bandwidth_rad_s=bandwidth_rad_s)
+    stage = Amplifier.filled(fill_amplifier, supplied, 8.0, period_s, 0, groups=1)[0]
     section = CoilSection(resistance_ohm=resistance_ohm, inductance_H=inductance_H, **THERMAL)
-    winding = group_coils(section, period_s, 1)
+    winding = GroupCoils.filled(fill_coils, section, period_s, groups=1)[0]
     reach = min(8.0, swing_V / resistance_ohm)
-    current, sums, silent = np.array([-reach]), zero_flow(1), 0
+    current, sums, silent = np.array([-reach]), Flow.zeros(groups=1)[0], 0
     for _ in range(200):
-        drive_coils(stage, winding, np.array([8.0]), np.zeros(1), current, sums)
+        drive_coils(stage, stage.whole, winding, np.array([8.0]), np.zeros(1), current, sums)
         silent += abs(current[0]) <= watcher.threshold_A
     if min(reach, watcher.reach_A[0]) > 2 * watcher.threshold_A:  # else no tick says anything
         assert silent < watcher.ticks

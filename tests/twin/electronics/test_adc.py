@@ -5,13 +5,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from spheretwin.electronics.converters import AdcSection, adc, converted
+from spheretwin.electronics.converters import Adc, AdcSection, converted, fill_adc
 
 NO_DRAWS = np.empty(0)
 
 
 def made(seed=0, **fields):
-    return adc(AdcSection(**fields), np.random.default_rng([seed, 2, 0]).uniform(-1, 1, 2))
+    shares = np.random.default_rng([seed, 2, 0]).uniform(-1, 1, 2)
+    return Adc.filled(fill_adc, AdcSection(**fields), shares)[0]
 
 
 def quiet(channel, volts, noise_V=0.0, draws=NO_DRAWS):

@@ -9,8 +9,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
-from spheretwin.electronics.amplifier import AmplifierSection, amplifier, drive_coils, reset_sums, zero_flow
-from spheretwin.electronics.coil import CoilSection, advance_lag, current_lag, group_coils
+from spheretwin.electronics.amplifier import (
+    Amplifier,
+    AmplifierSection,
+    Flow,
+    drive_coils,
+    fill_amplifier,
+    reset_sums,
+)
+from spheretwin.electronics.coil import CoilSection, CurrentLag, GroupCoils, advance_lag, fill_coils, fill_lag
 
 STEP_S = 5e-4
 SUPPLY = {"supply_V": 24.0, "drop_up_V": 4.8, "drop_down_V": 4.6}
@@ -75,7 +82,15 @@ def coils_of(resistance_ohm, inductance_H, groups):
         heat_capacity_J_K=60.0,
         thermal_resistance_K_W=4.0,
     )
-    return group_coils(section, PERIOD_S, groups)
+    return GroupCoils.filled(fill_coils, section, PERIOD_S, groups=groups)[0]
+
+
+def amplifier_of(section, limit_A, step_s, groups, seed=0):
+    return Amplifier.filled(fill_amplifier, section, limit_A, step_s, seed, groups=groups)[0]
+
+
+def zero_flow(groups):
+    return Flow.zeros(groups=groups)[0]
 
 
 def made(case, groups=1):
@@ -88,7 +103,7 @@ def made(case, groups=1):
         bandwidth_rad_s=case.rate,
     )
     coils = coils_of(case.R, case.L, groups)
-    return amplifier(section, case.limit, case.step_s, groups, 0), coils
+    return amplifier_of(section, case.limit, case.step_s, groups), coils
 
 
 def stepped(case, times=1):
@@ -96,7 +111,15 @@ def stepped(case, times=1):
     current, passed = np.array([case.start]), zero_flow(1)
     charge = 0.0
     for _ in range(times):
-        drive_coils(amplifiers, coils, np.array([case.setpoint]), np.array([case.emf]), current, passed)
+        drive_coils(
+            amplifiers,
+            amplifiers.whole,
+            coils,
+            np.array([case.setpoint]),
+            np.array([case.emf]),
+            current,
+            passed,
+        )
         charge += passed.mean_current_A[0] * case.step_s
     mean = charge / (times * case.step_s)
     return Stepped(current[0], mean, passed.copper_J[0], passed.work_J[0], passed.voltage_limited_s[0])
@@ -142,12 +165,15 @@ def test_with_enough_voltage_the_current_is_the_ideal_lag():
     coils = coils_of(1.3, 0.9e-3, groups)
     for supply_V in (1e6, None):
         section = AmplifierSection(supply_V=supply_V, bandwidth_rad_s=4096.0)  # 1 / rate is exact
-        amplifiers = amplifier(section, 8.0, STEP_S, groups, 0)
+        amplifiers = amplifier_of(section, 8.0, STEP_S, groups)
         current, ideal, mean, passed = np.zeros(groups), np.zeros(groups), np.empty(groups), zero_flow(groups)
         for _ in range(100):
             setpoint = generator.uniform(-10, 10, groups)  # some beyond the limit
-            drive_coils(amplifiers, coils, setpoint, generator.normal(size=groups), current, passed)
-            advance_lag(current_lag(1 / 4096.0, STEP_S, 8.0, groups), setpoint, ideal, mean)
+            drive_coils(
+                amplifiers, amplifiers.whole, coils, setpoint, generator.normal(size=groups), current, passed
+            )
+            lag = CurrentLag.filled(fill_lag, 1 / 4096.0, STEP_S, 8.0, groups=groups)[0]
+            advance_lag(lag, setpoint, ideal, mean)
             # Both are the same closed form; the roundings of a few currents of 8 A.
             np.testing.assert_allclose(current, ideal, rtol=0, atol=1e-14)
             np.testing.assert_allclose(passed.mean_current_A, mean, rtol=0, atol=1e-14)
@@ -159,7 +185,7 @@ def test_at_rest_nothing_moves_by_a_bit():
     setpoint, passed = np.array([0.0, 3.3, -8.0]), zero_flow(3)
     current = setpoint.copy()
     for _ in range(1000):
-        drive_coils(amplifiers, coils, setpoint, np.zeros(3), current, passed)
+        drive_coils(amplifiers, amplifiers.whole, coils, setpoint, np.zeros(3), current, passed)
     np.testing.assert_array_equal(current, setpoint)
     np.testing.assert_allclose(passed.copper_J, 1.3 * setpoint**2 * 0.5, rtol=1e-12)  # 1000 sums
 
@@ -253,12 +279,12 @@ REACHABLE = st.floats(-1e12, 1e12)  # A: of 1e9 V over 1 mohm
 def test_no_number_however_large_or_small_gives_anything_but_numbers(groups, R, L, bandwidth, supply, step_s):
     current, setpoint, emf = (np.array(column) for column in zip(*groups, strict=True))
     section = AmplifierSection(supply_V=supply, bandwidth_rad_s=bandwidth)
-    amplifiers = amplifier(section, 8.0, step_s, 4, 0)
+    amplifiers = amplifier_of(section, 8.0, step_s, 4)
     coils, passed = coils_of(R, L, 4), zero_flow(4)
     most = np.maximum(np.abs(current), (supply + 1e9) / R)
     for _ in range(3):
-        drive_coils(amplifiers, coils, setpoint, emf, current, passed)
-    for sums in (current, *passed):
+        drive_coils(amplifiers, amplifiers.whole, coils, setpoint, emf, current, passed)
+    for sums in (current, *(passed[name] for name in Flow.fields())):
         assert np.all(np.isfinite(sums))
     assert np.all(np.abs(current) <= most * (1 + 1e-12))
     assert np.all(passed.voltage_limited_s <= 3 * step_s * (1 + 1e-12))
@@ -270,7 +296,7 @@ def test_what_is_not_a_number_stays_so_in_its_group_alone(place):
     inputs = {"setpoint": np.full(3, 2.0), "emf": np.full(3, 0.5), "current": np.zeros(3)}
     inputs[place][1] = np.nan
     passed = zero_flow(3)
-    drive_coils(amplifiers, coils, **inputs, flow=passed)
+    drive_coils(amplifiers, amplifiers.whole, coils, **inputs, flow=passed)
     lost = np.array([False, True, False])
     for sums in (inputs["current"], passed.mean_current_A, passed.copper_J, passed.work_J):
         np.testing.assert_array_equal(np.isnan(sums), lost)
@@ -278,19 +304,21 @@ def test_what_is_not_a_number_stays_so_in_its_group_alone(place):
 
 def test_the_target_keeps_to_the_current_limit_with_its_offset():
     section = AmplifierSection(**SUPPLY, amplifier_offset_V=5e-3)
-    amplifiers = amplifier(section, 8.0, STEP_S, 18, 4)
+    amplifiers = amplifier_of(section, 8.0, STEP_S, 18, seed=4)
     assert np.all(np.abs(amplifiers.offset_A) <= 4e-3)  # 5 mV at 0.8 A/V
     coils, passed = coils_of(1.3, 0.9e-3, 18), zero_flow(18)
     current = np.zeros(18)
     for setpoint, expected in ((1.0, 1.0 + amplifiers.offset_A), (9.0, 8.0), (-np.inf, -8.0)):
         reset_sums(passed)
         for _ in range(40):
-            drive_coils(amplifiers, coils, np.full(18, setpoint), np.zeros(18), current, passed)
+            drive_coils(
+                amplifiers, amplifiers.whole, coils, np.full(18, setpoint), np.zeros(18), current, passed
+            )
         np.testing.assert_allclose(current, expected, rtol=1e-14)
         limited = 0.0 if setpoint == 1.0 else 40 * STEP_S
         np.testing.assert_allclose(passed.current_limited_s, limited, rtol=1e-13)
     exact, current, passed = made(CASES[0], groups=2)[0], np.array([8.0, -8.0]), zero_flow(2)
-    drive_coils(exact, made(CASES[0], groups=2)[1], current.copy(), np.zeros(2), current, passed)
+    drive_coils(exact, exact.whole, made(CASES[0], groups=2)[1], current.copy(), np.zeros(2), current, passed)
     np.testing.assert_array_equal(passed.current_limited_s, 0)  # the limit itself may be commanded
 
 

@@ -11,11 +11,13 @@ from scipy.integrate import quad
 from spheretwin.electronics.coil import (
     SERIES_TO,
     CoilSection,
+    CurrentLag,
+    GroupCoils,
     advance_lag,
     advance_temperature,
     back_emf,
-    current_lag,
-    group_coils,
+    fill_coils,
+    fill_lag,
     is_overheated,
     relaxation,
 )
@@ -27,7 +29,7 @@ R, L, PERIOD_S = 1.3, 0.9e-3, 1e-3
 def coils(groups, period_s=PERIOD_S, **changes):
     values = {"resistance_ohm": R, "inductance_H": L, "resistance_per_K": 0.0039}
     values |= {"heat_capacity_J_K": 60.0, "thermal_resistance_K_W": 4.0}
-    return group_coils(CoilSection(**values | changes), period_s, groups)
+    return GroupCoils.filled(fill_coils, CoilSection(**values | changes), period_s, groups=groups)[0]
 
 
 @pytest.mark.parametrize(("ambient", "share"), [(20.0, 1.0), (120.0, 1.39), (-30.0, 0.805)])
@@ -98,7 +100,8 @@ def test_one_step_is_the_exact_exponential_and_its_mean(time_constant_s):
     step_s = 5e-4
     command, current, mean = np.array([3.0, -1.0]), np.array([0.5, 2.0]), np.empty(2)
     start = current.copy()
-    advance_lag(current_lag(time_constant_s, step_s, 8.0, 2), command, current, mean)
+    lag = CurrentLag.filled(fill_lag, time_constant_s, step_s, 8.0, groups=2)[0]
+    advance_lag(lag, command, current, mean)
 
     def exact(t):
         return command + (start - command) * np.exp(-t / np.array(time_constant_s))
@@ -110,7 +113,7 @@ def test_one_step_is_the_exact_exponential_and_its_mean(time_constant_s):
 
 def test_without_lag_the_current_is_the_command():
     command, current, mean = np.array([4.0]), np.zeros(1), np.empty(1)
-    advance_lag(current_lag(0.0, 5e-4, 8.0, 1), command, current, mean)
+    advance_lag(CurrentLag.filled(fill_lag, 0.0, 5e-4, 8.0, groups=1)[0], command, current, mean)
     assert current[0] == mean[0] == 4.0
 
 

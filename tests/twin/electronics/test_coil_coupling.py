@@ -8,7 +8,7 @@ from scipy.linalg import expm
 from spheretwin import scenario as scenarios
 from spheretwin.electronics.coil import OPEN, SHORTED
 from spheretwin.electronics.coil_coupling import TOLERANCE_A
-from spheretwin.electronics.drive_chain import advance, begin, drive_chain
+from spheretwin.electronics.drive_chain import DriveFaults, advance, begin, build_drive
 from spheretwin.electronics.drive_section import ResolvedDrive
 from spheretwin.models.actuator import load
 from spheretwin.models.inductance import mutual_inductance
@@ -29,7 +29,8 @@ def chain_of(mutual_H, step_s, **changed):
         "thermal_resistance_K_W": 4.0,
     }  # fmt: skip
     groups = GROUPS if mutual_H is None else len(mutual_H)
-    return drive_chain(ResolvedDrive(**fields | changed), step_s, 1, groups, 0, None, mutual_H)
+    section = ResolvedDrive(**fields | changed)
+    return build_drive(section, step_s, 1, groups, 0, DriveFaults(), mutual_H)[0]
 
 
 class Steps:
@@ -43,11 +44,11 @@ class Steps:
         """Advance by one step; return charge, copper loss and electrical work of each group."""
         G = np.zeros((3, self.groups))
         G[0] = 0.0 if emf is None else emf
-        begin(self.chain, command)
-        ones = np.ones(self.groups)
-        advance(self.chain, command, 0, np.zeros(3), np.array([1.0, 0, 0]), G, ones, self.current, self.mean)
+        none, ones, rates = np.zeros(0), np.ones(self.groups), np.array([1.0, 0, 0])
+        begin(self.chain, command, 0, none)
+        advance(self.chain, 0, np.zeros(3), rates, G, ones, none, self.current, self.mean)
         flow = self.chain.flow
-        charge = self.mean * self.chain.amplifier.step_s
+        charge = self.mean * self.chain.amplifier.whole.step_s
         return charge, flow.copper_J.copy(), flow.work_J.copy()
 
 
@@ -165,8 +166,8 @@ def test_back_emf_takes_the_power_of_the_torque_to_the_last_digit():
     G, gain = generator.normal(size=(3, GROUPS)) * 0.05, generator.uniform(0.8, 1.2, GROUPS)
     q, qdot = generator.normal(size=3) * 0.3, generator.normal(size=3) * 5
     command, current, mean = generator.normal(size=GROUPS), np.zeros(GROUPS), np.empty(GROUPS)
-    begin(chain, command)
-    advance(chain, command, 0, q, qdot, G, gain, current, mean)
+    begin(chain, command, 0, np.zeros(0))
+    advance(chain, 0, q, qdot, G, gain, np.zeros(0), current, mean)
     electrical, mechanical = chain.coupling.own_emf @ mean, (G @ (gain * mean)) @ (rate_jacobian(q) @ qdot)
     assert electrical == pytest.approx(mechanical, rel=1e-14)
 

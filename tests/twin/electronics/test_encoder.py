@@ -7,17 +7,17 @@ from hypothesis import strategies as st
 from pydantic import ValidationError
 
 from spheretwin import scenario as scenarios
-from spheretwin.electronics.sensor_chain import SensorsSection, sense, sensor_chain
+from spheretwin.electronics.sensor_chain import SensorsSection, build_sensors, sense
 from spheretwin.electronics.stages import SensorSetup
-from spheretwin.electronics.transducers import EncoderSection, counted
+from spheretwin.electronics.transducers import Encoder, EncoderSection, counted
 from spheretwin.session import Session
 
 COUNTS = st.integers(1, 2**20)
 
 
 def encoder_of(counts):
-    setup = SensorSetup(None, 0, "encoder", first_draw=0, faults=False, longest_delay_ticks=0)
-    return EncoderSection(counts=counts).build(setup)
+    setup = SensorSetup(None, 0, "encoder", first_draw=0, faults=False)
+    return Encoder.filled(EncoderSection(counts=counts).fill, setup)[0]
 
 
 @given(st.floats())
@@ -54,9 +54,9 @@ LINE = 2 * np.pi / 2000
 
 def measured(q, seed=0, rates=None, **section):
     """Measured angles (n, 3) at poses (n, 3)."""
-    chain, row, angles = sensor_chain(SensorsSection(**section), seed), np.empty((3, 3)), []
+    chain, row, angles = build_sensors(SensorsSection(**section), seed)[0], np.empty((3, 3)), []
     for pose, rate in zip(q, np.zeros_like(q) if rates is None else rates, strict=True):
-        sense(chain, pose, rate, np.zeros(8), row)
+        sense(chain, pose, rate, np.zeros(8), np.zeros(0), row)
         angles.append(row[0].copy())
     return np.array(angles)
 

@@ -12,10 +12,11 @@ from spheretwin.electronics.sensor_chain import SensorsSection
 from spheretwin.electronics.stages import SensorSetup
 from spheretwin.electronics.transducers import (
     HARMONICS,
-    LAG,
     LARGEST_SHARE,
+    Potentiometer,
+    Potentiometers,
     PotentiometerSection,
-    potentiometer,
+    fill_potentiometer,
     wiper_angle,
     wiper_voltage,
 )
@@ -27,7 +28,8 @@ FINITE = st.floats(allow_nan=False, allow_infinity=False)
 
 def track_of(seed=0, **fields):
     section = PotentiometerSection(**fields)
-    return potentiometer(section, np.random.default_rng([seed, 1, 0]).random(4))
+    shares = np.random.default_rng([seed, 1, 0]).random(4)
+    return Potentiometer.filled(fill_potentiometer, section, shares)[0]
 
 
 def residual(track, angles):
@@ -60,7 +62,8 @@ def test_residual_is_four_harmonics_of_the_track_and_its_peak_is_the_stated_one(
     bound, samples, half_rad = 0.01, 4096, HALF_rad if seed % 2 else 0.75
     # A supply far above what is reached: else the ends would cut the residual off.
     fields = {"nonlinearity_rad": bound, "electrical_angle_rad": 2 * half_rad}
-    track = track_of(seed, **fields)._replace(half_supply_V=1e3)
+    track = track_of(seed, **fields)
+    track.half_supply_V = 1e3
     angles = half_rad * (2 * np.arange(samples) / samples - 1)
     off = residual(track, angles)
     # Between samples a peak rises above both by at most half its curvature times (π/4096)²; the curvature is
@@ -77,7 +80,8 @@ def test_residual_is_four_harmonics_of_the_track_and_its_peak_is_the_stated_one(
 @pytest.mark.parametrize("seed", range(50))
 def test_the_voltage_rises_with_the_angle_at_the_largest_residual(seed):
     largest = LARGEST_SHARE * 2 * HALF_rad * (1 - 1e-12)
-    track = track_of(seed, nonlinearity_rad=largest)._replace(half_supply_V=1e3)
+    track = track_of(seed, nonlinearity_rad=largest)
+    track.half_supply_V = 1e3
     volts = [wiper_voltage(track, angle) for angle in np.linspace(-HALF_rad, HALF_rad, 1001)]
     assert np.diff(volts).min() > 0
 
@@ -93,10 +97,8 @@ WIDTH, SPREAD = 4e-3, 1e-3
 
 def made(hysteresis=WIDTH, repeatability=SPREAD):
     section = PotentiometerSection(hysteresis_rad=hysteresis, repeatability_rad=repeatability)
-    setup = SensorSetup(
-        SensorsSection(), 0, "potentiometer", first_draw=0, faults=False, longest_delay_ticks=0
-    )
-    return section.build(setup)
+    setup = SensorSetup(SensorsSection(), 0, "potentiometer", first_draw=0, faults=False)
+    return Potentiometers.filled(section.fill, setup)[0]
 
 
 def followed(stage, angles, draws):
@@ -140,7 +142,7 @@ def test_hysteresis_is_the_difference_of_readings_from_both_sides():
     below, above = (followed(stage, approaches(3, side), none)[-1] for side in (-1, 1))
     assert above - below == pytest.approx(WIDTH, rel=1e-12)
     assert above == pytest.approx(WIDTH / 2, rel=1e-12)
-    assert stage.play[0, LAG] == above  # the joint is at 0
+    assert stage.lead_rad[0] == above  # the joint is at 0
 
 
 def test_spread_larger_than_the_play_is_refused():

@@ -8,7 +8,7 @@ from spheretwin import scenario as scenarios
 from spheretwin.control.estimators import ESTIMATORS
 from spheretwin.control.estimators.estimator import estimates
 from spheretwin.electronics.random_streams import noise_table
-from spheretwin.electronics.sensor_chain import noise_streams, sense, sensor_chain
+from spheretwin.electronics.sensor_chain import build_sensors, noise_streams, sense
 from spheretwin.models.lagrangian import inertia_matrix
 from spheretwin.session import Session
 from spheretwin.simulation import simulate
@@ -26,11 +26,11 @@ def test_the_law_is_handed_what_the_stages_make_of_the_true_state(kind):
     """Sensors and estimator called one after the other, outside the loop, give the logged columns."""
     run = simulate(prototype("tilt", **{"estimator.kind": kind, "duration": 0.5}))
     table, resolved = run.telemetry, run.scenario
-    chain = sensor_chain(resolved.sensors, resolved.seed)
+    chain = build_sensors(resolved.sensors, resolved.seed)[0]
     noise = noise_table(resolved.seed, 0, len(table), noise_streams(resolved.sensors))
     measurement, angles = np.empty((3, 3)), np.empty((len(table), 3))
     for tick, (q, qdot) in enumerate(zip(table["q_rad"], table["qdot_rad_s"], strict=True)):
-        sense(chain, q.copy(), qdot.copy(), noise[tick], measurement)
+        sense(chain, q.copy(), qdot.copy(), noise[tick], np.zeros(0), measurement)
         angles[tick] = measurement[0]
     np.testing.assert_array_equal(table["q_measured_rad"], angles)
     rates = estimates(assembly.estimator_of(resolved), angles)

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from spheretwin.electronics.random_streams import noise_table, width_of
-from spheretwin.electronics.sensor_chain import SensorsSection, noise_streams, sense, sensor_chain
+from spheretwin.electronics.sensor_chain import SensorsSection, build_sensors, noise_streams, sense
 from spheretwin.scenario.hardware import PROTOTYPE_SENSORS
 from tests.twin.plant.allocations import allocates_nothing
 
@@ -32,10 +32,11 @@ def prototype(**more):
 
 def measured(section, seed, q, first=0):
     """Angles (n, 3) that are handed over at poses q (n, 3) of consecutive ticks."""
-    sensors, noise = sensor_chain(section, seed), noise_table(seed, first, len(q), noise_streams(section))
+    sensors, streams = build_sensors(section, seed)[0], noise_streams(section)
+    noise = noise_table(seed, first, len(q), streams)
     measurement, angles = np.empty((3, 3)), np.empty_like(q)
     for tick in range(len(q)):
-        assert sense(sensors, q[tick], q[tick], noise[tick], measurement)
+        assert sense(sensors, q[tick], q[tick], noise[tick], NO_NOISE, measurement)
         angles[tick] = measurement[0]
     return angles
 
@@ -58,12 +59,12 @@ def poses(ticks, seed=0):
 @given(q=st.tuples(*[st.floats(allow_nan=False)] * 3), qdot=st.tuples(*[st.floats(allow_nan=False)] * 3))
 def test_an_ideal_chain_hands_over_the_very_bits(section, q, qdot):
     measurement, state = np.full((3, 3), 7.0), np.array([q, qdot])
-    sensors = sensor_chain(section, 0)
-    assert sense(sensors, state[0], state[1], NO_NOISE, measurement) == np.isfinite(state).all()
+    sensors = build_sensors(section, 0)[0]
+    assert sense(sensors, state[0], state[1], NO_NOISE, NO_NOISE, measurement) == np.isfinite(state).all()
     assert measurement[:2].tobytes() == state.tobytes()
     np.testing.assert_array_equal(measurement[2], 7.0)  # the torque believed, which is another's
     assert not sensors.shifts
-    assert not any(stage.on for stage in sensors.stages)
+    assert not any(sensors.stages[name].on for name in sensors.stages.dtype.names)
     assert width_of(noise_streams(section)) == 0
 
 
@@ -84,9 +85,9 @@ def test_a_mounting_error_alone_is_added_to_each_angle():
 
 
 def test_rates_are_the_true_ones_and_what_was_handed_over_is_kept():
-    sensors, measurement = sensor_chain(prototype(), 0), np.zeros((3, 3))
+    sensors, measurement = build_sensors(prototype(), 0)[0], np.zeros((3, 3))
     rates = np.array([1.0, -2.0, 3.0])
-    sense(sensors, np.array([0.1, 0.2, 0.3]), rates, np.zeros(2), measurement)
+    sense(sensors, np.array([0.1, 0.2, 0.3]), rates, np.zeros(2), NO_NOISE, measurement)
     np.testing.assert_array_equal(measurement[1], rates)
 
 
@@ -124,7 +125,8 @@ def sensed(section, state, draws):
     """What is returned, and what is handed over, with draws repeated to the width needed."""
     measurement = np.zeros((3, 3))
     noise = np.resize(np.array(draws), width_of(noise_streams(section)))
-    finite = sense(sensor_chain(section, 0), np.array(state[:3]), np.array(state[3:]), noise, measurement)
+    q, qdot = np.array(state[:3]), np.array(state[3:])
+    finite = sense(build_sensors(section, 0)[0], q, qdot, noise, NO_NOISE, measurement)
     return finite, measurement[:2]
 
 
@@ -157,10 +159,12 @@ def test_no_stage_makes_a_number_of_none(place):
 
 def test_a_short_row_of_noise_is_no_number_either():
     measurement = np.zeros((3, 3))
-    assert not sense(sensor_chain(prototype(), 0), np.zeros(3), np.zeros(3), NO_NOISE, measurement)
+    assert not sense(
+        build_sensors(prototype(), 0)[0], np.zeros(3), np.zeros(3), NO_NOISE, NO_NOISE, measurement
+    )
 
 
 def test_sensing_allocates_nothing():
     section = prototype(**{"sensors.adc.oversampling": 4})
-    arguments = np.zeros(3), np.zeros(3), np.zeros(8), np.zeros((3, 3))
-    assert allocates_nothing(sense, sensor_chain(section, 0), *arguments)
+    arguments = np.zeros(3), np.zeros(3), np.zeros(8), NO_NOISE, np.zeros((3, 3))
+    assert allocates_nothing(sense, build_sensors(section, 0)[0], *arguments)

@@ -8,7 +8,6 @@ from hypothesis import strategies as st
 
 from spheretwin import scenario as scenarios
 from spheretwin.control.law import Law
-from spheretwin.electronics.stages import LAST
 from spheretwin.faults.targets import TARGETS
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.telemetry.signals import Signal
@@ -87,17 +86,17 @@ INPUTS = {
     "angle": lambda machine: machine._rotor.rows["q"][0],
     "rate": lambda machine: machine._rotor.rows["qdot"][0],
     "current": lambda machine: machine._plant.current,
-    "temperature": lambda machine: machine._plant.drive.coil.temperature_degC,
-    "resistance": lambda machine: machine._plant.drive.coil.resistance_ohm,
-    "on their way": lambda machine: machine._plant.drive.delay.history.ravel(),
-    "held": lambda machine: machine._plant.drive.stage("dac").line.table[:, LAST],
+    "temperature": lambda machine: machine._plant.drive[0].coil.temperature_degC,
+    "resistance": lambda machine: machine._plant.drive[0].coil.resistance_ohm,
+    "on their way": lambda machine: machine._plant.drive[0].delay.history.ravel(),
+    "held": lambda machine: machine._plant.drive[0].stages["dac"].line.last,
     "group gain": lambda machine: machine._plant.group_gain,
     "estimate": lambda machine: machine._controller.estimator_memory,
     "law": lambda machine: machine._controller.memory,
     "belief": lambda machine: machine._controller.data[0].applied_torque.current,
     "detector": lambda machine: machine._controller.data[0].supervision.detector.shorted_A,
-    "wiper": lambda machine: machine._sensors.stage("potentiometer").line.table[:, LAST],
-    "converted": lambda machine: machine._sensors.stage("adc").delayed_rad.ravel(),
+    "wiper": lambda machine: machine._sensors[0].stages["potentiometer"].line.last,
+    "converted": lambda machine: machine._sensors[0].stages["adc"].delayed_rad.ravel(),
     "seen": lambda machine: machine._controller.data[0].supervision.watchdog.last_rad,
 }
 

@@ -5,7 +5,6 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from spheretwin import scenario as scenarios
-from spheretwin.electronics.stages import NOISE
 from spheretwin.faults.schedule import FaultSchedule
 from spheretwin.models.kinematics import rate_jacobian
 from spheretwin.models.magnetics import torque_matrix
@@ -153,7 +152,7 @@ def test_several_noises_of_one_source_are_one_of_their_root_sum_of_squares():
     faults = each("noise", "amplifier", value=0.3) + each("noise", "amplifier", value=0.4)
     with Session(prototype(*faults)) as session:
         session.advance(1)
-        drive = session._runtime._plant.drive
-    np.testing.assert_allclose(drive.stage("amplifier").line.table[:, NOISE], 0.5, rtol=1e-15)
-    assert not drive.stage("dac").line.table[:, NOISE].any()
+        drive = session._runtime._plant.drive[0]
+    np.testing.assert_allclose(drive.stages["amplifier"].line.noise, 0.5, rtol=1e-15)
+    assert not drive.stages["dac"].line.noise.any()
     assert len(FaultSchedule(session.scenario.fault, GROUPS, STEP_S, 0)) == 36

@@ -9,7 +9,7 @@ from scipy.linalg import expm, solve
 from spheretwin import scenario as scenarios
 from spheretwin import simulate
 from spheretwin.electronics.coil import advance_temperature
-from spheretwin.electronics.drive_chain import drive_chain
+from spheretwin.electronics.drive_chain import build_drive
 from spheretwin.electronics.drive_section import ResolvedDrive
 from spheretwin.models.actuator import load
 from spheretwin.models.base.errors import InputError
@@ -40,7 +40,7 @@ def heat_of(period_s, section=SECTION):
     coils = {"supply_V": 24.0, "resistance_ohm": 1.3, "inductance_H": 9e-4, "current_limit_A": 8.0}
     heat = {"heat_capacity_J_K": WINDING_J_K, "thermal_resistance_K_W": WINDING_K_W}
     drive = ResolvedDrive(resistance_per_K=0.0, ambient_degC=AMBIENT_degC, **coils, **heat)
-    coil = drive_chain(drive, period_s, 1, GROUPS, 0).coil
+    coil = build_drive(drive, period_s, 1, GROUPS, 0)[0].coil
     fields = section, AMBIENT_degC, period_s, WINDING_J_K, coil.settled
     return coil, MagnetHeat.filled(fill_heat, *fields, groups=GROUPS)[0]
 
@@ -51,7 +51,7 @@ def heated(duration_s, period_s, section=SECTION):
     copper_J, gain = LOSS_W * period_s, np.ones(GROUPS)
     degC = np.empty((round(duration_s / period_s), 2))
     for row in degC:
-        begin_heat(heat, gain, gain.copy(), coil.surroundings_degC)
+        begin_heat(heat, gain, gain.copy(), coil)
         advance_temperature(coil, copper_J)
         advance_heat(heat, coil.temperature_degC, copper_J)
         row[:] = heat.stator_degC, heat.rotor_degC
@@ -110,7 +110,7 @@ def test_gains_fall_with_the_remanence():
     gains = np.array([1.0, 0.9, 1.1, 1.0])
     coil, heat = heat_of(1e-3, thermal(rotor_degC=60.0))
     present = np.empty(GROUPS)
-    begin_heat(heat, gains, present, coil.surroundings_degC)
+    begin_heat(heat, gains, present, coil)
     np.testing.assert_allclose(present, gains * (1 - 0.0011 * 40), rtol=1e-15)
 
 
