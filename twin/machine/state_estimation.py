@@ -156,7 +156,8 @@ class Shadow:
 
     def _add(self, normalised: Array, used: NDArray[np.bool_]) -> None:
         # Summed row by row, so that a cut changes nothing. Without a finite estimate the sum is infinite.
-        squares = np.where(used, np.where(np.isfinite(normalised), normalised**2, np.inf), 0.0)
+        with np.errstate(over="ignore"):  # the square of an estimate that has diverged is infinite
+            squares = np.where(used, np.where(np.isfinite(normalised), normalised**2, np.inf), 0.0)
         self._squares = np.cumsum(np.concatenate([self._squares[None], squares]), axis=0)[-1]
         self._counts += np.count_nonzero(used, axis=0)
 

@@ -50,7 +50,8 @@ def test_the_truth_has_parameters_drawn_errors_and_states(files):
     assert truth["scenario"]["plant"]["payload_kg"] == 0.02
     assert truth["plant"]["coulomb_Nm"] == [2e-3] * 3
     assert truth["plant"]["weight_moment_Nm"] == pytest.approx(0.02 * 9.81 * 0.1)
-    potentiometers, adcs = truth["sensors"]["stages"][:2]
+    stages = truth["sensors"]["stages"]
+    potentiometers, adcs = stages["potentiometer"], stages["adc"]
     # The measured angle is that of the drawn residual, offset and gain, within noise of 0.02 degrees.
     (alpha, _), (adc, _) = potentiometers["channels"], adcs["channels"]
     phase = alpha["turns"] * run["q_rad"][:, 0, None] * np.arange(1, 1 + len(alpha["cosine_rad"]))
