@@ -20,7 +20,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from functools import cache
-from typing import Any, NamedTuple, get_args, get_type_hints
+from typing import Any, NamedTuple, get_args, get_origin, get_type_hints
 
 import numpy as np
 from numpy.typing import NDArray
@@ -44,6 +44,8 @@ class Field(NamedTuple):
     """True if faults write the value, which is the same again when they end."""
     sizes: dict[str, int | str]
     """Of a nested record: its sizes that have another name here, or a number."""
+    family: type | None
+    """Of a nested record that is made at run time: its class."""
 
 
 def field(
@@ -53,11 +55,13 @@ def field(
     *,
     state: bool = False,
     fault: bool = False,
+    family: type | None = None,
     **sizes: int | str,
 ) -> Any:
     """Declare a field of a record.
 
-    The annotation is ``float``, ``int``, ``bool``, an array of numbers, or the class of a nested record.
+    The annotation is ``float``, ``int``, ``bool``, an array of numbers, the class of a nested record, or a
+    tuple of that class, ``tuple[Adc, ...]``, for an array of nested records.
 
     Parameters
     ----------
@@ -70,10 +74,13 @@ def field(
         Whether the value belongs to the state of a run.
     fault : bool
         Whether faults write the value.
+    family : type
+        Class of a nested record that `record_of` makes; its annotation is any type.
     **sizes
         Of a nested record: its sizes that have another name here, or a number.
     """
-    return Field(meaning, unit, shape if isinstance(shape, tuple) else (shape,), state, fault, sizes)
+    shape = shape if isinstance(shape, tuple) else (shape,)
+    return Field(meaning, unit, shape, state, fault, sizes, family)
 
 
 class Record:
@@ -111,12 +118,14 @@ class Record:
 
 def kinds_of(kind: type[Record]) -> dict[str, type]:
     """Return ``float``, ``int`` or the class of a nested record for each field."""
-    return {name: _kind(hint) for name, hint in get_type_hints(kind).items()}
+    fields = kind.fields()
+    return {name: fields[name].family or _kind(hint) for name, hint in get_type_hints(kind).items()}
 
 
 def _kind(hint: Any) -> type:
-    if isinstance(hint, type) and issubclass(hint, Record):
-        return hint
+    one = get_args(hint)[0] if get_origin(hint) is tuple else hint
+    if isinstance(one, type) and issubclass(one, Record):
+        return one
     number = get_args(get_args(hint)[1])[0] if get_args(hint) else hint  # NDArray[number]
     return int if issubclass(number, int | np.integer | np.bool_) else float
 

@@ -49,7 +49,7 @@ class Coupling(Record):
     """Coupling of all groups."""
 
     on: bool = field("whether the groups are coupled")
-    parts: Step = field("the two parts of a physics step", shape=2)
+    parts: tuple[Step, ...] = field("the two parts of a physics step", shape=2)
     mutual_H: Array = field("mutual inductances", "H", ("groups", "groups"))
     own_emf: Array = field("EMF by the motion of the rotor", "V", "groups")
     change_A: Array = field(

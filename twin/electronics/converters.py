@@ -210,7 +210,7 @@ class Adcs(Record):
     on: bool = field("whether the stage changes the angles")
     converts: bool = field("false if the converter is ideal")
     volts_per_rad: float = field("nominal slope of the tracks", "V/rad")
-    channels: Adc = field("of α and β", shape=CHANNELS)
+    channels: tuple[Adc, ...] = field("of α and β", shape=CHANNELS)
     noise_V: float = field("of wiper and conversion together, rms, at the input", "V")
     first_draw: int = field("first random number")
     end_draw: int = field("end of the random numbers")

@@ -9,7 +9,7 @@ the controller its output.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -90,7 +90,7 @@ class DriveChain(Record):
     supply_V: float = field("supply without a fault; 0 without one", "V")
     lag: CurrentLag = field("current lag of amplifiers without a supply")
     output: ControllerOutput = field("output of the controller")
-    stages: DriveStages = field("in the order of `STAGES`")  # type: ignore[valid-type]
+    stages: Any = field("in the order of `STAGES`", family=DriveStages)
     delay: Delay = field("delay of the commands")
     supply: FaultLine = field("of the supply voltage", channels=1)
     amplifier: Amplifier = field("amplifiers")
@@ -178,7 +178,7 @@ def begin(chain: DriveChain, command: Array, halt: int, draws: Array) -> None:
         Standard normal numbers of this tick, of faults.
     """
     setpoint, output, period = chain.setpoint, chain.output, chain.period
-    output.halt, period.drawn_As, period.any_open_short = halt, 0.0, 0
+    output.halt, period.drawn_As, period.any_open_short = halt, 0.0, False
     for j in range(setpoint.shape[0]):
         setpoint[j] = command[j]
     if chain.converts:
@@ -193,7 +193,7 @@ def begin(chain: DriveChain, command: Array, halt: int, draws: Array) -> None:
         latch(chain.delay, setpoint)
     for j in range(setpoint.shape[0]):
         if _contact(chain, j) != DRIVEN:
-            period.any_open_short = 1
+            period.any_open_short = True
     if chain.supplied:
         period.supply_V = max(through(chain.supply, 0, chain.supply_V, draws), 0.0)
         set_supply(chain.amplifier, period.supply_V)

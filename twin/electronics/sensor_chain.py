@@ -70,7 +70,7 @@ class SensorChain(Record):
     offset_rad: Array = field("constant mounting errors", "rad", 3)
     skew_s: Array = field("time of the sample after the tick", "s", 3)
     shifts: bool = field("whether any offset or skew is not 0")
-    stages: SensorStages = field("in the order of `STAGES`")  # type: ignore[valid-type]
+    stages: Any = field("in the order of `STAGES`", family=SensorStages)
     silent: Integers = field("1 if a fault suppresses new angles", "", 3, fault=True)
     fresh: Array = field("1 for a new angle, 0 for a repeated one", "", 3)
     output_rad: Array = field("angles of the last tick; NaN before the first", "rad", 3, state=True)
@@ -143,7 +143,7 @@ def sensor_sheet(sensors: SensorsSection) -> dict[str, Any]:
 @inlined
 def write_telemetry(chain: SensorChain, row: Array) -> None:
     """Write the errors of the angles that are states of the sensors into the beginning of `row`, rad."""
-    tracks, encoder = chain.stages.potentiometer, chain.stages.encoder  # type: ignore[attr-defined]
+    tracks, encoder = chain.stages.potentiometer, chain.stages.encoder
     copy_into(row, 0, tracks.lead_rad, tracks.lead_rad.shape[0])
     row[2] = 0.0
     if encoder.starts_with_error:

@@ -52,7 +52,7 @@ class Potentiometers(Record):
     on: bool = field("whether the stage changes the angles")
     converts: bool = field("false if they are straight lines")
     volts_per_rad: float = field("slope of the straight line", "V/rad")
-    channels: Potentiometer = field("of α and β", shape=CHANNELS)
+    channels: tuple[Potentiometer, ...] = field("of α and β", shape=CHANNELS)
     line: FaultLine = field("of the wipers, in rad of the nominal slope", channels=CHANNELS)
     half_play_rad: float = field("half of the play", "rad")
     repeatability_rad: float = field("largest deviation of the play on a side", "rad")
