@@ -31,7 +31,7 @@ from spheretwin.plant.friction import Friction, fill_friction
 from spheretwin.plant.magnet_heat import MagnetHeat, fill_heat
 from spheretwin.plant.mass_properties import mass_errors
 from spheretwin.plant.part_scatter import scatter_of
-from spheretwin.plant.plant_tick import ENGINES, Plant
+from spheretwin.plant.plant_tick import ENGINES, Plant, engine_step
 from spheretwin.plant.rotor import Rotor, RotorSettings
 from spheretwin.scenario.files import Files
 from spheretwin.scenario.plant_sections import ResolvedNominal, ResolvedPlant
@@ -179,7 +179,9 @@ def plant_of(scenario: ResolvedScenario, files: Files, rotor: Rows, halt: NDArra
     current_sensors = CurrentSensors.zeros(groups=groups)
     current_sensors["on"] = scenario.senses_currents
     current_sensors["noise_A"] = scenario.sensors.current.noise_A
+    step = engine_step(section.engine)
     return Plant(
+        step=getattr(step, "address", step),
         rotor=rotor,
         magnetics=magnetics,
         G=np.empty((3, groups)),

@@ -168,9 +168,7 @@ class Runtime:
     @cached_property
     def loop(self) -> Callable[[loops.Inputs, NDArray[np.float64]], tuple[int, int]]:
         """Loop of the components, a function of inputs and rows; the first access compiles it."""
-        stages, memory = compiled_stages(
-            self._controller, self._sensors, self._plant, self._scenario.plant.engine, self.signals
-        )
+        stages, memory = compiled_stages(self._controller, self._sensors, self._plant, self.signals)
         parts = (
             self._functions.law,
             self._functions.allocate,

@@ -16,11 +16,11 @@ from numpy.typing import NDArray
 from spheretwin.channels import CHANNELS, Channel
 from spheretwin.control.controller import Controller
 from spheretwin.electronics.sensor_chain import sense
-from spheretwin.models.base.compiled import COMPILES, inlined, stage_address
+from spheretwin.models.base.compiled import COMPILES, stage_address
 from spheretwin.models.base.numba_internals.addresses import function_at, in_memory
 from spheretwin.models.base.record import Rows
 from spheretwin.models.telemetry.signals import Signal, offsets
-from spheretwin.plant.plant_tick import ENGINES, Plant, PlantOutput, plant_tick
+from spheretwin.plant.plant_tick import Plant, PlantOutput, plant_tick
 
 Array = NDArray[np.float64]
 
@@ -62,14 +62,14 @@ class Stage(NamedTuple):
     memory: Any
 
 
-def plant_stage(plant: Plant, engine: str) -> Stage:
+def plant_stage(plant: Plant) -> Stage:
     """Compile the stage of a plant, which `advance_at` calls."""
     memory, data = _data(plant)
-    return Stage(_function(_ADVANCE, _advance(ENGINES[engine].step), plant), data, memory)
+    return Stage(_function(_ADVANCE, _advance, plant), data, memory)
 
 
 def compiled_stages(
-    controller: Controller, sensors: Rows, plant: Plant, engine: str, signals: tuple[Signal, ...]
+    controller: Controller, sensors: Rows, plant: Plant, signals: tuple[Signal, ...]
 ) -> tuple[Stages, list[Any]]:
     """Compile the stages of a run; return them and the memory that they have addresses of.
 
@@ -78,8 +78,6 @@ def compiled_stages(
     controller : Controller
     sensors : array of SensorChain
     plant : Plant
-    engine : str
-        Of its rotor.
     signals : tuple of Signal
         Columns of the run: its channels are among them.
     """
@@ -97,7 +95,7 @@ def compiled_stages(
     stages = Stages(
         _function(_SENSE, _sense, sensors),
         data["sensors"],
-        _function(_ADVANCE, _advance(ENGINES[engine].step), plant),
+        _function(_ADVANCE, _advance, plant),
         data["plant"],
         sequence(writers),
         sequence([data[names[0]] for names in reads]),
@@ -126,18 +124,10 @@ def _sense(sensors: Any, q: Array, qdot: Array, noise: Array, draws: Array, meas
     return bool(sense(sensors[0][0], q, qdot, noise, draws, measurement))
 
 
-@cache
-def _advance(step_rotor: Callable[[Any], None]) -> Callable[..., int]:
-    @inlined
-    def tick(plant: Plant, command: Array, disturbance: Array, output: PlantOutput) -> int:
-        return plant_tick(step_rotor, plant, command, disturbance, output)
-
-    def advance(
-        plant: Any, command: Array, disturbance: Array, current: Array, mean_current: Array, torque_S: Array
-    ) -> int:
-        return tick(plant[0], command, disturbance, PlantOutput(current, mean_current, torque_S))
-
-    return advance
+def _advance(
+    plant: Any, command: Array, disturbance: Array, current: Array, mean_current: Array, torque_S: Array
+) -> int:
+    return plant_tick(plant[0], command, disturbance, PlantOutput(current, mean_current, torque_S))
 
 
 @cache

@@ -240,7 +240,7 @@ def drive_plant(
     states = np.full((len(disturbance) // every + 1, 6), np.nan)
     states[0] = [*section.initial_rad, *section.initial_rad_s]
     stage, output = (
-        plant_stage(plant, section.engine),
+        plant_stage(plant),
         PlantOutput(np.empty(groups), np.empty(groups), np.empty(3)),
     )
     motion = stepped.q, stepped.qdot

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from functools import cache
 from typing import Any, NamedTuple
 
+import numba
 import numpy as np
+from numba import types
 from numpy.typing import NDArray
 
 from spheretwin.electronics.drive_chain import advance, begin, end
-from spheretwin.models.base.compiled import copy_into, inlined, part_of_its_caller
+from spheretwin.models.base.compiled import compiled_callback, copy_into, inlined
+from spheretwin.models.base.numba_internals.addresses import function_at
 from spheretwin.models.base.record import Rows
 from spheretwin.models.joint_chain import torque_on_hinges, update_ideal_motion
 from spheretwin.models.magnetics import TorqueModel, fill_torque_matrix, rotor_torque
@@ -17,7 +20,7 @@ from spheretwin.plant import lagrangian_rotor, mujoco_rotor
 from spheretwin.plant.bristle_friction import apply_bristles, begin_bristles, log_bristles
 from spheretwin.plant.friction import slow_down
 from spheretwin.plant.magnet_heat import advance_heat, begin_heat
-from spheretwin.plant.rotor import EngineKind
+from spheretwin.plant.rotor import EngineKind, RotorData
 
 ENGINES: dict[str, EngineKind] = {
     row.name: row
@@ -26,6 +29,23 @@ ENGINES: dict[str, EngineKind] = {
         lagrangian_rotor.LAGRANGIAN,
     )
 }
+
+
+STEP_SIGNATURE = types.void(numba.typeof(RotorData.zeros()))
+"""Step of an engine, whose argument is the array of one rotor; the plant is compiled once for all engines."""
+
+step_at = function_at(STEP_SIGNATURE)
+
+
+@cache
+def engine_step(engine: str) -> Any:
+    """Return the step of an engine: a callback of `STEP_SIGNATURE`, in Python a function."""
+    step = ENGINES[engine].step
+
+    def step_rotor(rows: Rows) -> None:
+        step(rows[0])
+
+    return compiled_callback(STEP_SIGNATURE, step_rotor)
 
 
 GOING, LEFT_WORKSPACE, DIVERGED, FAILSAFE = 0, 1, 2, 3
@@ -41,6 +61,7 @@ Array = NDArray[np.float64]
 class Plant(NamedTuple):
     """True plant; the controller knows nothing of it."""
 
+    step: Any  # address of the step of the engine, or in Python a function
     rotor: Rows  # array of one RotorData
     magnetics: TorqueModel  # true
     G: NDArray[np.float64]  # (3, n) N·m/A, true torque matrix in the middle of the physics step
@@ -81,10 +102,8 @@ class PlantOutput(NamedTuple):
     torque_S: NDArray[np.float64]  # (3,) N·m, in the first physics step
 
 
-@part_of_its_caller
-def plant_tick(
-    step_rotor: Callable[[Any], None], plant: Plant, command: Array, disturbance: Array, output: PlantOutput
-) -> int:
+@inlined
+def plant_tick(plant: Plant, command: Array, disturbance: Array, output: PlantOutput) -> int:
     """Advance the plant by one control period.
 
     Each physics step: half of the friction, coil currents and torque, rotor with static friction and cable,
@@ -94,8 +113,6 @@ def plant_tick(
 
     Parameters
     ----------
-    step_rotor : callable
-        Step of the engine.
     plant : Plant
         Changed in place.
     command : (n,) array, A
@@ -141,7 +158,7 @@ def plant_tick(
         for i in range(3):
             torque_q[i] -= disturbance[i] + unmodelled[i]
         begin_bristles(bristles, middle_q, q, qdot, torque_q)
-        step_rotor(rotor)
+        step_at(plant.step)(plant.rotor)
         apply_bristles(bristles, joint, middle_q, middle_qdot, last_qdot, q, qdot)
         log_bristles(bristles, substep, friction_q)
         slow_down(friction, joint, q, qdot, friction_q)

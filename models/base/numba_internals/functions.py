@@ -26,9 +26,11 @@ from collections.abc import Callable
 from typing import Any
 
 from numba import njit, types
+from numba.core import event
 from numba.core import ir as numba_ir
 from numba.core.analysis import compute_cfg_from_blocks, compute_use_defs, must_use_alloca
 from numba.core.caching import NullCache
+from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import Compiler, CompilerBase, CompileResult, DefaultPassBuilder
 from numba.core.compiler_lock import global_compiler_lock
 from numba.core.compiler_machinery import PassManager, register_pass
@@ -52,6 +54,24 @@ class _Nesting(threading.local):
 
 
 _NESTING = _Nesting()
+
+
+class _Part:
+    """Key by which numba finds a function without machine code."""
+
+
+class _PartLibrary(JITCodeLibrary):
+    """Code that is optimised as far as its size goes; the callers that include it optimise it fully."""
+
+    def _optimize_final_module(self) -> None:
+        passes, builder = self._codegen._module_pass_manager(
+            loop_vectorize=False, slp_vectorize=False, opt=1, cost="cheap"
+        )
+        passes.run(self._final_module, builder)
+
+    def _finalize_final_module(self) -> None:
+        self._finalize_dynamic_globals()
+        self._finalized = True
 
 
 class CompiledFunction(CPUDispatcher):
@@ -81,11 +101,24 @@ class CompiledFunction(CPUDispatcher):
             if known is not None and not is_part and not _is_callable(known):
                 del self.overloads[arguments]
             self._compiler.targetoptions = {**self.targetoptions, "no_cpython_wrapper": is_part}
+            if is_part and self._compiler.pipeline_class is TupleCompiler:
+                return self._compile_part(arguments)
             cache, self._cache = self._cache, self._part_cache if is_part else self._cache
             try:
                 return super().compile(sig)
             finally:
                 self._cache = cache
+
+    def _compile_part(self, arguments: tuple[Any, ...]) -> _Part:
+        """Compile the function as code that its callers include; it has no machine code of its own."""
+        if arguments not in self.overloads:
+            with event.trigger_event("numba:compile", data={"dispatcher": self}):
+                result = self._compiler.compile(arguments, None)
+            result = result._replace(entry_point=_Part())
+            target = result.target_context
+            target.insert_user_function(result.entry_point, result.fndesc, [result.library])
+            self.overloads[arguments] = result
+        return self.overloads[arguments].entry_point
 
     def add_overload(self, cres: CompileResult) -> None:
         """Add the machine code of a signature; calls from Python find only what Python can call."""
@@ -97,6 +130,8 @@ class CompiledFunction(CPUDispatcher):
 
 def _is_callable(result: CompileResult) -> bool:
     """True if Python can call the machine code of a function."""
+    if isinstance(result.entry_point, _Part):
+        return False
     wrapper = result.fndesc.llvm_cpython_wrapper_name
     return bool(result.library.get_pointer_to_function(wrapper))
 
@@ -163,6 +198,9 @@ class TupleCompiler(CompilerBase):
 
     def define_pipelines(self) -> list[PassManager]:
         """Return the passes."""
+        if _NESTING.depth:
+            self.state.flags.no_compile = True
+            self.state.library = _PartLibrary(self.state.targetctx.codegen(), "part")
         passes = DefaultPassBuilder.define_nopython_pipeline(self.state)
         passes.passes = [
             (_TupleLowering if kind is NativeLowering else kind, name) for kind, name in passes.passes
