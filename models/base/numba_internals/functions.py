@@ -1,8 +1,10 @@
 """Compiled functions: for Python or for compiled callers, with tuples as values, inlined implementations.
 
-*Functions for compiled callers* (`CPUDispatcher`, its `_cache`, `_compiler`, `overloads` and `add_overload`).
-Reason: numba compiles the conversion of Python arguments of every function, a fifth of the compile time of a
-loop. Consequence of a change: a loop compiles longer, or a function is compiled at every call.
+*Functions for compiled callers* (`CPUDispatcher`, its `_cache`, `_compiler`, `overloads` and `add_overload`;
+`JITCodeLibrary`, the flag `no_compile`). Reason: numba optimises each function completely, makes machine code
+and a conversion of Python arguments of it, and does the same again in each caller that includes it; without
+that the first run compiles in three quarters of the time. Consequence of a change: a loop compiles longer, or
+a function is compiled at every call.
 
 *Inlined implementations without machine code* (`make_overload_template`, `_get_jit_decorator`,
 `_can_compile`). Reason: numba compiles an implementation completely, then inlines it and drops the code, a

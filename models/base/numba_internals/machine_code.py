@@ -7,7 +7,11 @@ function is compiled in every process, or an exception at its first call.
 *Fingerprint of types* (`_dispatcher.compute_fingerprint`). Reason: numba's type of the hundred arrays of a
 loop takes half of the start-up time of a session. Consequence: an exception at the first loop.
 
-`tests/models/base/test_internals.py` checks both.
+*Names of records in machine code* (`types.Record.mangling_args`). Reason: numba names them by numbers that
+each process counts anew, so that functions of two processes for different records can have one name.
+Consequence of a change: stored machine code reads the fields of another record.
+
+`tests/models/base/test_internals.py` checks each of them.
 """
 
 from __future__ import annotations
@@ -19,7 +23,7 @@ import warnings
 from collections.abc import Callable
 from typing import Any
 
-from numba import _dispatcher
+from numba import _dispatcher, types
 from numba.core.caching import NullCache
 from numba.core.compiler import CompileResult
 from numba.core.errors import NumbaWarning
@@ -34,6 +38,14 @@ from spheretwin.models.base.function_identity import function_identity, is_of_pa
 # Loaded machine code needs the symbols of hashes and the type of a callback, in addition to the math and
 # run-time libraries. These imports register them.
 _REGISTERED = hashing, function_type
+
+
+def _name_of_record(record: types.Record) -> tuple[str, tuple[int]]:
+    """Return the same name of a record in each process: a digest of its fields."""
+    return "Record", (int.from_bytes(hashlib.sha256(record.name.encode()).digest()[:12], "little"),)
+
+
+types.Record.mangling_args = property(_name_of_record)
 
 
 class MachineCode(NullCache):
