@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from spheretwin.models.base.compiled import allocation_free
 from spheretwin.models.base.record import Record, Rows, field
 from spheretwin.models.base.state import capacity, push_all
-from spheretwin.models.coil_group import PerGroup, of_each_group
+from spheretwin.models.coil_group import PerGroup
 from spheretwin.models.kinematics import generalised_torque
 from spheretwin.models.magnetics import rotor_torque
 
@@ -126,14 +126,14 @@ def delay_capacity(delay_s: float, period_s: float) -> int:
 
 def fill_lag_step(rows: Rows, duration_s: float, time_constant_s: ArrayLike) -> None:
     """Fill first-order lags (`LagStep`) of all groups over a duration."""
-    groups = rows["decay"].shape[-1]
-    rows["decay"], rows["mean_share"] = lag_step(duration_s, time_constant_s, groups)
+    rows["decay"], rows["mean_share"] = lag_step(duration_s, time_constant_s)
 
 
-def lag_step(duration_s: float, time_constant_s: ArrayLike, groups: int) -> tuple[Array, Array]:
-    """Return remaining and mean remaining shares of the first-order lag of all groups over a duration."""
-    constants_s = of_each_group(time_constant_s, groups).tolist()
-    decay, mean_share = np.array([_shares(duration_s, constant_s) for constant_s in constants_s]).T.copy()
+def lag_step(duration_s: float, time_constant_s: ArrayLike) -> tuple[Array, Array]:
+    """Return remaining and mean remaining shares of a first-order lag over a duration, for each constant."""
+    decay, mean_share = np.array(
+        [_shares(duration_s, one_s) for one_s in np.ravel(time_constant_s).tolist()]
+    ).T
     return decay, mean_share
 
 

@@ -68,7 +68,7 @@ class CopperLoss(Metric):
         section, groups = planned.scenario.drive, len(planned.actuator.groups)
         lag_s, period_s = of_each_group(section.lag_s, groups), planned.period_s
         spans = (lag_s, planned.scenario.plant.step_s), (lag_s, period_s), (0.5 * lag_s, period_s)
-        step, tick, tick_squared = (lag_step(span_s, lag, groups)[1] for lag, span_s in spans)
+        step, tick, tick_squared = (lag_step(span_s, lag)[1] for lag, span_s in spans)
         squares, logged_W = np.zeros((2, groups))
         follows = not section.converts
         self.state = CopperState(

@@ -151,8 +151,8 @@ def fill_amplifier(
     rows["drop_up_V"], rows["drop_down_V"] = section.drop_up_V, section.drop_down_V
     rows["bandwidth_rad_s"], rows["current_limit_A"] = section.bandwidth_rad_s, current_limit_A
     fill_step(rows["whole"], section, step_s)
-    for amplifier in rows:
-        set_supply(amplifier, amplifier.supply_V)
+    rows["highest_V"] = rows["supply_V"] - section.drop_up_V
+    rows["lowest_V"] = section.drop_down_V - rows["supply_V"]
 
 
 def fill_step(rows: Rows, section: AmplifierSection, step_s: float) -> None:

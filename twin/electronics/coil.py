@@ -18,7 +18,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from spheretwin.control.applied_torque import lag_step
 from spheretwin.models.base.compiled import inlined
 from spheretwin.models.base.record import Record, Rows, field
-from spheretwin.models.coil_group import PerGroup, of_each_group
+from spheretwin.models.coil_group import PerGroup
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -167,22 +167,19 @@ def fill_coils(rows: Rows, section: Any, period_s: float) -> None:
     period_s : float, s
         Control period, in which the temperature advances once.
     """
-    groups = rows["settled"].shape[1]
-    thermal_K_W = of_each_group(section.thermal_resistance_K_W, groups)
-    time_constants_s = thermal_K_W * of_each_group(section.heat_capacity_J_K, groups)
+    thermal_K_W = np.ravel(section.thermal_resistance_K_W)
+    time_constants_s = thermal_K_W * np.ravel(section.heat_capacity_J_K)
     rows["settled"] = [
         relaxation(period_s / time_s).settled if time_s > 0 else 1.0 for time_s in time_constants_s
     ]
-    for name in ("inductance_H", "resistance_per_K"):
-        rows[name] = of_each_group(getattr(section, name), groups)
-    rows["cold_resistance_ohm"] = of_each_group(section.resistance_ohm, groups)
+    rows["inductance_H"], rows["resistance_per_K"] = section.inductance_H, section.resistance_per_K
+    rows["cold_resistance_ohm"] = section.resistance_ohm
     rows["thermal_resistance_K_W"] = thermal_K_W
-    shutdown_degC = inf if section.shutdown_degC is None else section.shutdown_degC
-    rows["shutdown_degC"] = of_each_group(shutdown_degC, groups)
+    rows["shutdown_degC"] = inf if section.shutdown_degC is None else section.shutdown_degC
     rows["period_s"] = period_s
     rows["temperature_degC"] = rows["surroundings_degC"][:, None] = section.ambient_degC
-    for coils in rows:
-        update_resistance(coils)
+    warm = 1.0 + rows["resistance_per_K"] * (section.ambient_degC - REFERENCE_degC)
+    rows["resistance_ohm"] = rows["cold_resistance_ohm"] * warm
 
 
 @inlined
@@ -255,8 +252,7 @@ class CurrentLag(Record):
 
 def fill_lag(rows: Rows, time_constant_s: PerGroup, step_s: float, current_limit_A: float) -> None:
     """Fill the lag for time constants L/R (s; 0: ideal amplifiers), a physics step (s) and a limit (A)."""
-    groups = rows["decay"].shape[1]
-    rows["decay"], rows["mean_share"] = lag_step(step_s, time_constant_s, groups)
+    rows["decay"], rows["mean_share"] = lag_step(step_s, time_constant_s)
     rows["current_limit_A"] = current_limit_A
 
 

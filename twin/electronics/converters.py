@@ -275,7 +275,9 @@ class AdcSection(SensorStage):
         """Fill the channels, with errors from the seed; they also convert if the tracks have errors."""
         track = setup.sensors.potentiometer
         converts = not (self.ideal and track.ideal)
-        shares = errors(setup.seed, setup.name, CHANNELS, ERRORS)
+        shares = np.zeros((CHANNELS, ERRORS))
+        if self.offset_V or self.gain_error:
+            shares = errors(setup.seed, setup.name, CHANNELS, ERRORS)
         rows["on"], rows["converts"] = converts or setup.faults, converts
         rows["volts_per_rad"], rows["noise_V"] = track.volts_per_rad, self.input_noise_V(setup.sensors)
         for channel in range(CHANNELS):

@@ -128,7 +128,9 @@ class PotentiometerSection(SensorStage):
     def fill(self, rows: Rows, setup: SensorSetup) -> None:
         """Fill the potentiometers, with residuals from the seed; with ends if the converter is not ideal."""
         converts = not (self.ideal and setup.sensors.adc.ideal)
-        phases = uniforms(setup.seed, setup.name, CHANNELS, HARMONICS)
+        phases = np.zeros((CHANNELS, HARMONICS))
+        if self.nonlinearity_rad:
+            phases = uniforms(setup.seed, setup.name, CHANNELS, HARMONICS)
         rows["on"], rows["converts"] = converts or setup.faults, converts
         rows["volts_per_rad"] = self.volts_per_rad
         for channel in range(CHANNELS):
@@ -203,13 +205,13 @@ def fill_potentiometer(rows: Rows, section: PotentiometerSection, shares: Array)
     shares : (HARMONICS,) array
         Phases of the harmonics as shares of a turn, 0 to 1, drawn for this channel.
     """
-    order = np.arange(1, HARMONICS + 1)
-    shape = np.exp(1j * (2 * pi * shares)) / order**2
-    residual = section.nonlinearity_rad / _peak(shape) * shape
+    if section.nonlinearity_rad:
+        shape = np.exp(1j * (2 * pi * shares)) / np.arange(1, HARMONICS + 1) ** 2
+        residual = section.nonlinearity_rad / _peak(shape) * shape
+        rows["cosine_rad"], rows["sine_rad"] = residual.real, -residual.imag
     rows["volts_per_rad"] = section.volts_per_rad
     rows["half_angle_rad"], rows["half_supply_V"] = section.electrical_angle_rad / 2, section.supply_V / 2
     rows["turns"] = 2 * pi / section.electrical_angle_rad
-    rows["cosine_rad"], rows["sine_rad"] = residual.real, -residual.imag
 
 
 @inlined
@@ -312,7 +314,9 @@ class EncoderSection(SensorStage):
 
     def fill(self, rows: Rows, setup: SensorSetup) -> None:
         """Fill the encoder, with a phase of the eccentricity and an error of the start from the seed."""
-        phase, start = errors(setup.seed, setup.name, 1, 2)[0].tolist()
+        phase = start = 0.0
+        if self.eccentricity_rad or self.start_error_rad:
+            phase, start = errors(setup.seed, setup.name, 1, 2)[0].tolist()
         rows["on"], rows["counts_per_turn"] = not self.ideal or setup.faults, self.counts
         fill_fault_line(rows["line"])
         rows["eccentricity_rad"], rows["phase_rad"] = self.eccentricity_rad, pi * phase
