@@ -342,7 +342,8 @@ def update_cached_matrix(q: NDArray[np.float64], model: TorqueModel, cached: Cac
         Changed in place.
     """
     if not (q[0] == cached.q[0] and q[1] == cached.q[1] and q[2] == cached.q[2]):
-        fill_torque_matrix(q, model, cached.G, cached.scratch)
+        # Slices of fields have the type of other arrays: the function is compiled once for both.
+        fill_torque_matrix(q[:], model, cached.G[:], cached.scratch[:])
         cached.q[0], cached.q[1], cached.q[2] = q[0], q[1], q[2]
 
 
