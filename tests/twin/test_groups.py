@@ -13,7 +13,10 @@ from tests.models.model_files import edited
 RING = re.compile(r'(?s)<replicate count="12" euler="0 0 30">\s*<site name="coil_middle".*?</replicate>')
 
 
-@pytest.fixture(params=[12, 24])
+FEWER = pytest.mark.release("13 s to compile, as each number of groups; more groups are in the first suite")
+
+
+@pytest.fixture(params=[pytest.param(12, marks=FEWER), 24])
 def groups(request):
     return request.param
 
