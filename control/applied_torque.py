@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from spheretwin.models.base.compiled import allocation_free
-from spheretwin.models.base.record import Record, Rows, field
-from spheretwin.models.base.state import capacity, push_all
+from spheretwin.models.base.record import Record, Rows, capacity, field
+from spheretwin.models.base.state import push_all
 from spheretwin.models.coil_group import PerGroup
 from spheretwin.models.kinematics import generalised_torque
 from spheretwin.models.magnetics import rotor_torque
@@ -125,15 +125,14 @@ def delay_capacity(delay_s: float, period_s: float) -> int:
 
 
 def fill_lag_step(rows: Rows, duration_s: float, time_constant_s: ArrayLike) -> None:
-    """Fill first-order lags (`LagStep`) of all groups over a duration."""
+    """Fill first-order lags of all groups over a duration: `LagStep`, or a record with its fields."""
     rows["decay"], rows["mean_share"] = lag_step(duration_s, time_constant_s)
 
 
 def lag_step(duration_s: float, time_constant_s: ArrayLike) -> tuple[Array, Array]:
     """Return remaining and mean remaining shares of a first-order lag over a duration, for each constant."""
-    decay, mean_share = np.array(
-        [_shares(duration_s, one_s) for one_s in np.ravel(time_constant_s).tolist()]
-    ).T
+    shares = [_shares(duration_s, constant_s) for constant_s in np.ravel(time_constant_s).tolist()]
+    decay, mean_share = np.array(shares).T.copy()
     return decay, mean_share
 
 

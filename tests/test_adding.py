@@ -41,7 +41,7 @@ def drawn_numbers():
     from spheretwin.electronics.random_streams import noise_table
     from spheretwin.electronics.sensor_chain import build_sensors, noise_streams, sense
     from spheretwin.faults.schedule import FaultSchedule
-    from spheretwin.shared_buffers import fault_streams
+    from spheretwin.hardware_assembly import fault_streams
     from spheretwin.session import Session
 
     faults = [

@@ -18,6 +18,7 @@ from spheretwin.control.law import Law, NominalModel
 from spheretwin.control.laws import LAWS
 from spheretwin.electronics.transducers import CurrentSensors
 from spheretwin.faults.schedule import part_names
+from spheretwin.hardware_assembly import draws_of, drive_of, fill_supervision
 from spheretwin.models.actuator import Actuator
 from spheretwin.models.base.errors import InputError, SpheretwinError, exception_text, shown
 from spheretwin.models.base.record import Rows
@@ -36,7 +37,6 @@ from spheretwin.plant.rotor import Rotor, RotorSettings
 from spheretwin.scenario.files import Files
 from spheretwin.scenario.plant_sections import ResolvedNominal, ResolvedPlant
 from spheretwin.scenario.sections import ResolvedScenario
-from spheretwin.shared_buffers import draws_of, drive_of, fill_supervision
 
 Array = NDArray[np.float64]
 

@@ -124,7 +124,7 @@ class Connection:
             data.measurement[0],
             None if data.estimator_on else data.measurement[1],
             sensors.measured_A if sensors.on else plant.current,
-            drive.coil.temperature_degC.max() if drive.supplied or drive.converts else None,
+            drive.coil.temperature_degC.max() if drive.supplied else None,
         )
         command = self._part.command(t_s, measurement)
         if command is None:

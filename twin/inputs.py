@@ -18,10 +18,10 @@ from spheretwin.control.manual_currents import sample_currents
 from spheretwin.disturbances import Draws, term_draws
 from spheretwin.electronics.random_streams import noise_table
 from spheretwin.electronics.sensor_chain import noise_streams
+from spheretwin.hardware_assembly import fault_streams
 from spheretwin.loop import Inputs
 from spheretwin.models.base.errors import InputError
 from spheretwin.scenario.sections import Scenario
-from spheretwin.shared_buffers import fault_streams
 from spheretwin.trajectories.trajectory import Sampled, checked
 
 BLOCK_TICKS = 1000

@@ -13,6 +13,7 @@ from spheretwin.control.law import Law
 from spheretwin.control.manual_currents import sample_currents
 from spheretwin.electronics.random_streams import noise_table
 from spheretwin.electronics.sensor_chain import noise_streams
+from spheretwin.hardware_assembly import fault_streams
 from spheretwin.linear import python_control
 from spheretwin.loop import Inputs
 from spheretwin.models.base.errors import InputError
@@ -21,7 +22,6 @@ from spheretwin.plant.plant_step import State, step
 from spheretwin.plant_model import parameters_of
 from spheretwin.runtime import Runtime, RuntimeState
 from spheretwin.scenario.sections import Scenario
-from spheretwin.shared_buffers import fault_streams
 
 Array = NDArray[np.float64]
 

@@ -18,6 +18,7 @@ from spheretwin.control.supervision.watchdog import REASONS, Reason, transfer_tr
 from spheretwin.electronics.drive_chain import transfer_drive
 from spheretwin.electronics.sensor_chain import measure_again
 from spheretwin.external import Connection, ExternalController, ExternalPlant
+from spheretwin.hardware_assembly import faults_of, sensors_of
 from spheretwin.loop import dispatch, is_python_law, is_user_law, step_that_writes
 from spheretwin.models.base.compiled import COMPILES, for_types_of
 from spheretwin.models.base.errors import LawError
@@ -29,7 +30,6 @@ from spheretwin.plant.rotor import Rotor
 from spheretwin.scenario.changes import StateChange
 from spheretwin.scenario.files import Files
 from spheretwin.scenario.sections import ResolvedScenario
-from spheretwin.shared_buffers import faults_of, sensors_of
 from spheretwin.stages import compiled_stages
 
 # Only for the types.
@@ -129,7 +129,6 @@ class Runtime:
             check_bounds=scenario.controller.check_bounds,
         )
         self._may_raise = is_user_law(law) or scenario.controller.check_bounds
-        self._fresh = self._sensors["fresh"][0]
         if COMPILES and is_python_law(law):
             self._python_law = _PYTHON_LAW(self._call_law(step_that_writes(law)))
             self._data["python_law"] = ctypes.cast(self._python_law, ctypes.c_void_p).value or 0
@@ -176,7 +175,7 @@ class Runtime:
             self._controller,
             stages,
             self.row_width - width(self.law.signals),
-            self._fresh,
+            self._sensors["fresh"][0],
             self._connection.external,
         )
         entry = for_types_of(loops.loop, NO_INPUTS, *parts, np.empty((0, self.row_width)))

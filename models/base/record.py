@@ -98,7 +98,8 @@ class Record:
         Raises
         ------
         TypeError
-            A size is missing, or a field has the name of a method of a record of NumPy, such as `mean`.
+            A size is missing, a field has the name of a method of a record of NumPy, such as `mean`, or
+            another declaration has the same fields with other states.
         """
         kind: Any = cls
         return _dtype(kind, tuple(sorted(sizes.items())))
@@ -151,11 +152,21 @@ def _dtype(kind: type[Record], sizes: tuple[tuple[str, int], ...]) -> np.dtype[A
             member = np.dtype(np.int64 if kinds[name] is int else np.float64)
         members.append((name, member, tuple(length(entry, name) for entry in declared.shape)))
     made = np.dtype((np.record, np.dtype(members, align=True)))
-    _KINDS[made] = kind
+    known_kind = _KINDS.setdefault(made, kind)
+    if _marks(known_kind) != _marks(kind):
+        raise TypeError(
+            f"{kind.__name__}: expected the same states as in {known_kind.__name__}, whose fields have"
+            " the same names and types, received others"
+        )
     return made
 
 
 _KINDS: dict[np.dtype[Any], type[Record]] = {}
+
+
+def _marks(kind: type[Record]) -> list[tuple[bool, bool]]:
+    """Return which fields are state, and which ones faults write."""
+    return [(declared.is_state, declared.set_by_faults) for declared in kind.fields().values()]
 
 
 def is_rows(value: Any) -> bool:

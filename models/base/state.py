@@ -95,11 +95,6 @@ def check_length(name: str, state: Array, expected: int) -> None:
         )
 
 
-def capacity(entries: int) -> int:
-    """Return the length of a history for some entries: 8, 16, 32, …, so that few types are compiled."""
-    return max(8, 1 << (entries - 1).bit_length())
-
-
 @allocation_free
 def push(history: Array, column: int, value: float) -> None:
     """Store the newest value of a column of a history in row 0; the oldest one is dropped."""

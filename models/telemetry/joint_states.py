@@ -43,7 +43,7 @@ uint32 nanosec
 """
 METADATA = "spheretwin"
 ANGLE_NAMES = ("alpha", "beta", "gamma")
-_FOOTER_BYTES, _CRC_AND_MAGIC_BYTES = 37, 12
+_FOOTER_BYTES, _CRC_ANDMAGIC_BYTES = 37, 12
 _LITTLE_ENDIAN = b"\x00\x01\x00\x00"
 
 
@@ -212,20 +212,27 @@ def read(path: Path, time: str = STAMPS, names: Sequence[str] = ()) -> JointStat
         )
     if time == STAMPS and not any(times[0] for times, _ in messages) and messages[-1][0][1]:
         time, notes = LOG_TIME, (*notes, "no stamps, so log times")
+    time_ns, columns = _rows(messages, (STAMPS, LOG_TIME, PUBLISH_TIME).index(time))
+    return JointStates(time_ns, columns, metadata, notes)
+
+
+def _rows(
+    messages: Sequence[tuple[tuple[int, ...], dict[str, float]]], place: int
+) -> tuple[NDArray[np.int64], dict[str, Array]]:
+    """Return times, ns, and columns; consecutive messages with one of these times share a row."""
     rows: list[dict[str, float]] = []
     time_ns: list[int] = []
-    place = (STAMPS, LOG_TIME, PUBLISH_TIME).index(time)
     for times, numbers in messages:
         if not rows or time_ns[-1] != times[place] or not numbers.keys().isdisjoint(rows[-1]):
             rows.append({})
             time_ns.append(times[place])
         rows[-1] |= numbers
-    received = dict.fromkeys(name for row in rows for name in row)
-    columns = {name: np.array([row.get(name, np.nan) for row in rows]) for name in received}
-    return JointStates(np.array(time_ns, np.int64), columns, metadata, notes)
+    names = dict.fromkeys(name for row in rows for name in row)
+    columns = {name: np.array([row.get(name, np.nan) for row in rows]) for name in names}
+    return np.array(time_ns, np.int64), columns
 
 
-_MAGIC = b"\x89MCAP0\r\n"
+MAGIC = b"\x89MCAP0\r\n"
 _RECORD_HEAD = struct.Struct("<BQ")
 _CHUNK, _FOOTER = 6, 2
 
@@ -233,10 +240,10 @@ _CHUNK, _FOOTER = 6, 2
 def _content(path: Path) -> tuple[bytes, tuple[str, ...]]:
     """Return the bytes of a file, of one without an end the complete records; and notes."""
     content = regular_file(path).read_bytes()
-    if content.endswith(_MAGIC) or not content.startswith(_MAGIC):
+    if content.endswith(MAGIC) or not content.startswith(MAGIC):
         return content, ()
     content = content.rstrip(b"\0")  # blocks that the file system had not written
-    place, opcode = len(_MAGIC), 0
+    place, opcode = len(MAGIC), 0
     while place + _RECORD_HEAD.size <= len(content):
         following, length = _RECORD_HEAD.unpack_from(content, place)
         end = place + _RECORD_HEAD.size + length
@@ -245,9 +252,9 @@ def _content(path: Path) -> tuple[bytes, tuple[str, ...]]:
         place, opcode = end, following
     complete, rest = content[:place], content[place:]
     if opcode == _FOOTER:
-        if not _MAGIC.startswith(rest):
+        if not MAGIC.startswith(rest):
             raise ValueError("its last bytes differ")
-        complete += _MAGIC
+        complete += MAGIC
     elif rest[:1] == bytes([_CHUNK]):
         complete += _complete_messages(rest[_RECORD_HEAD.size :])
     return complete, ("the file has no end: read up to its last complete message",)
@@ -291,11 +298,11 @@ def _records(content: bytes) -> Iterator[Any]:
         for record in StreamReader(stream, validate_crcs=True, record_size_limit=len(content)).records:
             yield record
     except EndOfFile:
-        if content.endswith(_MAGIC) or record is None:
+        if content.endswith(MAGIC) or record is None:
             raise
     if isinstance(record, Footer) and record.summary_crc:
         start = record.summary_start or len(content) - _FOOTER_BYTES
-        if zlib.crc32(content[start:-_CRC_AND_MAGIC_BYTES]) != record.summary_crc:
+        if zlib.crc32(content[start:-_CRC_ANDMAGIC_BYTES]) != record.summary_crc:
             raise ValueError("the checksum of its summary differs")
 
 

@@ -239,10 +239,7 @@ def drive_plant(
     plant = assembly.plant_of(scenario, begun.files, rotor.rows, np.zeros(1, dtype=np.int64))
     states = np.full((len(disturbance) // every + 1, 6), np.nan)
     states[0] = [*section.initial_rad, *section.initial_rad_s]
-    stage, output = (
-        plant_stage(plant),
-        PlantOutput(np.empty(groups), np.empty(groups), np.empty(3)),
-    )
+    stage, output = plant_stage(plant), PlantOutput(np.empty(groups), np.empty(groups), np.empty(3))
     motion = stepped.q, stepped.qdot
     _drive(stage.function, stage.data, motion, commands(groups), disturbance, output, every, states)
     return states

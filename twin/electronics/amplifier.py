@@ -116,7 +116,6 @@ class Step(Record):
 class Amplifier(Record):
     """Amplifiers of all groups."""
 
-    supply_V: float = field("supply, plus and minus; infinite without one", "V")
     drop_up_V: float = field("supply less the largest voltage", "V")
     drop_down_V: float = field("lowest voltage less the negative supply", "V")
     highest_V: float = field("largest voltage in this control period", "V")
@@ -147,12 +146,11 @@ def fill_amplifier(
     if section.amplifier_offset_V:
         drawn = errors(seed, "drive.amplifier", rows["offset_A"].shape[1], 1)[:, 0]
         rows["offset_A"] = section.amplifier_offset_V * section.transconductance_A_V * drawn
-    rows["supply_V"] = inf if section.supply_V is None else section.supply_V
+    supply_V = inf if section.supply_V is None else section.supply_V
     rows["drop_up_V"], rows["drop_down_V"] = section.drop_up_V, section.drop_down_V
     rows["bandwidth_rad_s"], rows["current_limit_A"] = section.bandwidth_rad_s, current_limit_A
     fill_step(rows["whole"], section, step_s)
-    rows["highest_V"] = rows["supply_V"] - section.drop_up_V
-    rows["lowest_V"] = section.drop_down_V - rows["supply_V"]
+    rows["highest_V"], rows["lowest_V"] = supply_V - section.drop_up_V, section.drop_down_V - supply_V
 
 
 def fill_step(rows: Rows, section: AmplifierSection, step_s: float) -> None:

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field
 
-from spheretwin.control.applied_torque import lag_step
+from spheretwin.control.applied_torque import fill_lag_step
 from spheretwin.models.base.compiled import inlined
 from spheretwin.models.base.record import Record, Rows, field
 from spheretwin.models.coil_group import PerGroup
@@ -252,7 +252,7 @@ class CurrentLag(Record):
 
 def fill_lag(rows: Rows, time_constant_s: PerGroup, step_s: float, current_limit_A: float) -> None:
     """Fill the lag for time constants L/R (s; 0: ideal amplifiers), a physics step (s) and a limit (A)."""
-    rows["decay"], rows["mean_share"] = lag_step(step_s, time_constant_s)
+    fill_lag_step(rows, step_s, time_constant_s)
     rows["current_limit_A"] = current_limit_A
 
 

@@ -115,13 +115,16 @@ class DriveFaults(NamedTuple):
     """True if a watchdog may halt the drive."""
 
 
+NO_FAULTS = DriveFaults()
+
+
 def build_drive(
     section: ResolvedDrive,
     step_s: float,
     substeps: int,
     groups: int,
     seed: int,
-    faults: DriveFaults = DriveFaults(),  # noqa: B008, it cannot change
+    faults: DriveFaults = NO_FAULTS,
     mutual_H: Array | None = None,
 ) -> Rows:
     """Return the drive at rest, an array of one record, with errors drawn from the seed.
@@ -148,7 +151,7 @@ def build_drive(
     steps = steps_of(section, step_s, substeps)
     stored = stored_commands(steps, substeps) - -faults.longest_delay_steps // -substeps
     rows, period_s = DriveChain.zeros(groups=groups, delays=capacity(stored)), substeps * step_s
-    setup = DriveSetup(seed, step_s, groups, faults.scheduled)
+    setup = DriveSetup(seed, faults.scheduled)
     rows["converts"] = section.converts or faults.scheduled or faults.watchdog
     rows["supplied"] = section.supply_V is not None
     rows["supply_V"] = rows["period"]["supply_V"] = section.supply_V or 0.0

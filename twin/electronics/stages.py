@@ -152,9 +152,6 @@ class DriveSetup(NamedTuple):
     """Conditions that a stage is built for."""
 
     seed: int
-    step_s: float
-    """Physics step."""
-    groups: int
     faults: bool
     """True if a fault may occur."""
 

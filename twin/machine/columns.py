@@ -132,9 +132,7 @@ class Channels(BaseModel):
                     f" received {len(given)}"
                 )
             entries[field] = [*given] * len(names) if len(given) == 1 else given
-        entries["unit"] = entries["unit"] or [
-            table.unit(name, tuple(units)) or next(iter(units)) for name in names
-        ]
+        entries["unit"] = entries["unit"] or [self._unit(table, name, tuple(units)) for name in names]
         values = raw.copy()
         for place, (offset, wrap) in enumerate(zip(entries["offset"], entries["wrap"], strict=True)):
             if wrap:
@@ -146,6 +144,16 @@ class Channels(BaseModel):
             * np.array(entries["scale"])
             * (values - np.array(entries["offset"]))
         )
+
+    def _unit(self, table: RawTable, name: str, units: Sequence[str]) -> str:
+        """Return the unit of a column that the map leaves open; with a scale the file may state any."""
+        remedy = f"{self.section}.unit or {self.section}.scale"
+        try:
+            return table.unit(name, units, remedy) or units[0]
+        except InputError:
+            if self.scale == (1.0,):
+                raise
+        return units[0]
 
 
 def _pattern_columns(pattern: str, available: Sequence[str]) -> list[str]:

@@ -75,7 +75,6 @@ def read(
     except ValueError:
         raise InputError(f"log {path}: expected conditions and accepted findings as JSON") from None
     column_map = column_map.model_copy(update={"conditions": {**stated, **column_map.conditions}})
-
     return column_map.log(table, check_names((*before, *accepted)))
 
 
@@ -148,7 +147,7 @@ def _read_table(path: Path, column_map: ColumnMap | None) -> RawTable:
             start = file.read(8)
     except OSError as error:
         raise unreadable(path, error, "a log") from None
-    if start.startswith(_MCAP):
+    if start.startswith(joint_states.MAGIC):
         return _read_mcap(path, column_map)
     if start.startswith(_PARQUET):
         return _read_parquet(path)
@@ -162,7 +161,7 @@ def _read_table(path: Path, column_map: ColumnMap | None) -> RawTable:
     return csv_files.read(path, column_map.csv if column_map else None)
 
 
-_MCAP, _PARQUET = b"\x89MCAP0\r\n", b"PAR1"
+_PARQUET = b"PAR1"
 
 OTHER_FORMATS = {
     b"PK\x03\x04": ("a ZIP archive, such as a workbook of Excel", "save it as CSV"),

@@ -28,6 +28,8 @@ _OTHER_NAMES = {
 }  # fmt: skip
 """Units by other names that a file may state."""
 
+_NO_UNIT = ("", "1", "-")
+
 MISSING = ("", "nan", "na", "n/a", "#n/a", "null", "none", "-", "--", "1.#qnan", "-1.#ind", "1.#ind")
 """Texts, in lower case, that stand for a missing number."""
 
@@ -93,11 +95,22 @@ class RawTable:
             )
         return self.columns[name]
 
-    def unit(self, name: str, known: Sequence[str]) -> str | None:
-        """Return the unit that the file states for a column; None for none, or one that is not known."""
+    def unit(self, name: str, known: Sequence[str], remedy: str) -> str | None:
+        """Return the unit that the file states for a column; None for none.
+
+        Raises
+        ------
+        InputError
+            It is not one of the known units; the column map can state another by `remedy`.
+        """
         stated = self.units.get(name, "")
-        stated = stated if stated in known else _OTHER_NAMES.get(stated.lower(), "")
-        return stated if stated in known else None
+        unit = stated if stated in known else _OTHER_NAMES.get(stated.lower(), "")
+        if unit in known or stated in _NO_UNIT:
+            return unit if unit in known else None
+        raise InputError(
+            f"log {self.name}: column {name}: expected a unit of {', '.join(known)}, or {remedy} in the"
+            f" column map, received {stated}"
+        )
 
     def numbers(self, name: str) -> Array:
         """Return the numbers of a column; NaN for a missing one.
@@ -163,9 +176,9 @@ class RawTable:
         InputError
             There is no such column, or it has something else than times.
         """
-        column, unit = self.column(name), unit or self.unit(name, tuple(TIME_UNITS))
+        column = self.column(name)
         if isinstance(column, np.ndarray):
-            return _seconds(column, unit, wrap)
+            return _seconds(column, self._time_unit(name, unit), wrap)
         import pyarrow.types as types
 
         if types.is_temporal(column.type) and not types.is_date(column.type):
@@ -174,16 +187,19 @@ class RawTable:
             day = _SECONDS_OF_A_DAY / TIME_UNITS[column.type.unit] if is_clock else 0.0
             return _seconds(ticks, column.type.unit, wrap or day, is_date=types.is_timestamp(column.type))
         if types.is_decimal(column.type):
-            return self._exact(column, unit, wrap)
+            return self._exact(column, self._time_unit(name, unit), wrap)
         if _is_text(column.type):
             return self._times_of_texts(name, _texts(column), unit, wrap)
         if types.is_integer(column.type):
-            return _seconds(_ticks(column), unit, wrap)
+            return _seconds(_ticks(column), self._time_unit(name, unit), wrap)
         if not (types.is_floating(column.type) or types.is_null(column.type)):
             raise InputError(
                 f"log {self.name}: column {name}: expected times, received values of type {column.type}"
             )
-        return _seconds(self.numbers(name), unit, wrap)
+        return _seconds(self.numbers(name), self._time_unit(name, unit), wrap)
+
+    def _time_unit(self, name: str, given: str | None) -> str | None:
+        return given or self.unit(name, tuple(TIME_UNITS), "time.unit")
 
     def _exact(self, column: Any, unit: str | None, wrap: float) -> tuple[Array, tuple[str, ...]]:
         """Return the times of decimals: the digits beyond those of a float64 count."""
@@ -211,12 +227,14 @@ class RawTable:
 
         plain = pc.replace_substring(texts, ",", ".") if self.decimal == "," else texts
         try:
-            return _seconds(_ticks(plain.cast(pa.int64())), unit, wrap)
+            ticks = _ticks(plain.cast(pa.int64()))
+            return _seconds(ticks, self._time_unit(name, unit), wrap)
         except pa.ArrowInvalid:
             pass
         for kind, numbers in ((pa.decimal128(38, 12), plain), (pa.float64(), _of_fortran(plain))):
             try:
-                return self._exact(numbers.cast(kind), unit, wrap)
+                exact = numbers.cast(kind)
+                return self._exact(exact, self._time_unit(name, unit), wrap)
             except pa.ArrowInvalid:
                 continue
         for kind in (pa.timestamp("ns"), pa.timestamp("ns", "UTC")):

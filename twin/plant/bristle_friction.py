@@ -175,7 +175,7 @@ def begin_bristles(
         torque_q[i] += bristles.spring_q[i] - bristles.torque_q[0, i] - bristles.torque_q[1, i]
 
 
-@inlined
+@allocation_free  # not inlined: Newton's method would be compiled into each of its callers
 def apply_bristles(
     bristles: BristleFriction,
     joint: JointChain,
@@ -185,22 +185,7 @@ def apply_bristles(
     q: Array,
     qdot: Array,
 ) -> None:
-    """Correct the rotor's step as `solve_bristles` does, if there are elements or end stops."""
-    if bristles.on:
-        solve_bristles(bristles, joint, middle_q, middle_qdot, last_qdot, q, qdot)
-
-
-@allocation_free  # not inlined: a part that is off is compiled once
-def solve_bristles(
-    bristles: BristleFriction,
-    joint: JointChain,
-    middle_q: Array,
-    middle_qdot: Array,
-    last_qdot: Array,
-    q: Array,
-    qdot: Array,
-) -> None:
-    """Correct the rotor's step for the change of the torque of the elements.
+    """Correct the rotor's step for the change of the torque of the elements, if there are any.
 
     Parameters
     ----------
@@ -238,6 +223,8 @@ def solve_bristles(
     springs store: an implicit spring, damping and slip take energy, and a smaller slip deflection releases it
     as heat.
     """
+    if not bristles.on:
+        return
     h, g, trial, former = bristles.step_s, bristles.implicitness, bristles.trial, bristles.torque_q
     M = inertia_at(joint, triple(joint.inertia), triple(middle_q))
     for i in range(3):

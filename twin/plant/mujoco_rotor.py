@@ -71,7 +71,6 @@ class MujocoRotor:
         self.model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET) | idle_stages(self.model)
         self.data = mujoco.MjData(self.model)
         mujoco.mj_setConst(self.model, self.data)
-
         self.rows = RotorData.zeros()
 
     def start(self, q: Array, qdot: Array) -> Any:

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from spheretwin.models.base.compiled import allocation_free, compiled
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.base.record import Rows
-from spheretwin.models.joint_chain import torque_on_hinges, update_ideal_motion
+from spheretwin.models.joint_chain import JointChain, torque_on_hinges, update_ideal_motion
 from spheretwin.models.kinematics import triple
 from spheretwin.models.magnetics import SCRATCH_COLUMNS, TorqueModel, fill_torque_matrix, rotor_torque
 from spheretwin.plant.friction import slow_hinges
@@ -72,6 +72,21 @@ def _has(values: Array, size: int) -> bool:
 
 
 @allocation_free
+def _is_finite(joint: JointChain) -> bool:
+    """True if all numbers of a general joint are finite; an ideal one uses none of them."""
+    total = 0.0
+    if joint.on:
+        for i in range(3):
+            total += 0.0 * joint.gravity[i]
+            for j in range(3):
+                total += 0.0 * joint.axes[i, j] + 0.0 * joint.points[i, j]
+            for j in range(4):
+                for k in range(4):
+                    total += 0.0 * joint.masses[i, j, k]
+    return total == 0.0
+
+
+@allocation_free
 def check_parameters(parameters: Parameters) -> None:
     """Check the numbers of parameters; compiled code would read beyond the end of a shorter array.
 
@@ -96,8 +111,8 @@ def check_parameters(parameters: Parameters) -> None:
         raise InputError(
             "plant: expected a finite weight_moment_Nm, friction_smoothing_rad_s above 0, received others"
         )
-    if parameters.joint.shape[0] != 1:
-        raise InputError("plant: expected an array of one joint, received another")
+    if parameters.joint.shape[0] != 1 or not _is_finite(parameters.joint[0]):
+        raise InputError("plant: expected joint as an array of one joint of finite numbers, received another")
     lines, pairs = magnetics.line_axes.shape[0], magnetics.pair_gain.shape[1]
     if magnetics.line_weights.shape[0] != lines or magnetics.pair_stretch.shape[1] != pairs:
         raise InputError("plant: expected magnetics with arrays of matching lengths, received others")

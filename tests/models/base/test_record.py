@@ -50,6 +50,18 @@ def test_a_name_of_numpy_s_records_is_refused():
         Flow.zeros()
 
 
+def test_two_declarations_of_one_layout_with_other_states_are_refused():
+    class Volume(Record):
+        level: float = field("level", "m", state=True)
+
+    class Tank(Record):
+        level: float = field("level", "m")
+
+    Volume.zeros()
+    with pytest.raises(TypeError, match="Tank: expected the same states as in Volume"):
+        Tank.zeros()
+
+
 @allocation_free
 def advance(bank, value):
     filters = bank.pair

@@ -114,13 +114,35 @@ def test_each_axis_has_a_unit_of_its_own():
 
 def test_units_of_the_file_apply_unless_the_map_has_others():
     file = {"t_s": 1e3 * TIMES, "a": 180 + 0 * TIMES, "b": TIMES, "c": TIMES, "i0": 5 + 0 * TIMES}
-    table = RawTable("a", file, {"t_s": "msec", "a": "degrees", "b": "V", "i0": "mA"})
+    table = RawTable("a", file, {"t_s": "msec", "a": "degrees", "b": "1", "i0": "mA"})
     log = columns.of_fields({"angles": ANGLES, "currents": CURRENTS}).log(table)
     assert log.t_s == pytest.approx(TIMES)
     assert log.angle_rad[0, 0] == pytest.approx(math.pi)
     assert log.current_A[0, 0] == pytest.approx(5e-3)
     stated = {"angles": {**ANGLES, "unit": "rad"}, "currents": {**CURRENTS, "unit": "A"}}
     assert columns.of_fields(stated).log(table).angle_rad[0, 0] == pytest.approx(180)
+
+
+@pytest.mark.parametrize(
+    ("column", "unit", "remedy"),
+    [
+        ("t_s", "min", "time.unit"),
+        ("b", "V", "angles.unit or angles.scale"),
+        ("i0", "mV", "currents.unit or"),
+    ],
+)
+def test_a_unit_of_another_quantity_is_refused_unless_the_map_says_more(column, unit, remedy):
+    file = {"t_s": TIMES, "a": TIMES, "b": TIMES, "c": TIMES, "i0": TIMES}
+    table, fields = RawTable("a", file, {column: unit}), {"angles": ANGLES, "currents": CURRENTS}
+    with pytest.raises(InputError, match=rf"column {column}: expected a unit of .*, or {remedy}.* {unit}"):
+        columns.of_fields(fields).log(table)
+    more = {
+        "time": {"unit": "s"},
+        "angles": {**ANGLES, "scale": [2.0]},
+        "currents": {**CURRENTS, "unit": "A"},
+    }
+    log = columns.of_fields(more).log(table)
+    assert log.angle_rad[:, 1] == pytest.approx(2 * TIMES)
 
 
 def test_a_file_that_is_no_toml_is_refused(tmp_path):

@@ -8,6 +8,7 @@ import spheretwin as st
 from spheretwin import plant
 from spheretwin.models import actuator as actuators
 from spheretwin.models import magnetics
+from spheretwin.models.base.errors import InputError
 from spheretwin.plant.plant_step import step
 
 FRICTION = {"plant.coulomb_Nm": [2e-3] * 3, "plant.viscous_Nm_s": [1e-4] * 3}
@@ -103,6 +104,17 @@ def test_a_general_joint_turns_the_torque_matrix():
     q = np.array([0.5, 0.3, 0.2])
     apart = np.abs(plant.torque_matrix(q, ideal) - plant.torque_matrix(q, real)).max()
     assert 1e-4 < apart / np.abs(plant.torque_matrix(q, ideal)).max() < 0.2
+
+
+def test_a_general_joint_of_other_numbers_is_refused():
+    tilted = {"plant.mass.axis_tilt_rad": [[0.02, 0.0], [0.0, 0.01], [0.0, 0.0]]}
+    parameters = plant.parameters("tilt", tilted)
+    for name in ("axes", "points", "masses", "gravity"):
+        joint = parameters.joint.copy()
+        joint[name].flat[-1] = np.nan
+        for wrong in (joint, np.repeat(parameters.joint, 2)):
+            with pytest.raises(InputError, match="plant: expected joint as an array of one joint of finite"):
+                step(state_of(), np.zeros(18), np.zeros(3), parameters._replace(joint=wrong), 1e-3)
 
 
 @numba.njit

@@ -1,4 +1,4 @@
-"""Stages of a scenario that faults can modify, and the supervision."""
+"""Assembly of sensors, drive, faults and supervision from a scenario."""
 
 from __future__ import annotations
 
