@@ -68,7 +68,7 @@ SOURCES = {
     "models/telemetry/status.py": "statuses",
     "twin/cli/__init__.py": "commands",
     "twin/faults/targets.py": "fault_modes",
-    "twin/metrics.py": "metrics",
+    "twin/metrics/__init__.py": "metrics",
     "twin/scenario/hardware.py": "hardware",
     "twin/scenario/sections.py": "scenario_fields",
     "control/laws/__init__.py": "laws",

@@ -94,7 +94,7 @@ LARGEST = Channel(lambda groups: LARGEST_SIGNALS, lambda scenario: True, write_l
         "from spheretwin.plant import stiff\n",
     ),
     "metric": Addition(
-        "",
+        "twin/metrics/effort.py",
         '''
 class Load(NamedTuple):
     total: Array
@@ -121,11 +121,12 @@ class MeanLoad(Metric):
         """[3] in N·m; None without a row."""
         return (self.state.total / self._rows).tolist() if self._rows else None
 ''',
-        "twin/metrics.py",
+        "twin/metrics/__init__.py",
         (
             '    "copper_loss_J": CopperLoss,\n',
             '    "copper_loss_J": CopperLoss,\n    "mean_load_Nm": MeanLoad,\n',
         ),
+        "from spheretwin.metrics.effort import MeanLoad\n",
     ),
     "check": Addition(
         "twin/crosscheck/units.py",

@@ -10,7 +10,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
-from typing import Any, ClassVar
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -48,6 +48,12 @@ class PlannedRun:
 
 
 Array = NDArray[np.float64]
+
+
+class Largest(NamedTuple):
+    """Largest values so far; minus infinity before the first row."""
+
+    values: Array
 
 
 class Metric(ABC):

@@ -5,7 +5,8 @@ import pytest
 
 from spheretwin import metrics
 from spheretwin import scenario as scenarios
-from spheretwin.metrics import METRICS, BAND_rad
+from spheretwin.metrics import METRICS
+from spheretwin.metrics.tracking import BAND_rad
 from spheretwin.models import actuator as actuators
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.telemetry.signals import Signal, common_signals, width

@@ -14,7 +14,7 @@ import numpy as np
 from spheretwin.analysis.recorded_run import Reviewed, events, of_the_actuator
 from spheretwin.analysis.review import LONGEST_VALUE, common_conditions, scenario_differences
 from spheretwin.analysis.run_summary import amplitudes, peaks
-from spheretwin.metrics import BAND_rad
+from spheretwin.metrics.tracking import BAND_rad
 from spheretwin.models.actuator import MJCF_PATH, Actuator
 from spheretwin.models.base.errors import InputError, shortened, shown, without_breaks
 from spheretwin.models.base.user_code import short_names

@@ -16,7 +16,7 @@ from spheretwin.machine.link.channel import Channel
 from spheretwin.machine.link.frame_format import DEFAULT_FRAME
 from spheretwin.machine.link.machine_server import MachineServer
 from spheretwin.machine.link.transports import Transport, Udp, open_transport
-from spheretwin.metrics import BAND_rad
+from spheretwin.metrics.tracking import BAND_rad
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.base.files import check_writable
 from spheretwin.models.base.mujoco_library import timers_stopped

@@ -12,7 +12,7 @@ from spheretwin.analysis.review import Review, review
 from spheretwin.analysis.tolerances import Exceeded
 from spheretwin.cli.common import print_json, print_message, warn
 from spheretwin.cli.options import Parser
-from spheretwin.metrics import BAND_rad
+from spheretwin.metrics.tracking import BAND_rad
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.base.files import check_writable
 from spheretwin.models.telemetry.checksums import NO_CHECKSUMS

@@ -17,7 +17,7 @@ from spheretwin.cli.common import interruptible, keep_viewer, print_json, print_
 from spheretwin.cli.options import Parser, number
 from spheretwin.machine import export
 from spheretwin.machine.twin_file import read_twin
-from spheretwin.metrics import BAND_rad
+from spheretwin.metrics.tracking import BAND_rad
 from spheretwin.models.base.errors import InputError, SpheretwinError
 from spheretwin.models.base.mujoco_library import timers_stopped
 from spheretwin.models.telemetry.checksums import NO_CHECKSUMS, has_checksums

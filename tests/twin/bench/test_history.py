@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from spheretwin.bench.history import TEMPERATURE, History, LENGTH_s, RATE_Hz
-from spheretwin.metrics import CurrentVariation
+from spheretwin.metrics.effort import CurrentVariation
 from spheretwin.models.telemetry.signals import Signal
 from tests.twin.bench.cases import GROUPS, table
 
