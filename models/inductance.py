@@ -14,8 +14,9 @@ from math import pi
 import numpy as np
 from numpy.typing import NDArray
 
-from spheretwin.models.actuator import Actuator, CoilGeometry
+from spheretwin.models.actuator import Actuator
 from spheretwin.models.base.cache import cached_array
+from spheretwin.models.magnet_and_coil import CoilGeometry
 
 Array = NDArray[np.float64]
 

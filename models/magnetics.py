@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from spheretwin.models.actuator import Actuator, CoilGeometry, Magnet
+from spheretwin.models.actuator import Actuator
 from spheretwin.models.base.cache import cached_array
 from spheretwin.models.base.compiled import allocation_free, inlined
 from spheretwin.models.base.errors import InputError, distinct_texts, one_line
@@ -26,6 +26,7 @@ from spheretwin.models.base.vectors import (
     vector,
 )
 from spheretwin.models.kinematics import rotation_rows
+from spheretwin.models.magnet_and_coil import CoilGeometry, Magnet
 from spheretwin.models.torque_curve import TorqueCurve
 from spheretwin.models.torque_field import TorqueField
 

@@ -11,7 +11,7 @@ FOLDERS = ("models", "control", "viz", "twin", "tests")
 # Folders whose init holds the list of a family, or the functions that users import.
 FACES = {
     "control/allocation", "control/compensators", "control/estimators", "control/laws", "twin/bench",
-    "twin/cli", "twin/paper", "twin/scenario", "twin/study/engines", "twin/trajectories",
+    "twin/cli", "twin/metrics", "twin/paper", "twin/scenario", "twin/study/engines", "twin/trajectories",
 }  # fmt: skip
 
 # Their init is public API: it imports on demand and has an example in its docstring.

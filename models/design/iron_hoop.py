@@ -18,9 +18,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from spheretwin.models.actuator import CoilGeometry, Magnet
 from spheretwin.models.base.extras import missing
 from spheretwin.models.design.rotor_field import linkage
+from spheretwin.models.magnet_and_coil import CoilGeometry, Magnet
 
 Array = NDArray[np.float64]
 

@@ -18,9 +18,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from spheretwin.models.actuator import CoilGeometry, Magnet
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.base.extras import missing
+from spheretwin.models.magnet_and_coil import CoilGeometry, Magnet
 from spheretwin.models.magnetics import computed_from
 from spheretwin.models.torque_curve import TorqueCurve, head
 

@@ -22,10 +22,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from spheretwin.models.actuator import Actuator, CoilGeometry, Magnet
+from spheretwin.models.actuator import Actuator
 from spheretwin.models.base.checks import Check
 from spheretwin.models.design import direct_summation, pole_torque
 from spheretwin.models.design.direct_summation import Rule
+from spheretwin.models.magnet_and_coil import CoilGeometry, Magnet
 
 Array = NDArray[np.float64]
 

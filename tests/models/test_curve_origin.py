@@ -4,7 +4,7 @@ from dataclasses import fields, replace
 
 import pytest
 
-from spheretwin.models.actuator import CoilGeometry, Magnet
+from spheretwin.models.magnet_and_coil import CoilGeometry, Magnet
 from spheretwin.models.magnetics import disagreements
 
 

@@ -5,6 +5,7 @@ import pytest
 
 from spheretwin import cli
 from spheretwin.models import actuator as actuators
+from spheretwin.models import magnet_and_coil
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.kinematics import frame_of_axis
 from spheretwin.scenario import load
@@ -29,7 +30,7 @@ def model_file(folder, part, shape):
 @pytest.mark.parametrize("shape", SHAPES)
 def test_a_curve_is_refused_for_other_shapes(tmp_path, capsys, shape):
     path = model_file(tmp_path, POLE, shape)
-    for read in (actuators.read_magnet_and_coil, actuators.load):
+    for read in (magnet_and_coil.read_magnet_and_coil, actuators.load):
         with pytest.raises(InputError, match=f"as a cylinder, received the shape {shape}.*magnetics field"):
             read(path)
     with pytest.raises(InputError, match=f"pole_.* received the shape {shape}"):
@@ -57,7 +58,7 @@ def test_a_coil_of_another_shape_is_refused(tmp_path, shape):
 )
 def test_with_a_torque_field_a_pole_is_drawn_as_the_cylinder_around_it(tmp_path, shape, radius_m, length_m):
     model = actuators.read(model_file(tmp_path, POLE, shape)).described
-    magnet = actuators._magnet(model, actuators.sites(model, "pole_"))
+    magnet = magnet_and_coil.read_magnet(model, magnet_and_coil.sites(model, "pole_"))
     assert (magnet.radius_m, magnet.length_m) == pytest.approx((radius_m, length_m), rel=1e-12)
 
 

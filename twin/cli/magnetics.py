@@ -18,6 +18,7 @@ from spheretwin.models.base.files import check_writable
 from spheretwin.models.design import curve_check, field_check, iron_hoop, rotor_field, torque_map
 from spheretwin.models.design.curve_check import ComputedCurve
 from spheretwin.models.design.workspace import LARGEST_TILT_DEG
+from spheretwin.models.magnet_and_coil import read_magnet_and_coil
 from spheretwin.models.magnetics import SAME, computed_from
 from spheretwin.viz.pages import magnetics
 from spheretwin.viz.pages.markdown import prepare, save_text
@@ -254,7 +255,7 @@ def run_field(options: argparse.Namespace) -> bool:
 
 def run_hoop(options: argparse.Namespace) -> bool:
     """Run the part; return True."""
-    magnet, coil = actuators.read_magnet_and_coil(options.mjcf)
+    magnet, coil = read_magnet_and_coil(options.mjcf)
     angles = tracked("caps of iron")(range(len(iron_hoop.HALF_ANGLES_DEG)))
     effects = [iron_hoop.effect(magnet, coil, iron_hoop.HALF_ANGLES_DEG[i]) for i in angles]
     warn_about_model(options.mjcf)
@@ -268,7 +269,7 @@ def run_hoop(options: argparse.Namespace) -> bool:
 def _is_known(mjcf: Path) -> bool:
     """True if nothing that the shipped curve depends on differs in a model."""
     known = dict(torque_curve.read(TORQUE_CURVE_PATH).computed_for or {})
-    numbers = computed_from(*actuators.read_magnet_and_coil(mjcf))
+    numbers = computed_from(*read_magnet_and_coil(mjcf))
     return known.keys() == numbers.keys() and all(
         math.isclose(known[name], number, rel_tol=SAME) for name, number in numbers.items()
     )

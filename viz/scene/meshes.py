@@ -15,9 +15,9 @@ import numpy as np
 import rerun as rr
 from numpy.typing import NDArray
 
-from spheretwin.models.actuator import CoilGeometry, read_coil
 from spheretwin.models.base.errors import InputError, without_breaks
 from spheretwin.models.base.mujoco_library import compiler_warnings
+from spheretwin.models.magnet_and_coil import CoilGeometry, read_coil
 from spheretwin.models.mjcf import fingerprint, missing_meshes, read
 from spheretwin.viz import theme
 from spheretwin.viz.scene.solids import merged_surface, revolved_surface

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from spheretwin.models.base.errors import InputError
+from spheretwin.models.base.record import capacity
 from spheretwin.models.base.state import (
     arrays_of,
-    capacity,
     push,
     restore_state,
     save_state,

@@ -10,10 +10,11 @@ from scipy.constants import mu_0
 from scipy.optimize import brentq
 from scipy.spatial.transform import Rotation
 
-from spheretwin.models.actuator import CoilGeometry, Magnet, load
+from spheretwin.models.actuator import load
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.design import pole_torque
 from spheretwin.models.design.pole_torque import Mesh, MeshConvergence, compute_curve
+from spheretwin.models.magnet_and_coil import CoilGeometry, Magnet
 from tests.models.design.quadrature import winding_loops
 
 COARSE = Mesh(along=16, around=96, across=8)

@@ -8,7 +8,7 @@ import pytest
 
 from spheretwin import cli
 from spheretwin.models import actuator as actuators
-from spheretwin.models import torque_field
+from spheretwin.models import magnet_and_coil, torque_field
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.design import rotor_field
 from spheretwin.models.torque_field import TorqueField, directions
@@ -35,7 +35,7 @@ def test_a_sphere_at_the_centre_is_a_dipole(tmp_path):
     radius = 0.02
     path = written(tmp_path, f'type="sphere" size="{radius}" pos="0 0 0"')
     computed = rotor_field.compute(path, 6.0, 6)
-    coil = actuators.read_coil(mujoco.MjModel.from_xml_path(str(path)))
+    coil = magnet_and_coil.read_coil(mujoco.MjModel.from_xml_path(str(path)))
     moment = 1.2 / (4e-7 * np.pi) * 4 / 3 * np.pi * radius**3
     rho, z, share = np.transpose(winding_section(coil, 40, 40))
     # A turn of radius rho at height z links µ0 m rho² / 2 r³ of a dipole along its axis.
