@@ -343,7 +343,7 @@ FIGURES = {
     "margins_of_laws": margins_of_laws, "ratios": ratios, "estimators": built.estimators,
     "crosscheck_margins": built.margins, "crosscheck_spreads": spreads, "crosscheck_motion": motion,
     "crosscheck_convergence": convergence, "crosscheck_drifts": drifts,
-    "crosscheck_closed_loops": closed_loops, "crosscheck_friction": built.hinge_friction,
+    "crosscheck_closed_loops": closed_loops,
     "map": built.study_map, "map_narrow": narrow_map, "map_large": large_map, "map_lines": map_lines,
     "map_lines_of_names": map_lines_of_names, "heat": built.heat, "heat_of_many": heat_of_many,
     "workspace": workspace_figures, "distributions": spread_figures, "ranks": rank_figures,

@@ -6,8 +6,6 @@ from types import SimpleNamespace
 import numpy as np
 
 from spheretwin.crosscheck.dynamics import QUANTITIES, Dynamics
-from spheretwin.crosscheck.friction import HingeFriction
-from spheretwin.crosscheck.hinge import Bearing, Coast, Hinge, Motion, Ramp
 from spheretwin.crosscheck.identities import Drift, FreeRotor
 from spheretwin.crosscheck.suite import Evidence
 from spheretwin.crosscheck.trajectories import ClosedLoop, Convergence, Pair, Trajectories
@@ -72,25 +70,9 @@ def evidence() -> Evidence:
             checks("motion", "order", "slope"), T_s, three, 1e-9 * three, convergence
         ),
         "torque-free rotor": FreeRotor(checks("energy", "momentum"), T_s, drifts),
-        "friction": HingeFriction(
-            checks("ramp", "coast"), {"2 mN·m": _bearing(2e-3), "5 mN·m": _bearing(5e-3)}
-        ),
         "closed loop": ClosedLoop(checks("one", "two", "three", "four"), pairs),
     }
     return Evidence(findings)
-
-
-def _bearing(level: float) -> Bearing:
-    hinge = Hinge(1e-3, level, 1e-3, 1e-3)
-    torque = np.concatenate([COUNT, COUNT[::-1]]) * level / 30
-    ideal = np.maximum(torque - level, 0.0) / 1e-3
-    rates = {"ours": ideal + 0.01 * torque, "MuJoCo": ideal + 0.5 * torque}
-    coast = np.maximum(2.0 - T_s, 0.0)
-    motions = {
-        way: Motion(np.zeros(40), coast + far * (1 + T_s)) for way, far in (("ours", 1e-4), ("MuJoCo", 1e-2))
-    }
-    ramp = Ramp(torque, rates, ideal)
-    return Bearing(hinge, ramp, Coast(T_s, motions, coast), {"ours": 1e-6, "MuJoCo": 1e-3}, 60)
 
 
 def field_verdict() -> FieldVerdict:

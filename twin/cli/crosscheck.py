@@ -23,7 +23,7 @@ def declare(parser: Parser) -> None:
     """Declare the arguments of the verb."""
     parser.description = (
         "Compare the engine (MuJoCo) with the Lagrangian model and, if it is installed, with"
-        " Pinocchio: state by state, along trajectories, without torque, under friction, and in the closed"
+        " Pinocchio: state by state, along trajectories, without torque, driven by coils, and in the closed"
         " loop. Exit code 1 when a bound is broken."
     )
     parser.add_argument("--out", help="write a page with figures into this folder")

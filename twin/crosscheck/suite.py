@@ -6,18 +6,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import NamedTuple, Protocol, TypeVar
 
-from spheretwin.crosscheck import (
-    coil_driven,
-    dynamics,
-    end_stops,
-    friction,
-    identities,
-    prototype,
-    stiction,
-    trajectories,
-)
-from spheretwin.crosscheck.friction import HingeFriction
-from spheretwin.crosscheck.hinge import PUSH, Bearing, START_rad_s
+from spheretwin.crosscheck import coil_driven, dynamics, identities, prototype, trajectories
 from spheretwin.models import actuator as actuators
 from spheretwin.models.actuator import Actuator
 from spheretwin.models.base.checks import Check, bound_shares
@@ -62,9 +51,6 @@ PARTS = (
     Part("identities", lambda on: identities.check_identities(on.actuator, on.states)),
     Part("trajectories", lambda on: trajectories.compare_trajectories(on.mjcf, on.actuator)),
     Part("torque-free rotor", lambda on: identities.check_free_rotor(on.mjcf, on.actuator)),
-    Part("friction", lambda on: friction.compare(on.mjcf, on.actuator)),
-    Part("static friction", lambda on: stiction.compare(on.mjcf, on.actuator)),
-    Part("end stops", lambda on: end_stops.compare(on.mjcf, on.actuator)),
     Part("coil-driven motion", lambda on: coil_driven.compare(on.mjcf, on.actuator)),
     Part("closed loop", lambda on: trajectories.compare_closed_loop(on.mjcf, on.actuator)),
     Part("prototype", lambda on: prototype.compare(on.mjcf, on.actuator)),
@@ -166,42 +152,12 @@ def draw_differences(evidence: Evidence) -> Drawing:
     return Drawing("dynamics.svg", caption, figure)
 
 
-def draw_friction(evidence: Evidence) -> Drawing:
-    """Friction of a hinge: ours and MuJoCo's."""
-    from spheretwin.viz.figures import crosscheck
-
-    def measured(bearing: Bearing) -> tuple[crosscheck.Ramped, crosscheck.Resting]:
-        hinge, ramp, coast = bearing.hinge, bearing.ramp, bearing.coast
-        level = hinge.coulomb_Nm
-        rates = {way: motion.qdot_rad_s for way, motion in coast.motions.items()}
-        return (
-            crosscheck.Ramped(
-                ramp.torque_Nm, ramp.rates_rad_s, ramp.ideal_rad_s, level, PUSH * level, bearing.creep_rad_s
-            ),
-            crosscheck.Resting(coast.t_s, rates, coast.ideal_rad_s, hinge.ideal_time_s(START_rad_s)),
-        )
-
-    bearings = evidence.of(HingeFriction).bearings
-    figure = crosscheck.hinge_friction(
-        {
-            f"Coulomb {name}, viscous {1e3 * bearing.hinge.viscous_Nm_s:.4g} mN·m·s": measured(bearing)
-            for name, bearing in bearings.items()
-        },
-        "Friction of one hinge: our stage, and MuJoCo's friction loss and damping",
-    )
-    caption = (
-        "Sticking, breakaway, sliding and coming to rest of hinge γ under our stage of friction and under"
-        " MuJoCo's own, and under ideal friction; dots: settled under half of the level."
-    )
-    return Drawing("friction.svg", caption, figure)
-
-
 def draw_margins(evidence: Evidence) -> Drawing:
     """Value over bound of each check."""
     from spheretwin.viz.figures import crosscheck
 
     figure = crosscheck.margins(bound_shares(evidence.checks), "Share of the bound of each check")
-    caption = "Value over bound. Orders of convergence and breakaway torques have two bounds: see below."
+    caption = "Value over bound. Orders of convergence have two bounds: see below."
     return Drawing("margins.svg", caption, figure)
 
 
@@ -250,7 +206,6 @@ FIGURES: tuple[Callable[[Evidence], Drawing], ...] = (
     draw_trajectory,
     draw_convergence,
     draw_torque_free,
-    draw_friction,
     draw_closed_loop,
 )
 

@@ -66,25 +66,6 @@ def margins() -> Figure:
     return crosscheck.margins({"one": 0.5, "two": 2.0, "three": 0.0, "four": np.inf}, "margins")
 
 
-UP = np.linspace(0, 3e-3, 200)
-TORQUE = np.concatenate([UP, UP[-2::-1]])
-IDEAL = np.concatenate([np.maximum(UP - 2e-3, 0), np.maximum(UP[-2::-1] - 1e-3, 0)]) * 500
-COAST_s = np.linspace(0, 3, 3001)
-COAST = np.maximum(2 - COAST_s, 0)
-
-
-def _bearing(level):
-    rates = {"ours": IDEAL + 5 * TORQUE, "theirs": IDEAL + 0.5 * TORQUE}
-    ramped = crosscheck.Ramped(TORQUE, rates, IDEAL, level, level / 2, {"ours": 5e-3, "theirs": 5e-4})
-    late = {"ours": COAST + 1e-3, "theirs": COAST + np.where(COAST_s > 1.9, 1e-3, 0)}
-    return ramped, crosscheck.Resting(COAST_s, late, COAST, 2.0)
-
-
-def hinge_friction() -> Figure:
-    """Return two bearings under a ramp of torque, and as they come to rest."""
-    return crosscheck.hinge_friction({"soft": _bearing(2e-3), "hard": _bearing(2.5e-3)}, "friction")
-
-
 WINDOWS = 0.1 + np.linspace(0, 1, 40)[None, :, None] + 0.1 * np.arange(3)[:, None, None] * np.ones((1, 1, 2))
 
 

@@ -24,7 +24,7 @@ def long_texts():
 
 
 NAMES = (
-    *(name for name in FIGURES if name.startswith("crosscheck") and name != "crosscheck_friction"),
+    *(name for name in FIGURES if name.startswith("crosscheck")),
     "error_courses", "error_lines", "heat", "by_condition_of_three_hinges", "map", "estimators",
 )  # fmt: skip
 DRAWN = {"long_texts": long_texts, **{name: FIGURES[name] for name in NAMES}}

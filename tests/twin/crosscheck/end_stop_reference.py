@@ -1,4 +1,4 @@
-"""End stops: both engines against an adaptive integration of the same model.
+"""End stops by the plant and by an adaptive integration of the same model.
 
 The reference knows neither the step nor the implicit method of `plant.end_stops`: DOP853 integrates the
 Lagrangian with the torque of the buffers as it is written down.
@@ -7,7 +7,7 @@ Lagrangian with the torque of the buffers as it is written down.
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,9 +15,8 @@ from numpy.typing import NDArray
 from spheretwin.crosscheck.coil_driven import drive_plant
 from spheretwin.crosscheck.equations import equations_of
 from spheretwin.crosscheck.scale import Scale, scale_of
-from spheretwin.crosscheck.trajectories import ENGINES, reason_of, solve
+from spheretwin.crosscheck.trajectories import solve
 from spheretwin.models.actuator import MJCF_PATH, Actuator
-from spheretwin.models.base.checks import Check
 from spheretwin.plant.end_stops import EndStopsSection
 
 Array = NDArray[np.float64]
@@ -32,34 +31,10 @@ STOPS = EndStopsSection(on=True)
 TIGHT: dict[str, Any] = {"rtol": 1e-11, "atol": 1e-13, "max_step": 2e-4}
 
 
-class Contacts(NamedTuple):
-    """Checks of the end stops."""
-
-    checks: list[Check]
-
-
-def compare(mjcf: Path, actuator: Actuator) -> Contacts:
-    """Compare both engines with the reference.
-
-    Parameters
-    ----------
-    mjcf : Path
-        Model file that the engines read.
-    actuator : Actuator
-        Its inertia and hinge ranges are those of the reference.
-    """
-    section = stops(scale_of(actuator))
-    expected, contacts = Reference(actuator, section, mjcf).integrate()
-    # A contact turns a rate v with (natural h)²/12 of it, as the trapezoid of a spring does.
-    natural_s = section.stiffness_Nm_rad / float(min(actuator.inertia))
-    fastest = float(np.abs(expected[:, 3:]).max())
-    bound = contacts * fastest * natural_s * STEP_s**2
-    return Contacts(
-        [
-            _motion(name, np.abs(by_plant(mjcf, actuator, engine) - expected), bound)
-            for name, engine in ENGINES.items()
-        ]
-    )
+def bound_rad_s(actuator: Actuator, expected: Array, contacts: int) -> float:
+    """Return the bound of the rates: a contact turns a rate v with (natural h)²/12 of it, as a trapezoid."""
+    natural_s = stops(scale_of(actuator)).stiffness_Nm_rad / float(min(actuator.inertia))
+    return contacts * float(np.abs(expected[:, 3:]).max()) * natural_s * STEP_s**2
 
 
 class Reference:
@@ -131,18 +106,3 @@ def by_plant(mjcf: Path, actuator: Actuator, engine: str) -> Array:
     }
     every = round(SAMPLE_s / STEP_s)
     return drive_plant(mjcf, fields, lambda groups: np.zeros((count, groups)), np.zeros((count, 3)), every)
-
-
-def _motion(name: str, difference: Array, bound: float) -> Check:
-    return Check(
-        name=f"end stops: motion, {name}",
-        compares=f"hinge alpha that bounces while the others turn, for {DURATION_s:g} s: rates,"
-        " with DOP853 on the same equations",
-        states=len(difference),
-        value=float(difference[:, 3:].max()),
-        bound=bound,
-        why="a contact turns a rate with an error of (natural frequency times step)² of the rate",
-        unit="rad/s",
-        reason=reason_of(float(difference.max())),
-        detail={"largest difference of an angle, rad": float(difference[:, :3].max())},
-    )

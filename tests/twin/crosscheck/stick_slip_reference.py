@@ -1,4 +1,4 @@
-"""Static friction: both engines against an event-driven integration of the same model.
+"""Static friction by the plant and by an event-driven integration of the same model.
 
 The reference knows neither the step nor the implicit method of `plant.bristle_friction`: DOP853 integrates
 the Lagrangian between the instants at which a slider begins to slip or sticks again.
@@ -6,10 +6,9 @@ the Lagrangian between the instants at which a slider begins to slip or sticks a
 
 from __future__ import annotations
 
-from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,9 +16,8 @@ from numpy.typing import NDArray
 from spheretwin.crosscheck.coil_driven import drive_plant
 from spheretwin.crosscheck.equations import equations_of
 from spheretwin.crosscheck.scale import Scale, scale_of
-from spheretwin.crosscheck.trajectories import ENGINES, convergence, order_check, reason_of, solve
+from spheretwin.crosscheck.trajectories import solve
 from spheretwin.models.actuator import MJCF_PATH, Actuator
-from spheretwin.models.base.checks import Check
 from spheretwin.plant.bristle_friction import LAST, SLIP_SHARES, StictionSection
 
 Array = NDArray[np.float64]
@@ -34,57 +32,16 @@ AMPLITUDE_Nm, FREQUENCY_rad_s = np.array([5e-3, 6e-3, 4e-3]), 2 * np.pi * np.arr
 
 TIGHT: dict[str, Any] = {"rtol": 1e-11, "atol": 1e-13, "max_step": SAMPLE_s, "dense_output": True}
 
-STEPS_s = (1e-3, 5e-4, 2.5e-4, 1.25e-4, 6.25e-5)
-ORDER = 2
-PRESLIDING, REVERSING = "presliding", "reversing"
-PRESLIDING_SHARE = 0.5  # the torques stay below break-away
-WHY = {
-    PRESLIDING: "order 2: the mean torque over the path within a step is exact",
-    REVERSING: "reported: a step finds neither the instant of a break-away nor that of a reversal, and the"
-    " Stribeck effect begins there: order 1",
-}
 
+def bound_rad_s(actuator: Actuator, break_aways: int) -> float:
+    """Return the bound of the rates.
 
-class Stiction(NamedTuple):
-    """Checks of static friction."""
-
-    checks: list[Check]
-
-
-def compare(mjcf: Path, actuator: Actuator) -> Stiction:
-    """Compare both engines with the reference.
-
-    Parameters
-    ----------
-    mjcf : Path
-        Model file that the engines read.
-    actuator : Actuator
-        Its inertia is that of the Lagrangian.
+    After each break-away the Stribeck effect begins a step and a half late at most; it takes the difference
+    of both levels at most.
     """
-    scale = scale_of(actuator)
-    reference = Reference(actuator, STICTION, scale.torques_Nm(COULOMB_Nm), mjcf, scale.torque)
-    expected, break_aways = reference.integrate(scale.pose_rad(START_rad), DURATION_s)
-    drop = max(scale.torques_Nm(COULOMB_Nm)) * (STICTION.break_away - 1) / float(min(actuator.inertia))
-    bound = 1.5 * STEP_s * drop * break_aways
-    motions = [
-        _motion(name, np.abs(by_plant(mjcf, scale, engine) - expected), bound)
-        for name, engine in ENGINES.items()
-    ]
-    return Stiction([*motions, *(_order(mjcf, actuator, scale, name) for name in WHY)])
-
-
-def _order(mjcf: Path, actuator: Actuator, scale: Scale, name: str) -> Check:
-    """Check of the order of the Lagrangian plant within presliding; report of that with break-aways."""
-    share = PRESLIDING_SHARE if name == PRESLIDING else 1.0
-    levels_Nm = scale.torques_Nm(COULOMB_Nm)
-    reference = Reference(actuator, STICTION, levels_Nm, mjcf, share * scale.torque)
-    expected, _ = reference.integrate(scale.pose_rad(START_rad), DURATION_s)
-    method = partial(by_plant, mjcf, scale, "lagrangian", share=share)
-    measured = convergence(lambda step_s: method(step_s=step_s), expected, STEPS_s)
-    check = order_check(
-        f"static friction, {name}", measured, ORDER, WHY[name], f"torques of {share:g} of those above; ", ""
-    )
-    return check if name == PRESLIDING else replace(check, bound=None, at_least=None)
+    largest_Nm = max(scale_of(actuator).torques_Nm(COULOMB_Nm))
+    drop = largest_Nm * (STICTION.break_away - 1) / float(min(actuator.inertia))
+    return 1.5 * STEP_s * drop * break_aways
 
 
 def torque_Nm(t_s: float) -> Array:
@@ -195,19 +152,3 @@ def by_plant(mjcf: Path, scale: Scale, engine: str, step_s: float = STEP_s, shar
     }
     every = round(SAMPLE_s / step_s)
     return drive_plant(mjcf, fields, lambda groups: np.zeros((count, groups)), -torque, every)
-
-
-def _motion(name: str, difference: Array, bound: float) -> Check:
-    return Check(
-        name=f"static friction: motion, {name}",
-        compares=f"all hinges under torques of 1.3 to 1.7 of break-away for {DURATION_s:g} s: rates, with"
-        " DOP853 between the instants at which a slider slips or sticks",
-        states=len(difference),
-        value=float(difference[:, 3:].max()),
-        bound=bound,
-        why="after each break-away the Stribeck effect begins a step and a half late at most; it takes the"
-        " difference of both levels at most",
-        unit="rad/s",
-        reason=reason_of(float(difference.max())),
-        detail={"largest difference of an angle, rad": float(difference[:, :3].max())},
-    )
