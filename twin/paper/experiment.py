@@ -45,6 +45,8 @@ class Case(NamedTuple):
     """Runs unless the command states their number; more where a small difference or a rare case counts."""
     seeded_fields: Callable[[int], Mapping[str, Any]] = lambda seed: {}
     """Fields that depend on the seed, a function of the seed alone."""
+    columns: Mapping[str, Any] = {}
+    """Columns of its rows in the tables: law, condition and what else they name."""
 
     def fields_of(self, seed: int) -> dict[str, Any]:
         """Return the fields of the run with a seed, without the seed itself."""

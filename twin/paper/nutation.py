@@ -2,30 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from itertools import pairwise
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from spheretwin.models import actuator as actuators
 from spheretwin.models.telemetry.signals import ANGLES
-from spheretwin.models.telemetry.status import Status
 from spheretwin.paper import page
-from spheretwin.paper.experiment import Case, Experiment, Finding, Outcome, Outcomes, ResultTable, Section
-from spheretwin.paper.laws import COMPARED_LAWS, PAPER_LAWS, ComparedLaw
-from spheretwin.paper.sinusoid import EFFORT_HEAD, EFFORT_TITLE, EXPECTED, by_hinge, effort, triple
+from spheretwin.paper.experiment import Array, Finding, Outcome, Outcomes, Section
+from spheretwin.paper.experiment_file import CaseRuns, Cells, ExperimentFile, column, table
+from spheretwin.paper.laws import PAPER_LAWS
+from spheretwin.paper.sinusoid import EFFORT, EFFORT_TITLE, LARGEST_TITLE, STATUS, hinge_cells, triple
 from spheretwin.run import Run
 from spheretwin.viz.pages.markdown import Drawing
 
 if TYPE_CHECKING:
     from spheretwin.viz.comparison.trajectories import LawTrajectory
 
-Array = NDArray[np.float64]
+FILE = ExperimentFile("figure8")
 
-SCENARIO = "nutation"
-CONDITION = {"plant.modelling_error": 0.2, "disturbance.load": 2.0}
 FROM_s = 1.0
 
 WINDOW_s = 0.05
@@ -57,17 +54,6 @@ class NutationData(NamedTuple):
         return after.max(axis=0) if len(after) else np.full(3, np.nan)
 
 
-def case(law: ComparedLaw) -> Case:
-    """Case of the nutation under a law."""
-    return Case(
-        name=f"{law.law}: m 0.2, L 2",
-        scenario=SCENARIO,
-        fields={"controller.law": law.law, **CONDITION},
-        details={"gains": law.gains},
-        expected_statuses=EXPECTED.get(law.law, (Status.COMPLETED,)),
-    )
-
-
 def reduce(run: Run) -> NutationData:
     """Reduce a run."""
     table, period_s = run.telemetry, run.scenario.controller.period_s
@@ -84,104 +70,91 @@ def reduce(run: Run) -> NutationData:
 
 TITLE = "Figure 8: nutation, m = 0.2, L = 2"
 
-Runs = Mapping[ComparedLaw, Sequence[Outcome]]
+Items = Sequence[CaseRuns]
 
 
-def angles(runs: Runs) -> Drawing:
+def angles(items: Items) -> Drawing:
     """Angles of the first seed and the desired ones."""
     from spheretwin.viz.figures import over_time as figures
 
-    desired = _longest(runs)
+    desired = _longest(items)
     by_label = {
-        law.label: figures.AngleTraces(
-            law.law,
-            first.data.trajectory.t_s,
-            first.data.trajectory.q_rad,
+        item["label"]: figures.AngleTraces(
+            item["law"],
+            item.runs[0].data.trajectory.t_s,
+            item.runs[0].data.trajectory.q_rad,
             desired.t_s,
             desired.q_ref_rad,
-            first.is_complete,
+            item.runs[0].is_complete,
         )
-        for law, (first, *_) in runs.items()
+        for item in items
     }
-    caption = "Angles q and their references q_d, first seed."
-    return Drawing("figure8_angles.svg", caption, figures.angles(by_label, ANGLES, TITLE))
+    return FILE.drawing("angles", figures.angles(by_label, ANGLES, TITLE))
 
 
-def errors(runs: Runs) -> Drawing:
+def errors(items: Items) -> Drawing:
     """Errors of all seeds over time."""
     from spheretwin.viz.figures import over_time as figures
 
     by_label = {
-        law.label: figures.ErrorBand(law.law, page.padded([run.data.windows_rad for run in of_law]))
-        for law, of_law in runs.items()
+        item["label"]: figures.ErrorBand(
+            item["law"], page.padded([run.data.windows_rad for run in item.runs])
+        )
+        for item in items
     }
-    window = f"{1e3 * WINDOW_s:g} ms"
-    caption = f"Largest |error| within each {window}: median over the seeds, and their range as a band."
-    return Drawing("figure8_errors.svg", caption, figures.errors(by_label, WINDOW_s, ANGLES, TITLE))
+    figure = figures.errors(by_label, WINDOW_s, ANGLES, TITLE)
+    return FILE.drawing("errors", figure, window_ms=1e3 * WINDOW_s)
 
 
-def paths(runs: Runs) -> Drawing:
+def paths(items: Items) -> Drawing:
     """Paths of the shaft tip of the first seed."""
     from spheretwin.viz.figures import over_time as figures
     from spheretwin.viz.scene.entities import shaft_tip
 
-    actuator, desired = actuators.load(), _longest(runs)
+    actuator, desired = actuators.load(), _longest(items)
     by_label = {
-        law.label: figures.TipPath(
-            law.law,
-            1e3 * shaft_tip(first.data.trajectory.q_rad, actuator),
+        item["label"]: figures.TipPath(
+            item["law"],
+            1e3 * shaft_tip(item.runs[0].data.trajectory.q_rad, actuator),
             1e3 * shaft_tip(desired.q_ref_rad, actuator),
-            first.is_complete,
+            item.runs[0].is_complete,
         )
-        for law, (first, *_) in runs.items()
+        for item in items
     }
-    caption = "Path of the shaft's tip, desired and actual, of the first seed: in space, and from above."
-    return Drawing("figure8_paths.svg", caption, figures.paths(by_label, f"{TITLE}: the shaft's tip"))
+    return FILE.drawing("paths", figures.paths(by_label, f"{TITLE}: the shaft's tip"))
 
 
-def _longest(runs: Runs) -> Trajectory:
+def _longest(items: Items) -> Trajectory:
     """Trajectory of the first seed with the longest reference."""
-    trajectories: list[Trajectory] = [first.data.trajectory for first, *_ in runs.values()]
+    trajectories: list[Trajectory] = [item.runs[0].data.trajectory for item in items]
     return max(trajectories, key=lambda trajectory: len(trajectory.t_s))
 
 
-METHOD = (
-    "The rotor spins at 2π rad/s while its axis gyrates with a growing amplitude, up to 1 rad. The rotor"
-    " starts from rest and the reference with its full rate. Under every law that keeps the rotor, the error"
-    f" of γ is therefore largest in the first tenths of a second; the last column has the largest error after"
-    f" {FROM_s:g} s. The paper shows curves of q and q_d and prints no number."
-)
-HEAD = (
-    "law", "gains", "status", "α, mrad", "β, mrad", "γ, mrad", "in degrees",
-    f"from {FROM_s:g} s on, mrad",
-)  # fmt: skip
+def _largest_after(item: CaseRuns) -> str:
+    largest = np.median([run.data.largest_after(FROM_s) for run in item.runs], axis=0)
+    return triple(1e3 * largest, 1)
+
+
+LARGEST: Cells = {
+    "law": column("label"),
+    "gains": column("gains"),
+    **STATUS,
+    **hinge_cells("max_abs_error"),
+    f"from {FROM_s:g} s on, mrad": _largest_after,
+}
 
 
 def sections(outcomes: Outcomes) -> list[Section]:
     """Errors, angles and paths."""
-    by_law = {law: runs for law in COMPARED_LAWS if (runs := outcomes.runs(case(law)))}
-    largest = [
-        (
-            law.label,
-            law.gains,
-            page.statuses_text(runs),
-            *by_hinge(runs, "max_abs_error"),
-            triple(1e3 * np.median([run.data.largest_after(FROM_s) for run in runs], axis=0), 1),
-        )
-        for law, runs in by_law.items()
-    ]
-    tables = [
-        ResultTable("Largest |error|: median over the seeds, and range", HEAD, largest, 3),
-        ResultTable(EFFORT_TITLE, EFFORT_HEAD, [effort(law, runs) for law, runs in by_law.items()]),
-    ]
-    shown = _in_figures(outcomes)
+    items, shown = FILE.runs(outcomes), _in_figures(outcomes)
+    tables = [table(LARGEST_TITLE, items, LARGEST, 3), table(EFFORT_TITLE, items, EFFORT)]
     drawings = [lambda: angles(shown), lambda: errors(shown), lambda: paths(shown)] if shown else []
-    return [Section("The nutation under each law", METHOD, tables, drawings)]
+    return [FILE.section("laws", tables, drawings, from_s=FROM_s)]
 
 
 def findings(outcomes: Outcomes) -> list[Finding]:
     """Compare the order of the laws with the paper's."""
-    runs = [outcomes.runs(case(law)) for law in PAPER_LAWS]
+    runs = [outcomes.runs(FILE.case(law=law.law)) for law in PAPER_LAWS]
     if not all(runs):
         return []
     worst = [np.array([run.max_abs_error.max() for run in of_law]) for of_law in runs]
@@ -200,10 +173,9 @@ def _loss_text(runs: Sequence[Outcome]) -> str:
     return f" and {', '.join(lost)}" if lost else ""
 
 
-def _in_figures(outcomes: Outcomes) -> Runs:
-    """Runs of the laws of the figures whose first run lasted."""
-    laws = {law: outcomes.runs(case(law)) for law in COMPARED_LAWS if law.in_figures}
-    return {law: runs for law, runs in laws.items() if runs and len(runs[0].data.trajectory.t_s)}
+def _in_figures(outcomes: Outcomes) -> Items:
+    """Laws of the figures whose first run lasted."""
+    return [item for item in FILE.runs(outcomes, in_figures=True) if len(item.runs[0].data.trajectory.t_s)]
 
 
 def trajectories(outcomes: Outcomes) -> dict[str, LawTrajectory]:
@@ -211,18 +183,9 @@ def trajectories(outcomes: Outcomes) -> dict[str, LawTrajectory]:
     from spheretwin.viz.comparison.trajectories import LawTrajectory
 
     return {
-        law.label: LawTrajectory(law.law, *first.data.trajectory)
-        for law, (first, *_) in _in_figures(outcomes).items()
+        item["label"]: LawTrajectory(item["law"], *item.runs[0].data.trajectory)
+        for item in _in_figures(outcomes)
     }
 
 
-EXPERIMENT = Experiment(
-    name="figure8",
-    title="Figure 8: the nutation",
-    summary="The motion (59) for 5 s with m = 0.2 and L = 2 on ideal hardware.",
-    cases=lambda: [case(law) for law in COMPARED_LAWS],
-    sections=sections,
-    reduce=reduce,
-    findings=findings,
-    trajectories=trajectories,
-)
+EXPERIMENT = FILE.experiment(sections=sections, reduce=reduce, findings=findings, trajectories=trajectories)

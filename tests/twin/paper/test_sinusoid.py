@@ -9,10 +9,10 @@ from spheretwin.paper.experiment import Outcomes
 from spheretwin.paper.laws import COMPARED_LAWS, PAPER_LAWS, PRINTED_rad, printed_rad
 from spheretwin.paper.page import rows
 from spheretwin.paper.runner import make_plan, run_plan, unexpected_ends
-from spheretwin.paper.sinusoid import EXPERIMENT_6, EXPERIMENT_7, FIGURE6, FIGURE7, Condition, case
+from spheretwin.paper.sinusoid import EXPERIMENT_6, EXPERIMENT_7, FIGURE6, FIGURE7
 from tests.twin.paper.cases import outcome
 
-AT = Condition(0.2, 2.0)
+AT = {"m": 0.2, "L": 2.0}
 
 
 def test_figure_6_varies_m_alone_and_figure_7_the_load_alone():
@@ -61,17 +61,17 @@ def test_figure_7_has_the_errors_of_the_readme_and_the_order_and_growth_of_the_p
 
 def made_up(errors):
     """Outcomes of one seed by law, with the same error on all three hinges."""
-    names = [case(law, AT).name for law in PAPER_LAWS]
+    names = [FIGURE7.case(law=law.law, **AT).name for law in PAPER_LAWS]
     return Outcomes({name: [outcome(error)] for name, error in zip(names, errors, strict=True)})
 
 
 def test_findings_are_of_the_outcomes():
-    printed = [printed_rad(law.law, *AT) for law in PAPER_LAWS]
-    (finding,) = sinusoid.sizes(AT, made_up(printed))
+    printed = [printed_rad(law.law, **AT) for law in PAPER_LAWS]
+    (finding,) = sinusoid.sizes(FIGURE7, made_up(printed))
     assert finding.reproduced
     assert "PD 1.00 to 1.00 times, adaptive fuzzy 1.00 to 1.00 times, AFSM 1.00 to 1.00 times" in finding.text
     far = [np.array(error) * factor for error, factor in zip(printed, (1.24, 1.26, 0.76), strict=True)]
-    texts = {finding.reproduced: finding.text for finding in sinusoid.sizes(AT, made_up(far))}
+    texts = {finding.reproduced: finding.text for finding in sinusoid.sizes(FIGURE7, made_up(far))}
     assert "adaptive fuzzy 1.26" in texts[False]
     assert "closer than the paper says" not in texts[False]
     assert all(law in texts[True] for law in ("PD", "AFSM"))
@@ -83,5 +83,5 @@ def test_findings_are_of_the_outcomes():
 def test_nothing_is_said_of_what_was_not_run():
     for variation in (FIGURE6, FIGURE7):
         assert sinusoid.order(variation, Outcomes()) == []
-    assert sinusoid.sizes(AT, Outcomes()) == []
+    assert sinusoid.sizes(FIGURE7, Outcomes()) == []
     assert sinusoid.growth(FIGURE7, Outcomes()) == []

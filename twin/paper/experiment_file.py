@@ -1,0 +1,141 @@
+"""Study file of an experiment: its cases as crossed levels, and the words of its page."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from importlib import resources
+from itertools import product
+from typing import TYPE_CHECKING, Any, TypeVar
+
+from spheretwin.models.telemetry.status import Status
+from spheretwin.paper.experiment import Case, Experiment, Outcome, Outcomes, ResultTable, Section
+from spheretwin.paper.laws import COMPARED_LAWS, printed_rad
+from spheretwin.viz.pages.markdown import Drawing
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+FOLDER = resources.files("spheretwin.paper")
+
+T = TypeVar("T")
+
+
+@dataclass(frozen=True)
+class CaseRuns:
+    """Case with its runs; an item is a column of the case."""
+
+    case: Case
+    runs: Sequence[Outcome]
+
+    def __getitem__(self, column: str) -> Any:
+        return self.case.columns[column]
+
+
+class ExperimentFile:
+    """Study file of an experiment.
+
+    Each ``[[case]]`` crosses the lists of the file that ``cross`` names, the last fastest; the list ``law``
+    is that of `COMPARED_LAWS` unless the file has one. The entries of a list are columns of the case:
+    ``name`` is formatted with them, ``set`` gives the column of a field, ``details`` are columns of its row
+    in the JSON. ``fields`` of a case and of an entry are fields of the scenario, and ``expected`` are
+    statuses that are no failure, of all cases or by law.
+
+    Parameters
+    ----------
+    name : str
+        Of the file.
+    part : str, optional
+        Table of the file whose entries replace those of the file, if several experiments share one.
+    """
+
+    def __init__(self, name: str, part: str = "") -> None:
+        content = tomllib.loads((FOLDER / f"{name}.toml").read_text(encoding="utf-8"))
+        self._content: dict[str, Any] = {"law": [law._asdict() for law in COMPARED_LAWS]}
+        self._content |= content | content.get(part, {})
+
+    def __getitem__(self, entry: str) -> Any:
+        return self._content[entry]
+
+    @cached_property
+    def cases(self) -> list[Case]:
+        """All cases, block by block, each once."""
+        return list({case.name: case for block in self["case"] for case in self._block(block)}.values())
+
+    def case(self, **columns: Any) -> Case:
+        """Return the first case with some columns."""
+        return next(self._with(columns))
+
+    def runs(self, outcomes: Outcomes, **columns: Any) -> list[CaseRuns]:
+        """Return the cases with some columns that were run, with their runs."""
+        return [CaseRuns(case, runs) for case in self._with(columns) if (runs := outcomes.runs(case))]
+
+    def section(
+        self,
+        key: str,
+        tables: Sequence[ResultTable] = (),
+        drawings: Sequence[Callable[[], Drawing]] = (),
+        more: str = "",
+        **values: Any,
+    ) -> Section:
+        """Section of the page with the title and the text of the file, and more text behind it."""
+        title, text = (self[key][entry].format(**values) for entry in ("title", "text"))
+        return Section(title, text + more, tables, drawings)
+
+    def drawing(self, key: str, figure: Figure, **values: Any) -> Drawing:
+        """Figure with the file name and the caption of the file."""
+        file, caption = (self[key][entry].format(**values) for entry in ("file", "caption"))
+        return Drawing(file, caption, figure)
+
+    def experiment(self, **functions: Any) -> Experiment:
+        """Experiment with the name, title and summary of the file."""
+        texts = (self[entry] for entry in ("name", "title", "summary"))
+        return Experiment(*texts, cases=lambda: self.cases, **functions)
+
+    def _with(self, columns: Mapping[str, Any]) -> Iterable[Case]:
+        return iter(case for case in self.cases if columns.items() <= case.columns.items())
+
+    def _block(self, block: Mapping[str, Any]) -> list[Case]:
+        levels = (self[name] for name in block["cross"])
+        return [self._case(block, entries) for entries in product(*levels)]
+
+    def _case(self, block: Mapping[str, Any], entries: Sequence[Mapping[str, Any]]) -> Case:
+        columns = {name: value for entry in entries for name, value in entry.items()}
+        if {"law", "m", "L"} <= columns.keys():
+            printed = printed_rad(columns["law"], columns["m"], columns["L"])
+            columns["paper"] = printed and list(printed)
+        fields = {field: columns[column] for field, column in block.get("set", {}).items()}
+        for entry in (block, *entries):
+            fields |= entry.get("fields", {})
+        expected = block.get("expected", {})
+        statuses = expected.get(columns.get("law"), ["completed"]) if isinstance(expected, dict) else expected
+        return Case(
+            name=block["name"].format(**columns),
+            scenario=columns.get("scenario", block.get("scenario", "")),
+            fields=fields,
+            details={name: columns[name] for name in block.get("details", ())},
+            is_random=columns.get("is_random", True),
+            single_run=block.get("single_run", False),
+            expected_statuses=tuple(map(Status, statuses)),
+            comparable=block.get("comparable", True),
+            columns=columns,
+        )
+
+
+Cells = dict[str, Callable[[CaseRuns], str]]
+"""Cells of a table by the head of their column."""
+
+
+def table(
+    title: str, items: Iterable[T], columns: Mapping[str, Callable[[T], str]], texts: int = 1
+) -> ResultTable:
+    """Table with a row for each item, each cell a function of it."""
+    rows = [tuple(cell(item) for cell in columns.values()) for item in items]
+    return ResultTable(title, tuple(columns), rows, texts)
+
+
+def column(name: str, text: str = "{}") -> Callable[[CaseRuns], str]:
+    """Cell with a column of the case."""
+    return lambda item: text.format(item[name])
