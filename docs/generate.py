@@ -5,7 +5,6 @@
 
 from __future__ import annotations
 
-import argparse
 import importlib
 import importlib.util
 import inspect
@@ -19,7 +18,6 @@ from pydantic import BaseModel
 
 from spheretwin import cli
 from spheretwin.channels import CHANNELS
-from spheretwin.cli.options import Parser
 from spheretwin.control.law import NominalModel
 from spheretwin.control.laws import LAWS
 from spheretwin.faults.targets import TARGETS
@@ -234,21 +232,10 @@ def commands() -> str:
     ]
     for verb, text in cli.VERBS.items():
         lines += ["", f"## {verb}", "", f"{text[0].upper()}{text[1:]}.", ""]
-        for title, parser in _parsers(verb):
+        for title, parser in cli.parsers_of(verb).items():
             lines += ["", f"### {title}", ""] if title != verb else []
             lines += ["```text", parser.format_help().rstrip(), "```"]
     return _page(lines)
-
-
-def _parsers(verb: str) -> Iterator[tuple[str, argparse.ArgumentParser]]:
-    """Yield the parser of a verb, and those of the verbs below it."""
-    parser = Parser(prog=f"spheretwin {verb}", conflict_handler="resolve")
-    importlib.import_module(f"spheretwin.cli.{verb}").declare(parser)
-    yield verb, parser
-    for action in parser._actions:
-        if isinstance(action, argparse._SubParsersAction):
-            for name, below in action.choices.items():
-                yield f"{verb} {name}", below
 
 
 def statuses() -> str:

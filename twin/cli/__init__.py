@@ -190,3 +190,10 @@ def _parser(arguments: Sequence[str]) -> Parser:
     if called in parsers:
         import_module(f"spheretwin.cli.{called}").declare(parsers[called])
     return parser
+
+
+def parsers_of(verb: str) -> dict[str, Parser]:
+    """Return the parser of a verb, and those of its parts, by what is typed for each."""
+    parser = Parser(prog=f"spheretwin {verb}", conflict_handler="resolve")
+    import_module(f"spheretwin.cli.{verb}").declare(parser)
+    return {verb: parser, **{f"{verb} {name}": part for name, part in parser.parts().items()}}

@@ -30,7 +30,7 @@ from spheretwin.bench.operators import GONE_s, Operators
 from spheretwin.cli.common import interruptible, print_message, warn
 from spheretwin.cli.drive import add_link_options, limited_rate, open_link
 from spheretwin.cli.machine import STANDARD_STREAMS, add_frame_option
-from spheretwin.cli.options import Parser, number, whole
+from spheretwin.cli.options import Parser, from_zero, number, whole
 from spheretwin.control.laws import LAWS
 from spheretwin.faults.targets import TARGETS
 from spheretwin.machine.link.controller_scenario import left_out
@@ -222,44 +222,28 @@ LARGEST_PORT = 65_535
 
 def declare(parser: Parser) -> None:
     """Declare the arguments of the verb."""
-    parser.description = "Drive the running twin from a browser. Any field of the scenario is a flag"
     parser.usage = "spheretwin bench [SCENARIO] [options] [--section.field VALUE ...]"
-    parser.add_argument(
-        "scenario",
-        default=EXAMPLE,
-        help=f"{', '.join(shipped())}, or a .toml file; {EXAMPLE} unless given",
+    parser.define(
+        run,
+        "Drive the running twin from a browser. Any field of the scenario is a flag",
+        f"""
+        [SCENARIO]={EXAMPLE}  {", ".join(shipped())}, or a .toml file; {EXAMPLE} unless given
+        --port P={PORT}     port of the page, on 127.0.0.1; {PORT} unless given, 0 for any free port
+        --no-browser      only print the address of the page
+        --hold-after S={GONE_s:g}  time for which the twin continues after its page is closed; {GONE_s:g} s
+            unless given
+        --record FILE.rrd  record from the start
+        --folder DIR      files that the page names are below it; the working folder unless given
+        --machine ADDRESS  drive a machine at udp://HOST:PORT or serial:DEVICE@BAUD, with the options of
+            `drive`: --arm, --frame, --limit-angle-deg, …
+        """,
+        has_fields=True,
+        port=whole(LARGEST_PORT, first=0, name="a port"),
+        hold_after=number("a time from 0 s on", from_zero),
+        folder={"type": Path, "default": Path()},
     )
-    parser.add_argument(
-        "--port",
-        type=whole(LARGEST_PORT, first=0, name="a port"),
-        default=PORT,
-        metavar="P",
-        help=f"port of the page, on 127.0.0.1; {PORT} unless given, 0 for any free port",
-    )
-    parser.add_argument("--no-browser", action="store_true", help="only print the address of the page")
-    parser.add_argument(
-        "--hold-after",
-        type=number("a time from 0 s on", lambda time_s: time_s >= 0),
-        default=GONE_s,
-        metavar="S",
-        help=f"time for which the twin continues after its page is closed; {GONE_s:g} s unless given",
-    )
-    parser.add_argument("--record", help="record from the start")
-    parser.add_argument(
-        "--folder",
-        type=Path,
-        default=Path(),
-        metavar="DIR",
-        help="files that the page names are below it; the working folder unless given",
-    )
-    add_link_options(
-        parser,
-        "drive a machine at udp://HOST:PORT or serial:DEVICE@BAUD, with the options of `drive`: --arm,"
-        " --frame, --limit-angle-deg, …",
-        listed=False,
-    )
+    add_link_options(parser, listed=False)
     add_frame_option(parser, listed=False)
-    parser.set_run(run, has_fields=True)
 
 
 def run(options: argparse.Namespace) -> bool:

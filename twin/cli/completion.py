@@ -40,18 +40,19 @@ INSTALLATION = """To install it:
 def declare(parser: Parser) -> None:
     """Declare the arguments of the verb."""
     parser.formatter_class = argparse.RawDescriptionHelpFormatter
-    parser.description = (
-        f"Print the completion of a shell: verbs, options, scenarios, fields.\n\n{INSTALLATION}"
+    parser.define(
+        run,
+        f"Print the completion of a shell: verbs, options, scenarios, fields.\n\n{INSTALLATION}",
+        f"SHELL  {', '.join(SCRIPTS)}",
+        shell=(*SCRIPTS, "words"),
     )
-    parser.add_argument("shell", choices=(*SCRIPTS, "words"), metavar="SHELL", help=", ".join(SCRIPTS))
-    parser.add_argument("typed", nargs=argparse.REMAINDER, metavar="WORD", help=argparse.SUPPRESS)
-    parser.set_run(run)
+    parser.add_options("WORD", listed=False, word={"nargs": argparse.REMAINDER})
 
 
 def run(options: argparse.Namespace) -> bool:
     """Run the verb."""
     if options.shell == "words":
-        print("\n".join(words(options.typed)))
+        print("\n".join(words(options.word)))
     else:
         print(SCRIPTS[options.shell], end="")
     return True
@@ -69,10 +70,8 @@ def _offered(before: Sequence[str], last: str) -> Iterator[str]:
         return
     if before[0] not in cli.VERBS:
         return
-    parser: argparse.ArgumentParser = Parser(prog="spheretwin", conflict_handler="resolve")
-    import_module(f"spheretwin.cli.{before[0]}").declare(parser)
-    for word in before[1:]:
-        parser = next((below[word] for below in _subparsers(parser) if word in below), parser)
+    parsers = cli.parsers_of(before[0])
+    parser = parsers.get(" ".join(before[:2]), parsers[before[0]])
     has_fields = bool(parser.get_default("has_fields"))
     option = next((action for action in parser._actions if before[-1] in action.option_strings), None)
     if option and option.nargs != 0:
@@ -87,11 +86,7 @@ def _offered(before: Sequence[str], last: str) -> Iterator[str]:
         yield from _positional(parser)
 
 
-def _subparsers(parser: argparse.ArgumentParser) -> list[dict[str, argparse.ArgumentParser]]:
-    return [action.choices for action in parser._actions if isinstance(action, argparse._SubParsersAction)]
-
-
-def _positional(parser: argparse.ArgumentParser) -> Iterator[str]:
+def _positional(parser: Parser) -> Iterator[str]:
     for action in parser._actions:
         if not action.option_strings:
             yield from map(str, action.choices or ())

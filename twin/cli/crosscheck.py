@@ -21,24 +21,21 @@ MOST_STATES = 1_000_000  # some three minutes and a gigabyte
 
 def declare(parser: Parser) -> None:
     """Declare the arguments of the verb."""
-    parser.description = (
+    parser.define(
+        run,
         "Compare the engine (MuJoCo) with the Lagrangian model and, if it is installed, with"
         " Pinocchio: state by state, along trajectories, without torque, driven by coils, and in the closed"
-        " loop. Exit code 1 when a bound is broken."
+        " loop. Exit code 1 when a bound is broken.",
+        f"""
+        --out
+        --figure-format
+        --json              print the checks as JSON, alone on stdout
+        --states N={STATES}  random states, {STATES} unless given
+        --mjcf
+        --verbose
+        """,
+        states=whole(MOST_STATES, name="a number of states"),
     )
-    parser.add_argument("--out", help="write a page with figures into this folder")
-    parser.add_argument("--figure-format")
-    parser.add_argument("--json", help="print the checks as JSON, alone on stdout")
-    parser.add_argument(
-        "--states",
-        type=whole(MOST_STATES, name="a number of states"),
-        default=STATES,
-        metavar="N",
-        help=f"random states, {STATES} unless given",
-    )
-    parser.add_argument("--mjcf", default=actuators.MJCF_PATH)
-    parser.add_argument("--verbose")
-    parser.set_run(run)
 
 
 def run(options: argparse.Namespace) -> bool:

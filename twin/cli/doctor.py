@@ -40,12 +40,13 @@ class Finding(NamedTuple):
 
 def declare(parser: Parser) -> None:
     """Declare the arguments of the verb."""
-    parser.description = (
-        "Print versions, compile cache, cores, vector width, viewer, browser, ports, and the extras that are"
-        " missing with the command that installs each. Nothing is changed, and no other machine is contacted."
+    parser.define(
+        run,
+        "Print versions, compile cache, cores, vector width, viewer, browser, ports, and the extras that"
+        " are missing with the command that installs each. Nothing is changed, and no other machine is"
+        " contacted.",
+        "--json  print the findings as JSON, alone on stdout",
     )
-    parser.add_argument("--json", help="print the findings as JSON, alone on stdout")
-    parser.set_run(run)
 
 
 def run(options: argparse.Namespace) -> bool:

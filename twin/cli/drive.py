@@ -5,12 +5,11 @@ from __future__ import annotations
 import argparse
 import math
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 from spheretwin.cli.common import interruptible, print_message, warn
-from spheretwin.cli.machine import add_common_options, read_scenario, run_session
-from spheretwin.cli.options import Parser, number
+from spheretwin.cli.machine import OUTPUTS, add_frame_option, read_scenario, run_session
+from spheretwin.cli.options import Parser, from_zero, number
 from spheretwin.machine.files import conditions_of
 from spheretwin.machine.link.controller_scenario import left_out
 from spheretwin.machine.link.limits import Limits
@@ -29,65 +28,53 @@ LOCKSTEP_TIMEOUT_s = 1.0
 
 def declare(parser: Parser) -> None:
     """Declare the arguments of the verb."""
-    parser.description = (
-        "Drive a machine with the controller of a scenario. Without --arm it is a dry run: frames are"
-        " exchanged and shown, and all currents are 0."
-    )
     parser.usage = "spheretwin drive SCENARIO --machine ADDRESS [options] [--section.field VALUE ...]"
-    parser.add_argument("scenario", help=f"{', '.join(shipped())}, or a .toml file")
-    add_link_options(parser, "udp://HOST:PORT, serial:DEVICE@BAUD, or - for stdin and stdout")
-    parser.add_argument(
-        "--shadow", type=Path, metavar="FILE.parquet", help="write what the shadow estimates in parallel"
+    parser.add_options(
+        f"""
+        [SCENARIO]         {", ".join(shipped())}, or a .toml file
+        --machine ADDRESS  udp://HOST:PORT, serial:DEVICE@BAUD, or - for stdin and stdout
+        """
     )
-    parser.add_argument("--log", type=Path, metavar="LOG.parquet", help="write currents and angles as a log")
-    add_common_options(parser)
-    parser.set_run(run, has_fields=True)
+    add_link_options(parser)
+    parser.add_options(
+        """
+        --shadow FILE.parquet  write what the shadow estimates in parallel
+        --log LOG.parquet      write currents and angles as a log
+        """
+    )
+    add_frame_option(parser)
+    parser.define(
+        run,
+        "Drive a machine with the controller of a scenario. Without --arm it is a dry run: frames are"
+        " exchanged and shown, and all currents are 0.",
+        OUTPUTS,
+        has_fields=True,
+    )
 
 
-def add_link_options(parser: Parser, address: str, *, listed: bool = True) -> None:
-    """Declare the address of a machine, with its help, and how it is driven.
-
-    The help leaves out how it is driven unless that is `listed`.
-    """
-    parser.add_argument("--machine", metavar="ADDRESS", help=address)
-    for flag, text in (
-        ("--arm", "send currents"),
-        ("--lockstep", "wait for the reply of the machine in each tick, not for the clock"),
-    ):
-        parser.add_argument(flag, action="store_true", help=text if listed else argparse.SUPPRESS)
-    for flag, unit, text in (
-        ("--ramp-s", "s", f"time in which the currents rise to those commanded; {DEFAULTS.ramp_s:g}"),
-        (
-            "--timeout-ms",
-            "ms",
-            f"age of the newest measurement at which the currents are removed;"
-            f" {1e3 * DEFAULTS.timeout_s:g}, in lockstep {1e3 * LOCKSTEP_TIMEOUT_s:g}",
-        ),
-        ("--limit-current-A", "A", "largest current of a group; nominal.current_limit_A"),
-        ("--limit-angle-deg", "°", "largest tilt, the magnitude of α and β; the range of the hinges"),
-        ("--limit-rate-rad-s", "rad/s", "largest rate of a hinge; watchdog.largest_rate_rad_s"),
-        (
-            "--limit-temperature-degC",
-            "°C",
-            "highest temperature of a coil, reported or estimated from the currents;"
-            f" {Limits(current_A=1.0).temperature_degC:g}",
-        ),
-    ):
-        bound = "from 0 on" if flag == "--ramp-s" else "above 0"
-        parser.add_argument(
-            flag,
-            type=number(f"a number of {unit} {bound}", _from_zero if flag == "--ramp-s" else _above_zero),
-            metavar=unit.upper().replace("°", "DEG"),
-            help=f"{text} unless given" if listed else argparse.SUPPRESS,
-        )
-
-
-def _from_zero(value: float) -> bool:
-    return value >= 0
-
-
-def _above_zero(value: float) -> bool:
-    return value > 0
+def add_link_options(parser: Parser, *, listed: bool = True) -> None:
+    """Declare how a machine is driven; the help leaves it out unless it is `listed`."""
+    parser.add_options(
+        f"""
+        --arm            send currents
+        --lockstep       wait for the reply of the machine in each tick, not for the clock
+        --ramp-s S       time in which the currents rise to those commanded; {DEFAULTS.ramp_s:g} unless given
+        --timeout-ms MS  age of the newest measurement at which the currents are removed;
+            {1e3 * DEFAULTS.timeout_s:g}, in lockstep {1e3 * LOCKSTEP_TIMEOUT_s:g} unless given
+        --limit-current-A A  largest current of a group; nominal.current_limit_A unless given
+        --limit-angle-deg DEG  largest tilt, the magnitude of α and β; the range of the hinges unless given
+        --limit-rate-rad-s RAD/S  largest rate of a hinge; watchdog.largest_rate_rad_s unless given
+        --limit-temperature-degC DEGC  highest temperature of a coil, reported or estimated from the currents;
+            {Limits(current_A=1.0).temperature_degC:g} unless given
+        """,
+        listed=listed,
+        ramp_s=number("a number of s from 0 on", from_zero),
+        timeout_ms=number("a number of ms above 0"),
+        limit_current_A=number("a number of A above 0"),
+        limit_angle_deg=number("a number of ° above 0"),
+        limit_rate_rad_s=number("a number of rad/s above 0"),
+        limit_temperature_degC=number("a number of °C above 0"),
+    )
 
 
 def run(options: argparse.Namespace) -> bool:

@@ -35,28 +35,26 @@ class FieldFacts(NamedTuple):
 
 def declare(parser: Parser) -> None:
     """Declare the arguments of the verb."""
-    parser.description = (
+    parser.define(
+        run,
         "Print value, unit, distribution and origin: of a hardware set (explain hardware prototype), of the"
-        " fields that a scenario sets (explain scenario nutation), or of a field (explain plant.coulomb_Nm)."
+        " fields that a scenario sets (explain scenario nutation), or of a field (explain plant.coulomb_Nm).",
+        """
+        SUBJECT...  hardware NAME, scenario NAME or FILE, or a field
+        --all       of a scenario also the fields that have their defaults
+        --json      print the result as JSON, alone on stdout
+        """,
     )
-    parser.add_argument(
-        "subject", nargs="+", metavar="SUBJECT", help="hardware NAME, scenario NAME or FILE, or a field"
-    )
-    parser.add_argument(
-        "--all", action="store_true", help="of a scenario also the fields that have their defaults"
-    )
-    parser.add_argument("--json", help="print the result as JSON, alone on stdout")
-    parser.set_run(run)
 
 
 def run(options: argparse.Namespace) -> bool:
     """Run the verb."""
-    facts = list(_facts(options.subject, options.all))
+    facts = list(_facts(options.subjects, options.all))
     if options.json:
         print_json({"fields": [fact._asdict() for fact in facts]})
     else:
         print_facts(
-            " ".join(options.subject),
+            " ".join(options.subjects),
             [(*fact[:1], reading.value_text(fact.value), *fact[2:]) for fact in facts],
         )
     return True

@@ -18,55 +18,42 @@ BOTH = ("plant", "controller")
 def declare(parser: Parser) -> None:
     """Declare the arguments of the verb."""
     parts = parser.add_subparsers(metavar="PART", required=True)
-    fmu = _part(
-        parts,
-        "fmu",
-        "write the plant as a functional mock-up unit",
+    inputs = """
+        [SCENARIO]         name or file
+        --inputs=currents  inputs of the plant: commanded currents, or voltages at the groups
+            (default: currents)
+        --twin
+        --json             print what was written as JSON, alone on stdout"""
+    text = "write the plant as a functional mock-up unit"
+    parts.add_parser("fmu", help=text, conflict_handler="resolve").define(
+        run_fmu,
         "Write the plant of a scenario as an FMU: C99 without Python, with its sources, and with a binary for"
         " this machine if it has a C compiler.",
+        f"""{inputs}
+        --fmi=2               version of the interface (default: 2)
+        --kind=co-simulation  with the fixed-step method of the twin, or for the solver of the tool (default:
+            co-simulation)
+        --target PLATFORM...  also for other platforms, such as x86_64-windows, by the extra cross; repeatable
+        --out FILE.fmu        (default: the name of the scenario)
+        """,
+        has_fields=True,
+        inputs=("currents", "voltages"),
+        fmi=(2, 3),
+        kind=("co-simulation", "model-exchange"),
     )
-    fmu.add_argument(
-        "--fmi", type=int, choices=(2, 3), default=2, help="version of the interface (default: 2)"
-    )
-    fmu.add_argument(
-        "--kind",
-        choices=("co-simulation", "model-exchange"),
-        default="co-simulation",
-        help="with the fixed-step method of the twin, or for the solver of the tool (default: co-simulation)",
-    )
-    fmu.add_argument(
-        "--target",
-        action="append",
-        default=[],
-        metavar="PLATFORM",
-        help="also for other platforms, such as x86_64-windows, by the extra cross; repeatable",
-    )
-    fmu.add_argument("--out", metavar="FILE.fmu", help="(default: the name of the scenario)")
-    fmu.set_run(run_fmu, has_fields=True)
-    code = _part(
-        parts,
-        "c",
-        "write plant and control tick as C files",
+    text = "write plant and control tick as C files"
+    parts.add_parser("c", help=text, conflict_handler="resolve").define(
+        run_c,
         "Write the plant of a scenario as a C99 library, and one control tick of its controller (estimator,"
         " law, allocation) for a microcontroller.",
+        f"""{inputs}
+        --part     only this one (default: both)
+        --out DIR  (default: the name of the scenario, and _c)
+        """,
+        has_fields=True,
+        inputs=("currents", "voltages"),
+        part=BOTH,
     )
-    code.add_argument("--part", choices=BOTH, help="only this one (default: both)")
-    code.add_argument("--out", metavar="DIR", help="(default: the name of the scenario, and _c)")
-    code.set_run(run_c, has_fields=True)
-
-
-def _part(parts: argparse._SubParsersAction[Parser], name: str, summary: str, description: str) -> Parser:
-    parser = parts.add_parser(name, help=summary, description=description, conflict_handler="resolve")
-    parser.add_argument("scenario", help="name or file")
-    parser.add_argument(
-        "--inputs",
-        choices=("currents", "voltages"),
-        default="currents",
-        help="inputs of the plant: commanded currents, or voltages at the groups (default: currents)",
-    )
-    parser.add_argument("--twin", type=Path, metavar="TWIN.toml", help="use the fields of an identified twin")
-    parser.add_argument("--json", help="print what was written as JSON, alone on stdout")
-    return parser
 
 
 def run_fmu(options: argparse.Namespace) -> bool:

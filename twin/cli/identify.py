@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
 
 from spheretwin.cli.common import print_json, print_message
 from spheretwin.cli.log_options import add_logs, changes_of, check_given, read_logs, scenario_of
-from spheretwin.cli.options import Parser, number, whole
+from spheretwin.cli.options import Parser, from_zero, number, whole
 from spheretwin.machine.excitation import DesignSettings, design
 from spheretwin.machine.identification import Identified, IdentifySettings, identify
 from spheretwin.machine.parameters import KINDS
@@ -25,53 +24,30 @@ DEFAULT = ("torque_scale", "plant.coulomb_Nm")
 
 def declare(parser: Parser) -> None:
     """Declare the arguments of the verb."""
-    parser.description = (
-        "Identify parameters of a machine from logs, with 95 % intervals, judged by held-out windows."
-        " Exit code 1 if the data do not determine the parameters or the result is not better."
-    )
     add_logs(parser, many=True)
-    parser.add_argument(
-        "--design",
-        action="store_true",
-        help="instead of logs take a scenario, and find the motion whose log determines the parameters best",
+    parser.define(
+        run,
+        "Identify parameters of a machine from logs, with 95 % intervals, judged by held-out windows."
+        " Exit code 1 if the data do not determine the parameters or the result is not better.",
+        f"""
+        --design             instead of logs take a scenario, and find the motion whose log determines the
+            parameters best
+        --payload KG...      known payload of all logs, or of each in their order; repeatable. With --design:
+            of its runs
+        --candidates N       motions that a design tries (default: 24)
+        --currents FILE.csv  write the currents of the design
+        --parameter NAME...  parameter, or one part of it such as plant.coulomb_Nm.0; repeatable (default:
+            {", ".join(DEFAULT)}): {", ".join(KINDS)}
+        --window S           length of the windows (default: 0.2 s), or of a designed experiment
+            (default: 4 s)
+        --out FILE.toml      write the twin, if it is accepted; or the designed scenario
+        --json
+        """,
+        has_fields=True,
+        payload=number("a number of kg, at least 0", from_zero),
+        candidates=whole(10_000, first=2),
+        window=number("a number of s above 0"),
     )
-    parser.add_argument(
-        "--payload",
-        type=number("a number of kg, at least 0", lambda payload_kg: payload_kg >= 0),
-        action="append",
-        default=[],
-        metavar="KG",
-        help="known payload of all logs, or of each in their order; repeatable. With --design: of its runs",
-    )
-    parser.add_argument(
-        "--candidates",
-        type=whole(10_000, first=2),
-        metavar="N",
-        help="motions that a design tries (default: 24)",
-    )
-    parser.add_argument("--currents", type=Path, metavar="FILE.csv", help="write the currents of the design")
-    parser.add_argument(
-        "--parameter",
-        action="append",
-        default=[],
-        metavar="NAME",
-        help=f"parameter, or one part of it such as plant.coulomb_Nm.0; repeatable (default:"
-        f" {', '.join(DEFAULT)}): {', '.join(KINDS)}",
-    )
-    parser.add_argument(
-        "--window",
-        type=number("a number of s above 0", lambda window_s: window_s > 0),
-        metavar="S",
-        help="length of the windows (default: 0.2 s), or of a designed experiment (default: 4 s)",
-    )
-    parser.add_argument(
-        "--out",
-        type=Path,
-        metavar="FILE.toml",
-        help="write the twin, if it is accepted; or the designed scenario",
-    )
-    parser.add_argument("--json")
-    parser.set_run(run, has_fields=True)
 
 
 def run(options: argparse.Namespace) -> bool:

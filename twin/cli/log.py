@@ -5,7 +5,6 @@ from __future__ import annotations
 import argparse
 from collections.abc import Sequence
 from dataclasses import replace
-from pathlib import Path
 
 from spheretwin import machine
 from spheretwin import scenario as scenarios
@@ -25,38 +24,22 @@ _LEAST_ROWS = 1000
 
 def declare(parser: Parser) -> None:
     """Declare the arguments of the verb."""
-    parts = parser.add_subparsers(metavar="PART", required=True)
-    check = parts.add_parser(
-        "check",
-        help="give a verdict on logs",
-        description="Check logs of a machine: times, units, order and signs, clock offset, saturation,"
-        " excitation. Exit code 1 if a log is not accepted, with advice on what to record instead.",
+    check = parser.add_subparsers(metavar="PART", required=True).add_parser(
+        "check", help="give a verdict on logs"
     )
-    check.add_argument("files", type=Path, nargs="+", metavar="FILE", help="log (.parquet, .csv or .mcap)")
-    check.add_argument(
-        "--columns",
-        type=Path,
-        action="append",
-        default=[],
-        metavar="MAP.toml",
-        help="column map: names, units, signs, order and scales; one for all logs, or one for each; the names"
-        " of our exports unless given",
+    check.define(
+        run,
+        "Check logs of a machine: times, units, order and signs, clock offset, saturation, excitation. Exit"
+        " code 1 if a log is not accepted, with advice on what to record instead.",
+        f"""
+        FILE...                 log (.parquet, .csv or .mcap)
+        --columns MAP.toml...   column map: names, units, signs, order and scales; one for all logs, or one
+            for each; the names of our exports unless given
+        --scenario SCENARIO=hold  scenario of the machine: its plant, hardware and limits (default: hold)
+        --accept FINDING...     accept a finding; repeatable: {", ".join(FINDINGS)}
+        --json                  print the verdict as JSON, alone on stdout
+        """,
     )
-    check.add_argument(
-        "--scenario",
-        default="hold",
-        metavar="SCENARIO",
-        help="scenario of the machine: its plant, hardware and limits (default: hold)",
-    )
-    check.add_argument(
-        "--accept",
-        action="append",
-        default=[],
-        metavar="FINDING",
-        help=f"accept a finding; repeatable: {', '.join(FINDINGS)}",
-    )
-    check.add_argument("--json", help="print the verdict as JSON, alone on stdout")
-    check.set_run(run)
 
 
 def run(options: argparse.Namespace) -> bool:

@@ -33,21 +33,16 @@ T = TypeVar("T")
 
 def add_logs(parser: Parser, *, many: bool) -> None:
     """Declare logs, their columns, the scenario of the machine and its twin."""
-    if many:
-        parser.add_argument("logs", type=Path, nargs="*", metavar="LOG", help="Parquet, CSV or MCAP")
-        text = "column map of all logs, or one for each in their order"
-    else:
-        parser.add_argument("logs", nargs="?", metavar="LOG", help="Parquet, CSV or MCAP")
-        text = "column map of the log"
-    parser.add_argument("--columns", type=Path, action="append", default=[], metavar="MAP.toml", help=text)
-    parser.add_argument("--scenario", metavar="SCENARIO", help="scenario of the machine (default: hold)")
-    parser.add_argument("--twin", type=Path, metavar="TWIN.toml", help="identified parameters of the machine")
-    parser.add_argument(
-        "--accept",
-        action="append",
-        default=[],
-        metavar="FINDING",
-        help="accept a finding of `log check`; repeatable",
+    columns = "column map of all logs, or one for each in their order" if many else "column map of the log"
+    parser.add_options(
+        f"""
+        [LOG...]              Parquet, CSV or MCAP
+        --columns MAP.toml...  {columns}
+        --scenario SCENARIO   scenario of the machine (default: hold)
+        --twin TWIN.toml      identified parameters of the machine
+        --accept FINDING...   accept a finding of `log check`; repeatable
+        """,
+        logs=Path if many else {"nargs": "?"},
     )
 
 
@@ -71,23 +66,15 @@ def check_given(options: argparse.Namespace) -> None:
 def add_stream(parser: Parser) -> None:
     """Declare one log, or the address of a stream."""
     add_logs(parser, many=False)
-    parser.add_argument(
-        "--frame",
-        default=DEFAULT_FRAME,
-        metavar="NAME",
-        help="frames of a stream, which udp://:PORT, serial:DEVICE@BAUD or - in place of LOG names:"
-        f" {', '.join(shipped())}, or a .toml file (default: {DEFAULT_FRAME})",
-    )
-    parser.add_argument(
-        "--currents",
-        choices=(COMMANDED, MEASURED),
-        help="currents of a stream: sent to the amplifiers and held, or measured in the coils (default: as"
-        " the frames state)",
-    )
-    parser.add_argument(
-        "--live",
-        action="store_true",
-        help="follow the data in a viewer on 127.0.0.1; a file is played at the pace of its times",
+    parser.add_options(
+        f"""
+        --frame NAME={DEFAULT_FRAME}  frames of a stream, which udp://:PORT, serial:DEVICE@BAUD or - in place
+            of LOG names: {", ".join(shipped())}, or a .toml file (default: {DEFAULT_FRAME})
+        --currents  currents of a stream: sent to the amplifiers and held, or measured in the coils (default:
+            as the frames state)
+        --live      follow the data in a viewer on 127.0.0.1; a file is played at the pace of its times
+        """,
+        currents=(COMMANDED, MEASURED),
     )
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Callable, Mapping, Sequence
-from pathlib import Path
 from typing import Any
 
 from spheretwin import outputs
@@ -33,56 +32,42 @@ from spheretwin.viz.terminal import runs
 
 STANDARD_STREAMS = "-"
 
+OUTPUTS = """
+--record
+--telemetry
+--json
+"""
+"""Options of the outputs of a verb with an external part."""
+
 
 def declare(parser: Parser) -> None:
     """Declare the arguments of the verb."""
-    parser.description = (
-        "Simulate the machine (drive, plant, sensors) for a controller in another program. By default each"
-        " command advances it by one control period (lockstep)."
-    )
     parser.usage = "spheretwin machine SCENARIO --listen ADDRESS [options] [--section.field VALUE ...]"
-    parser.add_argument("scenario", help=f"{', '.join(shipped())}, or a .toml file")
-    parser.add_argument(
-        "--listen", metavar="ADDRESS", help="udp://HOST:PORT, serial:DEVICE@BAUD, or - for stdin and stdout"
+    parser.add_options(
+        f"""
+        [SCENARIO]        {", ".join(shipped())}, or a .toml file
+        --listen ADDRESS  udp://HOST:PORT, serial:DEVICE@BAUD, or - for stdin and stdout
+        --real-time       advance by the clock; the newest command applies
+        --timeout-ms MS=20  in real time: age of a command at which the currents are removed; 20 unless given
+        --idle-s S=60     time without commands after which the run ends; 60 unless given
+        """,
+        timeout_ms=number("a number of ms above 0"),
+        idle_s=number("a number of s above 0"),
     )
-    parser.add_argument(
-        "--real-time", action="store_true", help="advance by the clock; the newest command applies"
-    )
-    parser.add_argument(
-        "--timeout-ms",
-        type=number("a number of ms above 0", lambda value: value > 0),
-        default=20.0,
-        metavar="MS",
-        help="in real time: age of a command at which the currents are removed; 20 unless given",
-    )
-    parser.add_argument(
-        "--idle-s",
-        type=number("a number of s above 0", lambda value: value > 0),
-        default=60.0,
-        metavar="S",
-        help="time without commands after which the run ends; 60 unless given",
-    )
-    add_common_options(parser)
-    parser.set_run(run, has_fields=True)
-
-
-def add_common_options(parser: Parser) -> None:
-    """Add the options of the verbs with an external part."""
     add_frame_option(parser)
-    parser.add_argument("--record", help="write a Rerun recording")
-    parser.add_argument("--telemetry", type=Path, metavar="FILE.parquet", help="write the telemetry")
-    parser.add_argument("--json", help="print the figures as JSON, alone on stdout")
+    parser.define(
+        run,
+        "Simulate the machine (drive, plant, sensors) for a controller in another program. By default each"
+        " command advances it by one control period (lockstep).",
+        OUTPUTS,
+        has_fields=True,
+    )
 
 
 def add_frame_option(parser: Parser, *, listed: bool = True) -> None:
     """Add the option that names the frames of a link; the help leaves it out unless it is `listed`."""
-    names = f"frames: {', '.join(frame_format.shipped())}, or a .toml file; {DEFAULT_FRAME} unless given"
-    parser.add_argument(
-        "--frame",
-        default=DEFAULT_FRAME,
-        metavar="NAME",
-        help=names if listed else argparse.SUPPRESS,
-    )
+    names = f"{', '.join(frame_format.shipped())}, or a .toml file; {DEFAULT_FRAME} unless given"
+    parser.add_options(f"--frame NAME={DEFAULT_FRAME}  frames: {names}", listed=listed)
 
 
 def run(options: argparse.Namespace) -> bool:

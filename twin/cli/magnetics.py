@@ -6,13 +6,12 @@ import argparse
 import math
 import sys
 from pathlib import Path
-from typing import Any
 
 from spheretwin.cli.common import print_json, print_message, report_broken, warn, warn_about_model
 from spheretwin.cli.options import Parser, number, whole
 from spheretwin.models import actuator as actuators
 from spheretwin.models import torque_curve
-from spheretwin.models.actuator import MJCF_PATH, TORQUE_CURVE_PATH
+from spheretwin.models.actuator import TORQUE_CURVE_PATH
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.base.files import check_writable
 from spheretwin.models.design import curve_check, field_check, iron_hoop, rotor_field, torque_map
@@ -28,6 +27,14 @@ from spheretwin.viz.terminal.tables import print_checks, terminal_console
 
 CURVE = "torque curve from 0 to 180 degrees, columns phi_deg,torque_Nm_per_A"
 
+MODEL = """
+        --mjcf
+        --json
+        --verbose"""
+
+OF_CURVE = f"""
+        --csv FILE.csv  {CURVE}, or a torque field (default: the file of the model file)"""
+
 MOST_DEGREE = 300  # some gigabytes
 
 MOST_POSES = 10_000  # some four hours
@@ -39,121 +46,67 @@ STEEPEST_DEG = 85.0
 def declare(parser: Parser) -> None:
     """Declare the arguments of the verb."""
     parts = parser.add_subparsers(metavar="PART", required=True)
-    curve = _part(
-        parts,
-        "curve",
-        "compute the torque curve of a pole and a coil, or check another curve",
+    parts.add_parser(
+        "curve", help="compute the torque curve of a pole and a coil, or check another curve"
+    ).define(
+        run_curve,
         "Compute the torque curve f_t(φ) from the geometry of the model file, with magpylib; or compare"
         " finite-element or measured data with it.",
+        f"""{MODEL}
+        --out FILE.csv  write the curve here, not to stdout
+        --csv FILE.csv  check this {CURVE}
+        """,
     )
-    curve.add_argument("--out", metavar="FILE.csv", help="write the curve here, not to stdout")
-    curve.add_argument("--csv", type=Path, metavar="FILE.csv", help=f"check this {CURVE}")
-    curve.set_run(run_curve)
-
-    field = _part(
-        parts,
-        "field",
-        "compute the torque field of any arrangement of magnets",
+    parts.add_parser("field", help="compute the torque field of any arrangement of magnets").define(
+        run_field,
         "Compute the torque of one ampere in a coil as a vector function of its direction in the rotor frame"
         " from the magnets and the coils of the model file, with magpylib.",
+        f"""{MODEL}
+        --out FILE.csv   write the field here, not to stdout
+        --step DEG=1     step of the samples, degrees (default: 1)
+        --degree N={rotor_field.DEGREE}  largest degree of the harmonics (default: {rotor_field.DEGREE})
+        --on-iron        put the back of each magnet on an infinite plane of iron, by its mirror image
+        """,
+        step=number("a divisor of 180 from 0.25 to 30", lambda step: 0.25 <= step <= 30 and not 180 % step),
+        degree=whole(MOST_DEGREE, first=3),
     )
-    field.add_argument("--out", metavar="FILE.csv", help="write the field here, not to stdout")
-    field.add_argument(
-        "--step",
-        type=number("a divisor of 180 from 0.25 to 30", lambda step: 0.25 <= step <= 30 and not 180 % step),
-        default=1.0,
-        metavar="DEG",
-        help="step of the samples, degrees (default: 1)",
-    )
-    field.add_argument(
-        "--degree",
-        type=whole(MOST_DEGREE, first=3),
-        default=rotor_field.DEGREE,
-        metavar="N",
-        help=f"largest degree of the harmonics (default: {rotor_field.DEGREE})",
-    )
-    field.add_argument(
-        "--on-iron",
-        action="store_true",
-        help="put the back of each magnet on an infinite plane of iron, by its mirror image",
-    )
-    field.set_run(run_field)
-
-    hoop = _part(
-        parts,
-        "hoop",
-        "compute the effect of the iron behind the poles by finite elements",
+    parts.add_parser(
+        "hoop", help="compute the effect of the iron behind the poles by finite elements"
+    ).define(
+        run_hoop,
         "Compare the torque curve of a pole on caps of iron with that of a pole in air, by axisymmetric"
         " finite elements (scikit-fem).",
+        MODEL,
     )
-    hoop.set_run(run_hoop)
-
-    check = _part(
-        parts,
-        "check",
-        "compare the torque matrix with the summed field of all poles on all windings",
+    text = "compare the torque matrix with the summed field of all poles on all windings"
+    parts.add_parser("check", help=text).define(
+        run_check,
         "Compare G_t(q)·I with the exact field of all magnets on the current of all windings"
         " (magpylib), in random poses and for random currents.",
+        f"""{MODEL}{OF_CURVE}
+        --poses N=15  number of poses (default: 15)
+        --seed N=0    seed of poses and currents (default: 0)
+        --out
+        --figure-format
+        """,
+        poses=whole(MOST_POSES),
+        seed=whole(10**18, first=0),
     )
-    _add_curve(check)
-    check.add_argument(
-        "--poses", type=whole(MOST_POSES), default=15, metavar="N", help="number of poses (default: 15)"
-    )
-    check.add_argument(
-        "--seed",
-        type=whole(10**18, first=0),
-        default=0,
-        metavar="N",
-        help="seed of poses and currents (default: 0)",
-    )
-    _add_page(check)
-    check.set_run(run_check)
-
-    capability = _part(
-        parts,
-        "map",
-        "map the torque that is available in every direction over the workspace",
+    text = "map the torque that is available in every direction over the workspace"
+    parts.add_parser("map", help=text).define(
+        run_map,
         "Map, over tilt, its direction and spin: the torque available in every direction at the current"
         " limit, the torque matrix's smallest singular value and condition number, and the copper loss.",
+        f"""{MODEL}{OF_CURVE}
+        --need NM         fail if less torque (N·m) is available at a pose
+        --largest-tilt DEG={LARGEST_TILT_DEG:g}  largest tilt of the shaft, degrees
+            (default: {LARGEST_TILT_DEG:g})
+        --out
+        --figure-format
+        """,
+        need=number("a number above 0"),
+        largest_tilt=number(f"degrees from 0 to {STEEPEST_DEG:g}", lambda tilt: 0 <= tilt <= STEEPEST_DEG),
     )
-    _add_curve(capability)
-    capability.add_argument(
-        "--need",
-        type=number("a number above 0", lambda torque: torque > 0),
-        metavar="NM",
-        help="fail if less torque (N·m) is available at a pose",
-    )
-    capability.add_argument(
-        "--largest-tilt",
-        type=number(f"degrees from 0 to {STEEPEST_DEG:g}", lambda tilt: 0 <= tilt <= STEEPEST_DEG),
-        default=LARGEST_TILT_DEG,
-        metavar="DEG",
-        help=f"largest tilt of the shaft, degrees (default: {LARGEST_TILT_DEG:g})",
-    )
-    _add_page(capability)
-    capability.set_run(run_map)
-
-
-def _part(parts: Any, name: str, summary: str, description: str) -> Parser:
-    part: Parser = parts.add_parser(name, help=summary, description=description)
-    part.add_argument("--mjcf", default=MJCF_PATH)
-    part.add_argument("--json", help="print the figures as JSON, alone on stdout")
-    part.add_argument("--verbose")
-    return part
-
-
-def _add_curve(part: Parser) -> None:
-    part.add_argument(
-        "--csv",
-        type=Path,
-        metavar="FILE.csv",
-        help=f"{CURVE}, or a torque field (default: the file of the model file)",
-    )
-
-
-def _add_page(part: Parser) -> None:
-    part.add_argument("--out", help="write a page with figures into this folder")
-    part.add_argument("--figure-format")
 
 
 def run_check(options: argparse.Namespace) -> bool:

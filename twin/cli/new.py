@@ -24,10 +24,15 @@ TEMPLATES = {
 
 def declare(parser: Parser) -> None:
     """Declare the arguments of the verb."""
-    parser.description = "Write a commented template that runs, NAME.py, NAME.xml or NAME.toml."
-    parser.add_argument("kind", choices=TEMPLATES, metavar="KIND", help=", ".join(TEMPLATES))
-    parser.add_argument("name", metavar="NAME", help="name of the file without its ending, or its path")
-    parser.set_run(run)
+    parser.define(
+        run,
+        "Write a commented template that runs, NAME.py, NAME.xml or NAME.toml.",
+        f"""
+        KIND  {", ".join(TEMPLATES)}
+        NAME  name of the file without its ending, or its path
+        """,
+        kind=tuple(TEMPLATES),
+    )
 
 
 def run(options: argparse.Namespace) -> bool:

@@ -1,35 +1,37 @@
-"""Parser of the verbs: common options, numbers within bounds, messages of one line."""
+"""Parser of the verbs: options as their help lists them, numbers within bounds, messages of one line."""
 
 from __future__ import annotations
 
 import argparse
 import math
-from collections.abc import Callable
+import re
+from collections.abc import Callable, Iterator
 from pathlib import Path
+from textwrap import dedent
 from typing import Any, NoReturn
 
+from spheretwin.models.actuator import MJCF_PATH
 from spheretwin.models.base.errors import InputError, did_you_mean, shown
 
-COMMON: dict[str, dict[str, Any]] = {
-    "--figure-format": {
-        "choices": ("svg", "pdf", "png", "pdf-one-column", "pdf-two-columns"),
-        "default": "svg",
-        "help": "format in which figures are written in addition to svg; pdf also with the width of one"
-        " column (3.5 in) or of two columns (7.16 in) of a paper",
-    },
-    "--json": {"action": "store_true"},
-    "--mjcf": {"type": Path, "metavar": "FILE.xml", "help": "model file"},
-    "--out": {"type": Path, "metavar": "DIR"},
-    "--record": {"type": Path, "metavar": "FILE.rrd"},
-    "--verbose": {
-        "action": "store_true",
-        "help": "also print what each check compares, and the reason of its bound",
-    },
-    "scenario": {"metavar": "SCENARIO", "nargs": "?"},
-}
-"""Settings of the options that several verbs have; a verb adds its own settings."""
+FIGURE_FORMATS = ("svg", "pdf", "png", "pdf-one-column", "pdf-two-columns")
+
+COMMON = """
+--figure-format=svg  format in which figures are written in addition to svg; pdf also with the width of one
+    column (3.5 in) or of two columns (7.16 in) of a paper
+--json               print the figures as JSON, alone on stdout
+--mjcf FILE.xml      model file
+--out DIR            write a page with figures into this folder
+--record FILE.rrd    write a Rerun recording
+--telemetry FILE.parquet  write the telemetry
+--twin TWIN.toml     use the fields of an identified twin
+--verbose            also print what each check compares, and the reason of its bound
+"""
+"""Options that several verbs have; a verb that lists one by its name alone takes the rest from here."""
 
 MOST = 10**12
+
+_FILE = re.compile(r"FILE|DIR|[A-Z]+\.[a-z]+")
+"""Placeholders of paths."""
 
 
 class _Formatter(argparse.HelpFormatter):
@@ -52,25 +54,90 @@ class Parser(argparse.ArgumentParser):
         self.expected: list[str] = []
         super().__init__(**settings, allow_abbrev=False, formatter_class=_Formatter)
 
-    def add_argument(self, *names: str, **settings: Any) -> argparse.Action:
-        """Add an argument; the settings of a common option apply unless others are given."""
-        settings = {**COMMON.get(names[0], {}), **settings}
-        if "--help" not in names:
-            self.expected.append(names[0] if names[0].startswith("-") else settings["metavar"])
-        return super().add_argument(*names, **settings)
+    def define(
+        self,
+        run: Callable[[argparse.Namespace], bool],
+        description: str,
+        options: str,
+        *,
+        has_fields: bool = False,
+        **readers: Any,
+    ) -> None:
+        """Define a verb by its function, its description and its options.
 
-    def set_run(self, run: Callable[[argparse.Namespace], bool], *, has_fields: bool = False) -> None:
-        """Set the function of a verb; with `has_fields` any field of a scenario is a flag."""
+        Parameters
+        ----------
+        run : callable
+            Function of the verb; takes the options, and returns True if it succeeded.
+        description : str
+        options : str
+            See `add_options`.
+        has_fields : bool
+            Whether any field of a scenario is a flag.
+        **readers
+            See `add_options`.
+        """
+        self.description = description
+        self.add_options(options, **readers)
         self.set_defaults(run=run, parser=self, has_fields=has_fields)
         if has_fields:
-            self.add_argument(
-                "-h",
-                "--help",
-                nargs="?",
-                const="",
-                metavar="SECTION",
-                help="show this help, or the fields of a section, or all",
-            )
+            text = "show this help, or the fields of a section, or all"
+            self.add_argument("-h", "--help", nargs="?", const="", metavar="SECTION", help=text)
+
+    def add_options(self, text: str, *, listed: bool = True, **readers: Any) -> None:
+        """Add the arguments of a text, which has them as the help prints them.
+
+        Each begins a line, as ``--rate HZ=10  rows per second``: its placeholder, its default, and after two
+        spaces its help, which indented lines continue. An option without a placeholder is a switch; brackets
+        make an argument optional, and dots after the placeholder make it repeatable.
+
+        Parameters
+        ----------
+        text : str
+        listed : bool
+            Whether the help lists them.
+        **readers : callable, sequence or dict
+            By name: the function that reads a value, its valid values, or settings for argparse. By default,
+            placeholders of files and folders are paths, others texts.
+        """
+        readers = {"figure_format": FIGURE_FORMATS, "mjcf": {"type": Path, "default": MJCF_PATH}} | readers
+        common = {re.split("[ =]", spec)[0]: (spec, meaning) for spec, meaning in _entries(COMMON)}
+        for spec, meaning in _entries(text):
+            spec, standard = common.get(spec, (spec, ""))
+            self._add_option(spec, meaning or standard if listed else argparse.SUPPRESS, readers)
+
+    def _add_option(self, spec: str, meaning: str, readers: dict[str, Any]) -> None:
+        left, _, default = spec.partition("=")
+        names, _, placeholder = left.rpartition(" ") if " " in left or left[0] != "-" else (left, "", "")
+        many, optional = "..." in placeholder, placeholder.startswith("[")
+        placeholder = placeholder.strip("[]").removesuffix("...")
+        name = names or placeholder.lower() + "s" * many
+        reader = readers.get(name.strip("-").replace("-", "_"), ...)
+        settings: dict[str, Any] = {"help": meaning}
+        if placeholder:
+            settings["metavar"] = placeholder
+        if default:
+            settings["default"] = default
+        if callable(reader):
+            settings["type"] = reader
+        elif isinstance(reader, dict):
+            settings |= reader
+        elif reader is not ...:
+            settings |= {"choices": tuple(reader), "type": type(next(iter(reader)))}
+        elif _FILE.fullmatch(placeholder):
+            settings["type"] = Path
+        elif not placeholder:
+            settings["action"] = "store_true"
+        if many and names:
+            settings |= {"action": "append", "default": []}
+        elif many or optional:
+            settings.setdefault("nargs", ("*" if optional else "+") if many else "?")
+        self.expected.append(names or placeholder)
+        self.add_argument(name, **settings)
+
+    def parts(self) -> dict[str, Parser]:
+        """Return the parsers of the parts of a verb by their names; empty if it has none."""
+        return next((one.choices for one in self._actions if isinstance(one, argparse._SubParsersAction)), {})
 
     def error(self, message: str) -> NoReturn:
         """Refuse the command line with exit code 2."""
@@ -87,6 +154,13 @@ class Parser(argparse.ArgumentParser):
             )
 
 
+def _entries(text: str) -> Iterator[tuple[str, str]]:
+    """Yield each option of a text, and its help."""
+    for entry in re.split(r"\n(?=\S)", dedent(text).strip("\n")):
+        spec, _, meaning = entry.partition("  ")
+        yield spec.strip(), " ".join(meaning.split())
+
+
 def whole(last: int = MOST, *, first: int = 1, name: str = "a whole number") -> Callable[[str], int]:
     """Return a function that reads a whole number between two bounds."""
 
@@ -99,7 +173,17 @@ def whole(last: int = MOST, *, first: int = 1, name: str = "a whole number") -> 
     return read
 
 
-def number(name: str, is_valid: Callable[[float], bool]) -> Callable[[str], float]:
+def positive(value: float) -> bool:
+    """Return True for a number above 0."""
+    return value > 0
+
+
+def from_zero(value: float) -> bool:
+    """Return True for a number from 0 on."""
+    return value >= 0
+
+
+def number(name: str, is_valid: Callable[[float], bool] = positive) -> Callable[[str], float]:
     """Return a function that reads a finite number for which a condition is true."""
 
     def read(text: str) -> float:

@@ -15,17 +15,15 @@ from spheretwin.viz.terminal import runs
 
 def declare(parser: Parser) -> None:
     """Declare the arguments of the verb."""
-    parser.description = (
-        "Recover a complete file from the partial telemetry or recording of a killed process."
+    parser.define(
+        run,
+        "Recover a complete file from the partial telemetry or recording of a killed process.",
+        """
+        FILE        partial file, or the intended name of the file: RUN.parquet, RUN.rrd
+        --out FILE  path of the complete file
+        """,
+        out={"type": Path, "required": True},
     )
-    parser.add_argument(
-        "file",
-        type=Path,
-        metavar="FILE",
-        help="partial file, or the intended name of the file: RUN.parquet, RUN.rrd",
-    )
-    parser.add_argument("--out", metavar="FILE", required=True, help="path of the complete file")
-    parser.set_run(run)
 
 
 def run(options: argparse.Namespace) -> bool:

@@ -29,34 +29,27 @@ TWIN = "twin"
 
 def declare(parser: Parser) -> None:
     """Declare the arguments of the verb."""
-    parser.description = (
+    parser.define(
+        run,
         "Run the paper's experiments over several seeds: a verdict for each, tables, figures, one page."
         f" {TWIN} runs the workflow of a digital twin on a hidden machine, from design to watch. Exit code 1"
-        " if a run ended unexpectedly or a check failed."
+        " if a run ended unexpectedly or a check failed.",
+        f"""
+        NAME...    {", ".join(EXPERIMENTS)}, or {ALL}; or {TWIN} alone
+        --out
+        --figure-format
+        --json     print the rows as JSON, alone on stdout
+        --verbose  also print every result and every table
+        --seeds N  runs of each case; unless given {SEEDS}, and more where small differences or rare cases
+            count
+        --limit N  only the first N cases of each experiment
+        --plant    engine of rows that do not name one; lagrangian if the model allows it unless given, and a
+            sample of the rows also on mujoco
+        """,
+        seeds=whole(MOST),
+        limit=whole(MOST),
+        plant=tuple(ENGINES),
     )
-    parser.add_argument(
-        "names", metavar="NAME", nargs="+", help=f"{', '.join(EXPERIMENTS)}, or {ALL}; or {TWIN} alone"
-    )
-    parser.add_argument("--out", help="write a page with figures into this folder")
-    parser.add_argument("--figure-format")
-    parser.add_argument("--json", help="print the rows as JSON, alone on stdout")
-    parser.add_argument("--verbose", help="also print every result and every table")
-    parser.add_argument(
-        "--seeds",
-        type=whole(MOST),
-        metavar="N",
-        help=f"runs of each case; unless given {SEEDS}, and more where small differences or rare cases count",
-    )
-    parser.add_argument(
-        "--limit", type=whole(MOST), metavar="N", help="only the first N cases of each experiment"
-    )
-    parser.add_argument(
-        "--plant",
-        choices=tuple(ENGINES),
-        help="engine of rows that do not name one; lagrangian if the model allows it unless given, and a"
-        " sample of the rows also on mujoco",
-    )
-    parser.set_run(run)
 
 
 def run(options: argparse.Namespace) -> bool:

@@ -23,44 +23,23 @@ from spheretwin.viz.terminal.runs import print_written
 
 def declare(parser: Parser) -> None:
     """Declare the arguments of the verb."""
-    parser.description = (
+    parser.define(
+        run,
         "Print facts, figures and events of runs from their files; with several runs also the"
-        " differences from the first. Exit code 1 if a run exceeds the tolerances."
+        " differences from the first. Exit code 1 if a run exceeds the tolerances.",
+        f"""
+        RUN...                 telemetry (.parquet) or a recording (.rrd), also of a killed process
+        --tolerance FILE.toml  compare the other runs with the first, signal by signal; a file or a shipped
+            one: {", ".join(tolerances.shipped())}
+        --export FILE    write the columns of the run as .csv, .parquet or .mcap, one for each number
+        --merge OUT.rrd  write all runs into one new recording, with a layout for comparison
+        --figures DIR    draw all runs: SVG and one page with interactive plots, without viewer or network
+        --figure-format
+        --json           print the result as JSON, alone on stdout
+        """,
+        runs=Path,
+        tolerance=str,
     )
-    parser.add_argument(
-        "runs",
-        type=Path,
-        nargs="+",
-        metavar="RUN",
-        help="telemetry (.parquet) or a recording (.rrd), also of a killed process",
-    )
-    parser.add_argument(
-        "--tolerance",
-        metavar="FILE.toml",
-        help="compare the other runs with the first, signal by signal; a file or a shipped one:"
-        f" {', '.join(tolerances.shipped())}",
-    )
-    parser.add_argument(
-        "--export",
-        type=Path,
-        metavar="FILE",
-        help="write the columns of the run as .csv, .parquet or .mcap, one for each number",
-    )
-    parser.add_argument(
-        "--merge",
-        type=Path,
-        metavar="OUT.rrd",
-        help="write all runs into one new recording, with a layout for comparison",
-    )
-    parser.add_argument(
-        "--figures",
-        type=Path,
-        metavar="DIR",
-        help="draw all runs: SVG and one page with interactive plots, without viewer or network",
-    )
-    parser.add_argument("--figure-format")
-    parser.add_argument("--json", help="print the result as JSON, alone on stdout")
-    parser.set_run(run)
 
 
 def run(options: argparse.Namespace) -> bool:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import argparse
 import json
 import time
-from pathlib import Path
 
 import numpy as np
 
@@ -40,19 +39,20 @@ from spheretwin.viz.terminal import runs
 
 def declare(parser: Parser) -> None:
     """Declare the arguments of the verb."""
-    parser.description = (
-        "Estimate angles, rates and disturbance torque of a machine from a log, by an extended Kalman filter"
-        " on the plant of a scenario. Exit code 1 if model and log are not consistent."
-    )
     add_stream(parser)
-    parser.add_argument("--fit", action="store_true", help="fit noise and delay to the log first")
-    parser.add_argument(
-        "--offsets", action="store_true", help="estimate the offsets of the angle sensors as well"
+    parser.define(
+        run,
+        "Estimate angles, rates and disturbance torque of a machine from a log, by an extended Kalman filter"
+        " on the plant of a scenario. Exit code 1 if model and log are not consistent.",
+        """
+        --fit      fit noise and delay to the log first
+        --offsets  estimate the offsets of the angle sensors as well
+        --telemetry FILE.parquet  write the estimates
+        --record
+        --json
+        """,
+        has_fields=True,
     )
-    parser.add_argument("--telemetry", type=Path, metavar="FILE.parquet", help="write the estimates")
-    parser.add_argument("--record")
-    parser.add_argument("--json")
-    parser.set_run(run, has_fields=True)
 
 
 def run(options: argparse.Namespace) -> bool:

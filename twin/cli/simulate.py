@@ -6,7 +6,6 @@ import argparse
 import contextlib
 import sys
 from collections.abc import Iterator, Mapping, Sequence
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -40,55 +39,30 @@ from spheretwin.viz.terminal.progress import Progress
 
 def declare(parser: Parser) -> None:
     """Declare the arguments of the verb."""
-    parser.description = "Run a scenario. Any field of it is a flag: --controller.law pd"
     parser.usage = "spheretwin simulate SCENARIO [options] [--section.field VALUE ...]"
-    parser.add_argument("scenario", help=f"{', '.join(shipped())}, or a .toml file")
-    parser.add_argument("--record", help="write a Rerun recording")
-    parser.add_argument(
-        "--record-rate",
-        type=number("a number of Hz above 0", lambda rate_Hz: rate_Hz > 0),
-        metavar="HZ",
-        help="rows per second of the recording; default: all",
+    parser.define(
+        run,
+        "Run a scenario. Any field of it is a flag: --controller.law pd",
+        f"""
+        [SCENARIO]               {", ".join(shipped())}, or a .toml file
+        --record
+        --record-rate HZ         rows per second of the recording; default: all
+        --telemetry
+        --live                   run in real time, with a viewer on 127.0.0.1
+        --live-window S          time that the live plots show; default: {LIVE_WINDOW_S:g} s
+        --view TAB               first tab of the recording: {", ".join(VIEW_NAMES)}
+        --replay RUN.parquet     replay the run of a telemetry file
+        --twin
+        --export-log FILE        write what a laboratory would record (.parquet)
+        --export-truth FILE      write true parameters (.json) and states (.parquet)
+        --metric FILE.py:NAME...  own metric: a function of the run; repeatable
+        --json
+        """,
+        has_fields=True,
+        record_rate=number("a number of Hz above 0"),
+        live_window=number("a number of s above 0"),
+        view=VIEW_NAMES,
     )
-    parser.add_argument("--telemetry", type=Path, metavar="FILE.parquet", help="write the telemetry")
-    parser.add_argument("--live", action="store_true", help="run in real time, with a viewer on 127.0.0.1")
-    parser.add_argument(
-        "--live-window",
-        type=number("a number of s above 0", lambda window_s: window_s > 0),
-        metavar="S",
-        help=f"time that the live plots show; default: {LIVE_WINDOW_S:g} s",
-    )
-    parser.add_argument(
-        "--view",
-        choices=VIEW_NAMES,
-        metavar="TAB",
-        help=f"first tab of the recording: {', '.join(VIEW_NAMES)}",
-    )
-    parser.add_argument(
-        "--replay", type=Path, metavar="RUN.parquet", help="replay the run of a telemetry file"
-    )
-    parser.add_argument("--twin", type=Path, metavar="TWIN.toml", help="use the fields of an identified twin")
-    parser.add_argument(
-        "--export-log",
-        type=Path,
-        metavar="FILE",
-        help="write what a laboratory would record (.parquet)",
-    )
-    parser.add_argument(
-        "--export-truth",
-        type=Path,
-        metavar="FILE",
-        help="write true parameters (.json) and states (.parquet)",
-    )
-    parser.add_argument(
-        "--metric",
-        action="append",
-        default=[],
-        metavar="FILE.py:NAME",
-        help="own metric: a function of the run; repeatable",
-    )
-    parser.add_argument("--json", help="print the figures as JSON, alone on stdout")
-    parser.set_run(run, has_fields=True)
 
 
 def run(options: argparse.Namespace) -> bool:

@@ -37,65 +37,41 @@ MOST_THREADS = 1024
 MOST_TRIALS = 15
 """Trials of a front that are printed, evenly along it; the table has all."""
 
+DRAWS = 100
+"""Machines of a twin unless their number is given."""
+
 GO_ON = "sweep: finished rows are stored; the same command continues from there"
 
 
 def declare(parser: Parser) -> None:
     """Declare the arguments of the verb."""
-    parser.description = (
+    parser.define(
+        run,
         "Run a study on all cores. Rows in its journal are not run again: an interrupted"
         " study continues. Exit code 1 if it is not complete, or if a row ended as"
-        " failsafe or by an exception of a law or a metric."
+        " failsafe or by an exception of a law or a metric.",
+        f"""
+        STUDY              {", ".join(shipped())}, or a .toml file
+        --out DIR          folder of journal and table; NAME_study unless given
+        --threads N        as many as there are cores unless given
+        --engine=local     local, threads on this machine, unless given; the table is the same
+        --address HOST     for ray: auto, or HOST[:PORT] of a cluster that this machine is a node of; a
+            cluster on this machine alone unless given
+        --limit ROWS       run only the first rows; finished later rows stay in the table
+        --row KEY          run only the row of this key, and print its figures
+        --optimise         tune the gains that the section [optimise] of the study names
+        --trials N         trials of each law, with --optimise
+        --twin TWIN.toml   run each row on machines drawn from the covariance of an identified twin
+        --draws N          machines of --twin; {DRAWS} unless given
+        --figure-format
+        --json             print the result as JSON, alone on stdout
+        """,
+        threads=whole(MOST_THREADS),
+        engine=tuple(ENGINES),
+        limit=whole(),
+        trials=whole(),
+        draws=whole(100_000),
     )
-    parser.add_argument("study", metavar="STUDY", help=f"{', '.join(shipped())}, or a .toml file")
-    parser.add_argument("--out", help="folder of journal and table; NAME_study unless given")
-    parser.add_argument(
-        "--threads",
-        type=whole(MOST_THREADS),
-        metavar="N",
-        help="as many as there are cores unless given",
-    )
-    parser.add_argument(
-        "--engine",
-        choices=tuple(ENGINES),
-        default="local",
-        help="local, threads on this machine, unless given; the table is the same",
-    )
-    parser.add_argument(
-        "--address",
-        metavar="HOST",
-        help="for ray: auto, or HOST[:PORT] of a cluster that this machine is a node of; a cluster on this"
-        " machine alone unless given",
-    )
-    parser.add_argument(
-        "--limit",
-        type=whole(),
-        metavar="ROWS",
-        help="run only the first rows; finished later rows stay in the table",
-    )
-    parser.add_argument("--row", metavar="KEY", help="run only the row of this key, and print its figures")
-    parser.add_argument(
-        "--optimise",
-        action="store_true",
-        help="tune the gains that the section [optimise] of the study names",
-    )
-    parser.add_argument("--trials", type=whole(), metavar="N", help="trials of each law, with --optimise")
-    parser.add_argument(
-        "--twin",
-        type=Path,
-        metavar="TWIN.toml",
-        help="run each row on machines drawn from the covariance of an identified twin",
-    )
-    parser.add_argument(
-        "--draws", type=whole(100_000), metavar="N", help="machines of --twin; 100 unless given"
-    )
-    parser.add_argument("--figure-format")
-    parser.add_argument("--json", help="print the result as JSON, alone on stdout")
-    parser.set_run(run)
-
-
-DRAWS = 100
-"""Machines of a twin unless their number is given."""
 
 
 def run(options: argparse.Namespace) -> bool:

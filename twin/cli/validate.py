@@ -16,13 +16,14 @@ MOST_LINES = 5
 
 def declare(parser: Parser) -> None:
     """Declare the arguments of the verb."""
-    parser.description = (
-        "Judge a twin by a log: residuals by hinge, pose and rate, and what would explain those that noise"
-        " does not. Exit code 1 if the twin is not accepted."
-    )
     add_logs(parser, many=False)
-    parser.add_argument("--json")
-    parser.set_run(run, has_fields=True)
+    parser.define(
+        run,
+        "Judge a twin by a log: residuals by hinge, pose and rate, and what would explain those that noise"
+        " does not. Exit code 1 if the twin is not accepted.",
+        "--json",
+        has_fields=True,
+    )
 
 
 def run(options: argparse.Namespace) -> bool:

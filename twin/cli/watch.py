@@ -29,27 +29,19 @@ MOST_VARIANCE = 1.5
 
 def declare(parser: Parser) -> None:
     """Declare the arguments of the verb."""
-    parser.description = (
-        "Watch over a machine: print a line of JSON for each change of its parameters. Exit code 1 if there"
-        " was one."
-    )
     add_stream(parser)
-    parser.add_argument(
-        "--parameter",
-        action="append",
-        default=[],
-        metavar="NAME",
-        help=f"parameter to watch; repeatable (default: {', '.join(WATCHED)})",
+    parser.define(
+        run,
+        "Watch over a machine: print a line of JSON for each change of its parameters. Exit code 1 if there"
+        " was one.",
+        f"""
+        --parameter NAME...      parameter to watch; repeatable (default: {", ".join(WATCHED)})
+        --false-alarms RATE=0.1  largest mean rate of alarms without a change, 1/h (default: 0.1)
+        --json  print nothing but the lines of JSON, also no summary on stderr
+        """,
+        has_fields=True,
+        false_alarms=number("a number above 0"),
     )
-    parser.add_argument(
-        "--false-alarms",
-        type=number("a number above 0", lambda rate: rate > 0),
-        default=0.1,
-        metavar="RATE",
-        help="largest mean rate of alarms without a change, 1/h (default: 0.1)",
-    )
-    parser.add_argument("--json", help="print nothing but the lines of JSON, also no summary on stderr")
-    parser.set_run(run, has_fields=True)
 
 
 def run(options: argparse.Namespace) -> bool:

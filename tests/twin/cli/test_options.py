@@ -40,7 +40,7 @@ DEFAULTS = {
     "sweep paper": {"study": "paper", "engine": "local", "figure_format": "svg"},
     "review a": {"runs": [Path("a")], "figure_format": "svg"},
     "recover a --out b": {"file": Path("a"), "out": Path("b")},
-    "explain x y": {"subject": ["x", "y"]},
+    "explain x y": {"subjects": ["x", "y"]},
     "magnetics curve": {"mjcf": MJCF_PATH},
     "magnetics check": {"mjcf": MJCF_PATH, "poses": 15, "seed": 0, "figure_format": "svg"},
     "magnetics map": {"mjcf": MJCF_PATH, "largest_tilt": 57.0, "figure_format": "svg"},

@@ -6,7 +6,7 @@ from xml.etree import ElementTree
 import pytest
 from matplotlib.figure import Figure
 
-from spheretwin.cli.options import COMMON
+from spheretwin.cli.options import FIGURE_FORMATS
 from spheretwin.viz.figures.style import PAPER_WIDTHS_in
 from spheretwin.viz.pages import markdown
 
@@ -68,7 +68,7 @@ def test_the_same_page_has_the_same_bytes_in_each_format(tmp_path, kind, start):
 
 def test_formats_of_a_paper_have_its_widths():
     assert PAPER_WIDTHS_in == {"pdf-one-column": 3.5, "pdf-two-columns": 7.16}
-    assert set(COMMON["--figure-format"]["choices"]) == {"svg", "pdf", "png", *PAPER_WIDTHS_in}
+    assert set(FIGURE_FORMATS) == {"svg", "pdf", "png", *PAPER_WIDTHS_in}
 
 
 @pytest.mark.release("1 s; changes with Matplotlib")
