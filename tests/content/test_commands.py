@@ -208,7 +208,7 @@ def tunings():
     for name, more in OBJECTIVES:
         made = Objective(metric=name, **more)
         trial |= {"values": {made.called: 2.0}, "fresh": None, "fresh_reason": None}
-        files.append(str(report.chosen({"start": None, "best": [trial]})[0]))
+        files.append(str(report.chosen({"start": None, "best": [trial]}).head))
     return "\n".join([text, *tree(json.loads(gains)), page, *files])
 
 

@@ -170,7 +170,7 @@ def _difference_table(runs: Sequence[Reviewed]) -> list[str]:
         return ["The scenarios of the runs are equal."]
     head = ["field", *(f"run {place}" for place in range(1, len(runs) + 1))]
     cells = [[_plain(cell) for cell in (name, *values)] for name, values in rows]
-    return markdown.table(head, cells, [False] * len(head))
+    return markdown.Table("", head, cells, len(head)).lines()
 
 
 def _rows(run: Reviewed, table: Table) -> QuantityRows:
@@ -371,7 +371,7 @@ def _below(runs: Sequence[Reviewed], drawn: Sequence[ComparedRun], figures: Sequ
     head = ["angles in mrad (degrees)", *(_plain(run.label) for run in drawn)]
     rows = [[cell.replace("\n", "; ") for cell in row] for row in table_rows(figures, BAND_rad)]
     note = ["Differences are from run 1.", ""] if len(runs) > 1 else []
-    lines = ["## Metrics", "", *note, *markdown.table(head, rows, [False] + [True] * len(runs)), ""]
+    lines = ["## Metrics", "", *note, *markdown.Table("", head, rows).lines(), ""]
     if len(runs) > 1:
         lines += ["## Differences of the scenarios", "", *_difference_table(runs)]
     return "\n".join(lines)

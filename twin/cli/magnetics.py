@@ -124,7 +124,7 @@ def run_check(options: argparse.Namespace) -> bool:
     if options.json:
         print_json(verdict._asdict())
     else:
-        runs.print_rows(*magnetics.field_table(verdict), 1)
+        runs.print_rows(*magnetics.field_table(verdict))
         terminal_console().print(magnetics.sources_text(verdict))
         print_checks("magnetics check", verdict.checks, options.verbose)
         runs.print_written(written)
@@ -171,7 +171,7 @@ def _compute(options: argparse.Namespace) -> bool:
             }
         )
     elif options.out:
-        runs.print_rows(*magnetics.computed_curve_table(computed), 1)
+        runs.print_rows(*magnetics.computed_curve_table(computed))
         print_checks("magnetics curve", computed.checks, options.verbose)
         runs.print_written([options.out])
     else:
@@ -215,7 +215,7 @@ def run_hoop(options: argparse.Namespace) -> bool:
     if options.json:
         print_json({"effects": [effect._asdict() for effect in effects]})
     else:
-        runs.print_rows(*magnetics.hoop_table(effects), 1)
+        runs.print_rows(*magnetics.hoop_table(effects))
     return True
 
 
@@ -261,7 +261,7 @@ def _judge(csv: Path, mjcf: Path, as_json: bool) -> bool:
             }
         )
     else:
-        runs.print_rows(*magnetics.judged_curve_table(csv, judged), 1)
+        runs.print_rows(*magnetics.judged_curve_table(csv, judged))
     return True  # user data has no bounds here
 
 
@@ -283,7 +283,7 @@ def run_map(options: argparse.Namespace) -> bool:
         print_json(verdict._asdict())
     else:
         for table in magnetics.workspace_tables(verdict):
-            runs.print_rows(*table, 1)
+            runs.print_rows(*table)
         terminal_console().print(magnetics.MAP_TERMS)
         print_checks("magnetics map", verdict.checks, options.verbose)
         runs.print_written(written)

@@ -160,4 +160,4 @@ def _print_tables(chapters: Sequence[Chapter]) -> None:
         for section in chapter.sections:
             for table in section.tables:
                 title = f"{chapter.experiment.name}, {section.title}. {table.title}"
-                tables.print_rows(title, table.head, table.rows, table.texts)
+                tables.print_rows(*table._replace(title=title))

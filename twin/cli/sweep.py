@@ -107,7 +107,7 @@ def run(options: argparse.Namespace) -> bool:
     else:
         limited = "" if outcome.of == outcome.study_rows else f", the first of {outcome.study_rows}"
         title = f"{study.name}: {outcome.rows} of {outcome.of} rows{limited}"
-        runs.print_rows(title, *report.medians(printed), 1)
+        runs.print_rows(*report.medians(printed, title))
         if outcome.startup_s is not None:
             print(f"took   {outcome.wall_s:.1f} s, {outcome.startup_s:.1f} s of it to start")
         print(f"table  {outcome.table}")
@@ -212,9 +212,8 @@ def _print_laws(name: str, laws: Mapping[str, Any]) -> None:
     for law, of_law in laws.items():
         front = of_law["best"]
         step = max(1, math.ceil(len(front) / MOST_TRIALS))
-        head, body = tuning_page.chosen({**of_law, "best": front[::step]})
-        if body:
-            runs.print_rows(f"{name}, {law}", head, body, 1)
+        if table := tuning_page.chosen({**of_law, "best": front[::step]}, f"{name}, {law}"):
+            runs.print_rows(*table)
         else:
             print(f"{name}, {law}: {tuning_page.NONE_COMPLETED}")
         print(tuning_page.counted(of_law))

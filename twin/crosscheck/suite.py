@@ -13,7 +13,7 @@ from spheretwin.models.base.checks import Check, bound_shares
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.mjcf import read
 from spheretwin.viz.pages import markdown as pieces
-from spheretwin.viz.pages.markdown import Drawing, write_page
+from spheretwin.viz.pages.markdown import Drawing, Page
 
 F = TypeVar("F", bound="Finding")
 
@@ -230,11 +230,10 @@ def write(folder: Path, evidence: Evidence, figure_format: str = "svg") -> list[
     InputError
         A file cannot be written there.
     """
-    drawings = [draw(evidence) for draw in FIGURES]
-    summary = [
+    lead = (
         "Comparison of the engine (MuJoCo) with the Lagrangian model, which is derived independently, and"
         f" with Pinocchio. {pieces.verdict(evidence.checks)}"
-    ]
-    sections = ["## Figures", "", *map(pieces.figure, drawings), *pieces.checks_section(evidence.checks)]
-    command = "spheretwin crosscheck"
-    return write_page(folder, NAME, "Cross-check", summary, sections, drawings, command, figure_format)
+    )
+    figures = pieces.figures_section(draw(evidence) for draw in FIGURES)
+    sections = [*figures, pieces.checks_section(evidence.checks)]
+    return Page(NAME, "Cross-check", lead, sections, "spheretwin crosscheck").write(folder, figure_format)

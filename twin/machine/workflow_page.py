@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +17,7 @@ from spheretwin.machine.workflow import CHANGED_s, Watched, Workflow
 from spheretwin.machine.workflow_checks import TRUE_COLUMNS, checks_of, rms_error, settled_errors
 from spheretwin.models.telemetry.signals import ANGLES
 from spheretwin.viz.pages import markdown
-from spheretwin.viz.pages.markdown import Drawing, write_page
+from spheretwin.viz.pages.markdown import Drawing, Page, Section, Table
 
 Array = NDArray[np.float64]
 
@@ -53,33 +54,30 @@ def write(folder: Path, result: Workflow, command: str, figure_format: str = "sv
         Exists.
     result : Workflow
     command, figure_format : str
-        As in `markdown.write_page`.
+        As in `markdown.Page`.
 
     Raises
     ------
     InputError
         A file cannot be written there.
     """
-    checks, drawings = checks_of(result), _drawings(result)
-    shadow, residuals, sums = map(markdown.figure, drawings)
-    summary = [
+    checks = checks_of(result)
+    shadow, residuals, sums = _drawings(result)
+    lead = (
         "MuJoCo plays a machine with noisy sensors; its torque, inertia and friction are hidden."
         " A twin that starts from the data sheet designs an experiment, identifies the machine from"
         f" logs of it, follows its state, is validated, and watches it. {markdown.verdict(checks)}"
-    ]
+    )
     sections = [
-        *_section("1. Design", DESIGN_TEXT, _design_rows(result)),
-        *_section("2. Logs", LOGS_TEXT, _log_rows(result)),
-        *_section("3. Identification", _identification_text(result), _parameter_rows(result)),
-        *_section("4. Shadow", SHADOW_TEXT, _shadow_rows(result)),
-        shadow,
-        *_section("5. Validation", _validation_text(result), _structure_rows(result)),
-        residuals,
-        *_section("6. Watch", WATCH_TEXT, _watch_rows(result)),
-        sums,
-        *markdown.checks_section(checks),
+        Section("1. Design", [DESIGN_TEXT, _design_rows(result)]),
+        Section("2. Logs", [LOGS_TEXT, _log_rows(result)]),
+        Section("3. Identification", [_identification_text(result), _parameter_rows(result)]),
+        Section("4. Shadow", [SHADOW_TEXT, _shadow_rows(result), shadow]),
+        Section("5. Validation", [_validation_text(result), _structure_rows(result), residuals]),
+        Section("6. Watch", [WATCH_TEXT, _watch_rows(result), sums]),
+        markdown.checks_section(checks),
     ]
-    return write_page(folder, NAME, TITLE, summary, sections, drawings, command, figure_format)
+    return Page(NAME, TITLE, lead, sections, command).write(folder, figure_format)
 
 
 DESIGN_TEXT = (
@@ -108,37 +106,36 @@ WORDS = (
 )  # fmt: skip
 """Headings of columns of words; the others are numbers."""
 
-Rows = list[tuple[str, ...]]
-"""Heading, then rows."""
+
+def _table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> Table:
+    return Table("", head, list(rows), 0, WORDS)
 
 
-def _section(title: str, text: str, rows: Rows) -> list[str]:
-    head, *others = rows
-    numbers = [name not in WORDS for name in head]
-    return [f"## {title}", "", text, "", *markdown.table(head, others, numbers), ""]
-
-
-def _design_rows(result: Workflow) -> Rows:
+def _design_rows(result: Workflow) -> Table:
     design = result.design
-    return [
+    units = {
+        name: next(kind.unit for kind in KINDS.values() if name.startswith(kind.name))
+        for name in design.deviations
+    }
+    return _table(
         ("parameter", "designed", "nutation", "unit", "times narrower"),
-        *(
+        (
             (
                 name,
                 f"{value:.2g}",
                 f"{design.reference[name]:.2g}",
-                next(kind.unit for kind in KINDS.values() if name.startswith(kind.name)),
+                units[name],
                 f"{design.narrower[name]:.2f}",
             )
             for name, value in design.deviations.items()
         ),
-    ]
+    )
 
 
-def _log_rows(result: Workflow) -> Rows:
-    return [
+def _log_rows(result: Workflow) -> Table:
+    return _table(
         ("log", "length, s", "rows", "accepted", "findings"),
-        *(
+        (
             (
                 played.log.name,
                 f"{played.log.t_s[-1] - played.log.t_s[0]:.3g}",
@@ -148,7 +145,7 @@ def _log_rows(result: Workflow) -> Rows:
             )
             for played, verdict in zip(result.logs, result.verdicts, strict=True)
         ),
-    ]
+    )
 
 
 def _identification_text(result: Workflow) -> str:
@@ -160,24 +157,21 @@ def _identification_text(result: Workflow) -> str:
     return "\n\n".join(f"{line}." for line in lines)
 
 
-def _parameter_rows(result: Workflow) -> Rows:
-    return [
+def _parameter_rows(result: Workflow) -> Table:
+    numbers = {
+        name: (result.nominal[name], result.true[name], one.value, *one.interval)
+        for name, one in result.identified.parameters.items()
+    }
+    return _table(
         ("parameter", "nominal", "true", "found", "from", "to (95 %)", "unit"),
-        *(
-            (
-                name,
-                *(
-                    f"{value:.5g}"
-                    for value in (result.nominal[name], result.true[name], one.value, *one.interval)
-                ),
-                one.unit,
-            )
+        (
+            (name, *(f"{value:.5g}" for value in numbers[name]), one.unit)
             for name, one in result.identified.parameters.items()
         ),
-    ]
+    )
 
 
-def _shadow_rows(result: Workflow) -> Rows:
+def _shadow_rows(result: Workflow) -> Table:
     head = ["hinge"]
     columns = []
     for label, judged in zip(LABELS, (result.before, result.after), strict=True):
@@ -188,7 +182,7 @@ def _shadow_rows(result: Workflow) -> Rows:
                 [f"{1e3 * value:.3g}" for value in rms_error(result, judged, name)],
                 [f"{100 * share:.0f} %" for share in np.mean(np.abs(error) <= half, axis=0)],
             ]
-    return [tuple(head), *zip(ANGLES, *columns, strict=True)]
+    return _table(head, zip(ANGLES, *columns, strict=True))
 
 
 def _validation_text(result: Workflow) -> str:
@@ -202,19 +196,19 @@ def _validation_text(result: Workflow) -> str:
     )
 
 
-def _structure_rows(result: Workflow) -> Rows:
-    return [
+def _structure_rows(result: Workflow) -> Table:
+    return _table(
         ("a change alone of", "explains", "unit", "standard deviations from 0"),
-        *(
+        (
             (one.what, f"{one.size:+.3g}", one.unit, f"{one.deviations:+.1f}")
             for one in result.before.validation.structure[:5]
         ),
-    ]
+    )
 
 
-def _watch_rows(result: Workflow) -> Rows:
+def _watch_rows(result: Workflow) -> Table:
     head = ("change", "named as", "true size", "size", "unit", "after, s", "confidence", "further alarms")
-    return [head, *map(_watch_row, result.watched)]
+    return _table(head, map(_watch_row, result.watched))
 
 
 def _watch_row(watched: Watched) -> tuple[str, ...]:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from spheretwin.models.telemetry.status import Status
 from spheretwin.run import Run
-from spheretwin.viz.pages.markdown import Drawing
+from spheretwin.viz.pages.markdown import Drawing, Table
 
 if TYPE_CHECKING:
     from spheretwin.viz.comparison.trajectories import LawTrajectory
@@ -98,13 +98,7 @@ class Outcomes(dict[str, Sequence[Outcome]]):
         return self.get(case.name, ())
 
 
-class ResultTable(NamedTuple):
-    """Rows of text under headings; `texts` columns at the left are words, the others figures."""
-
-    title: str
-    head: tuple[str, ...]
-    rows: list[tuple[str, ...]]
-    texts: int = 1
+ResultTable = Table
 
 
 class Section(NamedTuple):
@@ -113,7 +107,7 @@ class Section(NamedTuple):
     title: str
     text: str
     """Paragraphs in Markdown."""
-    tables: Sequence[ResultTable] = ()
+    tables: Sequence[Table] = ()
     drawings: Sequence[Callable[[], Drawing]] = ()
     """Functions that draw the figures; only a page calls them."""
 

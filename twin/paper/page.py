@@ -16,7 +16,7 @@ from spheretwin.paper.runner import CaseSummary, Plan, PlanResult, command_line,
 from spheretwin.study.agreement import BOUND
 from spheretwin.study.statistics import finite_ends
 from spheretwin.viz.pages import markdown as pieces
-from spheretwin.viz.pages.markdown import Drawing, save_text, write_page
+from spheretwin.viz.pages.markdown import Page, Table, save_text
 
 if TYPE_CHECKING:
     from spheretwin.viz.comparison.trajectories import LawTrajectory
@@ -78,31 +78,27 @@ def write(folder: Path, chapters: Sequence[Chapter], command: str, figure_format
     InputError
         A file cannot be written there.
     """
-    drawings: list[Drawing] = []
-    summary, sections = _results(chapters)
-    sections += [line for chapter in chapters for line in _chapter(chapter, drawings)]
+    lead, sections = _results(chapters)
+    sections += map(_chapter, chapters)
     recordings = [_recorded(folder, chapter) for chapter in chapters if chapter.trajectories]
     for chapter in chapters:
         if len(chapter.commands) > MOST_COMMANDS:
             save_text(folder / _commands_file(chapter), "\n".join([*chapter.commands, ""]))
-    return [
-        *write_page(folder, NAME, TITLE, summary, sections, drawings, command, figure_format),
-        *recordings,
+    return [*Page(NAME, TITLE, lead, sections, command).write(folder, figure_format), *recordings]
+
+
+def _chapter(chapter: Chapter) -> pieces.Section:
+    """Section of an experiment."""
+    inner = [
+        pieces.Section(section.title, [section.text, *section.tables, *(draw() for draw in section.drawings)])
+        for section in chapter.sections
     ]
+    return pieces.Section(
+        chapter.experiment.title, [chapter.experiment.summary, chapter.plants, *inner, *_commands(chapter)]
+    )
 
 
-def _chapter(chapter: Chapter, drawings: list[Drawing]) -> list[str]:
-    """Lines of an experiment; its figures are added to the drawings."""
-    lines = [f"## {chapter.experiment.title}", "", chapter.experiment.summary, ""]
-    lines += [chapter.plants, ""] if chapter.plants else []
-    for section in chapter.sections:
-        of_section = [draw() for draw in section.drawings]
-        drawings += of_section
-        lines += [*_section(section), *map(pieces.figure, of_section)]
-    return [*lines, *_commands(chapter)]
-
-
-def _results(chapters: Sequence[Chapter]) -> tuple[list[str], list[str]]:
+def _results(chapters: Sequence[Chapter]) -> tuple[str, list[pieces.Section]]:
     """Summary with the number of reproduced results, and sections with a row for each finding."""
     findings = [(chapter.experiment.name, finding) for chapter in chapters for finding in chapter.findings]
     of_paper = [
@@ -111,29 +107,30 @@ def _results(chapters: Sequence[Chapter]) -> tuple[list[str], list[str]]:
         if finding.reproduced is not None
     ]
     further = [(name, f"{finding.text}.") for name, finding in findings if finding.reproduced is None]
-    summary, lines = [f"Experiments: {len(chapters)}; findings: {len(findings)}."], []
+    summary, sections = [f"Experiments: {len(chapters)}; findings: {len(findings)}."], []
     if of_paper:
         count = sum(bool(finding.reproduced) for _, finding in findings)
-        table = pieces.table(("experiment", "verdict", "result"), of_paper, (False,) * 3)
         summary.append(f"{count} of {len(of_paper)} results of the paper were reproduced.")
-        lines += [f"## {REPRODUCED}", "", *table, ""]
+        sections.append(
+            pieces.Section(REPRODUCED, [Table("", ("experiment", "verdict", "result"), of_paper, 3)])
+        )
     if further:
-        table = pieces.table(("experiment", "finding"), further, (False,) * 2)
-        lines += [f"## {FURTHER}", "", *table, ""]
-    return summary, lines
+        sections.append(pieces.Section(FURTHER, [Table("", ("experiment", "finding"), further, 2)]))
+    return "\n".join(summary), sections
 
 
-def _commands(chapter: Chapter) -> list[str]:
+def _commands(chapter: Chapter) -> list[pieces.Section]:
     """Commands that run single rows."""
     if not chapter.commands:
         return []
-    lines = ["### Commands for single runs", ""]
     if len(chapter.commands) > MOST_COMMANDS:
         file = _commands_file(chapter)
         text = f"The commands of {len(chapter.commands)} rows are in [{file}]({file})"
-        return [*lines, f"{text}, in the order of the JSON.", ""]
-    text = "One command for each row of the JSON, in its order, with the first seed; further seeds follow it."
-    return [*lines, text, "", "```sh", *chapter.commands, "```", ""]
+        parts = [f"{text}, in the order of the JSON."]
+    else:
+        text = "One command for each row of the JSON, in its order, with the first seed; further seeds"
+        parts = [f"{text} follow it.", "\n".join(["```sh", *chapter.commands, "```"])]
+    return [pieces.Section("Commands for single runs", parts)]
 
 
 def _recorded(folder: Path, chapter: Chapter) -> Path:
@@ -147,14 +144,6 @@ def _recorded(folder: Path, chapter: Chapter) -> Path:
 
 def _commands_file(chapter: Chapter) -> str:
     return f"{chapter.experiment.name}_commands.txt"
-
-
-def _section(section: Section) -> list[str]:
-    lines = [f"### {section.title}", "", section.text, ""]
-    for table in section.tables:
-        numbers = [column >= table.texts for column in range(len(table.head))]
-        lines += [f"**{table.title}**", "", *pieces.table(table.head, table.rows, numbers), ""]
-    return lines
 
 
 NONE = "–"

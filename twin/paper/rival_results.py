@@ -175,7 +175,7 @@ def errors(hardware: Hardware, outcomes: Outcomes) -> list[ResultTable]:
     conditions = [condition for condition in hardware.conditions if not condition.perturbed]
     largest, *others = _tables(hardware, hardware.title, conditions, outcomes)
     if not hardware.in_degrees:
-        largest.rows.extend(_current_limits(conditions, outcomes))
+        largest = largest._replace(rows=[*largest.rows, *_current_limits(conditions, outcomes)])
     return [largest, *others]
 
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from spheretwin.scenario.fields import quantity_text
 from spheretwin.study.statistics import Rows, quantile_text
-from spheretwin.viz.pages import markdown as pieces
+from spheretwin.viz.pages.markdown import Section, Table
 
 MOST_CONDITIONS = 60
 """Largest number of conditions that are listed."""
@@ -24,8 +24,8 @@ METHOD = (
 )
 
 
-def section(rows: Rows) -> list[str]:
-    """Lines of the table; none if there is one condition, more than are listed, or one row of each."""
+def section(rows: Rows) -> list[Section]:
+    """Section of the table; none if there is one condition, more than are listed, or one row of each."""
     numbers = _numbers(rows)
     count = int(numbers.max(initial=-1)) + 1
     if not 1 < count <= MOST_CONDITIONS or count * len(rows.law_names) >= len(numbers) or rows.main is None:
@@ -40,9 +40,8 @@ def section(rows: Rows) -> list[str]:
     figures = [f"{name}, degrees" for name in HINGES] if rows.hinges_rad is not None else [""]
     head = [*map(quantity_text, varied), "law", "rows", *figures]
     head = [name or quantity_text(str(rows.main)) for name in head]
-    is_number = [False] * (len(varied) + 1) + [True] * (1 + len(figures))
-    title = f"## Medians by condition: {quantity_text(str(rows.main))}"
-    return [title, "", METHOD, "", *pieces.table(head, body, is_number), ""]
+    title = f"Medians by condition: {quantity_text(str(rows.main))}"
+    return [Section(title, [METHOD, Table("", head, body, len(varied) + 1)])]
 
 
 def _row(rows: Rows, varied: list[str], chosen: NDArray[np.bool_], law: str) -> list[str]:

@@ -17,7 +17,7 @@ from spheretwin.scenario.fields import quantity_text
 from spheretwin.study import conditions
 from spheretwin.study.statistics import Array, Rows, ranked, strongest
 from spheretwin.viz.pages import markdown as pieces
-from spheretwin.viz.pages.markdown import Drawing, write_page
+from spheretwin.viz.pages.markdown import Drawing, Page, Section, Table
 
 if TYPE_CHECKING:
     from spheretwin.viz.figures.maps import MapPanel, StudyLine
@@ -247,16 +247,17 @@ def write(
         A file cannot be written there.
     """
     study, command = rows.study, f"spheretwin sweep {shlex.quote(source)}"
-    figures = list(drawings(rows))
-    head, body = medians(summary)
-    table = pieces.table(head, body, [False, *(True for _ in summary)])
-    sections = ["## Metrics of the rows", "", *table, ""]
-    sections += ["## Figures", "", *map(pieces.figure, figures)] if figures else []
-    sections += [*conditions.section(rows), *_worst(rows, command), *_failures(rows)]
-    sections += ["## Varied fields", "", *_axes(study, rows), ""]
+    sections = [
+        Section("Metrics of the rows", [medians(summary)]),
+        *pieces.figures_section(drawings(rows)),
+        *conditions.section(rows),
+        *_worst(rows, command),
+        *_failures(rows),
+        Section("Varied fields", [_axes(study, rows)]),
+    ]
     limit = f" --limit {requested[0]}" if requested[0] < requested[1] else ""
-    lead = [study["description"], "", _ends(rows, *requested)]
-    return write_page(folder, NAME, study["name"], lead, sections, figures, command + limit, figure_format)
+    lead = "\n".join([study["description"], "", _ends(rows, *requested)])
+    return Page(NAME, study["name"], lead, sections, command + limit).write(folder, figure_format)
 
 
 def _ends(rows: Rows, of: int, total: int) -> str:
@@ -268,8 +269,8 @@ def _ends(rows: Rows, of: int, total: int) -> str:
     return f"{count} of {of} rows: {ends or 'none'}.{missing}{first}"
 
 
-def medians(summary: Mapping[str, Any]) -> tuple[list[str], list[list[str]]]:
-    """Headings and rows of a table: of each figure median, its 95 % interval and range, then the statuses."""
+def medians(summary: Mapping[str, Any], title: str = "") -> Table:
+    """Table: of each figure median, its 95 % interval and range, then the statuses."""
     figures = [name for name in next(iter(summary.values()), {}) if name != "statuses"]
     statuses = sorted({status for of_law in summary.values() for status in of_law["statuses"]})
     body = [
@@ -279,7 +280,7 @@ def medians(summary: Mapping[str, Any]) -> tuple[list[str], list[list[str]]]:
         [f"number of rows: {name}", *(str(of_law["statuses"].get(name, 0)) for of_law in summary.values())]
         for name in statuses
     ]
-    return ["median [its 95 % interval] (95 % range) of the completed rows", *summary], body
+    return Table(title, ["median [its 95 % interval] (95 % range) of the completed rows", *summary], body)
 
 
 def _spread(figure: Mapping[str, Any]) -> str:
@@ -290,7 +291,7 @@ def _spread(figure: Mapping[str, Any]) -> str:
     return f"{figure['median']:.4g} [{', '.join(ends)}] ({low:.4g} to {high:.4g})"
 
 
-def _worst(rows: Rows, command: str) -> list[str]:
+def _worst(rows: Rows, command: str) -> list[Section]:
     """Completed rows with the largest main figure, and the command that runs each alone."""
     if rows.main is None:
         return []
@@ -302,13 +303,12 @@ def _worst(rows: Rows, command: str) -> list[str]:
         [str(rows.numbers[place]), f"`{rows.keys[place]}`", rows.laws[place], f"{values[place]:.4g}"]
         for place in order[:MOST_NAMED]
     ]
-    head = ["row", "key", "law", _quantity(rows)]
-    table = pieces.table(head, body, [True, False, False, True])
+    table = Table("", ["row", "key", "law", _quantity(rows)], body, 0, ["key", "law"])
     alone = f"`{command} --row KEY` runs one row and prints its command line."
-    return ["## Completed rows with the largest value", "", *table, "", alone, ""]
+    return [Section("Completed rows with the largest value", [table, alone])]
 
 
-def _failures(rows: Rows) -> list[str]:
+def _failures(rows: Rows) -> list[Section]:
     """Rows that did not complete by status and reason, with the first of each kind."""
     by_kind: dict[tuple[str, str, str], list[int]] = {}
     for place in np.flatnonzero(~rows.completed).tolist():
@@ -326,23 +326,21 @@ def _failures(rows: Rows) -> list[str]:
         ]
         for (law, status, complaint), places in kinds[: 2 * MOST_NAMED]
     ]
-    table = pieces.table(
-        ["law", "status", "reason", "rows", "first row"], body, [False, False, False, True, False]
-    )
-    rest = [f"And {len(kinds) - len(body)} other reasons.", ""] if len(kinds) > len(body) else []
-    return ["## Rows that did not complete", "", *table, "", *rest]
+    head = ["law", "status", "reason", "rows", "first row"]
+    rest = f"And {len(kinds) - len(body)} other reasons." if len(kinds) > len(body) else ""
+    return [Section("Rows that did not complete", [Table("", head, body, 3, head[-1:]), rest])]
 
 
-def _axes(study: Mapping[str, Any], rows: Rows) -> list[str]:
+def _axes(study: Mapping[str, Any], rows: Rows) -> Table | str:
     """Axes with the values of the finished rows."""
     if not study["axis"]:
-        return ["Only the seed differs."]
+        return "Only the seed differs."
     fields = [axis["field"] for axis in study["axis"]]
     body = [
         [quantity_text(field), axis["kind"], _range(rows.axes[field]), f"`{field}`"]
         for field, axis in zip(fields, study["axis"], strict=True)
     ]
-    return pieces.table(["quantity", "kind", "values", "field"], body, [False] * 4)
+    return Table("", ["quantity", "kind", "values", "field"], body, 4)
 
 
 def _range(values: Any) -> str:

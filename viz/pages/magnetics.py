@@ -11,7 +11,7 @@ from spheretwin.models.design.field_check import FieldVerdict
 from spheretwin.models.design.iron_hoop import Effect
 from spheretwin.models.design.torque_map import TorqueSurvey, WeakPose, WorkspaceVerdict, direction_text
 from spheretwin.viz.pages import markdown
-from spheretwin.viz.pages.markdown import Drawing, write_page
+from spheretwin.viz.pages.markdown import Drawing, Page, Section, Table
 
 # A table row for every third tilt: one screen.
 ROW_STRIDE = 3
@@ -40,17 +40,14 @@ MAP_TERMS = (
 )
 """Meaning of the headings of the torque map."""
 
-TitledTable = tuple[str, Sequence[str], Sequence[Sequence[str]]]
-"""Title, headings and rows; the first column is words."""
 
-
-def computed_curve_table(computed: ComputedCurve) -> TitledTable:
+def computed_curve_table(computed: ComputedCurve) -> Table:
     """Return the results for a computed curve."""
     title = "torque curve computed from the geometry"
-    return title, CURVE_HEAD, [("peak", _peak(computed.peak))]
+    return Table(title, CURVE_HEAD, [("peak", _peak(computed.peak))])
 
 
-def judged_curve_table(path: Path, judged: JudgedCurve) -> TitledTable:
+def judged_curve_table(path: Path, judged: JudgedCurve) -> Table:
     """Return the results for a user's curve."""
     geometry = judged.geometry
     rows = [
@@ -62,27 +59,27 @@ def judged_curve_table(path: Path, judged: JudgedCurve) -> TitledTable:
         ("difference from it after scaling", _misfit(geometry.scaled, "its peak")),
         ("difference of look-up table and spline", f"{judged.lookup_error:.1e} of the peak"),
     ]
-    return f"torque curve {path}", CURVE_HEAD, rows
+    return Table(f"torque curve {path}", CURVE_HEAD, rows)
 
 
-def hoop_table(effects: Sequence[Effect]) -> TitledTable:
+def hoop_table(effects: Sequence[Effect]) -> Table:
     """Return the effects of caps of iron on the torque curve."""
     rows = [
         (f"{effect.half_angle_deg:g}°", f"{effect.peak:.3f}", f"{effect.mean:.3f}", f"{effect.mesh:.0e}")
         for effect in effects
     ]
     head = ("half angle of the iron", "peak", "mean to 27°", "half the elements")
-    return "torque of a pole on iron over that of a pole in air", head, rows
+    return Table("torque of a pole on iron over that of a pole in air", head, rows)
 
 
-def field_table(verdict: FieldVerdict) -> TitledTable:
+def field_table(verdict: FieldVerdict) -> Table:
     """Return the errors of the torque matrix by tilt."""
     title = f"torque by the curve against the direct sum (largest torque {verdict.largest_torque_Nm:.3f} N·m)"
     rows = [
         (f"{tilt_deg[0]:.0f}° to {tilt_deg[1]:.0f}°", str(poses), *map(_percent, errors))
         for tilt_deg, poses, *errors in verdict.by_tilt
     ]
-    return title, FIELD_HEAD, rows
+    return Table(title, FIELD_HEAD, rows)
 
 
 def sources_text(verdict: FieldVerdict) -> str:
@@ -96,7 +93,7 @@ def sources_text(verdict: FieldVerdict) -> str:
     )
 
 
-def workspace_tables(verdict: WorkspaceVerdict) -> list[TitledTable]:
+def workspace_tables(verdict: WorkspaceVerdict) -> list[Table]:
     """Return torque by tilt, torque matrix by tilt, and the weakest poses."""
     tilts = [
         tilt for i, tilt in enumerate(verdict.by_tilt) if i % ROW_STRIDE == 0 or i == len(verdict.by_tilt) - 1
@@ -108,9 +105,9 @@ def workspace_tables(verdict: WorkspaceVerdict) -> list[TitledTable]:
         f" worst and median of {verdict.poses} poses"
     )
     return [
-        (title, TORQUE_HEAD, torques),
-        ("torque matrix and copper loss in the worst of these poses", MATRIX_HEAD, matrices),
-        ("weakest poses", POSE_HEAD, [_weak_row(pose) for pose in verdict.weakest]),
+        Table(title, TORQUE_HEAD, torques),
+        Table("torque matrix and copper loss in the worst of these poses", MATRIX_HEAD, matrices),
+        Table("weakest poses", POSE_HEAD, [_weak_row(pose) for pose in verdict.weakest]),
     ]
 
 
@@ -123,7 +120,7 @@ def write_check(folder: Path, verdict: FieldVerdict, command: str, figure_format
         Exists.
     verdict : FieldVerdict
     command, figure_format : str
-        As in `markdown.write_page`.
+        As in `markdown.Page`.
 
     Raises
     ------
@@ -138,8 +135,8 @@ def write_check(folder: Path, verdict: FieldVerdict, command: str, figure_format
         "Comparison of the torque matrix with the summed field of all magnets on all windings, in random"
         " poses and for random currents, and of the methods with published values."
     )
-    sections = [*_section(*field_table(verdict)), sources_text(verdict), ""]
-    return _write(folder, "check", lead, verdict, sections, [drawing], command, figure_format)
+    section = _section(field_table(verdict), sources_text(verdict))
+    return _page("check", lead, verdict, [drawing], [section], command).write(folder, figure_format)
 
 
 def write_map(
@@ -155,7 +152,7 @@ def write_map(
     verdict : WorkspaceVerdict
         `torque_map.judge` of the survey.
     command, figure_format : str
-        As in `markdown.write_page`.
+        As in `markdown.Page`.
 
     Raises
     ------
@@ -169,9 +166,9 @@ def write_map(
         f" {verdict.largest_tilt_deg:g}°, least-norm currents give at least {least_norm_Nm:.3f} N·m in every"
         f" direction; the best currents give at least {best_Nm:.3f} N·m."
     )
-    sections = [line for table in workspace_tables(verdict) for line in _section(*table)]
-    sections += [MAP_TERMS, ""]
-    return _write(folder, "map", lead, verdict, sections, _maps(surveyed), command, figure_format)
+    *tables, last = workspace_tables(verdict)
+    sections = [*map(_section, tables), _section(last, MAP_TERMS)]
+    return _page("map", lead, verdict, _maps(surveyed), sections, command).write(folder, figure_format)
 
 
 def _maps(surveyed: TorqueSurvey) -> list[Drawing]:
@@ -199,24 +196,22 @@ def _maps(surveyed: TorqueSurvey) -> list[Drawing]:
     ]
 
 
-def _write(
-    folder: Path, part: str, lead: str, verdict: FieldVerdict | WorkspaceVerdict, sections: Sequence[str],
-    drawings: Sequence[Drawing], command: str, figure_format: str,
-) -> list[Path]:  # fmt: skip
-    """Write the page of a part: warnings and exceeded bounds are in its summary."""
+def _page(
+    part: str, lead: str, verdict: FieldVerdict | WorkspaceVerdict, drawings: Sequence[Drawing],
+    sections: Sequence[Section], command: str,
+) -> Page:  # fmt: skip
+    """Page of a part: warnings and exceeded bounds are in its summary."""
     warnings = [f"Warning: {warning}." for warning in verdict.warnings]
-    summary = [" ".join([lead, markdown.verdict(verdict.checks), *warnings])]
-    lines = ["## Figures", "", *map(markdown.figure, drawings), *sections]
-    lines += markdown.checks_section(verdict.checks)
-    return write_page(
-        folder, f"magnetics_{part}", TITLES[part], summary, lines, drawings, command, figure_format
-    )
+    summary = " ".join([lead, markdown.verdict(verdict.checks), *warnings])
+    sections = [
+        *markdown.figures_section(drawings), *sections, markdown.checks_section(verdict.checks)
+    ]  # fmt: skip
+    return Page(f"magnetics_{part}", TITLES[part], summary, sections, command)
 
 
-def _section(title: str, head: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:
-    """Lines of a section with one table."""
-    numbers = [place > 0 for place in range(len(head))]
-    return [f"## {title[0].upper()}{title[1:]}", "", *markdown.table(head, rows, numbers), ""]
+def _section(table: Table, text: str = "") -> Section:
+    """Section that has the title of its table."""
+    return Section(f"{table.title[0].upper()}{table.title[1:]}", [table._replace(title=""), text])
 
 
 def _weak_row(pose: WeakPose) -> tuple[str, ...]:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from html import escape
 from importlib.util import find_spec
 from pathlib import Path
@@ -122,36 +122,58 @@ class Drawing(NamedTuple):
     figure: Figure
 
 
-def table(head: Sequence[str], rows: Sequence[Sequence[str]], numbers: Sequence[bool]) -> list[str]:
-    """Lines of a table.
+class Table(NamedTuple):
+    """Rows of text under headings, for a page and for the terminal."""
 
-    Parameters
-    ----------
-    head : sequence of str
-        A heading for each column.
-    rows : sequence of sequence of str
-    numbers : sequence of bool
-        Whether each column contains numbers, aligned at the right.
-    """
-    return [
-        _row(head),
-        f"|{'|'.join('---:' if right else '---' for right in numbers)}|",
-        *(_row(row) for row in rows),
-    ]
+    title: str
+    """Stands above the table unless it is empty."""
+    head: Sequence[str]
+    rows: Sequence[Sequence[str]]
+    texts: int = 1
+    """Number of columns of words at the left; the others are numbers, aligned at the right."""
+    words: Sequence[str] = ()
+    """Headings of further columns of words."""
+
+    def lines(self) -> list[str]:
+        """Return the lines of Markdown."""
+        is_right = [place >= self.texts and name not in self.words for place, name in enumerate(self.head)]
+        rule = f"|{'|'.join('---:' if right else '---' for right in is_right)}|"
+        return [_row(self.head), rule, *map(_row, self.rows)]
 
 
-def figure(drawing: Drawing) -> str:
-    """A figure and, below it, what it shows."""
-    return f"![{drawing.caption}]({drawing.file})\n\n*{drawing.caption}*\n"
+class Section(NamedTuple):
+    """Section of a page."""
+
+    title: str
+    content: Sequence[str | Table | Drawing | Section]
+    """Texts in Markdown, tables, figures, and sections of the next level; empty texts are left out."""
+
+    def lines(self, level: int = 2) -> Iterator[str]:
+        """Yield the lines of Markdown, with a heading of some level."""
+        yield from (f"{'#' * level} {self.title}", "")
+        for part in self.content:
+            if isinstance(part, Section):
+                yield from part.lines(level + 1)
+            elif isinstance(part, Table):
+                yield from (f"**{part.title}**", "") if part.title else ()
+                yield from (*part.lines(), "")
+            elif isinstance(part, Drawing):
+                yield from (f"![{part.caption}]({part.file})", "", f"*{part.caption}*", "")
+            elif part:
+                yield from (part, "")
+
+    def drawings(self) -> Iterator[Drawing]:
+        """Yield the figures, also of inner sections."""
+        for part in self.content:
+            if isinstance(part, Section):
+                yield from part.drawings()
+            elif isinstance(part, Drawing):
+                yield part
 
 
 def _row(cells: Sequence[str]) -> str:
-    return f"| {' | '.join(_cell(cell) for cell in cells)} |"
-
-
-def _cell(text: str) -> str:
-    """Text in which no bar ends a cell of the table."""
-    return text.replace("|", "\\|")
+    """Row of a table; no bar in a text ends a cell."""
+    return f"| {' | '.join(cell.replace('|', chr(92) + '|') for cell in cells)} |"
 
 
 def prepare(folder: Path, *libraries: str) -> None:
@@ -174,50 +196,51 @@ def prepare(folder: Path, *libraries: str) -> None:
     make_folder(folder)
 
 
-def write_page(
-    folder: Path,
-    name: str,
-    title: str,
-    summary: Sequence[str],
-    sections: Sequence[str],
-    drawings: Iterable[Drawing],
-    command: str,
-    figure_format: str = "svg",
-) -> list[Path]:
-    """Write a page as Markdown and as self-contained HTML, and its figures; return the two pages.
+class Page(NamedTuple):
+    """Page of a command."""
 
-    Parameters
-    ----------
-    folder : Path
-        Exists.
-    name : str
-        Name of the page's files without the suffix.
-    title : str
-    summary, sections : sequence of str
-        Lines of Markdown.
-    drawings : iterable of Drawing
-        Figures to which the lines refer.
-    command : str
-        Command that creates the page.
-    figure_format : str
-        Format in which the figures are written in addition to SVG, as in `save_drawings`.
+    name: str
+    """Name of its files without the suffix."""
+    title: str
+    lead: str
+    """Summary in Markdown."""
+    sections: Sequence[Section]
+    command: str
+    """Command that creates the page."""
 
-    Raises
-    ------
-    InputError
-        A file cannot be written there.
-    """
-    save_drawings(folder, drawings, figure_format)
-    lines = [f"# {title}", "", *summary, "", *contents(sections), *sections, *foot(command)]
-    text = "\n".join(lines)
-    return [
-        save_text(folder / f"{name}.md", text),
-        save_text(folder / f"{name}.html", page(title, text, folder)),
-    ]
+    def write(self, folder: Path, figure_format: str = "svg") -> list[Path]:
+        """Write Markdown, self-contained HTML, and the figures into a folder that exists; return the pages.
+
+        Parameters
+        ----------
+        folder : Path
+        figure_format : str
+            Format in which the figures are written in addition to SVG, as in `save_drawings`.
+
+        Raises
+        ------
+        InputError
+            A file cannot be written there.
+        """
+        save_drawings(
+            folder, (drawing for section in self.sections for drawing in section.drawings()), figure_format
+        )
+        lines = [line for section in self.sections for line in section.lines()]
+        text = "\n".join(
+            [f"# {self.title}", "", self.lead, "", *contents(lines), *lines, *foot(self.command)]
+        )
+        return [
+            save_text(folder / f"{self.name}.md", text),
+            save_text(folder / f"{self.name}.html", page(self.title, text, folder)),
+        ]
 
 
-HEAD = ("check", "compared quantities", "states", "value", "bound", "passed", "reason for the bound")
-NUMBERS = (False, False, True, True, True, False, False)
+def figures_section(drawings: Iterable[Drawing]) -> list[Section]:
+    """Section of all figures of a page; none without a figure."""
+    return [Section("Figures", all_drawings)] if (all_drawings := tuple(drawings)) else []
+
+
+CHECK_HEAD = ("check", "compared quantities", "states", "value", "bound", "passed", "reason for the bound")
 
 
 def verdict(checks: Sequence[Check]) -> str:
@@ -227,9 +250,9 @@ def verdict(checks: Sequence[Check]) -> str:
     return f"Number of checks: {len(checks)}. {result}"
 
 
-def checks_section(checks: Iterable[Check]) -> list[str]:
+def checks_section(checks: Iterable[Check]) -> Section:
     """Section with a row for each check."""
-    return ["## Checks", "", *table(HEAD, [_check_row(check) for check in checks], NUMBERS), ""]
+    return Section("Checks", [Table("", CHECK_HEAD, list(map(_check_row, checks)), 2, CHECK_HEAD[-2:])])
 
 
 def _check_row(check: Check) -> tuple[str, ...]:

@@ -159,11 +159,13 @@ def print_written(paths: Sequence[Path]) -> None:
         tables.terminal_console().print(f"written  {escape(str(path))}", soft_wrap=True)
 
 
-def print_rows(title: str, head: Sequence[str], rows: Sequence[Sequence[str]], texts: int) -> None:
-    """Print a table whose first `texts` columns are words."""
+def print_rows(
+    title: str, head: Sequence[str], rows: Sequence[Sequence[str]], texts: int = 1, words: Sequence[str] = ()
+) -> None:
+    """Print a table of the fields of `pages.markdown.Table`."""
     table = tables.new_table(title, head[0], *head[1:])
-    for column in table.columns[1:texts]:
-        column.justify = "left"
+    for place, (column, name) in enumerate(zip(table.columns, head, strict=True)):
+        column.justify = "left" if not place or place < texts or name in words else "right"
     for row in rows:
         table.add_row(*(escape(cell) for cell in row))
     tables.print_table(table, labels=max(1, min(texts, 2, len(head) - 1)))

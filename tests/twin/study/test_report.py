@@ -216,7 +216,7 @@ def test_medians_by_condition_are_those_of_each_hinge(tmp_path):
         40, {"max_abs_error_rad": np.radians(errors_deg).max(axis=1)}, {"drive.delay_s": delays}, lost=[3]
     )
     rows = rows._replace(hinges_rad=np.radians(errors_deg))
-    lines = conditions.section(rows)
+    lines = conditions.section(rows)[0].lines()
     first, second = (line.split("|")[1:-1] for line in lines if "of 20" in line)
     assert [cell.strip() for cell in first[:3]] == ["0.001", "pd", "19 of 20"]
     worse = np.delete(errors_deg[:20, :2].max(axis=1), 3)
@@ -226,7 +226,7 @@ def test_medians_by_condition_are_those_of_each_hinge(tmp_path):
     tilt = summary(rows)["pd"]["max_abs_tilt_error_rad"]["median"]  # without γ, also in the printed table
     assert tilt == pytest.approx(np.median(np.radians(np.delete(errors_deg, 3, 0)[:, :2].max(axis=1))))
     assert summary(rows)["pd"]["max_abs_error_rad"]["median"] > 3 * tilt
-    assert [row[0] for row in report.medians(summary(rows))[1][1:2]] == ["largest tilt error, rad"]
+    assert [row[0] for row in report.medians(summary(rows)).rows[1:2]] == ["largest tilt error, rad"]
     assert (
         conditions.section(made(2, {"max_abs_error_rad": np.ones(2)}, {"drive.delay_s": delays[19:21]})) == []
     )

@@ -31,11 +31,10 @@ def drawing(name):
 
 def write(folder, figure_format="svg"):
     folder.mkdir()
-    drawings = [drawing("first"), drawing("second")]
-    sections = ["## Gains, `pd`", "", "### Errors", "", "## Errors", "", *map(markdown.figure, drawings)]
-    return markdown.write_page(
-        folder, "page", "A title", ["Two of three hold."], sections, drawings, "spheretwin x", figure_format,
-    )  # fmt: skip
+    gains = markdown.Section("Gains, `pd`", [markdown.Section("Errors", [])])
+    errors = markdown.Section("Errors", [drawing("first"), drawing("second")])
+    page = markdown.Page("page", "A title", "Two of three hold.", [gains, errors], "spheretwin x")
+    return page.write(folder, figure_format)
 
 
 def test_figures_of_a_page_have_text_a_title_and_identifiers_of_their_own(tmp_path):

@@ -18,7 +18,7 @@ from spheretwin.study.tuning.gains import section_of
 from spheretwin.study.tuning.trials import Ended
 from spheretwin.study.tuning.tuning import LawResult, ReportedTrial, TuningResult
 from spheretwin.viz.pages import markdown as pieces
-from spheretwin.viz.pages.markdown import Drawing, save_text, write_page
+from spheretwin.viz.pages.markdown import Drawing, Page, Section, Table, save_text
 
 if TYPE_CHECKING:
     from spheretwin.viz.figures import fronts
@@ -153,8 +153,6 @@ METHODS = {
     "random": "drawn at random",
     "local": "points of a Sobol sequence, then perturbations of the best within each limit",
 }
-ALIGNED = [False, False, True, True, False, False]
-"""Whether the columns of the ranges are numbers."""
 
 
 def write(
@@ -180,21 +178,20 @@ def write(
     """
     optimise = section_of(study)
     figures = drawings(study.name, result, optimise.objective) if can_be_drawn() else []
-    sections = ["## Method", "", *_what(study), ""]
-    sections += ["## Figures", "", *map(pieces.figure, figures)] if figures else []
-    for law, of_law in summary(result, optimise.objective)["laws"].items():
-        head, body = chosen(of_law)
-        table = pieces.table(head, body, [False, *(True for _ in head[1:])]) if body else [NONE_COMPLETED]
-        sections += [f"## {law}", "", counted(of_law), "", *table, ""]
+    sections = [Section("Method", _what(study)), *pieces.figures_section(figures)]
+    sections += [
+        Section(law, [counted(of_law), chosen(of_law) or NONE_COMPLETED])
+        for law, of_law in summary(result, optimise.objective)["laws"].items()
+    ]
     gains = json.dumps(best(result, optimise.objective), indent=1, ensure_ascii=False)
-    lead = [study.description, "", f"{result.trials} of {result.of} trials are finished."]
+    lead = f"{study.description}\n\n{result.trials} of {result.of} trials are finished."
     return [
-        *write_page(folder, NAME, study.name, lead, sections, figures, command, figure_format),
+        *Page(NAME, study.name, lead, sections, command).write(folder, figure_format),
         save_text(folder / GAINS, f"{gains}\n"),
     ]
 
 
-def _what(study: Study) -> list[str]:
+def _what(study: Study) -> list[str | Table]:
     """Objectives, method and ranges."""
     optimise = section_of(study)
     ranges = [
@@ -215,8 +212,7 @@ def _what(study: Study) -> list[str]:
         + (" A trial that can no longer be among the best is pruned." if optimise.prune else "")
         + _limits(optimise)
         + fresh,
-        "",
-        *pieces.table(["gain", "law", "from", "to", "fields", "reason"], ranges, ALIGNED),
+        Table("", ["gain", "law", "from", "to", "fields", "reason"], ranges, 2, ["fields", "reason"]),
     ]
 
 
@@ -257,16 +253,16 @@ def counted(of_law: Mapping[str, Any]) -> str:
 NONE_COMPLETED = "No trial completed."
 
 
-def chosen(of_law: Mapping[str, Any]) -> tuple[list[str], list[list[str]]]:
-    """Headings and rows of a table: gains, fields and objectives of the start and of the best or the front.
+def chosen(of_law: Mapping[str, Any], title: str = "") -> Table | None:
+    """Table of gains, fields and objectives of the start, and of the best or the front.
 
-    Without rows if no trial completed.
+    None if no trial completed.
     """
     labelled = [("start", of_law["start"])] if of_law["start"] else []
     labelled += [(str(candidate["trial"]), candidate) for candidate in of_law["best"]]
     values = next((list(candidate["values"]) for _, candidate in labelled if candidate["values"]), None)
     if values is None:
-        return [], []
+        return None
     columns = dict.fromkeys(
         [*labelled[0][1]["gains"], *(field for _, candidate in labelled for field in candidate["fields"])]
     )
@@ -283,4 +279,4 @@ def chosen(of_law: Mapping[str, Any]) -> tuple[list[str], list[list[str]]]:
         for figures, otherwise in groups if is_fresh else groups[:1]:
             cells += [f"{figures[name]:.4g}" if figures else otherwise for name in values]
         body.append([label, *cells])
-    return head, body
+    return Table(title, head, body)
