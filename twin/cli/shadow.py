@@ -27,6 +27,7 @@ from spheretwin.machine.state_estimation import (
     Shadowed,
     ShadowSettings,
     Verdict,
+    chi2_text,
     followed,
     shadow,
     signals,
@@ -132,7 +133,7 @@ def _print(result: Shadowed, settings: ShadowSettings, shift: tuple[float, float
     rows = [
         [
             ANGLES[i],
-            f"{chi2:.3f}",
+            chi2_text(chi2),
             f"{1e3 * result.rms_innovation_rad[i]:.3f}",
             f"{1e3 * deviations[0][i]:.3f}",
             f"{1e3 * deviations[1][i]:.2f}",

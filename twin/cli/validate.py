@@ -7,8 +7,10 @@ import argparse
 from spheretwin.cli.common import print_json, print_message
 from spheretwin.cli.log_options import add_logs, changes_of, check_given, read_logs, scenario_of
 from spheretwin.cli.options import Parser
+from spheretwin.machine.residuals import CHI2, QUANTITIES
+from spheretwin.machine.state_estimation import chi2_text
 from spheretwin.machine.twin_file import read_uncertainty
-from spheretwin.machine.validation import CHI2, Validation, validate
+from spheretwin.machine.validation import Validation, validate
 from spheretwin.viz.terminal import runs
 
 MOST_LINES = 5
@@ -38,9 +40,9 @@ def run(options: argparse.Namespace) -> bool:
                 "accepted": result.accepted,
                 "log_sha256": log.digest,
                 "accepted_findings": list(log.accepted),
-                "chi2": {"all": result.chi2, **result.hinge_chi2},
+                "chi2": {"all": result.fit.chi2, **result.fit.hinge_chi2},
                 "structure": result.structure,
-                "bins": result.bins,
+                "bins": result.fit.bins,
             }
         )
     else:
@@ -59,12 +61,13 @@ def _why(result: Validation) -> str:
         )
     return (
         f"not accepted: expected a mean square from {CHI2[0]:g} to {CHI2[1]:g} of that of the noise, received"
-        f" {result.chi2:.3g}"
+        f" {result.fit.chi2:.3g}"
     )
 
 
 def _print(result: Validation) -> None:
-    rows = [[name, f"{value:.3f}"] for name, value in {"all": result.chi2, **result.hinge_chi2}.items()]
+    fit = result.fit
+    rows = [[name, chi2_text(value)] for name, value in {"all": fit.chi2, **fit.hinge_chi2}.items()]
     runs.print_rows("residuals", ["hinge", "mean square over that of the noise"], rows, 1)
     if result.structure:
         rows = [
@@ -73,11 +76,11 @@ def _print(result: Validation) -> None:
         ]
         head = ["a change alone of", "explains", "unit", "standard deviations from 0"]
         runs.print_rows("what the residuals show", head, rows, 1)
-    worst = sorted(result.bins, key=lambda one: -abs(one.mean_rad) * one.rows**0.5 / one.rms_rad)[:MOST_LINES]
+    worst = sorted(fit.bins, key=lambda one: -abs(one.mean_rad) * one.rows**0.5 / one.rms_rad)[:MOST_LINES]
     rows = [
         [
             one.hinge,
-            one.by.rpartition("_rad")[0],
+            QUANTITIES[one.by],
             f"{one.low:.3g} to {one.high:.3g}",
             str(one.rows),
             f"{1e3 * one.mean_rad:+.3f}",
@@ -85,5 +88,5 @@ def _print(result: Validation) -> None:
         ]
         for one in worst
     ]
-    head = ["hinge", "by", "range, rad or rad/s", "rows", "mean residual mrad", "rms mrad"]
+    head = ["hinge", "by", "range", "rows", "mean residual mrad", "rms mrad"]
     runs.print_rows("largest mean residuals", head, rows, 2)

@@ -15,6 +15,7 @@ from scipy.stats import chi2
 from spheretwin.machine.intervals import Cost, Uncertainty, interval
 from spheretwin.machine.log import Log
 from spheretwin.machine.parameters import Machine, Parameter, priors, selected, short_names
+from spheretwin.machine.residuals import Fit, fit_of
 from spheretwin.machine.row_order import align_rows
 from spheretwin.machine.windows import Part, Shooting, Window, windows_of
 from spheretwin.models.base.errors import InputError
@@ -61,15 +62,6 @@ class Refusal(NamedTuple):
 
     parameters: tuple[str, ...]
     why: str
-
-
-class Fit(NamedTuple):
-    """Agreement of a machine with windows."""
-
-    chi2: float
-    """Mean square of the residuals in the noise of the sensors."""
-    rms_rad: Array
-    """(3,) root mean square of the residuals of each angle."""
 
 
 class Identified(NamedTuple):
@@ -195,7 +187,10 @@ class Problem:
         self.requested = selected(names, self.machine.model.actuator)
         if not self.requested:
             raise InputError("identification: expected at least one parameter, received none")
-        prior = priors(self.machine) if settings.nuisance else {}
+        prior = {}
+        if settings.nuisance:
+            for machine, log in zip(machines, logs, strict=True):
+                prior |= priors(machine, log)
         nuisance = [parameter for parameter in prior if parameter not in self.requested]
         self.parameters: list[Parameter] = [*self.requested, *nuisance]
         self.initial = np.array([self.machine.nominal(parameter) for parameter in self.parameters])
@@ -291,8 +286,8 @@ class Problem:
 
     def result(self, values: Array, covariance: Array, train: list[Part]) -> Identified:
         """Return the result, judged by the held-out windows."""
-        before = _fit(self.held_out.parts(self.initial, slopes=False), self.held_out)
-        after = _fit(self.held_out.parts(values, slopes=False), self.held_out)
+        before = fit_of(self.held_out.parts(self.initial, slopes=False), self.held_out)
+        after = fit_of(self.held_out.parts(values, slopes=False), self.held_out)
         improvement = 1 - np.sqrt(after.chi2 / before.chi2)
         is_right = self._is_right(after, values, covariance)
         reasons = [] if is_right else self._reasons(after, improvement)
@@ -310,7 +305,7 @@ class Problem:
             },
             refused=(),
             correlations=tuple(_correlations(covariance, self.requested)),
-            train=_fit(train, self.train),
+            train=fit_of(train, self.train),
             held_out=after,
             held_out_before=before,
             improvement=float(improvement),
@@ -360,15 +355,6 @@ def _split(
             f" {len(train) + len(held_out)}"
         )
     return train, held_out
-
-
-def _fit(parts: Sequence[Part], shooting: Shooting) -> Fit:
-    squares = sum(part.squares for part in parts)
-    used = sum(part.used for part in parts)
-    deviations, measured = (np.concatenate([one[place] for one in shooting.observed]) for place in (1, 0))
-    residual_rad = np.concatenate([part.residual for part in parts]) * deviations
-    residual_rad[np.isnan(measured)] = np.nan
-    return Fit(squares / used, np.sqrt(np.nanmean(residual_rad**2, axis=0)))
 
 
 # Information of a direction in which the data only determine changes that matter; with less it is refused. In

@@ -11,7 +11,9 @@ from numpy.typing import NDArray
 
 from spheretwin.electronics.drive_section import drive_sheet
 from spheretwin.electronics.transducers import HARMONICS
+from spheretwin.machine.log import Log
 from spheretwin.machine.model import Model, model_of
+from spheretwin.machine.row_order import OWN_STAMPS
 from spheretwin.models.actuator import Actuator
 from spheretwin.models.base.errors import InputError, did_you_mean
 from spheretwin.models.coil_group import PerGroup
@@ -261,16 +263,18 @@ def sensor_angles(setup: Setup, q: Array) -> Array:
     return reported
 
 
-def priors(machine: Machine) -> dict[Parameter, float]:
+def priors(machine: Machine, log: Log) -> dict[Parameter, float]:
     """Return the standard deviations of the errors that the data sheets of sensors and drive state.
 
-    They are nuisance parameters: a log that is explained without them gives other parameters a bias.
+    If the currents have stamps of their own, these are known to half a period of the angles. All are nuisance
+    parameters: a log that is explained without them gives other parameters a bias.
     """
     scenario, actuator = machine.model.scenario, machine.model.actuator
     sensors, drive = scenario.sensors, scenario.drive
     track = sensors.potentiometer
     adc_rad = sensors.adc.offset_V / track.volts_per_rad / sqrt(3)
     sheet = drive_sheet(drive)
+    stamps_s = float(np.median(np.diff(log.t_s))) / 2 if OWN_STAMPS in log.notes else 0.0
     # Four harmonics with amplitudes of 1/k² and any phase have about this share of their peak each.
     shares = np.repeat([0.5 / (k + 1) ** 2 for k in range(HARMONICS)], 2)
     sizes: dict[str, Any] = {
@@ -279,6 +283,7 @@ def priors(machine: Machine) -> dict[Parameter, float]:
         "sensor_residual_rad": np.tile(track.nonlinearity_rad * shares, 2),
         "plant.group_gain": [sheet["gain_error"] / sqrt(3)] * len(actuator.groups),
         "current_offset_A": [sheet["offset_error_A"] / sqrt(3)] * len(actuator.groups),
+        "delay_s": [stamps_s],
     }
     return {
         parameter: float(size)

@@ -18,6 +18,9 @@ Array = NDArray[np.float64]
 GAP_PERIODS = 2.5
 """Periods of a stream from which an interval is a gap."""
 
+OWN_STAMPS = "currents at times of their own, as means at the times of the angles"
+"""Note of a log whose currents had other stamps than the angles."""
+
 _SHORT, _MISSING = 0.7, 1.5  # periods: of a row between others, and where an angle is missing
 _COUNTED = 0.5  # share of equal successive angles from which a sensor counts: it is held, not interpolated
 _MOST_MISSING = 1000  # periods of the angles in which rows without them are inserted
@@ -102,8 +105,8 @@ def align_rows(log: Log) -> Log:
     held = log.currents == COMMANDED
     early_s = 0.0 if held else 0.5 * (ends - t_s)
     current_A = _interval_means(log.t_s, log.current_A, t_s - early_s, ends - early_s, held=held)
-    note = "currents at times of their own, as means at the times of the angles"
-    return replace(log, t_s=t_s, current_A=current_A, angle_rad=angle_rad, notes=(*log.notes, note))
+    notes = (*log.notes, OWN_STAMPS)
+    return replace(log, t_s=t_s, current_A=current_A, angle_rad=angle_rad, notes=notes)
 
 
 def _is_table(t_s: Array, has_angles: NDArray[np.bool_], has_currents: NDArray[np.bool_]) -> bool:

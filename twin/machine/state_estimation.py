@@ -94,6 +94,7 @@ class Shadow:
         self._t_s, self._present_A = np.empty(0), np.zeros(groups)
         self._sample_s, self._sample_A = np.empty(0), np.empty((0, groups))
         self._squares, self._counts = np.zeros(3), np.zeros(3)
+        self._first_rad, self._changes = np.full(3, np.nan), self.model.half_count_rad == 0
 
     def advance(self, log: Log) -> Table:
         """Advance over the next rows; the result does not depend on how a log is cut.
@@ -139,7 +140,7 @@ class Shadow:
         )
         self._t_s = log.t_s[-1:]
         normalised = estimates.innovation_rad / estimates.expected_rad
-        self._add(normalised, np.isfinite(angle_rad))
+        self._add(normalised, angle_rad)
         return _table(log.t_s, angle_rad, estimates, normalised)
 
     def verdict(self) -> Verdict:
@@ -147,6 +148,7 @@ class Shadow:
         chi2 = np.divide(self._squares, self._counts, out=np.full(3, np.nan), where=self._counts > 0)
         low, high = CONSISTENT
         counted = self.model.half_count_rad > 0
+        chi2[~self._changes & (chi2 <= high)] = np.nan
         within = np.isnan(chi2) | ((chi2 <= high) & (counted | (chi2 >= low)))
         return Verdict(dict(zip(HINGE_NAMES, map(float, chi2), strict=True)), bool(np.all(within)))
 
@@ -154,7 +156,14 @@ class Shadow:
         """Return mean and covariance of angles and rates at the last row, (6,) and (6, 6)."""
         return self._filter.mean[:6].copy(), self._filter.covariance[:6, :6].copy()
 
-    def _add(self, normalised: Array, used: NDArray[np.bool_]) -> None:
+    def _add(self, normalised: Array, angle_rad: Array) -> None:
+        used = np.isfinite(angle_rad)
+        for hinge, values in enumerate(angle_rad.T):
+            known = values[used[:, hinge]]
+            if len(known):
+                if np.isnan(self._first_rad[hinge]):
+                    self._first_rad[hinge] = known[0]
+                self._changes[hinge] |= bool(np.any(known != self._first_rad[hinge]))
         # Summed row by row, so that a cut changes nothing. Without a finite estimate the sum is infinite.
         with np.errstate(over="ignore"):  # the square of an estimate that has diverged is infinite
             squares = np.where(used, np.where(np.isfinite(normalised), normalised**2, np.inf), 0.0)
@@ -185,17 +194,20 @@ class Verdict(NamedTuple):
     """Agreement of a model with a log."""
 
     chi2: dict[str, float]
-    """Mean square of the innovations of each hinge over the expected one: 1 if the model is right."""
+    """Mean square of the innovations of each hinge over the expected one: 1 if the model is right.
+
+    NaN for a hinge that is not informative: without angles, or with a count that does not change.
+    """
     consistent: bool
 
     def text(self) -> str:
         """Return the verdict as a line."""
-        figures = ", ".join(f"{hinge} {value:.3f}" for hinge, value in self.chi2.items())
+        figures = ", ".join(f"{hinge} {chi2_text(value)}" for hinge, value in self.chi2.items())
         return f"model and machine are {'' if self.consistent else 'not '}consistent, χ² {figures}"
 
     def markdown(self, log: Log) -> str:
         """Return the verdict on a log as Markdown."""
-        rows = [f"| {hinge} | {value:.3f} |" for hinge, value in self.chi2.items()]
+        rows = [f"| {hinge} | {chi2_text(value)} |" for hinge, value in self.chi2.items()]
         findings = ", ".join(log.accepted)
         accepted = ["", f"Accepted findings of `log check`: {findings}."] if findings else []
         return "\n".join(
@@ -211,6 +223,11 @@ class Verdict(NamedTuple):
 
 
 HINGE_NAMES = ("alpha", "beta", "gamma")
+
+
+def chi2_text(chi2: float) -> str:
+    """Return a mean square over the expected one, or that the channel is not informative."""
+    return "not informative" if np.isnan(chi2) else f"{chi2:.3f}"
 
 
 class Shadowed(NamedTuple):

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spheretwin.machine.intervals import Z95
-from spheretwin.machine.validation import CHI2
+from spheretwin.machine.residuals import CHI2
 from spheretwin.machine.workflow import CHANGED_s, Judged, Workflow
 from spheretwin.models.base.checks import Check
 
@@ -100,7 +100,7 @@ def checks_of(result: Workflow) -> list[Check]:
             "validation",
             "mean square of the residuals of another motion over that of the noise",
             len(result.logs[-1].log),
-            result.after.validation.chi2,
+            result.after.validation.fit.chi2,
             CHI2[1],
             "noise explains the residuals",
             at_least=CHI2[0],

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spheretwin.machine.parameters import KINDS
+from spheretwin.machine.residuals import Bin
 from spheretwin.machine.state_estimation import HINGE_NAMES
-from spheretwin.machine.validation import Bin
 from spheretwin.machine.watching import WatchSettings
 from spheretwin.machine.workflow import CHANGED_s, Watched, Workflow
 from spheretwin.machine.workflow_checks import TRUE_COLUMNS, checks_of, rms_error, settled_errors
@@ -37,7 +37,7 @@ def figures(result: Workflow) -> dict[str, Any]:
             for name, one in result.identified.parameters.items()
         },
         "refused": result.without_payload.refused,
-        "chi2": {"before": result.before.validation.chi2, "after": result.after.validation.chi2},
+        "chi2": {"before": result.before.validation.fit.chi2, "after": result.after.validation.fit.chi2},
         "watch": [
             {"change": one.change.label if one.change else None, "alarms": one.alarms}
             for one in result.watched
@@ -190,7 +190,7 @@ def _validation_text(result: Workflow) -> str:
     wrong = [len(one.structure) for one in (before, after)]
     return (
         "`validate`: the mean square of the residuals over that of the noise, in the log that has not"
-        f" identified the twin, is {before.chi2:.2f} before and {after.chi2:.2f} after identification."
+        f" identified the twin, is {before.fit.chi2:.2f} before and {after.fit.chi2:.2f} after it."
         f" Parameters that the residuals show to be wrong: {wrong[0]} before, {wrong[1]} after. The table has"
         " the five clearest before. Each is tested alone, so a wrong torque also shows as others."
     )
@@ -245,7 +245,7 @@ def _drawings(result: Workflow) -> list[Drawing]:
             error, half = settled_errors(result, judged, name)
             columns[quantity][label] = twin.ErrorTrace(times[-len(error) :], 1e3 * error, 1e3 * half)
         for hinge, name in zip(ANGLES, HINGE_NAMES, strict=True):
-            bins = [one for one in judged.validation.bins if (one.hinge, one.by) == (name, "rate_rad_s")]
+            bins = [one for one in judged.validation.fit.bins if (one.hinge, one.by) == (name, "rate_rad_s")]
             residuals[hinge][label] = _bins(bins)
     panels = {
         one.change.label if one.change else "no change": twin.Sums(

@@ -116,8 +116,8 @@ def test_a_twin_is_identified_validated_and_simulated(log, tmp_path):
     assert figures["accepted_findings"] == ["jitter"]
     assert figures["log_sha256"] == read(log).digest
     assert figures["chi2"]["all"] == pytest.approx(1.0, abs=0.1)
-    # Six of three hinges by angle and by rate, if a count changes there.
-    assert 33 <= len(figures["bins"]) <= 36
+    # Six of three hinges by angle, by rate and by time, if a count changes there.
+    assert 48 <= len(figures["bins"]) <= 54
     _sweep_over(twin, tmp_path)
     result = call("validate", log, *MACHINE, *wrong)
     assert result.code == 1

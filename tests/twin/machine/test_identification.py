@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 import spheretwin
 from spheretwin.machine import Log, identify
-from spheretwin.machine.identification import unidentifiable
+from spheretwin.machine.identification import Problem, unidentifiable
 from spheretwin.machine.parameters import KINDS, Machine, members, selected, sensor_angles
 from spheretwin.machine.twin_file import draw_fields, write_twin
 from spheretwin.machine.windows import Shooting, Window, windows_of
@@ -175,6 +175,20 @@ def test_a_scenario_that_has_the_true_values_gives_a_covariance(empty):
     assert outcome.improvement < 0.05
     assert outcome.held_out.chi2 == pytest.approx(1.0, abs=0.1)
     assert np.all(np.diag(outcome.covariance) > 0)
+
+
+def test_stamps_of_another_topic_are_known_to_half_a_period(empty):
+    """Currents with stamps 0.5 ms late: the delay is a nuisance, with a value that removes it."""
+    rows = len(empty)
+    angles, currents = np.full((2 * rows, 3), np.nan), np.full((2 * rows, 18), np.nan)
+    angles[::2], currents[1::2] = empty.angle_rad, empty.current_A
+    late = Log(np.repeat(empty.t_s, 2) + np.tile([0.0, 5e-4], rows), currents, angles)
+    problem = Problem([late], SCENARIO, ["plant.coulomb_Nm"], {**KNOWN, **TRUE})
+    assert [one.name for one in problem.parameters[3:]] == ["delay_s"]
+    values, _, _ = problem.solve(lambda done, most: None)
+    # A commanded current acts 1 ms after its row, 0.5 ms after this stamp.
+    assert values[3] == pytest.approx(5e-4, abs=1e-4)
+    assert values[:3] == pytest.approx(TRUE["plant.coulomb_Nm"], abs=1.5e-4)
 
 
 def test_other_values_that_are_hardly_better_are_not_accepted(empty):

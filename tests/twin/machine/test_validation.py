@@ -5,8 +5,12 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from spheretwin.machine import validate
+import spheretwin
+from spheretwin.machine import shadow, validate
 from spheretwin.machine.intervals import Uncertainty
+from spheretwin.machine.model import model_of
+from spheretwin.machine.state_estimation import Shadow
+from tests.twin.machine.logs import log_of
 from tests.twin.machine.machine_logs import KNOWN, SCENARIO, changing_log
 
 
@@ -19,9 +23,9 @@ def test_the_true_twin_is_accepted(log):
     result = validate(log, SCENARIO, KNOWN)
     assert result.accepted, result.structure
     # Two standard deviations of 9,000 squares are 3 %; the plant of the log is MuJoCo's.
-    assert result.chi2 == pytest.approx(1.0, abs=0.06)
+    assert result.fit.chi2 == pytest.approx(1.0, abs=0.06)
     # Of gamma some 370 edges remain; the mean of as many squares of uniform errors deviates by 0.046.
-    for value in result.hinge_chi2.values():
+    for value in result.fit.hinge_chi2.values():
         assert value == pytest.approx(1.0, abs=0.12)
 
 
@@ -57,13 +61,28 @@ def test_errors_of_identified_values_are_no_structure(log):
 
 def test_bins_hold_every_row_with_the_mean_and_rms_of_their_residuals(log):
     result = validate(log, SCENARIO, {**KNOWN, "plant.coulomb_Nm": [0.0, 2e-3, 2e-3]})
-    for hinge in result.hinge_chi2:
-        angles = [one for one in result.bins if (one.hinge, one.by) == (hinge, "angle_rad")]
+    for hinge in result.fit.hinge_chi2:
+        angles = [one for one in result.fit.bins if (one.hinge, one.by) == (hinge, "angle_rad")]
         # The encoder is used where its count changes.
         counts = np.count_nonzero(np.diff(log.angle_rad[: 14 * 200 + 1, 2]))
         assert sum(one.rows for one in angles) == (counts if hinge == "gamma" else 14 * 200)
         assert all(first.high == second.low for first, second in pairwise(angles))
         assert all(abs(one.mean_rad) <= one.rms_rad for one in angles)
     # Missing friction about α: against the motion, so by rate from one sign to the other.
-    rates = [one for one in result.bins if (one.hinge, one.by) == ("alpha", "rate_rad_s")]
+    rates = [one for one in result.fit.bins if (one.hinge, one.by) == ("alpha", "rate_rad_s")]
     assert np.ptp([one.mean_rad for one in rates]) > 1e-4
+
+
+def test_a_hinge_whose_count_does_not_change_is_not_informative():
+    """No innovation and no residual of it is an agreement: its chi-squared was 0.000, and consistent."""
+    motion = {"trajectory.amplitude_rad": [0.2, 0.2, 0.0], "duration": 1.0}
+    run = spheretwin.simulate(SCENARIO, {**KNOWN, **motion})
+    log = log_of(run)
+    assert np.ptp(log.angle_rad[:, 2]) == 0.0
+    for chi2 in (validate(log, SCENARIO, KNOWN).fit.hinge_chi2, shadow(log, SCENARIO, KNOWN).chi2):
+        assert np.isnan(chi2["gamma"])
+        assert chi2["alpha"] == pytest.approx(1.0, abs=0.15)
+    running = Shadow(model_of(SCENARIO, KNOWN))
+    running.advance(log)
+    assert running.verdict().consistent
+    assert "gamma not informative" in running.verdict().text()
