@@ -133,8 +133,8 @@ class Experiment(NamedTuple):
     sections: Callable[[Outcomes], list[Section]]
     reduce: Callable[[Run], Any] = lambda run: None
     """Data that `sections` need in addition to the figures; the telemetry is released."""
-    row_fields: Callable[[Sequence[Outcome]], Mapping[str, Any]] = lambda outcomes: {}
-    """Entries of a case's row in the JSON that follow from its outcomes."""
+    row_fields: Callable[[Case, Sequence[Outcome]], Mapping[str, Any]] = lambda case, outcomes: {}
+    """Further entries of a case's row in the JSON."""
     findings: Callable[[Outcomes], list[Finding]] = lambda outcomes: []
     """Lines of the first page; none of cases that were not run."""
     trajectories: Callable[[Outcomes], Mapping[str, LawTrajectory]] = lambda outcomes: {}

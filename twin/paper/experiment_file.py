@@ -39,9 +39,10 @@ class ExperimentFile:
 
     Each ``[[case]]`` crosses the lists of the file that ``cross`` names, the last fastest; the list ``law``
     is that of `COMPARED_LAWS` unless the file has one. The entries of a list are columns of the case:
-    ``name`` is formatted with them, ``set`` gives the column of a field, ``details`` are columns of its row
-    in the JSON. ``fields`` of a case and of an entry are fields of the scenario, and ``expected`` are
-    statuses that are no failure, of all cases or by law.
+    ``name`` is formatted with them, ``set`` has the columns that are fields of the scenario, ``details``
+    those of its row in the JSON. An entry, and the case, may have further ``fields``. ``expected`` are
+    statuses that are no failure, of all cases or by law. An entry of another list that names a law has the
+    columns and the fields of the law too.
 
     Parameters
     ----------
@@ -49,12 +50,15 @@ class ExperimentFile:
         Of the file.
     part : str, optional
         Table of the file whose entries replace those of the file, if several experiments share one.
+    **lists
+        Lists that the file does not have.
     """
 
-    def __init__(self, name: str, part: str = "") -> None:
+    def __init__(self, name: str, part: str = "", **lists: Sequence[Mapping[str, Any]]) -> None:
         content = tomllib.loads((FOLDER / f"{name}.toml").read_text(encoding="utf-8"))
         self._content: dict[str, Any] = {"law": [law._asdict() for law in COMPARED_LAWS]}
-        self._content |= content | content.get(part, {})
+        self._content |= content | content.get(part, {}) | lists
+        self._laws = {law["law"]: law for law in self["law"]}
 
     def __getitem__(self, entry: str) -> Any:
         return self._content[entry]
@@ -66,7 +70,7 @@ class ExperimentFile:
 
     def case(self, **columns: Any) -> Case:
         """Return the first case with some columns."""
-        return next(self._with(columns))
+        return self._with(columns)[0]
 
     def runs(self, outcomes: Outcomes, **columns: Any) -> list[CaseRuns]:
         """Return the cases with some columns that were run, with their runs."""
@@ -91,23 +95,28 @@ class ExperimentFile:
 
     def experiment(self, **functions: Any) -> Experiment:
         """Experiment with the name, title and summary of the file."""
-        texts = (self[entry] for entry in ("name", "title", "summary"))
-        return Experiment(*texts, cases=lambda: self.cases, **functions)
+        name, title, summary = (self[entry] for entry in ("name", "title", "summary"))
+        functions.setdefault("cases", lambda: self.cases)
+        return Experiment(name, title, summary, **functions)
 
-    def _with(self, columns: Mapping[str, Any]) -> Iterable[Case]:
-        return iter(case for case in self.cases if columns.items() <= case.columns.items())
+    def _with(self, columns: Mapping[str, Any]) -> list[Case]:
+        return [case for case in self.cases if columns.items() <= case.columns.items()]
 
     def _block(self, block: Mapping[str, Any]) -> list[Case]:
         levels = (self[name] for name in block["cross"])
         return [self._case(block, entries) for entries in product(*levels)]
 
     def _case(self, block: Mapping[str, Any], entries: Sequence[Mapping[str, Any]]) -> Case:
-        columns = {name: value for entry in entries for name, value in entry.items()}
+        columns: dict[str, Any] = {}
+        if named := [entry["law"] for entry in entries if "law" in entry]:
+            entries = [self._laws[named[0]], *entries]
+        for entry in entries:
+            columns |= entry
         if {"law", "m", "L"} <= columns.keys():
             printed = printed_rad(columns["law"], columns["m"], columns["L"])
             columns["paper"] = printed and list(printed)
         fields = {field: columns[column] for field, column in block.get("set", {}).items()}
-        for entry in (block, *entries):
+        for entry in (*entries, block):
             fields |= entry.get("fields", {})
         expected = block.get("expected", {})
         statuses = expected.get(columns.get("law"), ["completed"]) if isinstance(expected, dict) else expected
@@ -115,10 +124,10 @@ class ExperimentFile:
             name=block["name"].format(**columns),
             scenario=columns.get("scenario", block.get("scenario", "")),
             fields=fields,
-            details={name: columns[name] for name in block.get("details", ())},
+            details={name: columns[column] for name, column in block.get("details", {}).items()},
             is_random=columns.get("is_random", True),
             single_run=block.get("single_run", False),
-            expected_statuses=tuple(map(Status, statuses)),
+            expected_statuses=tuple(Status(status) for status in statuses),
             comparable=block.get("comparable", True),
             columns=columns,
         )

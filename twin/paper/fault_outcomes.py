@@ -19,7 +19,7 @@ from spheretwin.models.actuator import Actuator
 from spheretwin.models.base.compiled import compiled
 from spheretwin.models.design.capability import LOST, torque_matrices
 from spheretwin.models.telemetry.table import Table
-from spheretwin.paper.experiment import Outcome
+from spheretwin.paper.experiment import Case, Outcome
 from spheretwin.run import Run
 from spheretwin.scenario.sections import Scenario
 from spheretwin.simulation import simulate
@@ -237,7 +237,7 @@ def reason(outcome: Outcome) -> str | None:
     return f"{data.remaining.least_share:.3f} of the commanded torque is delivered"
 
 
-def row_fields(outcomes: Sequence[Outcome]) -> Mapping[str, Any]:
+def row_fields(case: Case, outcomes: Sequence[Outcome]) -> Mapping[str, Any]:
     """Entries of the JSON: medians and ranges over the seeds, the smallest remaining torque."""
     data: list[FaultData] = [outcome.data for outcome in outcomes]
     remaining = [run.remaining for run in data if run.remaining is not None]

@@ -193,7 +193,7 @@ def _row(plan: Plan, case: Case, summary: CaseSummary, outcomes: Sequence[Outcom
         "statuses": dict(sorted(Counter(str(outcome.status) for outcome in outcomes).items())),
         "paper": None,
         **case.details,
-        **plan.experiment.row_fields(outcomes),
+        **plan.experiment.row_fields(case, outcomes),
     }
 
 

@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 
 from spheretwin.paper import page
-from spheretwin.paper.experiment import Array, Experiment, Finding, Outcome, Outcomes, ResultTable, Section
+from spheretwin.paper.experiment import Array, Case, Finding, Outcome, Outcomes, Section
+from spheretwin.paper.experiment_file import CaseRuns, Cells, ExperimentFile, column, table
 from spheretwin.paper.runner import measured_error
-from spheretwin.paper.tilt_cases import BY_LAW, CHANGES, TILT_LAWS, Change, TiltLaw, cases, printed
+from spheretwin.paper.sinusoid import STATUS
 from spheretwin.run import Run
 from spheretwin.viz.pages.markdown import Drawing
+
+FILE = ExperimentFile("figure11")
 
 ALPHA, BETA = 0, 1
 
@@ -33,56 +37,55 @@ def reduce(run: Run) -> Array:
     return page.window_maxima(error, WINDOW_s, run.scenario.controller.period_s)
 
 
-def errors_drawing(windows: Mapping[str, Sequence[Array]]) -> Drawing:
-    """Measured |error| of α and β over time.
+def row_fields(case: Case, outcomes: Sequence[Outcome]) -> Mapping[str, Any]:
+    """Errors of the paper's figure, for the JSON."""
+    law = case.columns
+    if "paper_deg" not in law:
+        return {}
+    paper = float(np.radians(law["paper_deg"]))
+    by_axis = [paper if axis in law["paper_axes"] else None for axis in range(3)]
+    return {"paper": by_axis, "paper_relation": law["relation"]}
 
-    Parameters
-    ----------
-    windows : mapping of law to (windows, 2) arrays, rad
-        One for each seed.
-    """
+
+def paper_text(law: CaseRuns) -> str:
+    """Largest error of α in the paper's figure, for a table."""
+    columns = law.case.columns
+    return f"{columns['relation']} {columns['paper_deg']:g}" if "paper_deg" in columns else page.NONE
+
+
+def errors_drawing(items: Sequence[CaseRuns]) -> Drawing:
+    """Measured |error| of α and β over time, of the laws as printed."""
     from spheretwin.viz.figures import over_time as figures
 
-    courses = {
-        f"{BY_LAW[law].label} ({paper_text(BY_LAW[law])})": figures.ErrorCourse(
-            law, np.degrees(page.padded(of_seeds)), BY_LAW[law].paper_deg or 0.0, BY_LAW[law].paper_axes
+    courses = {}
+    for item in items:
+        columns = item.case.columns
+        origin = f"paper {paper_text(item)}°" if "paper_deg" in columns else item["gains"]
+        courses[f"{item['label']} ({origin})"] = figures.ErrorCourse(
+            item["law"],
+            np.degrees(page.padded([run.data for run in item.runs])),
+            columns.get("paper_deg", 0.0),
+            tuple(columns.get("paper_axes", ())),
         )
-        for law, of_seeds in windows.items()
-    }
-    figure = figures.courses(
-        courses, WINDOW_s, ("α", "β"), "Tilt with the prototype's electronics: measured error"
-    )
-    caption = (
-        f"Largest measured |error| within each {1e3 * WINDOW_s:g} ms: median over the seeds, and their range"
-        " as a band. Dotted, and in the legend: the largest error of α in the paper's figure."
-    )
-    return Drawing("figure11_errors.svg", caption, figure)
+    title = "Tilt with the prototype's electronics: measured error"
+    figure = figures.courses(courses, WINDOW_s, ("α", "β"), title)
+    return FILE.drawing("printed", figure, window_ms=1e3 * WINDOW_s)
 
 
-def paper_text(law: TiltLaw) -> str:
-    """Printed value of a law, or the source of its gains if the paper does not have it."""
-    return f"paper {law.paper}°" if law.paper_deg else law.gains
-
-
-def changes_drawing(by_law: Mapping[str, Mapping[str, Errors]]) -> Drawing:
-    """Largest error of α under every single change, by law and change."""
+def changes_drawing(outcomes: Outcomes) -> Drawing:
+    """Largest error of α as printed and under every single change, by law."""
     from spheretwin.viz.figures import over_time as figures
 
-    groups = [
-        figures.ErrorGroup(
-            law,
-            BY_LAW[law].label,
-            [
-                figures.ErrorLine(label, np.degrees(measured), np.degrees(true))
-                for label, (measured, true) in errors.items()
-            ],
-            BY_LAW[law].paper_deg,
-        )
-        for law, errors in by_law.items()
-    ]
+    groups = []
+    for law in FILE["law"]:
+        lines = [
+            figures.ErrorLine(item.case.columns.get("change", "unchanged"), *map(np.degrees, _alpha(item)))
+            for item in FILE.runs(outcomes, law=law["law"])
+        ]
+        if lines:
+            groups.append(figures.ErrorGroup(law["law"], law["label"], lines, law.get("paper_deg")))
     figure = figures.lines(groups, "largest |error| of α, degrees", "One change at a time")
-    caption = "Largest |error| of α: median over the seeds, and range. Filled: measured. Hollow: true."
-    return Drawing("figure11_changes.svg", caption, figure)
+    return FILE.drawing("changes", figure)
 
 
 def estimators_drawing() -> Drawing:
@@ -92,41 +95,31 @@ def estimators_drawing() -> Drawing:
 
     curves = {kind: figures.Curve(*result) for kind, result in compare(BANDWIDTHS_rad_s.tolist()).items()}
     figure = figures.estimators(BANDWIDTHS_rad_s, curves, "Rates of the paper's sinusoid from noisy angles")
-    caption = "RMS error and lag of the estimated rate against the estimator's bandwidth, 0.02° rms of noise."
-    return Drawing("figure11_estimators.svg", caption, figure)
+    return FILE.drawing("rates", figure)
 
 
-MEASURED = (
-    "The paper's figure shows errors of sensors, so this figure has the *measured* error; the table also has"
-    " the true one. The nonlinearity of a potentiometer and the offset of its converter add to the true error"
-    " alone, noise to the measured error alone. The encoder of γ has steps of 0.18°, which hide its error. PD"
-    " has no integral and sags under the mass. In the paper its error of β is as large as that of α; here no"
-    " torque acts on β."
-)
-PRINTED_HEAD = (
-    "law", "gains", "status", "paper", "α measured", "β measured", "α true", "β true", "γ true",
-)  # fmt: skip
+def _hinge(error: str, axis: int) -> Callable[[CaseRuns], str]:
+    return lambda item: page.spread_deg(page.of_axis(item.runs, error, axis))
+
+
+MEASURED, TRUE = "measured_max_abs_error", "max_abs_error"
+PRINTED: Cells = {
+    "law": column("label"),
+    "gains": column("gains"),
+    **STATUS,
+    "paper": paper_text,
+    **{f"{name} measured": _hinge(MEASURED, axis) for axis, name in enumerate("αβ")},
+    **{f"{name} true": _hinge(TRUE, axis) for axis, name in enumerate("αβγ")},
+}
 
 
 def printed_section(outcomes: Outcomes) -> Section:
     """Errors of the laws next to the paper's, and their course."""
-    of_laws = [(law, runs) for law in TILT_LAWS if (runs := outcomes.runs(printed(law)))]
+    items = FILE.runs(outcomes, as_printed=True)
     title = "Largest |error| over the run in degrees: median over the seeds, and range"
-    windows = {law.law: [run.data for run in runs] for law, runs in of_laws}
-    table = [_printed_row(law, runs) for law, runs in of_laws]
     order = "".join(f" T{finding.text.removeprefix('t')}." for finding in _order(outcomes))
-    return Section(
-        "The laws as printed",
-        f"{MEASURED}{order}",
-        [ResultTable(title, PRINTED_HEAD, table, 3)],
-        [lambda: errors_drawing(windows)] if windows else [],
-    )
-
-
-def _printed_row(law: TiltLaw, runs: Sequence[Outcome]) -> tuple[str, ...]:
-    measured = [page.spread_deg(page.of_axis(runs, "measured_max_abs_error", axis)) for axis in (ALPHA, BETA)]
-    true = [page.spread_deg(page.of_axis(runs, "max_abs_error", axis)) for axis in range(3)]
-    return law.label, law.gains, page.statuses_text(runs), law.paper, *measured, *true
+    drawings = [lambda: errors_drawing(items)] if items else []
+    return FILE.section("printed", [table(title, items, PRINTED, 3)], drawings, order)
 
 
 def findings(outcomes: Outcomes) -> list[Finding]:
@@ -134,15 +127,20 @@ def findings(outcomes: Outcomes) -> list[Finding]:
     return [*_order(outcomes), *_sizes(outcomes)]
 
 
+def _printed(outcomes: Outcomes) -> list[CaseRuns]:
+    """Laws of the paper as printed, of which runs exist."""
+    laws = FILE.runs(outcomes, as_printed=True)
+    return [law for law in laws if "paper_deg" in law.case.columns]
+
+
 def _order(outcomes: Outcomes) -> list[Finding]:
     """Compare the order of the laws with the paper's, seed by seed."""
-    of_paper = [law for law in TILT_LAWS if law.paper_deg]
-    runs = [outcomes.runs(printed(law)) for law in of_paper]
-    if not all(runs):
+    of_paper = _printed(outcomes)
+    if len(of_paper) < sum("paper_deg" in law for law in FILE["law"]):
         return []
-    errors = np.array([page.of_axis(of_law, "measured_max_abs_error", ALPHA) for of_law in runs])
+    errors = np.array([page.of_axis(law.runs, MEASURED, ALPHA) for law in of_paper])
     right, seeds = int(np.sum(np.all(np.diff(errors, axis=0) < 0, axis=0))), errors.shape[1]
-    order = " > ".join(law.label for law in of_paper)
+    order = " > ".join(law["label"] for law in of_paper)
     text = f"the paper's order, {order}, holds for α under {right} of {seeds} seeds"
     return [Finding(right == seeds, text)]
 
@@ -150,106 +148,67 @@ def _order(outcomes: Outcomes) -> list[Finding]:
 def _sizes(outcomes: Outcomes) -> list[Finding]:
     """Compare the measured errors of α with the paper's."""
     texts, reproduced = [], True
-    for law in TILT_LAWS:
-        runs = outcomes.runs(printed(law))
-        if not law.paper_deg or not runs:
-            continue
-        median = float(np.degrees(np.median(page.of_axis(runs, "measured_max_abs_error", ALPHA))))
-        reproduced = reproduced and median <= REACHED * law.paper_deg
-        texts.append(f"{law.label} {median:.2f}° (paper {law.paper})")
+    for law in _printed(outcomes):
+        median = float(np.degrees(np.median(page.of_axis(law.runs, MEASURED, ALPHA))))
+        reproduced = reproduced and median <= REACHED * law["paper_deg"]
+        texts.append(f"{law['label']} {median:.2f}° (paper {paper_text(law)})")
     if not texts:
         return []
     why = "" if reproduced else "; its chapter lists the single changes with which a law reaches it"
     return [Finding(reproduced, f"largest measured error of α: {', '.join(texts)}{why}")]
 
 
-ONE_THING = (
-    "Each row changes one thing. The values come from scans: the gain with the paper's error, or the value"
-    " with the least error if none has it, as of corners and estimators. *Reached* means that the median over"
-    f" the seeds is at most {REACHED:g} times the paper's figure, which is read from a plot; *by the true"
-    " error* means that the measured error does not reach it. On ideal hardware (true angles and rates, no"
-    " delay, no friction, coils with the lag L/R alone) the remaining error comes from the corners of the"
-    " reference: its rate jumps, and no law has a feed-forward of the acceleration. A better estimator or"
-    " true rates do not reduce it."
-)
-CHANGE_HEAD = ("law", "single change", "reaches the paper", "paper", "α measured", "α true")
-
-
 def change_section(outcomes: Outcomes) -> Section:
     """Errors under every single change."""
-    by_change = [(change, _alpha(runs)) for change in CHANGES if (runs := outcomes.runs(change.case()))]
+    items = FILE.runs(outcomes, as_printed=False)
     title = "Largest |error| of α in degrees: median over the seeds, and range"
-    table = [_change_row(change, errors) for change, errors in by_change]
-    return Section(
-        "What brings each law to the paper's figure",
-        f"{ONE_THING}{_sufficient_changes(by_change)}",
-        [ResultTable(title, CHANGE_HEAD, table, 3)],
-        [lambda: changes_drawing(_by_law(outcomes, by_change))] if by_change else [],
-    )
+    tables = [table(title, items, CHANGES, 3)]
+    drawings = [lambda: changes_drawing(outcomes)] if items else []
+    return FILE.section("changes", tables, drawings, _sufficient_changes(items), times=REACHED)
 
 
-def reached(law: TiltLaw, measured: Array, true: Array) -> str:
+def reached(paper_deg: float | None, measured: Array, true: Array) -> str:
     """State if a law reaches the paper's figure, from the errors (rad) of all seeds."""
-    if law.paper_deg is None:
+    if paper_deg is None:
         return page.NONE
-    limit = REACHED * np.radians(law.paper_deg)
+    limit = REACHED * np.radians(paper_deg)
     if np.median(measured) <= limit:
         return "yes"
     return "by the true error" if np.median(true) <= limit else "no"
 
 
-def _change_row(change: Change, errors: Errors) -> tuple[str, ...]:
-    law = BY_LAW[change.law]
-    return law.label, change.label, reached(law, *errors), law.paper, *map(page.spread_deg, errors)
+def _reached(item: CaseRuns) -> str:
+    return reached(item.case.columns.get("paper_deg"), *_alpha(item))
 
 
-def _sufficient_changes(by_change: Sequence[tuple[Change, Errors]]) -> str:
+CHANGES: Cells = {
+    "law": column("label"),
+    "single change": column("change"),
+    "reaches the paper": _reached,
+    "paper": paper_text,
+    "α measured": _hinge(MEASURED, ALPHA),
+    "α true": _hinge(TRUE, ALPHA),
+}
+
+
+def _sufficient_changes(items: Sequence[CaseRuns]) -> str:
     """List the changes of each law that reach the paper's figure with the prototype's electronics."""
     labels: dict[str, list[str]] = {}
-    for change, errors in by_change:
-        law = BY_LAW[change.law]
-        if not change.ideal and reached(law, *errors) == "yes":
-            labels.setdefault(law.label, []).append(change.label)
+    for item in items:
+        if "hardware" in item.case.fields and _reached(item) == "yes":
+            labels.setdefault(item["label"], []).append(item["change"])
     text = "; ".join(f"{law} by {' or '.join(of_law)}" for law, of_law in labels.items())
     return f" What brings a law there with these electronics: {text}." if text else ""
 
 
-def _by_law(outcomes: Outcomes, by_change: Sequence[tuple[Change, Errors]]) -> dict[str, dict[str, Errors]]:
-    """Errors of each law as printed, and under each change."""
-    by_law: dict[str, dict[str, Errors]] = {}
-    for law in TILT_LAWS:
-        runs = outcomes.runs(printed(law))
-        errors = {"unchanged": _alpha(runs)} if runs else {}
-        errors |= {change.label: of_change for change, of_change in by_change if change.law == law.law}
-        if errors:
-            by_law[law.law] = errors
-    return by_law
-
-
-def _alpha(runs: Sequence[Outcome]) -> Errors:
-    return page.of_axis(runs, "measured_max_abs_error", ALPHA), page.of_axis(runs, "max_abs_error", ALPHA)
-
-
-RATES = (
-    "No sensor of the prototype measures a rate. A wider bandwidth passes more noise, a narrower one has a"
-    " larger lag: the figure shows both for the paper's sinusoid with the noise of the potentiometers. The"
-    " runs above use the Kalman filter with its default bandwidth, unless a row states another one."
-)
+def _alpha(item: CaseRuns) -> Errors:
+    return page.of_axis(item.runs, MEASURED, ALPHA), page.of_axis(item.runs, TRUE, ALPHA)
 
 
 def sections(outcomes: Outcomes) -> list[Section]:
     """Errors as printed, the changes, and the estimators."""
-    rates = Section("Where the rates come from", RATES, drawings=[estimators_drawing])
+    rates = FILE.section("rates", drawings=[estimators_drawing])
     return [printed_section(outcomes), change_section(outcomes), rates]
 
 
-EXPERIMENT = Experiment(
-    name="figure11",
-    title="Figure 11: the tilt with the prototype's electronics",
-    summary="The motion (60): α rises at π/30 rad/s for 2 s, holds 12° and falls, with 0.05 kg on the shaft"
-    " and gravity on; sensors, estimator, electronics and bearings are the prototype's.",
-    cases=cases,
-    sections=sections,
-    reduce=reduce,
-    findings=findings,
-)
+EXPERIMENT = FILE.experiment(sections=sections, reduce=reduce, row_fields=row_fields, findings=findings)

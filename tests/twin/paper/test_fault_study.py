@@ -233,7 +233,12 @@ def test_a_lost_direction_is_the_first_reason(study):
 
 def test_a_run_that_ends_before_the_fault_has_no_ratio():
     assert np.isnan(reduce(opened(0, 1.0, 0.5)).ratio)
-    assert json.loads(json.dumps(row_fields([outcome(float("nan"))]), allow_nan=False))["error_ratio"] is None
+    assert (
+        json.loads(json.dumps(row_fields(fault_cases.HEALTHY, [outcome(float("nan"))]), allow_nan=False))[
+            "error_ratio"
+        ]
+        is None
+    )
 
 
 def test_a_figure_parts_the_good_from_the_bad_with_the_fewest_errors():

@@ -6,10 +6,9 @@ import pytest
 from spheretwin.paper import readings
 from spheretwin.paper.experiment import Outcomes
 from spheretwin.paper.laws import PAPER_LAWS, PRINTED_rad, printed_rad
-from spheretwin.paper.readings import AS_SHIPPED, READINGS, case
+from spheretwin.paper.readings import READINGS, case
 from spheretwin.paper.runner import scenario_of
-from spheretwin.paper.sinusoid import Condition
-from spheretwin.paper.sinusoid import case as of_figure
+from spheretwin.paper.sinusoid import FIGURE6, FIGURE7
 from tests.twin.paper.cases import outcome
 
 
@@ -17,7 +16,7 @@ def made_up(ratio, only=READINGS):
     """Outcomes that are so many times the printed ones, by reading."""
     return Outcomes(
         {
-            case(reading, law, *condition).name: [
+            case(reading, law.law, *condition).name: [
                 outcome(ratio(reading) * np.array(printed_rad(law.law, *condition)), saturated_fraction=0.0)
             ]
             for reading in only
@@ -29,17 +28,17 @@ def made_up(ratio, only=READINGS):
 
 def test_the_shipped_reading_is_what_figures_6_and_7_run():
     for law in PAPER_LAWS:
-        for at in PRINTED_rad:
-            ours = scenario_of(case(AS_SHIPPED, law, *at), None)
-            assert ours == scenario_of(of_figure(law, Condition(*at)), None)
+        for (m, L), figure in zip(PRINTED_rad, (FIGURE6, FIGURE7), strict=True):
+            ours = scenario_of(case(READINGS[0], law.law, m, L), None)
+            assert ours == scenario_of(figure.case(law=law.law, m=m, L=L), None)
 
 
 def test_a_reading_is_level_rate_and_slope_and_nothing_else():
     for reading in READINGS:
-        scenario = scenario_of(case(reading, PAPER_LAWS[-1], 0.2, 1.0), None)
-        assert scenario.controller.level == reading.level
-        assert scenario.controller.period_s == pytest.approx(1 / reading.rate_Hz)
-        assert scenario.controller.surface_slope == ((reading.surface_slope or 50.0),) * 3
+        scenario = scenario_of(case(reading, "afsm", 0.2, 1.0), None)
+        assert scenario.controller.level == reading["level"]
+        assert f", {1e-3 / scenario.controller.period_s:g} kHz" in reading["reading"]
+        assert scenario.controller.surface_slope == ((reading.get("slope", 50.0)),) * 3
         assert scenario.controller.reaching_gain == (20.0,) * 3
 
 
@@ -54,9 +53,9 @@ def test_score_is_the_rms_of_the_logarithm():
 def test_the_finding_names_the_nearest_reading():
     (finding,) = readings.findings(made_up(lambda reading: 1.1 if reading is READINGS[2] else 3.0))
     assert finding.reproduced
-    assert READINGS[2].label in finding.text
+    assert READINGS[2]["reading"] in finding.text
     # Gains other than the printed ones are no reading of the paper.
-    (finding,) = readings.findings(made_up(lambda reading: 1.1 if reading.surface_slope else 3.0))
+    (finding,) = readings.findings(made_up(lambda reading: 1.1 if "slope" in reading else 3.0))
     assert not finding.reproduced
     assert "λ = 5" in finding.text
     assert "AFSM's errors then differ from the print by a factor of 1.10 to 1.10 at L = 1 and" in finding.text

@@ -51,7 +51,10 @@ def test_a_limit_leaves_the_first_cases():
 
 
 def test_what_is_kept_of_a_run_is_handed_on():
-    reductions = {"reduce": lambda run: len(run.telemetry), "row_fields": lambda runs: {"n": runs[0].data}}
+    reductions = {
+        "reduce": lambda run: len(run.telemetry),
+        "row_fields": lambda case, runs: {"n": runs[0].data},
+    }
     plan = make_plan(experiment(IDEAL, **reductions), 1)
     assert rows(plan, run_plan(plan))[0]["n"] == 200
 

@@ -7,9 +7,11 @@ from spheretwin import scenario as scenarios
 from spheretwin.control.laws.pid import BANDWIDTH_rad_s
 from spheretwin.paper import tilt
 from spheretwin.paper.runner import make_plan, run_plan
-from spheretwin.paper.tilt_cases import BY_LAW, CHANGES, TILT_LAWS, printed
 from spheretwin.scenario.fields import flat
 from spheretwin.viz.theme import LAW_COLOURS, LAW_MARKS
+
+PRINTED = {case.columns["law"]: case for case in tilt.FILE.cases if case.columns["as_printed"]}
+CHANGED = [case for case in tilt.FILE.cases if not case.columns["as_printed"]]
 
 COMPILES = pytest.mark.release("compiles a loop for 12 s; content of figure 11 has its tables")
 
@@ -21,23 +23,23 @@ def outcomes():
 
 
 def test_laws_are_the_paper_s_a_tuned_pid_and_ours():
-    assert [law.law for law in TILT_LAWS] == ["pd", "adaptive_fuzzy", "afsm", "pid", "afsm_eso"]
-    for looks in zip(*((LAW_COLOURS[law.law], *LAW_MARKS[law.law]) for law in TILT_LAWS), strict=True):
-        assert len(set(looks)) == len(TILT_LAWS)  # distinct by colour, by marker and by dash
-    assert f"{BANDWIDTH_rad_s:g} 1/s" in BY_LAW["pid"].gains
-    for law in TILT_LAWS:
-        scenario = scenarios.load("tilt", printed(law).fields)
+    assert list(PRINTED) == ["pd", "adaptive_fuzzy", "afsm", "pid", "afsm_eso"]
+    for looks in zip(*((LAW_COLOURS[law], *LAW_MARKS[law]) for law in PRINTED), strict=True):
+        assert len(set(looks)) == len(PRINTED)  # distinct by colour, by marker and by dash
+    assert f"{BANDWIDTH_rad_s:g} 1/s" in PRINTED["pid"].columns["gains"]
+    for law, case in PRINTED.items():
+        scenario = scenarios.load("tilt", case.fields)
         assert scenario.hardware == "electronics"
         assert scenario.plant.payload_kg == 0.05
-        preset = {"preset": "prototype"} if law.law == "afsm_eso" else {}
+        preset = {"preset": "prototype"} if law == "afsm_eso" else {}
         assert scenario.controller == type(scenario.controller)(**preset)  # printed gains are the defaults
 
 
 @pytest.mark.parametrize(
-    "change", [change for change in CHANGES if not change.ideal], ids=lambda each: each.case().name
+    "case", [case for case in CHANGED if "hardware" in case.fields], ids=lambda case: case.name
 )
-def test_a_change_is_of_one_thing_alone(change):
-    cases = change.case(), printed(BY_LAW[change.law])
+def test_a_change_is_of_one_thing_alone(case):
+    cases = case, PRINTED[case.columns["law"]]
     changed, unchanged = (flat(scenarios.load("tilt", case.fields).model_dump(mode="json")) for case in cases)
     fields = {name for name in changed | unchanged if changed.get(name) != unchanged.get(name)}
     sections, named = ({name.split(".")[place] for name in fields} for place in (0, 1))
@@ -49,7 +51,7 @@ def test_a_change_is_of_one_thing_alone(change):
 
 @COMPILES
 def test_order_of_the_paper_is_kept_and_the_tuned_laws_are_ahead(outcomes):
-    errors = [[run.measured_max_abs_error[0] for run in outcomes[printed(law).name]] for law in TILT_LAWS]
+    errors = [[run.measured_max_abs_error[0] for run in outcomes[case.name]] for case in PRINTED.values()]
     assert np.all(np.diff(errors[:3], axis=0) < 0)
     assert np.all(np.max(errors[3:], axis=0) < errors[2])
     assert "holds for α under 2 of 2 seeds" in tilt.printed_section(outcomes).text
@@ -78,5 +80,5 @@ def test_one_change_brings_each_law_to_the_paper(outcomes):
 
 def test_reached_is_by_the_median():
     errors = ([0.1, 0.126, 9.0], [1.0]), ([0.127], [0.1]), ([0.127], [0.127])  # 1.05 times 0.12 is the bound
-    said = [tilt.reached(BY_LAW["afsm"], *map(np.radians, each)) for each in errors]
+    said = [tilt.reached(0.12, *map(np.radians, each)) for each in errors]
     assert said == ["yes", "by the true error", "no"]
