@@ -122,6 +122,7 @@ def follow(
     log: NDArray[np.float64] | None = None,
     journal: Sequence[Change] = (),
     live: bool = False,
+    short_chunks: bool = False,
     stop_requested: Callable[[], bool] = lambda: False,
 ) -> Status:
     """Advance a session to a tick, and pass every chunk to the sinks.
@@ -140,6 +141,8 @@ def follow(
         Changes during the run, each applied before its tick.
     live : bool
         True for the pace of the clock, in chunks of 20 ms.
+    short_chunks : bool
+        True for chunks of 20 ms without the pace of the clock: an external part has its own.
     stop_requested : callable
         Called between chunks; True ends the run with the status ``interrupted``.
 
@@ -155,7 +158,7 @@ def follow(
     """
     sinks, pending = list(sinks), list(journal)
     session.check_horizon(_known_to(ticks, pending))
-    chunk = _chunk_ticks(session.scenario, live)
+    chunk = _chunk_ticks(session.scenario, live or short_chunks)
     session.compile()
     started, first = time.perf_counter(), session.t_s
     reported, messages = _report_events(session, 0, sinks), FaultMessages()
@@ -212,8 +215,8 @@ def _advance(session: Session, last: int, log: NDArray[np.float64] | None) -> Ta
     return Table(session.signals, rows[: session.advance_into(rows)])
 
 
-def _chunk_ticks(scenario: Scenario, live: bool) -> int:
-    if live:
+def _chunk_ticks(scenario: Scenario, short: bool) -> int:
+    if short:
         return max(1, round(LIVE_CHUNK_S / scenario.controller.period_s))
     return max(1, CHUNK_STEPS // scenario.substeps)
 

@@ -17,6 +17,7 @@ from typing import NamedTuple
 from spheretwin.cli.bench import PORT
 from spheretwin.cli.common import print_json
 from spheretwin.cli.options import Parser
+from spheretwin.machine.link.real_time import PRIORITY, real_time
 from spheretwin.models.base import cache
 from spheretwin.models.base.extras import PURPOSES, install_command, missing_packages
 
@@ -42,9 +43,9 @@ def declare(parser: Parser) -> None:
     """Declare the arguments of the verb."""
     parser.define(
         run,
-        "Print versions, compile cache, cores, vector width, viewer, browser, ports, and the extras that"
-        " are missing with the command that installs each. Nothing is changed, and no other machine is"
-        " contacted.",
+        "Print versions, compile cache, cores, vector width, viewer, browser, ports, permissions for real"
+        " time, and the extras that are missing with the command that installs each. Nothing is changed, and"
+        " no other machine is contacted.",
         "--json  print the findings as JSON, alone on stdout",
     )
 
@@ -69,6 +70,7 @@ def report() -> dict[str, list[Finding]]:
     return {
         "needed": [*versions(), compile_cache(), processor()],
         "to see a run": [viewer(), graphics(), browser(), bench_port()],
+        "real time": real_time_permissions(),
         "extras": list(extras()),
     }
 
@@ -157,6 +159,25 @@ def bench_port() -> Finding:
     return Finding(
         "port of the bench", f"{PORT} is in use", ok=False, advice="bench --port 0 takes a free one"
     )
+
+
+def real_time_permissions() -> list[Finding]:
+    """Return what the system permits to `drive` and `machine --real-time`; it is tried for a moment."""
+    with real_time() as granted:
+        pass
+    texts = (
+        ("memory in RAM", granted.locked_memory, "ulimit -l unlimited", "memlock unlimited"),
+        ("priority", granted.priority, f"ulimit -r {PRIORITY}", f"rtprio {PRIORITY}"),
+    )
+    return [
+        Finding(
+            name,
+            "permitted" if permitted else "not permitted",
+            ok=permitted,
+            advice="" if permitted else f"Linux: {command}, or {limit} in /etc/security/limits.conf",
+        )
+        for name, permitted, command, limit in texts
+    ]
 
 
 def extras() -> Iterator[Finding]:

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from typing import Any
 
 from spheretwin.cli.common import interruptible, print_message, warn
-from spheretwin.cli.machine import OUTPUTS, add_frame_option, read_scenario, run_session
+from spheretwin.cli.machine import OUTPUTS, add_frame_option, read_scenario, rehearse_run, run_session
 from spheretwin.cli.options import Parser, from_zero, number
 from spheretwin.machine.files import conditions_of
 from spheretwin.machine.link.controller_scenario import left_out
@@ -84,24 +84,28 @@ def run(options: argparse.Namespace) -> bool:
     shadow = RunningShadow(Shadow(scenario)) if options.shadow else None
     if shadow:
         check_writable(options.shadow, ".parquet")
+    period_s, conditions = scenario.controller.period_s, conditions_of(scenario.plant.payload_kg)
     with (
         interruptible() as stop_requested,
         open_link(options, scenario, stop_requested, shadow=shadow) as link,
-        link.session(scenario) as session,
     ):
-        period_s, conditions = scenario.controller.period_s, conditions_of(scenario.plant.payload_kg)
-        log = LogFile(options.log, link.late_ticks, period_s, conditions) if options.log else None
+
+        def logs() -> list[LogFile]:
+            return [LogFile(options.log, link.late_ticks, period_s, conditions)] if options.log else []
+
+        session = link.session(scenario, lambda stand_in: rehearse_run(stand_in, options, logs()))
+        log = logs()
 
         def finish() -> None:
             link.release()
-            if log:
-                log.close()
+            for file in log:
+                file.close()
             if shadow and (estimates := shadow.telemetry()):
                 estimates.write_parquet(options.shadow, {"log": "link"})
                 print_message(f"shadow: {shadow.shadow.verdict().text()}")
 
-        law, sinks = scenario.controller.law, [log] if log else []
-        return run_session(session, options, law, link.figures, lambda: link.ending, finish, sinks)
+        with session:
+            return run_session(session, options, scenario.controller.law, link, finish, log)
 
 
 def open_link(

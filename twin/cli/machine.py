@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable, Mapping, Sequence
-from typing import Any
+from collections.abc import Callable, Sequence
+from contextlib import nullcontext
+from pathlib import Path
+from tempfile import TemporaryDirectory
 
 from spheretwin import outputs
 from spheretwin import scenario as scenarios
@@ -13,7 +15,10 @@ from spheretwin.cli.options import Parser, number
 from spheretwin.machine.link import frame_format
 from spheretwin.machine.link.channel import Channel
 from spheretwin.machine.link.frame_format import DEFAULT_FRAME
+from spheretwin.machine.link.machine_link import Link
 from spheretwin.machine.link.machine_server import MachineServer
+from spheretwin.machine.link.real_time import real_time
+from spheretwin.machine.link.rehearsal import FileThread, rehearse
 from spheretwin.machine.link.transports import Transport, Udp, open_transport
 from spheretwin.metrics.tracking import BAND_rad
 from spheretwin.models.base.errors import InputError
@@ -93,15 +98,15 @@ def run(options: argparse.Namespace) -> bool:
                 idle_s=options.idle_s,
                 stop_requested=stop_requested,
             )
+            with Session(scenario, external=server.to_stand_in()) as rehearsal:
+                rehearse_run(rehearsal, options)  # the controller does not wait for what is done first
             with Session(scenario, external=server) as session:
-                session.compile()  # the controller does not wait for it
                 print_message(f"listening at {_address(options.listen, transport)}")
                 return run_session(
                     session,
                     options,
                     "an external controller",
-                    server.figures,
-                    lambda: server.ending,
+                    server,
                     lambda: server.finish(session.t_s, session.q_rad),
                 )
         finally:
@@ -135,12 +140,26 @@ def _address(given: str, transport: Transport) -> str:
     return f"{given.rpartition(':')[0]}:{transport.port}" if isinstance(transport, Udp) else given
 
 
+def rehearse_run(session: Session, options: argparse.Namespace, sinks: Sequence[Sink] = ()) -> None:
+    """Run a session with a stand-in to files of the same kinds, which are removed."""
+    scenario = session.initial_scenario
+    with TemporaryDirectory() as folder:
+        record, telemetry = (
+            path and Path(folder, Path(path).name) for path in (options.record, options.telemetry)
+        )
+        figures = Figures(PlannedRun(scenario, session.actuator, scenario.ticks))
+        files = Outputs(session, record, telemetry)
+        try:
+            rehearse(session, [figures, *sinks, FileThread(files.sinks)])
+        finally:
+            files.close()
+
+
 def run_session(
     session: Session,
     options: argparse.Namespace,
     law: str,
-    figures_of_link: Callable[[], Mapping[str, Any]],
-    ending: Callable[[], str],
+    part: Link | MachineServer,
     finish: Callable[[], object],
     sinks: Sequence[Sink] = (),
 ) -> bool:
@@ -153,10 +172,8 @@ def run_session(
         Of the command line.
     law : str
         Name of the controller, for the title.
-    figures_of_link : callable
-        Counts of frames and distributions of times.
-    ending : callable
-        Reason for which the external part ended the run.
+    part : Link or MachineServer
+        External part.
     finish : callable
         Called once after the last tick, also after an error.
     sinks : sequence of Sink
@@ -165,17 +182,22 @@ def run_session(
     scenario = session.initial_scenario
     figures = Figures(PlannedRun(scenario, session.actuator, scenario.ticks))
     files = Outputs(session, options.record, options.telemetry)
+    file_sinks = [FileThread(files.sinks)] if part.real_time else files.sinks
+    granted = None
     try:
-        with timers_stopped():
+        with timers_stopped(), real_time() if part.real_time else nullcontext() as granted:
             try:
-                status = follow(session, scenario.ticks, [figures, *sinks, *files.sinks])
+                all_sinks = [figures, *sinks, *file_sinks]
+                status = follow(session, scenario.ticks, all_sinks, short_chunks=True)
             finally:
                 finish()
     finally:
         errors = files.close()
     warnings = [*session.warnings(), *figures.warnings()]
-    result = {**summary(session, status, figures.values(), warnings), "link": figures_of_link()}
-    why = session.reason.text if session.reason else ending() or None
+    result = {**summary(session, status, figures.values(), warnings), "link": part.figures()}
+    if granted:
+        result["link"]["real_time"] = granted._asdict()
+    why = session.reason.text if session.reason else part.ending or None
     result["reason"] = why
     if options.json:
         print_json(result)

@@ -9,7 +9,7 @@ from typing import Any
 from spheretwin.machine.link.codec import Codec, Values
 from spheretwin.machine.link.decoder import Counts, Decoder
 from spheretwin.machine.link.frame_format import FrameFormat
-from spheretwin.machine.link.transports import Transport
+from spheretwin.machine.link.transports import StandIn, Transport
 
 SHOWN_FRAMES = 3
 """Frames of each direction that a channel reports."""
@@ -50,12 +50,30 @@ class Channel:
         report: Callable[[str], None] | None = None,
     ) -> None:
         self.transport, self.groups = transport, groups
+        self._formats = sends, receives
         self._encoder = Codec(sends, groups)
         self._decoder = Decoder(Codec(receives, groups), datagrams=transport.datagrams)
         self._report = report
         self.has_echo = receives.has("echo")
         self.modulus = min(sends.modulus("sequence"), receives.modulus("echo"))
         self._shown = {"sent": 0, "received": 0}
+
+    def stand_in(self, values: Callable[[Values], Mapping[str, Any]]) -> tuple[Channel, StandIn]:
+        """Return a channel to a stand-in of the peer, and the stand-in.
+
+        Parameters
+        ----------
+        values : callable
+            Returns the values of the reply to those of a frame, and of the peer's first frame to none.
+        """
+        sends, receives = self._formats
+        sent, replies = Codec(sends, self.groups), Codec(receives, self.groups)
+
+        def reply(content: bytes) -> bytes:
+            return replies.encode(values(sent.decode(content) or {}))
+
+        peer = StandIn(reply)
+        return Channel(peer, sends, receives, self.groups), peer
 
     @property
     def counts(self) -> Counts:

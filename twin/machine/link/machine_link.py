@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from copy import deepcopy
 from typing import Annotated, Any, Protocol
 
 import numpy as np
@@ -18,6 +19,7 @@ from spheretwin.machine.link.codec import Values
 from spheretwin.machine.link.controller_scenario import check_measurement, controller_scenario
 from spheretwin.machine.link.frame_format import DEFAULT_FRAME, Flags
 from spheretwin.machine.link.limits import CoilHeat, Limits
+from spheretwin.machine.link.rehearsal import rehearse
 from spheretwin.machine.link.timing import Distribution
 from spheretwin.machine.link.transports import open_transport
 from spheretwin.models.base.errors import InputError, SpheretwinError, distinct_texts
@@ -49,6 +51,9 @@ class ParallelShadow(Protocol):
         The angles are NaN if no new measurement had arrived.
         """
 
+    def new(self) -> ParallelShadow:
+        """Return an estimator of the same machine at its start."""
+
 
 class LinkSettings(SettingsModel):
     """Settings of the drive of a machine."""
@@ -68,6 +73,10 @@ class LinkSettings(SettingsModel):
     lockstep: bool = Field(
         False, description="whether a tick waits for the reply of the machine instead of the clock"
     )
+
+
+def _rehearsed(session: Session) -> None:
+    rehearse(session, ())
 
 
 class Link:
@@ -99,6 +108,8 @@ class Link:
         Share of the commands that is sent at the next tick.
     ending : str
         Reason for which the run ended early; empty otherwise.
+    real_time : bool
+        Ticks follow the clock.
     late_ticks : set of int
         Ticks that had no new measurement.
     latency, jitter : Distribution
@@ -122,6 +133,7 @@ class Link:
         self.authority = 1.0 if settings.armed and settings.ramp_s == 0 else 0.0
         self.latency, self.jitter = Distribution(), Distribution()
         self.late_ticks: set[int] = set()
+        self.real_time = not settings.lockstep
         self._settings, self._limits, self._heat, self._period_s = settings, limits, heat, period_s
         self._shadow, self._stop_requested, self._now = shadow, stop_requested, now
         self._sequence = 0
@@ -191,8 +203,14 @@ class Link:
         heat = CoilHeat(resolved.drive, limits, period_s)
         return cls(channel, f"a machine at {address}", settings, limits, heat, period_s, **options)
 
-    def session(self, scenario: Scenario) -> Session:
+    def session(self, scenario: Scenario, rehearsed: Callable[[Session], object] = _rehearsed) -> Session:
         """Return a session of the controller of a scenario whose plant is the machine, ready to run.
+
+        Parameters
+        ----------
+        scenario : Scenario
+        rehearsed : callable
+            Runs a session whose plant is a stand-in; default: without sinks.
 
         Raises
         ------
@@ -203,15 +221,40 @@ class Link:
         """
         with Session(scenario) as complete:
             resolved = complete.initial_scenario
-        # The machine does not wait for the compiler: the same loop is compiled before.
-        stand_in = Measurement(np.array(resolved.plant.initial_rad), np.zeros(3))
-        self._session_from(resolved, stand_in).compile()
+        stand_in = self._to_stand_in(resolved)  # the machine does not wait for what is done first
+        with stand_in._session_from(resolved, stand_in.connect()) as rehearsal:
+            rehearsed(rehearsal)
         first = self.connect()
         check_measurement(resolved, first)
         return self._session_from(resolved, first)
 
     def _session_from(self, resolved: ResolvedScenario, first: Measurement) -> Session:
         return Session(controller_scenario(resolved, first, self._limits.current_A), external=self)
+
+    def _to_stand_in(self, resolved: ResolvedScenario) -> Link:
+        """Return the same link to a stand-in of the machine, which stays at the initial pose."""
+        still = {
+            "angle": np.array(resolved.plant.initial_rad),
+            "rate": np.zeros(3),
+            "current": np.zeros(self.channel.groups),
+            "temperature": resolved.drive.ambient_degC,
+        }
+
+        def measure(command: Values) -> Values:
+            return {"sequence": command.get("sequence"), "echo": command.get("sequence"), **still}
+
+        channel, peer = self.channel.stand_in(measure)
+        heat, shadow = deepcopy(self._heat), self._shadow.new() if self._shadow else None
+        return Link(
+            channel,
+            self.name,
+            self._settings,
+            self._limits,
+            heat,
+            self._period_s,
+            shadow=shadow,
+            now=peer.now,
+        )
 
     def __enter__(self) -> Link:
         return self
@@ -243,6 +286,7 @@ class Link:
                 hello_s = now_s + HELLO_s
             self._receive(hello_s - now_s)
         self._sent_s.clear()  # the machine may have been starting
+        self.latency = Distribution()
         measurement = _measurement(self._newest)
         if not _is_finite(measurement):
             raise SpheretwinError(f"link {self.name}: expected finite numbers, received others")

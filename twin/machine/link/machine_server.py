@@ -54,6 +54,7 @@ class MachineServer:
 
     Attributes
     ----------
+    real_time : bool
     ending : str
         Reason for which the controller ended the run; empty otherwise.
     jitter, turnaround : Distribution
@@ -75,7 +76,7 @@ class MachineServer:
     ) -> None:
         self.channel, self.name, self.ending = channel, name, ""
         self.jitter, self.turnaround = Distribution(), Distribution()
-        self._groups, self._period_s, self._real_time = groups, period_s, real_time
+        self._groups, self._period_s, self.real_time = groups, period_s, real_time
         self._timeout_s, self._idle_s, self._stop_requested, self._now = (
             timeout_s,
             idle_s,
@@ -92,6 +93,18 @@ class MachineServer:
         self._sent_s: float | None = None
         self._arrival_s = 0.0
 
+    def to_stand_in(self) -> MachineServer:
+        """Return the same server for a stand-in of the controller, whose currents are 0."""
+
+        def command(measurement: Values) -> Values:
+            number = (measurement.get("sequence", 0) + 1) % self.channel.modulus
+            return {"sequence": number, "flags": Flags.ARMED, "time": 0.0, "current": np.zeros(self._groups)}
+
+        channel, peer = self.channel.stand_in(command)
+        return MachineServer(
+            channel, self.name, self._groups, self._period_s, real_time=self.real_time, now=peer.now
+        )
+
     def command(self, t_s: float, measurement: Measurement) -> Array | None:
         """Return the currents for a measurement; None at the end of the run."""
         self._sequence += 1
@@ -105,9 +118,9 @@ class MachineServer:
             "current": measurement.current_A,
             "temperature": measurement.temperature_degC,
         }
-        if self._echo is not None or self._real_time:
+        if self._echo is not None or self.real_time:
             self._send_reply()
-        return self._newest_command() if self._real_time else self._next_command()
+        return self._newest_command() if self.real_time else self._next_command()
 
     def finish(self, t_s: float, angle_rad: Array) -> None:
         """Send the last measurement, with `Flags.END`."""
@@ -125,7 +138,7 @@ class MachineServer:
 
     def figures(self) -> dict[str, Any]:
         """Return counts of frames and distributions of times."""
-        jitter = {"jitter": self.jitter.figures()} if self._real_time else {}
+        jitter = {"jitter": self.jitter.figures()} if self.real_time else {}
         return {"frames": self.channel.figures(), "turnaround": self.turnaround.figures(), **jitter}
 
     def _send_reply(self) -> None:
@@ -162,7 +175,7 @@ class MachineServer:
                 self._pending.append(frame)
             else:
                 self.channel.counts.corrupt += 1
-        if self.channel.counts.duplicated > duplicated and not self._pending and not self._real_time:
+        if self.channel.counts.duplicated > duplicated and not self._pending and not self.real_time:
             self._send_reply()
 
     def _newest_command(self) -> Array | None:

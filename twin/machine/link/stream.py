@@ -139,6 +139,10 @@ class RunningShadow:
         if len(self._rows) >= BLOCK_ROWS:
             self._estimate()
 
+    def new(self) -> RunningShadow:
+        """Return a shadow of the same machine at its start."""
+        return RunningShadow(Shadow(self.shadow.model, self.shadow.settings))
+
     def telemetry(self) -> Table | None:
         """Return the estimates so far, without a single last row; None if there are none."""
         if len(self._rows) > 1:

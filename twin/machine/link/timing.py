@@ -6,6 +6,9 @@ from array import array
 
 import numpy as np
 
+QUANTILES = {"p50_ms": 50.0, "p99_ms": 99.0, "p999_ms": 99.9, "max_ms": 100.0}
+"""Percentages by name."""
+
 
 class Distribution:
     """Times, s, of which quantiles are reported."""
@@ -18,9 +21,8 @@ class Distribution:
         self._times_s.append(time_s)
 
     def figures(self) -> dict[str, float | None]:
-        """Return median, 99th percentile and maximum in ms; None without times."""
+        """Return quantiles and maximum in ms; None without times."""
         if not self._times_s:
-            return dict.fromkeys(("p50_ms", "p99_ms", "max_ms"))
+            return dict.fromkeys(QUANTILES)
         times_ms = 1e3 * np.array(self._times_s)
-        p50, p99 = np.percentile(times_ms, (50, 99)).tolist()
-        return {"p50_ms": p50, "p99_ms": p99, "max_ms": float(times_ms.max())}
+        return dict(zip(QUANTILES, np.percentile(times_ms, list(QUANTILES.values())).tolist(), strict=True))

@@ -172,6 +172,42 @@ class Stream:
         self._close()
 
 
+class StandIn:
+    """Transport to a peer that replies at once, with a clock that only waiting moves.
+
+    Parameters
+    ----------
+    reply : callable
+        Returns the reply to sent bytes, and the first frame of the peer to no bytes.
+    """
+
+    datagrams, foreign, is_closed = True, 0, False
+
+    def __init__(self, reply: Callable[[bytes], bytes]) -> None:
+        self._reply, self._waiting, self._now_s = reply, reply(b""), 0.0
+
+    def now(self) -> float:
+        """Return the time of its clock, s."""
+        return self._now_s
+
+    def send(self, content: bytes) -> None:
+        """Take bytes; the reply waits."""
+        self._waiting = self._reply(content)
+
+    def receive(self, timeout_s: float) -> bytes:
+        """Return the reply; without one the time passes."""
+        content, self._waiting = self._waiting, b""
+        if not content:
+            self._now_s += timeout_s + 1e-9  # rounding must not leave a rest to wait for
+        return content
+
+    def accept(self) -> None:
+        """Do nothing: there is only one peer."""
+
+    def close(self) -> None:
+        """Do nothing."""
+
+
 def _is_readable(file: Any, timeout_s: float) -> bool:
     return bool(select.select([file], [], [], max(timeout_s, 0.0))[0])
 

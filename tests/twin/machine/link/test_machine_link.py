@@ -7,6 +7,7 @@ from spheretwin.control.supervision.watchdog import Reason
 from spheretwin.machine.link.frame_format import Flags
 from spheretwin.machine.link.limits import Limits
 from spheretwin.machine.link.machine_link import Link, LinkSettings
+from spheretwin.machine.link.timing import QUANTILES
 from spheretwin.models.base.errors import SpheretwinError
 from tests.twin.machine.link import lines
 from tests.twin.machine.link.lines import COMMAND, GROUPS, LIMITS, PERIOD_s, Script, measurement
@@ -77,7 +78,7 @@ def test_a_healthy_machine_is_driven(machine, lockstep):
     assert len(machine.commands) == 10
     assert all(command["flags"] == Flags.ARMED for command in machine.commands)
     figures = link.figures()
-    assert figures["latency"] == {name: pytest.approx(0.2) for name in ("p50_ms", "p99_ms", "max_ms")}
+    assert figures["latency"] == {name: pytest.approx(0.2) for name in QUANTILES}
     if not lockstep:
         assert machine.script.t_s == pytest.approx(10 * PERIOD_s + 2e-4)  # after the first measurement
         assert figures["jitter"]["max_ms"] == pytest.approx(0.0, abs=1e-9)
