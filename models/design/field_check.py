@@ -1,4 +1,4 @@
-"""Check of the torque matrix: the field of all poles on all windings, and published numbers."""
+"""Check of the torque matrix: the field of all poles on all windings."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from spheretwin.models.actuator import Actuator
 from spheretwin.models.base.checks import Check
-from spheretwin.models.design import curve_check, direct_summation, geometry_check, published_values
+from spheretwin.models.design import curve_check, direct_summation, geometry_check
 from spheretwin.models.design.direct_summation import Comparison, Errors
 from spheretwin.models.design.pole_torque import compute_curve
 from spheretwin.models.scatter import Scatter, part_errors
@@ -74,7 +74,7 @@ def judge(
     seed: int = 0,
     track: Callable[[range], Iterable[int]] = iter,
 ) -> FieldVerdict:
-    """Compare G_t(q)·I with the field of every magnet on every winding, and the methods with literature.
+    """Compare G_t(q)·I with the field of every magnet on every winding.
 
     Parameters
     ----------
@@ -104,7 +104,7 @@ def judge(
             curve_between_samples_of_peak=_curve_error(actuator),
             lookup_of_peak=curve_check.largest_lookup_error(curve),
         ),
-        checks=[torque, quadrature, *_scatter(actuator, seed), *published_values.checks(actuator)],
+        checks=[torque, quadrature, *_scatter(actuator, seed)],
         warnings=geometry_check.of_geometry(actuator),
     )
 

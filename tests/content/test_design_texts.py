@@ -11,11 +11,9 @@ from spheretwin.models.design import (
     capability,
     curve_check,
     direct_summation,
-    eddy_currents,
     field_check,
     geometry_check,
     pole_torque,
-    published_values,
     torque_map,
     workspace,
 )
@@ -90,8 +88,6 @@ def curves():
     content["convergence"] = pole_torque.convergence(curve, actuator.magnet, actuator.coil, mesh)
     content["leave one out"] = curve_check.leave_one_out(actuator.torque_curve)
     content["lookup"] = curve_check.largest_lookup_error(actuator.torque_curve)
-    content["dipole"] = published_values.dipole_torque(actuator.magnet, actuator.coil, angles)
-    content["eddy currents"] = [eddy_currents.face_field_T_per_A(actuator)]
     return lines(content)
 
 
@@ -132,13 +128,9 @@ def geometry():
     return lines(content)
 
 
-def published():
-    return lines([each.row() for each in published_values.checks(actuators.load())])
-
-
 CASES = {
     "design_direct_sums": direct_sums, "design_field_verdict": verdict_of_the_field, "design_curves": curves,
-    "design_workspaces": workspaces, "design_geometry": geometry, "design_published": published,
+    "design_workspaces": workspaces, "design_geometry": geometry,
 }  # fmt: skip
 
 

@@ -5,22 +5,24 @@ from __future__ import annotations
 import argparse
 import math
 import sys
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 from spheretwin.cli.common import print_json, print_message, report_broken, warn, warn_about_model
 from spheretwin.cli.options import Parser, number, whole
 from spheretwin.models import actuator as actuators
 from spheretwin.models import torque_curve
 from spheretwin.models.actuator import TORQUE_CURVE_PATH
+from spheretwin.models.base.checks import Check
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.base.files import check_writable
-from spheretwin.models.design import curve_check, field_check, iron_hoop, rotor_field, torque_map
-from spheretwin.models.design.curve_check import ComputedCurve
+from spheretwin.models.design import curve_check, field_check, rotor_field, torque_map
 from spheretwin.models.design.workspace import LARGEST_TILT_DEG
 from spheretwin.models.magnet_and_coil import read_magnet_and_coil
 from spheretwin.models.magnetics import SAME, computed_from
 from spheretwin.viz.pages import magnetics
-from spheretwin.viz.pages.markdown import prepare, save_text
+from spheretwin.viz.pages.markdown import Table, prepare, save_text
 from spheretwin.viz.terminal import runs
 from spheretwin.viz.terminal.progress import tracked
 from spheretwin.viz.terminal.tables import print_checks, terminal_console
@@ -38,6 +40,8 @@ OF_CURVE = f"""
 MOST_DEGREE = 300  # some gigabytes
 
 MOST_POSES = 10_000  # some four hours
+
+HOOP = "docs/scripts/iron_hoop.py"
 
 # At 90 degrees the azimuth of the shaft no longer determines a pose, and the hinges lock.
 STEEPEST_DEG = 85.0
@@ -70,13 +74,8 @@ def declare(parser: Parser) -> None:
         step=number("a divisor of 180 from 0.25 to 30", lambda step: 0.25 <= step <= 30 and not 180 % step),
         degree=whole(MOST_DEGREE, first=3),
     )
-    parts.add_parser(
-        "hoop", help="compute the effect of the iron behind the poles by finite elements"
-    ).define(
-        run_hoop,
-        "Compare the torque curve of a pole on caps of iron with that of a pole in air, by axisymmetric"
-        " finite elements (scikit-fem).",
-        MODEL,
+    parts.add_parser("hoop", help=f"moved to {HOOP} of the repository").define(
+        run_hoop, f"The effect of the iron behind the poles is computed by {HOOP} of the repository.", MODEL
     )
     text = "compare the torque matrix with the summed field of all poles on all windings"
     parts.add_parser("check", help=text).define(
@@ -117,17 +116,6 @@ def run_check(options: argparse.Namespace) -> bool:
     verdict = field_check.judge(actuator, options.poses, options.seed, tracked("direct sums"))
     warn_about_model(options.mjcf)
     warn(verdict.warnings)
-    written = []
-    if options.out:
-        command = f"spheretwin magnetics check --poses {options.poses} --seed {options.seed}"
-        written = magnetics.write_check(options.out, verdict, command, options.figure_format)
-    if options.json:
-        print_json(verdict._asdict())
-    else:
-        runs.print_rows(*magnetics.field_table(verdict))
-        terminal_console().print(magnetics.sources_text(verdict))
-        print_checks("magnetics check", verdict.checks, options.verbose)
-        runs.print_written(written)
     if verdict.curve_is_of_another_geometry:
         distance = 100 * verdict.sources.curve_between_samples_of_peak
         warn(
@@ -136,133 +124,12 @@ def run_check(options: argparse.Namespace) -> bool:
                 " `spheretwin magnetics curve` computes it again"
             ]
         )
-    return report_broken("magnetics check", verdict.checks)
-
-
-def run_curve(options: argparse.Namespace) -> bool:
-    """Run the part; return True if no bound is broken."""
-    if options.csv and options.out:
-        raise InputError("command line: expected --out or --csv, received both")
-    if options.csv:
-        return _judge(options.csv, options.mjcf, options.json)
-    if options.out:
-        check_writable(Path(options.out), ".csv")
-    return _compute(options)
-
-
-def _compute(options: argparse.Namespace) -> bool:
-    """Compute the curve, check it, write it."""
-    if _is_known(options.mjcf):
-        print_message(f"{options.mjcf} has the poles and coils of {TORQUE_CURVE_PATH}: the curve is the same")
-    computed = curve_check.compute(options.mjcf, tracked("torque curve"))
-    warn_about_model(options.mjcf)
-    warn(computed.warnings)
-    if options.out:
-        save_text(options.out, computed.csv)
-    if options.json:
-        print_json(
-            {
-                **computed.peak._asdict(),
-                "doubled_mesh_moves_peak": computed.doubled_mesh.peak,
-                "doubled_mesh_moves_worst_sample": computed.doubled_mesh.worst,
-                "lookup_error": computed.lookup_error,
-                "checks": computed.checks,
-                "warnings": computed.warnings,
-            }
-        )
-    elif options.out:
-        runs.print_rows(*magnetics.computed_curve_table(computed))
-        print_checks("magnetics curve", computed.checks, options.verbose)
-        runs.print_written([options.out])
-    else:
-        _print_text(computed)
-    return report_broken("magnetics curve", computed.checks)
-
-
-def run_field(options: argparse.Namespace) -> bool:
-    """Run the part; return True if no bound is broken."""
-    if options.out:
-        check_writable(Path(options.out), ".csv")
-    computed = rotor_field.compute(
-        options.mjcf, options.step, options.degree, options.on_iron, tracked("field of the magnets")
+    command = f"spheretwin magnetics check --poses {options.poses} --seed {options.seed}"
+    written = (
+        magnetics.write_check(options.out, verdict, command, options.figure_format) if options.out else []
     )
-    warn_about_model(options.mjcf)
-    if options.out:
-        save_text(options.out, computed.csv)
-    if options.json:
-        print_json(
-            {
-                "peak_Nm_per_A": computed.field.peak_Nm_per_A,
-                "rows": computed.field.torque_Nm_per_A.size // 3,
-                "upper_degrees": computed.degree_share,
-                "checks": computed.checks,
-            }
-        )
-    elif options.out:
-        print_checks("magnetics field", computed.checks, options.verbose)
-        runs.print_written([options.out])
-    else:
-        print(computed.csv, end="")
-    return report_broken("magnetics field", computed.checks)
-
-
-def run_hoop(options: argparse.Namespace) -> bool:
-    """Run the part; return True."""
-    magnet, coil = read_magnet_and_coil(options.mjcf)
-    angles = tracked("caps of iron")(range(len(iron_hoop.HALF_ANGLES_DEG)))
-    effects = [iron_hoop.effect(magnet, coil, iron_hoop.HALF_ANGLES_DEG[i]) for i in angles]
-    warn_about_model(options.mjcf)
-    if options.json:
-        print_json({"effects": [effect._asdict() for effect in effects]})
-    else:
-        runs.print_rows(*magnetics.hoop_table(effects))
-    return True
-
-
-def _is_known(mjcf: Path) -> bool:
-    """True if nothing that the shipped curve depends on differs in a model."""
-    known = dict(torque_curve.read(TORQUE_CURVE_PATH).computed_for or {})
-    numbers = computed_from(*read_magnet_and_coil(mjcf))
-    return known.keys() == numbers.keys() and all(
-        math.isclose(known[name], number, rel_tol=SAME) for name, number in numbers.items()
-    )
-
-
-def _print_text(computed: ComputedCurve) -> None:
-    """Print the curve on stdout and its properties on stderr."""
-    print(computed.csv, end="")
-    print(
-        f"peak {computed.peak.peak_Nm_per_A:.5f} N·m/A at {computed.peak.peak_deg:.2f}°;"
-        f" a doubled mesh moves it by {computed.doubled_mesh.peak:.0e} of itself",
-        file=sys.stderr,
-    )
-
-
-def _judge(csv: Path, mjcf: Path, as_json: bool) -> bool:
-    """Report the smoothness of a user curve and its distance from the curve of the geometry."""
-    judged = curve_check.judge(torque_curve.read(csv), mjcf, tracked("the geometry's own curve"))
-    warn_about_model(mjcf)
-    warn(judged.warnings)
-    if as_json:
-        print_json(
-            {
-                "path": str(csv),
-                "rows": judged.rows,
-                **judged.peak._asdict(),
-                "leave_one_out": judged.leave_one_out,
-                "geometry": {
-                    "difference": judged.geometry.as_given,
-                    "scale": judged.geometry.scale,
-                    "difference_after_scaling": judged.geometry.scaled,
-                },
-                "lookup_error": judged.lookup_error,
-                "checks": [],
-                "warnings": judged.warnings,
-            }
-        )
-    else:
-        runs.print_rows(*magnetics.judged_curve_table(csv, judged))
-    return True  # user data has no bounds here
+    tables, text = [magnetics.field_table(verdict)], magnetics.sources_text(verdict)
+    return _report(options, "check", verdict._asdict(), verdict.checks, tables, text, written)
 
 
 def run_map(options: argparse.Namespace) -> bool:
@@ -279,12 +146,136 @@ def run_map(options: argparse.Namespace) -> bool:
         need = f" --need {options.need:g}" if options.need else ""
         command = f"spheretwin magnetics map --largest-tilt {options.largest_tilt:g}{need}"
         written = magnetics.write_map(options.out, surveyed, verdict, command, options.figure_format)
+    tables, text = magnetics.workspace_tables(verdict), magnetics.MAP_TERMS
+    return _report(options, "map", verdict._asdict(), verdict.checks, tables, text, written)
+
+
+def run_curve(options: argparse.Namespace) -> bool:
+    """Run the part; return True if no bound is broken."""
+    if options.csv and options.out:
+        raise InputError("command line: expected --out or --csv, received both")
+    if options.csv:
+        return _judge(options)
+    if options.out:
+        check_writable(Path(options.out), ".csv")
+    if _is_known(options.mjcf):
+        print_message(f"{options.mjcf} has the poles and coils of {TORQUE_CURVE_PATH}: the curve is the same")
+    computed = curve_check.compute(options.mjcf, tracked("torque curve"))
+    warn_about_model(options.mjcf)
+    warn(computed.warnings)
+    figures = {
+        **computed.peak._asdict(),
+        "doubled_mesh_moves_peak": computed.doubled_mesh.peak,
+        "doubled_mesh_moves_worst_sample": computed.doubled_mesh.worst,
+        "lookup_error": computed.lookup_error,
+        "checks": computed.checks,
+        "warnings": computed.warnings,
+    }
+    if not options.out and not options.json:
+        print(
+            f"peak {computed.peak.peak_Nm_per_A:.5f} N·m/A at {computed.peak.peak_deg:.2f}°;"
+            f" a doubled mesh moves it by {computed.doubled_mesh.peak:.0e} of itself",
+            file=sys.stderr,
+        )
+    tables = [magnetics.computed_curve_table(computed)]
+    return _report_csv(options, "curve", figures, computed.checks, tables, computed.csv)
+
+
+def run_field(options: argparse.Namespace) -> bool:
+    """Run the part; return True if no bound is broken."""
+    if options.out:
+        check_writable(Path(options.out), ".csv")
+    computed = rotor_field.compute(
+        options.mjcf, options.step, options.degree, options.on_iron, tracked("field of the magnets")
+    )
+    warn_about_model(options.mjcf)
+    figures = {
+        "peak_Nm_per_A": computed.field.peak_Nm_per_A,
+        "rows": computed.field.torque_Nm_per_A.size // 3,
+        "upper_degrees": computed.degree_share,
+        "checks": computed.checks,
+    }
+    return _report_csv(options, "field", figures, computed.checks, [], computed.csv)
+
+
+def run_hoop(options: argparse.Namespace) -> bool:
+    """Name the script that computes the effect of the iron.
+
+    Raises
+    ------
+    InputError
+        Always.
+    """
+    raise InputError(f"magnetics hoop: expected `python {HOOP}` in a clone of the repository: it moved there")
+
+
+def _judge(options: argparse.Namespace) -> bool:
+    """Report the smoothness of a user curve and its distance from the curve of the geometry."""
+    track = tracked("the geometry's own curve")
+    judged = curve_check.judge(torque_curve.read(options.csv), options.mjcf, track)
+    warn_about_model(options.mjcf)
+    warn(judged.warnings)
+    figures = {
+        "path": str(options.csv),
+        "rows": judged.rows,
+        **judged.peak._asdict(),
+        "leave_one_out": judged.leave_one_out,
+        "geometry": {
+            "difference": judged.geometry.as_given,
+            "scale": judged.geometry.scale,
+            "difference_after_scaling": judged.geometry.scaled,
+        },
+        "lookup_error": judged.lookup_error,
+        "checks": [],  # the user judges the data
+        "warnings": judged.warnings,
+    }
+    return _report(options, "curve", figures, [], [magnetics.judged_curve_table(options.csv, judged)])
+
+
+def _is_known(mjcf: Path) -> bool:
+    """True if nothing that the shipped curve depends on differs in a model."""
+    known = dict(torque_curve.read(TORQUE_CURVE_PATH).computed_for or {})
+    numbers = computed_from(*read_magnet_and_coil(mjcf))
+    return known.keys() == numbers.keys() and all(
+        math.isclose(known[name], number, rel_tol=SAME) for name, number in numbers.items()
+    )
+
+
+def _report_csv(
+    options: argparse.Namespace,
+    part: str,
+    figures: Mapping[str, Any],
+    checks: Sequence[Check],
+    tables: Sequence[Table],
+    csv: str,
+) -> bool:
+    """Write a curve or a field to its file or to stdout; return True if no bound is broken."""
+    if options.out:
+        save_text(options.out, csv)
+    elif not options.json:
+        print(csv, end="")
+        return report_broken(f"magnetics {part}", checks)
+    return _report(options, part, figures, checks, tables, written=[options.out])
+
+
+def _report(
+    options: argparse.Namespace,
+    part: str,
+    figures: Mapping[str, Any],
+    checks: Sequence[Check],
+    tables: Sequence[Table],
+    text: str = "",
+    written: Sequence[Path] = (),
+) -> bool:
+    """Print the figures as JSON, or tables, checks and files; return True if no bound is broken."""
     if options.json:
-        print_json(verdict._asdict())
+        print_json(figures)
     else:
-        for table in magnetics.workspace_tables(verdict):
+        for table in tables:
             runs.print_rows(*table)
-        terminal_console().print(magnetics.MAP_TERMS)
-        print_checks("magnetics map", verdict.checks, options.verbose)
+        if text:
+            terminal_console().print(text)
+        if checks:
+            print_checks(f"magnetics {part}", checks, options.verbose)
         runs.print_written(written)
-    return report_broken("magnetics map", verdict.checks)
+    return report_broken(f"magnetics {part}", checks)

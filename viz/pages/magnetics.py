@@ -8,7 +8,6 @@ from pathlib import Path
 from spheretwin.models.base.checks import bound_shares
 from spheretwin.models.design.curve_check import ComputedCurve, CurvePeak, JudgedCurve, Misfit
 from spheretwin.models.design.field_check import FieldVerdict
-from spheretwin.models.design.iron_hoop import Effect
 from spheretwin.models.design.torque_map import TorqueSurvey, WeakPose, WorkspaceVerdict, direction_text
 from spheretwin.viz.pages import markdown
 from spheretwin.viz.pages.markdown import Drawing, Page, Section, Table
@@ -60,16 +59,6 @@ def judged_curve_table(path: Path, judged: JudgedCurve) -> Table:
         ("difference of look-up table and spline", f"{judged.lookup_error:.1e} of the peak"),
     ]
     return Table(f"torque curve {path}", CURVE_HEAD, rows)
-
-
-def hoop_table(effects: Sequence[Effect]) -> Table:
-    """Return the effects of caps of iron on the torque curve."""
-    rows = [
-        (f"{effect.half_angle_deg:g}°", f"{effect.peak:.3f}", f"{effect.mean:.3f}", f"{effect.mesh:.0e}")
-        for effect in effects
-    ]
-    head = ("half angle of the iron", "peak", "mean to 27°", "half the elements")
-    return Table("torque of a pole on iron over that of a pole in air", head, rows)
 
 
 def field_table(verdict: FieldVerdict) -> Table:
@@ -133,7 +122,7 @@ def write_check(folder: Path, verdict: FieldVerdict, command: str, figure_format
     drawing = Drawing("magnetics_margins.svg", "Value over bound of each check.", figure)
     lead = (
         "Comparison of the torque matrix with the summed field of all magnets on all windings, in random"
-        " poses and for random currents, and of the methods with published values."
+        " poses and for random currents."
     )
     section = _section(field_table(verdict), sources_text(verdict))
     return _page("check", lead, verdict, [drawing], [section], command).write(folder, figure_format)

@@ -4,14 +4,13 @@ import json
 import sys
 from importlib.metadata import distribution
 
-import numpy as np
 import pytest
 
 from spheretwin.machine.link.transports import open_transport
 from spheretwin.models import actuator as actuators
 from spheretwin.models.base import extras
 from spheretwin.models.base.errors import InputError
-from spheretwin.models.design import iron_hoop, pole_torque, rotor_field
+from spheretwin.models.design import pole_torque, rotor_field
 from tests.models.poses import SECOND
 
 
@@ -72,8 +71,6 @@ MISSING = [
     ("magpylib.core", "magpylib to compute the torque curve", "magnetics",
      lambda: pole_torque.compute_curve(ACTUATOR.magnet, ACTUATOR.coil)),
     ("magpylib", "magpylib to compute fields", "magnetics", lambda: rotor_field.compute(SECOND)),
-    ("skfem", "scikit-fem for finite elements", "fem",
-     lambda: iron_hoop.torque_curve(ACTUATOR.magnet, ACTUATOR.coil, None, np.array([0.1]))),
     ("serial", "pyserial", "machine", lambda: open_transport("serial:/dev/ttyS0")),
 ]  # fmt: skip
 

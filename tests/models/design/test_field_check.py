@@ -5,13 +5,13 @@ from dataclasses import replace
 import magpylib
 import numpy as np
 import pytest
+from manifold3d import CrossSection, Manifold
 from numpy.testing import assert_allclose
 
 from spheretwin.models.design import direct_summation
 from spheretwin.models.design.direct_summation import Rule
 from spheretwin.models.design.pole_torque import compute_curve
 from spheretwin.models.magnetics import torque_matrix
-from spheretwin.models.meshes.solids import revolve
 from spheretwin.models.torque_curve import TorqueCurve
 from tests.models.design.quadrature import COARSE
 
@@ -65,7 +65,8 @@ def drawn_body(magnet, sections, steps):
     """The ground body as magpylib's own mesh of triangles, its axis along z."""
     rho = np.linspace(magnet.radius_m, 0.0, steps + 1)
     front = [(r, magnet.front_m - magnet.sagitta_at_m(r)) for r in rho]
-    solid = revolve([(0.0, magnet.back_m), (magnet.radius_m, magnet.back_m), *front], sections).to_mesh64()
+    outline = CrossSection([np.array([(0.0, magnet.back_m), (magnet.radius_m, magnet.back_m), *front])])
+    solid = Manifold.revolve(outline, sections).to_mesh64()
     return magpylib.magnet.TriangularMesh(
         vertices=solid.vert_properties[:, :3],
         faces=solid.tri_verts,

@@ -1,6 +1,6 @@
 """Mesh files of the MJCF, generated from its numbers.
 
-``python -m spheretwin.models.meshes.mesh_files`` writes them; it needs the extra ``meshes``. Solids are
+``python docs/scripts/make_meshes.py`` writes them; it needs the extra ``meshes``. Solids are
 built and cut by manifold3d, in metres, in the frame of their body (pole and coil: origin at
 their centre, z outward).
 """
@@ -12,11 +12,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from manifold3d import Manifold
+from meshes import rotor, stator
 from numpy.typing import NDArray
 
 from spheretwin.models import actuator as actuators
 from spheretwin.models.actuator import Actuator
-from spheretwin.models.meshes import rotor, stator
 
 if TYPE_CHECKING:
     from trimesh import Trimesh
@@ -84,9 +84,6 @@ def crease_normals(mesh: Trimesh) -> NDArray[np.float64]:
     total = coo_array((weight, (a, b)), shape=pairs.shape) @ normal
     return (total / np.linalg.norm(total, axis=1, keepdims=True)).reshape(-1, 3, 3)
 
-
-if TYPE_CHECKING:
-    from trimesh import Trimesh
 
 ASSETS = actuators.FOLDER / "assets"
 

@@ -1,5 +1,8 @@
 """Effect of the iron behind the poles on the torque curve, by axisymmetric finite elements (scikit-fem).
 
+``python docs/scripts/iron_hoop.py [MODEL.xml]`` prints the table of `models/README.md`; it needs the extra
+``fem``.
+
 One pole stands on a cap of iron about its own axis, a shell between two spheres with a flat seat. The hoop of
 the actuator is a band: near a pole it is wider than the narrowest cap within it and narrower than a complete
 shell. The scalar potential Φ, ``H = -grad Φ``, obeys ``div(µ grad Φ) = div M`` with the relative permeability
@@ -12,15 +15,18 @@ lines of it. The iron is linear. The field of the coils in the iron, quadratic i
 
 from __future__ import annotations
 
+import sys
 from itertools import pairwise
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from spheretwin.models.actuator import MJCF_PATH
 from spheretwin.models.base.extras import missing
 from spheretwin.models.design.rotor_field import linkage
-from spheretwin.models.magnet_and_coil import CoilGeometry, Magnet
+from spheretwin.models.magnet_and_coil import CoilGeometry, Magnet, read_magnet_and_coil
 
 Array = NDArray[np.float64]
 
@@ -256,3 +262,16 @@ def _peak(curve: Array) -> float:
     top = int(np.argmax(curve))
     before, at, after = curve[top - 1 : top + 2]
     return float(at + (after - before) ** 2 / (8 * (2 * at - before - after)))
+
+
+def main(mjcf: Path = MJCF_PATH) -> None:
+    """Print the effect of each cap of iron on the torque curve of a model file."""
+    magnet, coil = read_magnet_and_coil(mjcf)
+    print("| half angle of the iron | peak | mean to 27° | mesh |\n|---|---|---|---|")
+    for half_angle_deg in HALF_ANGLES_DEG:
+        row = effect(magnet, coil, half_angle_deg)
+        print(f"| {half_angle_deg:g}° | {row.peak:.3f} | {row.mean:.3f} | {row.mesh:.0e} |", flush=True)
+
+
+if __name__ == "__main__":
+    main(*map(Path, sys.argv[1:]))

@@ -7,9 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 from manifold3d import Manifold
-
-from spheretwin.models.actuator import Actuator
-from spheretwin.models.meshes.solids import (
+from meshes.solids import (
     MM,
     PIN_SECTIONS,
     RING_CHAMFER_M,
@@ -25,6 +23,8 @@ from spheretwin.models.meshes.solids import (
     spherical_shell,
     tube,
 )
+
+from spheretwin.models.actuator import Actuator
 
 # Circles of a pole's front, from its rim to its middle.
 FRONT_STEPS = 6

@@ -1,13 +1,17 @@
 """Finite elements of the iron behind a pole: exact spheres, the image limit, air, and mesh convergence."""
 
-import json
+import sys
 
 import numpy as np
 import pytest
 
 from spheretwin import cli
-from spheretwin.models.design import iron_hoop
-from spheretwin.models.design.iron_hoop import Iron, Shape, effect, harmonics, torque_curve
+from tests.docs.snippets import ROOT
+
+sys.path.insert(0, str(ROOT / "docs" / "scripts"))
+
+import iron_hoop
+from iron_hoop import Iron, Shape, effect, harmonics, torque_curve
 
 INNER, OUTER, FRONT, SPHERE = 0.0365, 0.0400, 0.0500, 0.0550
 
@@ -88,10 +92,14 @@ def test_the_effect_of_iron_converges_below_its_image(half_angle_deg, actuator):
     assert 1 < fine.mean < 1.24
 
 
-def test_the_verb_reports_all_caps(monkeypatch, capsys):
+def test_the_script_prints_all_caps(monkeypatch, capsys):
     monkeypatch.setattr(iron_hoop, "ELEMENTS", 4)
     monkeypatch.setattr(iron_hoop, "HALF_ANGLES_DEG", (20.0,))
-    assert cli.main(["magnetics", "hoop", "--json"]) == 0
-    (row,) = json.loads(capsys.readouterr().out)["effects"]
-    assert row["half_angle_deg"] == 20.0
-    assert row["peak"] > 1
+    iron_hoop.main()
+    _, _, row = capsys.readouterr().out.splitlines()
+    assert row.startswith("| 20° | 1.")
+
+
+def test_the_verb_names_the_script(capsys):
+    assert cli.main(["magnetics", "hoop"]) == cli.BAD_INPUT
+    assert "docs/scripts/iron_hoop.py" in capsys.readouterr().err

@@ -1,5 +1,6 @@
 """The drawn parts: remade from the numbers, closed, clear of each other; and the scene that shows them."""
 
+import sys
 from dataclasses import replace
 from itertools import pairwise
 
@@ -10,8 +11,13 @@ import trimesh
 
 from spheretwin.models import actuator as actuators
 from spheretwin.models import mjcf
-from spheretwin.models.meshes import mesh_files, rotor, stator
-from spheretwin.models.meshes.solids import SMALL_SECTIONS, along
+from tests.docs.snippets import ROOT
+
+sys.path.insert(0, str(ROOT / "docs" / "scripts"))
+
+import make_meshes
+from meshes import rotor, stator
+from meshes.solids import SMALL_SECTIONS, along
 
 NAMES = ("stator", "outer_ring", "inner_ring", "ball", "hoop", "shaft", "pole", "coil")
 ASSETS = actuators.FOLDER / "assets"
@@ -22,7 +28,7 @@ ROUNDING_M = 1e-7
 
 @pytest.fixture(scope="module")
 def made(actuator):
-    return mesh_files.meshes(actuator)
+    return make_meshes.meshes(actuator)
 
 
 @pytest.fixture(scope="module")
@@ -88,7 +94,7 @@ def test_the_files_are_what_the_numbers_make(name, made, committed):
 
 @pytest.mark.release("0.8 s; changes with the mesh library")
 def test_writing_twice_gives_the_same_bytes(tmp_path, actuator):
-    first, second = (mesh_files.write(tmp_path / folder, actuator) for folder in ("first", "second"))
+    first, second = (make_meshes.write(tmp_path / folder, actuator) for folder in ("first", "second"))
     assert sorted(path.stem for path in first) == sorted(NAMES)
     for a, b in zip(first, second, strict=True):
         assert a.read_bytes() == b.read_bytes()
@@ -113,16 +119,16 @@ def test_the_meshes_stay_small(committed):
 @pytest.mark.parametrize("name", NAMES)
 def test_normals_are_unit_vectors_on_the_outer_side(name, made):
     mesh = made[name]
-    normals = mesh_files.crease_normals(mesh)
+    normals = make_meshes.crease_normals(mesh)
     np.testing.assert_allclose(np.linalg.norm(normals, axis=2), 1.0, atol=1e-9)
     # A corner's normal averages faces within the crease angle of its own.
     cosine = np.einsum("fcj,fj->fc", normals, mesh.face_normals)
-    assert cosine.min() > np.cos(np.radians(mesh_files.CREASE_DEG))
+    assert cosine.min() > np.cos(np.radians(make_meshes.CREASE_DEG))
 
 
 def test_edges_stay_sharp_and_curves_smooth(made, actuator):
     mesh = made["coil"]
-    normals = mesh_files.crease_normals(mesh)
+    normals = make_meshes.crease_normals(mesh)
     flange = np.abs(mesh.triangles[:, :, 2]).min(axis=1) > actuator.coil.length_m / 2 - ROUNDING_M
     np.testing.assert_allclose(np.abs(normals[flange][:, :, 2]), 1.0, atol=1e-9)
     rho = np.linalg.norm(mesh.triangles[:, :, :2], axis=2)

@@ -5,16 +5,14 @@ Sizes and positions of the coils are those of the actuator; all else is visual.
 
 import numpy as np
 from manifold3d import Manifold
-
-from spheretwin.models.actuator import Actuator
-from spheretwin.models.meshes.rotor import (
+from meshes.rotor import (
     FORK_INNER_RADIUS_M,
     FORK_OUTER_RADIUS_M,
     SHAFT_RADIUS_M,
     ball_radius,
     fork,
 )
-from spheretwin.models.meshes.solids import (
+from meshes.solids import (
     HOLE_SECTIONS,
     MM,
     RING_CHAMFER_M,
@@ -29,6 +27,8 @@ from spheretwin.models.meshes.solids import (
     spherical_shell,
     union,
 )
+
+from spheretwin.models.actuator import Actuator
 
 # Coil: two flanges, and between them a winding with visible turns.
 COIL_FLANGE_M = 1.2 * MM

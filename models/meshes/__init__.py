@@ -1,1 +1,0 @@
-"""Meshes of the actuator, generated from its numbers."""
