@@ -358,7 +358,7 @@ def _above(title: str, runs: Sequence[ComparedRun], most: int) -> str:
         f"# {_plain(title)}",
         "",
         "Drag to zoom, double-click to reset the view; every plot shows the values at the cursor. The"
-        " buttons switch runs. The wide grey line is the reference.",
+        " buttons switch runs. The dashed dark line is the reference.",
     ]
     if thin:
         lines.append(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import base64
 import io
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -30,6 +30,7 @@ from spheretwin.viz.figures.style import (
     DPI,
     FAINT,
     INK,
+    MOST_BINS,
     WIDTH_in,
     draw_line,
     name_axes,
@@ -46,7 +47,19 @@ MOST_CELLS = 200
 LEGEND_ROW_in = 0.16
 
 
-def currents(runs: Sequence[ComparedRun], title: str) -> Figure:
+class Detail(NamedTuple):
+    """Detail of the lines of a figure."""
+
+    points: int = MOST_BINS
+    """Points up to which every tick is drawn."""
+    bins: int = MOST_BINS
+    """Bins of a line with more ticks."""
+
+
+PRINT = Detail()
+
+
+def currents(runs: Sequence[ComparedRun], title: str, most_cells: int = MOST_CELLS) -> Figure:
     """Draw the mean of each cell on one scale, blue negative and red positive; below it a lane of variation.
 
     The variation is the standard deviation of the ticks within a cell, of the group where it is largest.
@@ -55,6 +68,8 @@ def currents(runs: Sequence[ComparedRun], title: str) -> Figure:
     ----------
     runs : sequence of ComparedRun
     title : str
+    most_cells : int
+        Cells of a row.
     """
     figure = Figure(figsize=(WIDTH_in, 1.2 + 2.3 * len(runs)), layout="constrained")
     panels = figure.subplots(2 * len(runs), 1, sharex=True, squeeze=False, height_ratios=[7, 1] * len(runs))[
@@ -64,17 +79,18 @@ def currents(runs: Sequence[ComparedRun], title: str) -> Figure:
     scale = {"cmap": "RdBu_r", "vmin": -largest_A, "vmax": largest_A}
     lane_scale = {"cmap": "Greys", "vmin": 0.0, "vmax": largest_A / 2}
     for panel, lane, run in zip(panels[::2], panels[1::2], runs, strict=True):
-        cells = mean_and_deviation(run.table["current_A"], MOST_CELLS)
+        cells = mean_and_deviation(run.table["current_A"], most_cells)
         groups, t_s = cells.mean.shape[1], run.table["t_s"]
         edges_s = np.append(t_s[cells.starts], t_s[-1] + run.period_s)
-        means = panel.pcolormesh(edges_s, np.arange(groups + 1) - 0.5, cells.mean.T, **scale)
+        label = f"_{run.legend}"
+        means = panel.pcolormesh(edges_s, np.arange(groups + 1) - 0.5, cells.mean.T, label=label, **scale)
         variation = np.max(cells.deviation, axis=1)[None]
-        deviations = lane.pcolormesh(edges_s, [0.0, 1.0], variation, **lane_scale)
+        deviations = lane.pcolormesh(edges_s, [0.0, 1.0], variation, label=label, **lane_scale)
         panel.set_ylim(groups - 0.5, -0.5)
         panel.set_ylabel("group", fontsize="small")
         panel.set_yticks(range(0, groups, max(1, groups // 6)))
         panel.tick_params(labelsize="small")
-        panel.set_title(run.legend, fontsize="small", loc="left")
+        panel.set_title(f"mean currents of {run.legend}", fontsize="small", loc="left")
         lane.set_yticks([0.5], ["variation"], fontsize="small")
     panels[-1].set_xlabel("time, s")
     bar: dict[str, Any] = {"shrink": 0.9, "aspect": 30}
@@ -117,7 +133,10 @@ def events_figure(runs: Sequence[ComparedRun], title: str) -> Figure:
 LINES_EACH_OCTAVE = 64
 
 
-def spectra(runs: Sequence[ComparedRun], of_runs: Sequence[Sequence[Spectrum]], title: str) -> Figure:
+def spectra(
+    runs: Sequence[ComparedRun], of_runs: Sequence[Sequence[Spectrum]], title: str,
+    each_octave: int = LINES_EACH_OCTAVE,
+) -> Figure:  # fmt: skip
     """Draw them, both axes logarithmic.
 
     Parameters
@@ -126,6 +145,8 @@ def spectra(runs: Sequence[ComparedRun], of_runs: Sequence[Sequence[Spectrum]], 
     of_runs : sequence of sequence of Spectrum
         Spectra of each run and each hinge.
     title : str
+    each_octave : int
+        Lines of each octave.
     """
     figure = Figure(figsize=(WIDTH_in, 7.0), layout="constrained")
     panels = panel_column(figure, len(ANGLES))
@@ -133,10 +154,12 @@ def spectra(runs: Sequence[ComparedRun], of_runs: Sequence[Sequence[Spectrum]], 
         panel.set(xscale="log", yscale="log")
         for run, look, of_run in zip(runs, run_styles(runs), of_runs, strict=True):
             spectrum = of_run[axis]
-            lines = octave_maxima(spectrum.frequency_Hz, spectrum.amplitude_mrad, LINES_EACH_OCTAVE)
+            lines = octave_maxima(spectrum.frequency_Hz, spectrum.amplitude_mrad, each_octave)
             panel.plot(*lines, label=run.label, **look.line())
             for frequency_Hz, amplitude_mrad in spectrum.peaks:
-                panel.plot(frequency_Hz, amplitude_mrad, "o", color=look.colour, markersize=4)
+                panel.plot(
+                    frequency_Hz, amplitude_mrad, "o", color=look.colour, markersize=4, label=f"_{run.label}"
+                )
         plain(panel, f"error of {name},\namplitude, mrad")
     panels[0].set_title(title, fontsize="medium")
     panels[-1].set_xlabel("frequency, Hz")
@@ -145,8 +168,9 @@ def spectra(runs: Sequence[ComparedRun], of_runs: Sequence[Sequence[Spectrum]], 
 
 
 def over_time(
-    runs: Sequence[ComparedRun], leading: Sequence[int], quantities: Sequence[Quantity], title: str
-) -> Figure:
+    runs: Sequence[ComparedRun], leading: Sequence[int], quantities: Sequence[Quantity], title: str,
+    detail: Detail = PRINT,
+) -> Figure:  # fmt: skip
     """Draw quantities over time; the reference is a thin dark line over the others.
 
     A run with more ticks than the figure has dots is drawn by the bounds and the mean of every few ticks. The
@@ -160,6 +184,7 @@ def over_time(
         Places of the runs that show the reference.
     quantities : sequence of Quantity
     title : str
+    detail : Detail
     """
     panels_of = [(quantity, False) for quantity in quantities]
     panels_of += [(quantity, True) for quantity in quantities if quantity.group == "whole"]
@@ -175,14 +200,16 @@ def over_time(
         else:
             limits = _stated_range(panel, quantity_range(quantity, runs, leading))
         for run, of_run, values in zip(runs, run_styles(runs), of_runs, strict=True):
-            draw_line(panel, run.table["t_s"], values, label=run.legend, **of_run.line())
+            draw_line(panel, run.table["t_s"], values, *detail, label=run.legend, **of_run.line())
             if run.early_end:
                 _mark_end(panel, run, values, limits, of_run.colour)
         for place in leading:
             if quantity.desired:
                 name = "reference" if len(leading) == 1 else f"reference of {runs[place].label}"
                 look = {"label": name, "color": INK, "linewidth": 0.7, "linestyle": (0, (4, 3))}
-                draw_line(panel, runs[place].table["t_s"], quantity.desired(runs[place].rows), **look)
+                draw_line(
+                    panel, runs[place].table["t_s"], quantity.desired(runs[place].rows), *detail, **look
+                )
         panel.set_ylim(*limits)
         unit = f"{quantity.unit}, logarithmic" if logarithmic else quantity.unit
         plain(panel, f"{quantity.title},\n{unit}")
@@ -206,6 +233,7 @@ def _mark_end(panel: Axes, run: ComparedRun, values: Array, limits: tuple[float,
         last = np.clip(finite[-1], *limits)
         mark: dict[str, Any] = {
             "color": colour,
+            "label": f"_{run.legend}",
             "markersize": 8,
             "markeredgecolor": INK,
             "clip_on": False,

@@ -137,7 +137,9 @@ MOST_BINS = 1000
 """Bins of a line: a print of 20 cm has few more dots."""
 
 
-def draw_line(axes: Axes, t_s: Array, values: Array, **look: Any) -> None:
+def draw_line(
+    axes: Axes, t_s: Array, values: Array, points: int = MOST_BINS, most_bins: int = MOST_BINS, **look: Any
+) -> None:
     """Draw every tick, or of a long run the band of the bounds and the mean of every few ticks.
 
     Both reach from the first tick to the last.
@@ -146,19 +148,24 @@ def draw_line(axes: Axes, t_s: Array, values: Array, **look: Any) -> None:
     ----------
     axes : Axes
     t_s, values : (n,) arrays
+    points : int
+        Ticks up to which each is drawn.
+    most_bins : int
+        Bins of a longer line.
     **look
         Properties of the line, with its color.
     """
-    if len(values) <= MOST_BINS:
+    if len(values) <= points:
         axes.plot(t_s, values, **look)
         return
-    bins = envelope(values, MOST_BINS)
+    bins = envelope(values, most_bins)
     edges_s = np.append(t_s[bins.starts], t_s[-1])
     low, high = (np.append(bound, bound[-1]) for bound in (bins.low, bins.high))
     band: dict[str, Any] = {
         "facecolor": (look["color"], 0.25),
         "edgecolor": (look["color"], 0.6),
         "linewidth": 0.3,
+        "label": f"_{look.get('label')}",
     }
     axes.fill_between(edges_s, low, high, step="post", **band)
     middles_s = (edges_s[1:] + edges_s[:-1]) / 2

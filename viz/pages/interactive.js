@@ -14,20 +14,3 @@ for (const button of document.querySelectorAll("[data-run]")) {
     }
   });
 }
-// Axes that can be logarithmic, with range and note of that scale; a note states what is outside.
-const scale = document.getElementById("logarithmic"), plot = plots[0], axes = plot.layout.meta;
-const notes = (plot.layout.annotations ?? []).map((annotation) => annotation.name);
-const linear = axes.map(({axis}) => ({range: [...plot.layout[axis].range],
-  note: plot.layout.annotations[notes.indexOf(axis)]?.text}));
-scale.addEventListener("click", () => {
-  const on = scale.getAttribute("aria-pressed") === "false";
-  scale.setAttribute("aria-pressed", on);
-  const changes = {};
-  for (const [i, {axis, range, note}] of axes.entries()) {
-    changes[`${axis}.type`] = on ? "log" : "linear";
-    changes[`${axis}.range`] = on ? [...range] : [...linear[i].range];
-    const place = notes.indexOf(axis);
-    if (place >= 0) changes[`annotations[${place}].text`] = on ? note : linear[i].note;
-  }
-  Plotly.relayout(plot, changes);
-});

@@ -1,4 +1,4 @@
-"""The figures of the page: all over time in one, spectra of the errors in another."""
+"""Figures of Matplotlib with zoom, hover and switches of the runs, and the page that holds them."""
 
 from __future__ import annotations
 
@@ -8,24 +8,24 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import plotly.graph_objects as plotly
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.collections import PolyCollection, QuadMesh
+from matplotlib.colors import to_hex, to_rgba
+from matplotlib.lines import Line2D
 from plotly.offline import get_plotlyjs
 
-from spheretwin.models.telemetry.signals import ANGLES
-from spheretwin.viz.comparison.runs import ComparedRun, Spectrum, logarithmic_range, quantity_range
-from spheretwin.viz.decimation import envelope, mean_and_deviation, octave_maxima
+from spheretwin.viz.comparison.runs import ComparedRun, Spectrum
+from spheretwin.viz.figures import comparison
+from spheretwin.viz.figures.style import DASHES
 from spheretwin.viz.pages import markdown
 from spheretwin.viz.quantities import Array, Quantity
-from spheretwin.viz.theme import rgb, run_colours
+from spheretwin.viz.theme import run_colours
 
 # The browser contacts no host.
 POLICY = (
     "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data: blob:;"
     " font-src data:; form-action 'none'; base-uri 'none'"
-)
-
-
-SCALE = (
-    '<button type="button" id="logarithmic" aria-pressed="false">logarithmic axis of the error angle</button>'
 )
 
 TITLES = {"over-time": "Signals over time", "spectra": "Spectra of the tracking errors"}
@@ -54,7 +54,7 @@ def page(
     content = ", ".join(f'"{name}": {figure.to_json()}' for name, figure in figures.items())
     body = [
         markdown.rendered(above),
-        f'<div class="runs" role="group" aria-label="runs">{_switches(runs)}{SCALE}</div>',
+        f'<div class="runs" role="group" aria-label="runs">{_switches(runs)}</div>',
         *(
             markdown.rendered(f"## {TITLES[name]}") + f'<div class="plot" id="{name}"></div>'
             for name in figures
@@ -75,12 +75,12 @@ def _switches(runs: Sequence[ComparedRun]) -> str:
     return "".join(
         f'<button type="button" data-run="{place}" aria-pressed="true"><svg width="32" height="6">'
         f'<line y1="3" x2="32" y2="3" stroke="{colour}" stroke-width="3"'
-        f' stroke-dasharray="{DASHES_px[place % len(DASHES_px)]}"/></svg>{escape(run.label)}</button>'
+        f' stroke-dasharray="{_dash(place)}"/></svg>{escape(run.label)}</button>'
         for place, (run, colour) in enumerate(zip(runs, colours, strict=True))
     )
 
 
-FAINT, INK, REFERENCE_COLOUR = "#e3e6ea", "#30343a", "#9aa1ab"
+FAINT, INK = "#e3e6ea", "#30343a"
 
 HEIGHT_px, GAP_px, MARGIN_px, NOTE_px = 150, 26, 46, 14
 
@@ -160,17 +160,16 @@ MOST_NUMBERS = 130_000
 """Numbers in all lines; each takes five to six bytes of the page, in addition to the library's 4.8 MB."""
 
 MOST_POINTS, FEWEST_POINTS = 20_000, 300
+NUMBERS_OF_A_BIN = 8
 MOST_COLUMNS, MOST_CURRENTS = 500, 30_000
 MOST_LINES_EACH_OCTAVE, FEWEST_LINES_EACH_OCTAVE = 48, 8
 LINES_OF_ALL = 288
-
-BLUE_TO_RED = [[0, "#2166ac"], [0.5, "#f7f7f7"], [1, "#b2182b"]]
 
 
 def over_time(
     runs: Sequence[ComparedRun], leading: Sequence[int], quantities: Sequence[Quantity]
 ) -> plotly.Figure:
-    """Figure of every quantity, the currents of each run and what happened.
+    """Figure of every quantity, the currents of each run and the events.
 
     Parameters
     ----------
@@ -180,49 +179,15 @@ def over_time(
     quantities : sequence of Quantity
     """
     most = int(np.clip(points_per_line(runs, leading, quantities), FEWEST_POINTS, MOST_POINTS))
-    colours = run_colours([run.law for run in runs])
-    panels: list[PlotPanel] = []
-    logarithmic: list[dict[str, Any]] = []
-    for quantity in quantities:
-        reference_lines = [
-            trace
-            for place in leading
-            if quantity.desired
-            for trace in _lines(
-                runs[place],
-                place,
-                quantity.desired(runs[place].rows),
-                most,
-                {"color": REFERENCE_COLOUR, "width": 4.0},
-            )
-        ]
-        of_runs = [quantity.column(run.rows) for run in runs]
-        lines = [
-            trace
-            for place, (run, colour, values) in enumerate(zip(runs, colours, of_runs, strict=True))
-            for trace in _lines(run, place, values, most, _line(place, colour))
-        ]
-        for trace in reference_lines:
-            trace.hoverinfo, trace.hovertemplate = "skip", None
-        limits = quantity_range(quantity, runs, leading)
-        axis, note = {"range": (limits.low, limits.high)}, limits.outside_lines()
-        if quantity.group == "whole":
-            other = logarithmic_range(of_runs)
-            note, other_note = _of_same_length(note, other.outside_lines())
-            ends = np.log10([other.low, other.high]).tolist()
-            logarithmic.append({"axis": _axis(len(panels)), "range": ends, "note": "<br>".join(other_note)})
-        panels.append(PlotPanel(_text(quantity.heading), [*reference_lines, *lines], axis, note=note))
-    panels += _currents(runs)
-    panels.append(_events(runs, colours))
-    figure = stacked(panels, "time [s]")
-    figure.layout.meta = logarithmic
-    return figure
-
-
-def _of_same_length(*notes: Sequence[str]) -> list[list[str]]:
-    """Return notes with as many lines each: the panel has the space of the longest."""
-    most = max(map(len, notes))
-    return [[*lines, *[" "] * (most - len(lines))] for lines in notes]
+    detail = comparison.Detail(most, most // NUMBERS_OF_A_BIN)
+    groups = runs[0].table["current_A"].shape[1]
+    cells = min(MOST_COLUMNS, MOST_CURRENTS // (groups * len(runs)))
+    drawn = [
+        comparison.over_time(runs, leading, quantities, "", detail).axes,
+        comparison.currents(runs, "", cells).axes,
+    ]
+    panels = [_panel(axes, runs) for of_figure in drawn for axes in of_figure if axes.get_subplotspec()]
+    return stacked([*panels, _events(runs)], "time [s]")
 
 
 def points_per_line(
@@ -242,91 +207,95 @@ def error_spectra(runs: Sequence[ComparedRun], spectra: Sequence[Sequence[Spectr
     spectra : sequence of sequence of Spectrum
         Spectra of each run and each hinge.
     """
-    colours, panels = run_colours([run.law for run in runs]), []
-    lines_per_octave = int(
-        np.clip(LINES_OF_ALL // len(runs), FEWEST_LINES_EACH_OCTAVE, MOST_LINES_EACH_OCTAVE)
-    )
-    for axis, name in enumerate(ANGLES):
-        traces = []
-        for place, (colour, of_run) in enumerate(zip(colours, spectra, strict=True)):
-            spectrum, look = of_run[axis], _line(place, colour)
-            x, y = octave_maxima(spectrum.frequency_Hz, spectrum.amplitude_mrad, lines_per_octave)
-            hover = "%{x:.4g} Hz: %{y:.3g} mrad<extra></extra>"
-            traces.append(plotly.Scatter(x=_small(x), y=_small(y), mode="lines", line=look,
-                                         meta=f"{place}", hovertemplate=hover))  # fmt: skip
-            tops = np.array(spectrum.peaks).reshape(-1, 2).T
-            traces.append(plotly.Scatter(x=tops[0], y=tops[1], mode="markers", hoverinfo="skip",
-                                         marker={"color": colour, "size": 8}, meta=f"{place}"))  # fmt: skip
-        panels.append(
-            PlotPanel(
-                f"error of {name}, amplitude [mrad]", traces, {"type": "log", "exponentformat": "power"}
-            )
-        )
-    return stacked(panels, "frequency [Hz]", type="log")
+    each_octave = LINES_OF_ALL // len(runs)
+    each_octave = int(np.clip(each_octave, FEWEST_LINES_EACH_OCTAVE, MOST_LINES_EACH_OCTAVE))
+    axes_of_hinges = comparison.spectra(runs, spectra, "", each_octave).axes
+    figure = stacked([_panel(axes, runs) for axes in axes_of_hinges], "frequency [Hz]", type="log")
+    hover = "%{x:.4g} Hz: %{y:.3g} mrad<extra></extra>"
+    return figure.update_traces(hovertemplate=hover, selector={"mode": "lines"})
 
 
-DASHES_px = ("", "7,3", "2,2", "7,2,2,2", "12,3", "12,2,2,2", "4,4", "2,5")
-"""Dash of each run, as an SVG writes it: colours alone are too alike for some readers."""
-
-
-def _line(place: int, colour: str) -> dict[str, Any]:
-    """Return the look of the lines of a run."""
-    dash = DASHES_px[place % len(DASHES_px)]
-    return {"color": colour, "width": 1.3, "dash": dash.replace(",", "px,") + "px" if dash else "solid"}
-
-
-def _lines(
-    run: ComparedRun, place: int, values: Array, most: int, line: dict[str, Any]
-) -> list[plotly.Scatter]:
-    """Return every tick as one line, or the bounds of every few ticks as a band and their mean."""
-    t_s, colour = run.table["t_s"], line["color"]
-    common = {"mode": "lines", "meta": f"{place}"}
-    hover = "%{y:.4g}<extra></extra>"
-    if len(values) <= most:
-        return [plotly.Scatter(x0=float(t_s[0]), dx=run.period_s, y=_small(values), line=line,
-                               hovertemplate=hover, **common)]  # fmt: skip
-    bins = envelope(values, most // 3)
-    width_s = run.period_s * int(bins.starts[1])
-    step = {"x0": float(t_s[0]), "dx": width_s, "hoverinfo": "skip"}
-    edge = {"color": colour, "width": 0.5, "shape": "hv"}
-    low, high = (np.append(bound, bound[-1]) for bound in (bins.low, bins.high))
-    band = {"fill": "tonexty", "fillcolor": f"rgba{(*rgb(colour), 0.3)}"}
-    middles_s = np.concatenate([t_s[bins.starts[:-1]] + width_s / 2, t_s[-1:]])
-    return [
-        plotly.Scatter(y=_small(low), line=edge, **step, **common),
-        plotly.Scatter(y=_small(high), line=edge, **step, **band, **common),
-        plotly.Scatter(x=_small(middles_s), y=_small(bins.mean), line=line, hovertemplate=hover, **common),
+def _panel(axes: Axes, runs: Sequence[ComparedRun]) -> PlotPanel:
+    """Panel with the lines, bands, markers and images of axes; those of a run have its label."""
+    places = {label: place for place, run in enumerate(runs) for label in (run.label, run.legend)}
+    traces = [
+        trace
+        for artist in axes.get_children()
+        for trace in _traces(artist, places.get(str(artist.get_label()).removeprefix("_")))
     ]
+    is_log, heading = axes.get_yscale() == "log", axes.get_title(loc="left") or axes.get_ylabel()
+    axis: dict[str, Any] = {"type": "log", "exponentformat": "power"} if is_log else {}
+    if not axes.get_autoscaley_on():
+        axis["range"] = np.log10(axes.get_ylim()).tolist() if is_log else axes.get_ylim()
+    for image in axes.collections:
+        if isinstance(image, QuadMesh):
+            heading = f"{heading or axes.get_yticklabels()[0].get_text()}, up to {image.get_clim()[1]:.3g} A"
+            axis["tickvals"] = axes.get_yticks()[: np.shape(image.get_coordinates())[0] - 2].tolist()
+    place, note = axes.get_subplotspec(), axes.get_title(loc="right").splitlines()
+    ratios = np.asarray(place.get_gridspec().get_height_ratios() if place else [1.0], dtype=np.float64)
+    height = max(float(ratios[place.rowspan.start if place else 0] / ratios.max()), 0.25)
+    return PlotPanel(_text(heading.replace("\n", " ")), traces, axis, height, note)
 
 
-def _currents(runs: Sequence[ComparedRun]) -> list[PlotPanel]:
-    """Return a panel for each run: mean currents, blue negative and red positive, and a row of variation."""
-    largest_A = max(float(np.nanmax(np.abs(run.table["current_A"]))) for run in runs)
-    panels = []
-    for place, run in enumerate(runs):
-        groups = run.table["current_A"].shape[1]
-        most = min(MOST_COLUMNS, MOST_CURRENTS // (groups * len(runs)))
-        cells = mean_and_deviation(run.table["current_A"], most)
-        ends_s = np.append(run.table["t_s"][cells.starts], run.table["t_s"][-1] + run.period_s)
-        common = {"x": _small(ends_s), "showscale": False, "meta": f"{place}"}
-        hover = "group %{y}: mean %{z:.3g} A<extra></extra>"
-        means = plotly.Heatmap(z=_small(cells.mean.T), colorscale=BLUE_TO_RED, zmin=-largest_A,
-                               zmax=largest_A, hovertemplate=hover, **common)  # fmt: skip
-        hover = "standard deviation up to %{z:.3g} A<extra></extra>"
-        lane = plotly.Heatmap(z=_small(np.max(cells.deviation, axis=1)[None]), y=[groups + 0.5], dy=1.0,
-                              colorscale="Greys", zmin=0.0, zmax=largest_A / 2, hovertemplate=hover,
-                              **common)  # fmt: skip
-        title = f"mean currents by group up to ±{largest_A:.3g} A, below their variation: {_text(run.legend)}"
-        panels.append(
-            PlotPanel(title, [means, lane], {"range": (groups + 1, -0.5), "dtick": max(1, groups // 6)})
-        )
-    return panels
+SYMBOLS = {"o": "circle", "X": "x"}
 
 
-def _events(runs: Sequence[ComparedRun], colours: Sequence[str]) -> PlotPanel:
+def _traces(artist: Artist, run: int | None) -> list[Any]:
+    """Traces of one artist, switched with its run; none of one without data."""
+    common: dict[str, Any] = {} if run is None else {"meta": f"{run}"}
+    if isinstance(artist, Line2D):
+        x, y = map(np.asarray, artist.get_data())
+        if not len(x):
+            return []
+        colour, marker = to_hex(artist.get_color()), SYMBOLS.get(str(artist.get_marker()))
+        if marker:
+            look = {"color": colour, "size": 8, "symbol": marker}
+            return [plotly.Scatter(x=x, y=y, mode="markers", marker=look, hoverinfo="skip", **common)]
+        dash = "dash" if run is None else (_dash(run).replace(",", "px,") + "px" if _dash(run) else "solid")
+        line = {"color": colour, "width": 1.2 * artist.get_linewidth(), "dash": dash}
+        hover = {"hoverinfo": "skip"} if run is None else {"hovertemplate": "%{y:.4g}<extra></extra>"}
+        return [plotly.Scatter(**_places(x), y=_small(y), mode="lines", line=line, **hover, **common)]
+    if isinstance(artist, QuadMesh):
+        corners, values = np.asarray(artist.get_coordinates()), np.asarray(artist.get_array())
+        (low, high), shades = artist.get_clim(), np.linspace(0, 1, 11)
+        mesh = {"x": _small(corners[0, :, 0]), "y": corners[:, 0, 1], "z": _small(values)}
+        scale = [[shade, to_hex(artist.cmap(shade))] for shade in shades.tolist()]
+        group = "group %{y:.0f}: " if len(corners) > 2 else ""
+        text: dict[str, Any] = {"hovertemplate": group + "%{z:.3g} A<extra></extra>", "showscale": False}
+        return [plotly.Heatmap(**mesh, zmin=low, zmax=high, colorscale=scale, **text, **common)]
+    if isinstance(artist, PolyCollection):
+        ends = np.full((1, 2), np.nan)
+        outlines = [part for path in artist.get_paths() for part in (path.vertices, ends)]
+        x, y = np.concatenate([*outlines, ends]).T
+        fill = [_rgba(colours[0]) for colours in (artist.get_facecolor(), artist.get_edgecolor())]
+        edge = {"color": fill[1], "width": 0.5}
+        return [plotly.Scatter(x=_small(x), y=_small(y), mode="lines", line=edge, fill="toself",
+                               fillcolor=fill[0], hoverinfo="skip", **common)]  # fmt: skip
+    return []
+
+
+def _dash(place: int) -> str:
+    """Dash of a run in the notation of an SVG: colours alone are too alike for some readers."""
+    dash = DASHES[place % len(DASHES)]
+    return "" if dash == "-" else ",".join(f"{1.5 * length:g}" for length in dash[1])
+
+
+def _rgba(colour: Any) -> str:
+    *shades, alpha = to_rgba(colour)
+    return f"rgba({','.join(f'{255 * shade:.0f}' for shade in shades)},{alpha:g})"
+
+
+def _places(x: Array) -> dict[str, Any]:
+    """Horizontal places of points; if they have one distance, the first and the distance are enough."""
+    steps = np.diff(x)
+    is_even = len(steps) > 1 and np.allclose(steps, steps[0], rtol=1e-6)
+    return {"x0": float(x[0]), "dx": float(steps.mean())} if is_even else {"x": _small(x)}
+
+
+def _events(runs: Sequence[ComparedRun]) -> PlotPanel:
     """A row a run, a mark an event."""
     traces = []
-    for place, (run, colour) in enumerate(zip(runs, colours, strict=True)):
+    for place, (run, colour) in enumerate(zip(runs, run_colours([run.law for run in runs]), strict=True)):
         times = [event[0] for event in run.events]
         text = [_text(f"{t_s:.4g} s: {text}") for t_s, _, text in run.events]
         symbols = ["circle" if level == "INFO" else "triangle-up" for _, level, _ in run.events]

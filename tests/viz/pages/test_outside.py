@@ -28,26 +28,17 @@ def test_a_transient_outside_of_the_axis_is_stated_as_in_the_figure():
     assert height == pytest.approx(2 * interactive.NOTE_px)
     low, high = page.layout.yaxis.domain
     inner_px = page.layout.height - 2 * interactive.MARGIN_px
-    assert np.isclose((high - low) * inner_px, interactive.HEIGHT_px)
+    assert (high - low) * inner_px == pytest.approx(interactive.HEIGHT_px)
     titles = [note for note in page.layout.annotations if not note.name]
     assert titles[0].yshift == 2 * interactive.NOTE_px
 
 
 def test_an_axis_with_all_values_has_no_note():
-    page = interactive.over_time([run_of(SETTLED)], [], [VALUE, ANGLE])
-    assert notes_of(page) == {}
-    assert page.layout.meta[0]["note"] == ""
+    assert notes_of(interactive.over_time([run_of(SETTLED)], [], [VALUE, ANGLE])) == {}
 
 
-def test_the_logarithmic_axis_has_its_own_note():
-    decay = 10.0 ** (-4.0 * T_s)  # to 1e-16
-    page = interactive.over_time([run_of(decay)], [], [VALUE, ANGLE])
-    (of_axis,) = page.layout.meta
-    assert of_axis["axis"] == "yaxis2"
-    assert of_axis["range"] == pytest.approx([np.log10(1.5) - 6, np.log10(1.5)])
-    assert of_axis["note"] == "values below 2e-06 are below the axis"
-    below = comparison.over_time([run_of(decay)], [], [ANGLE], "title").axes[1]
-    assert below.get_title(loc="right") == of_axis["note"]
-    assert np.allclose(np.log10(below.get_ylim()), of_axis["range"])
-    # Both notes take the same space.
-    assert notes_of(page)["yaxis2"].count("<br>") == of_axis["note"].count("<br>")
+def test_the_logarithmic_axis_has_its_own_range_and_note():
+    page = interactive.over_time([run_of(10.0 ** (-4.0 * T_s))], [], [VALUE, ANGLE])  # to 1e-16
+    assert notes_of(page)["yaxis3"] == "values below 2e-06 are below the axis"
+    assert page.layout.yaxis3.type == "log"
+    assert page.layout.yaxis3.range == pytest.approx([np.log10(1.5) - 6, np.log10(1.5)])

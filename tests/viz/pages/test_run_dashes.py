@@ -14,7 +14,7 @@ def test_every_run_has_its_own_dash_in_the_plot_and_on_its_switch():
     assert [trace.meta for trace in lines] == [str(place) for place in range(8)]
     dashes = [trace.line.dash for trace in lines]
     assert len(set(dashes)) == 8
-    assert dashes[:2] == ["solid", "7px,3px"]
+    assert dashes[:2] == ["solid", "7.5px,1.5px"]
     switches = interactive._switches(RUNS)
     strokes = re.findall(r'stroke="([^"]*)" stroke-width="3" stroke-dasharray="([^"]*)"', switches)
     assert [colour for colour, _ in strokes] == [trace.line.color for trace in lines]
