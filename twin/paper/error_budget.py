@@ -42,7 +42,9 @@ def overrides(stage: Mapping[str, Any]) -> dict[str, Any]:
         return values  # the sets have a data sheet of their own
     # All is known but the mass on the shaft.
     nominal = {"nominal.equals_truth": True, "nominal.inertia_kg_m2": tuple(actuator.load().inertia.tolist())}
-    lag = {} if "drive.supply_V" in {*values, *other} else {"drive.time_constant_s": 0.0}
+    lag: dict[str, float | None] = (
+        {} if "drive.supply_V" in {*values, *other} else {"drive.time_constant_s": 0.0}
+    )
     if "plain_lag" in stage:
         lag = {"drive.time_constant_s": None}
     return {**nominal, **lag, **values, **other}

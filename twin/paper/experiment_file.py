@@ -11,7 +11,7 @@ from itertools import product
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from spheretwin.models.telemetry.status import Status
-from spheretwin.paper.experiment import Case, Experiment, Outcome, Outcomes, ResultTable, Section
+from spheretwin.paper.experiment import SEEDS, Case, Experiment, Outcome, Outcomes, ResultTable, Section
 from spheretwin.paper.laws import COMPARED_LAWS, printed_rad
 from spheretwin.viz.pages.markdown import Drawing
 
@@ -19,6 +19,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 FOLDER = resources.files("spheretwin.paper")
+
+STATUSES = {str(status): status for status in Status}
 
 T = TypeVar("T")
 
@@ -37,12 +39,12 @@ class CaseRuns:
 class ExperimentFile:
     """Study file of an experiment.
 
-    Each ``[[case]]`` crosses the lists of the file that ``cross`` names, the last fastest; the list ``law``
-    is that of `COMPARED_LAWS` unless the file has one. The entries of a list are columns of the case:
-    ``name`` is formatted with them, ``set`` has the columns that are fields of the scenario, ``details``
-    those of its row in the JSON. An entry, and the case, may have further ``fields``. ``expected`` are
-    statuses that are no failure, of all cases or by law. An entry of another list that names a law has the
-    columns and the fields of the law too.
+    Each ``[[case]]``, with the entries of ``[every_case]``, crosses the lists of the file that ``cross``
+    names, the last fastest; the list ``law`` is that of `COMPARED_LAWS` unless the file has one. The entries
+    of a list are columns of the case: ``name`` is formatted with them, ``set`` has the columns that are
+    fields of the scenario, ``details`` those of its row in the JSON. An entry, and the case, may have further
+    ``fields``. ``expected`` are statuses that are no failure, of all cases or by law. An entry of another
+    list that names a law has the columns and the fields of the law too.
 
     Parameters
     ----------
@@ -63,10 +65,16 @@ class ExperimentFile:
     def __getitem__(self, entry: str) -> Any:
         return self._content[entry]
 
-    @cached_property
+    @property
     def cases(self) -> list[Case]:
         """All cases, block by block, each once."""
-        return list({case.name: case for block in self["case"] for case in self._block(block)}.values())
+        return list({case.name: case for case in self._cases}.values())
+
+    @cached_property
+    def _cases(self) -> list[Case]:
+        """All cases; one that belongs to several entries of a list has the columns of each."""
+        common = self._content.get("every_case", {})
+        return [case for block in self["case"] for case in self._block(common | block)]
 
     def case(self, **columns: Any) -> Case:
         """Return the first case with some columns."""
@@ -100,7 +108,7 @@ class ExperimentFile:
         return Experiment(name, title, summary, **functions)
 
     def _with(self, columns: Mapping[str, Any]) -> list[Case]:
-        return [case for case in self.cases if columns.items() <= case.columns.items()]
+        return [case for case in self._cases if columns.items() <= case.columns.items()]
 
     def _block(self, block: Mapping[str, Any]) -> list[Case]:
         levels = (self[name] for name in block["cross"])
@@ -118,17 +126,20 @@ class ExperimentFile:
         fields = {field: columns[column] for field, column in block.get("set", {}).items()}
         for entry in (*entries, block):
             fields |= entry.get("fields", {})
+        option = {**block, **columns}
         expected = block.get("expected", {})
         statuses = expected.get(columns.get("law"), ["completed"]) if isinstance(expected, dict) else expected
+        details = block.get("details", {}).items()
         return Case(
             name=block["name"].format(**columns),
-            scenario=columns.get("scenario", block.get("scenario", "")),
+            scenario=option["scenario"],
             fields=fields,
-            details={name: columns[column] for name, column in block.get("details", {}).items()},
-            is_random=columns.get("is_random", True),
-            single_run=block.get("single_run", False),
-            expected_statuses=tuple(Status(status) for status in statuses),
-            comparable=block.get("comparable", True),
+            details={name: columns[column] for name, column in details if column in columns},
+            is_random=option.get("is_random", True),
+            single_run=option.get("single_run", False),
+            expected_statuses=tuple(STATUSES[status] for status in statuses),
+            comparable=option.get("comparable", True),
+            seeds=option.get("seeds", SEEDS),
             columns=columns,
         )
 

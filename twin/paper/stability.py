@@ -2,110 +2,36 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from spheretwin import scenario as scenarios
-from spheretwin.models.telemetry.status import Status
 from spheretwin.models.telemetry.table import Table
 from spheretwin.paper import frequency_response as responses
-from spheretwin.paper.experiment import Case, Experiment, Finding, Outcome, Outcomes, ResultTable, Section
-from spheretwin.paper.laws import COMPARED_LAWS, ComparedLaw
+from spheretwin.paper.experiment import Case, Finding, Outcome, Outcomes, ResultTable, Section
+from spheretwin.paper.experiment_file import CaseRuns, Cells, ExperimentFile, column, table
+from spheretwin.paper.laws import BY_LAW
 from spheretwin.paper.lyapunov import Descent, descent
 from spheretwin.paper.page import NONE
 from spheretwin.run import Run
 from spheretwin.viz.pages.markdown import Drawing
 
-SCENARIO = "sinusoid"
-
-LAWS = tuple(law for law in COMPARED_LAWS if law.law in ("afsm", "pid", "afsm_eso"))
-
-# The laws that are linear at rest; AFSM switches.
-LOOPS = tuple(law for law in LAWS if law.law in ("pid", "afsm_eso"))
-
-LONG_s = 600.0
-LOADS = (1.0, 5.0)
-STEP_s = 5e-4
-
-# The steps go beyond the margin: a run may be lost there.
-EXPECTED = (Status.COMPLETED, Status.LEFT_WORKSPACE, Status.DIVERGED)
-
-
-class Margin(NamedTuple):
-    """Quantity that is made worse step by step."""
-
-    name: str
-    unit: str
-    steps: tuple[float, ...]
-    """From the healthy value on."""
-
-
-DELAY = Margin("unknown delay", "ms", (0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 12, 14))
-HEAVIER = Margin("inertia, heavier: m", "", (0, 0.5, 1, 2, 3, 4, 5, 6, 8, 12, 16))
-LIGHTER = Margin("inertia, lighter: m", "", (0, -0.3, -0.5, -0.6, -0.7, -0.8, -0.9, -0.95))
-SLOWER = Margin("control rate, slower", "Hz", (1000, 500, 400, 250, 200, 100))
-FASTER = Margin("control rate, faster", "Hz", (1000, 2000, 5000, 10000))
-MARGINS = (DELAY, HEAVIER, LIGHTER, SLOWER, FASTER)
+FILE = ExperimentFile("stability")
+LAWS = [BY_LAW[entry["law"]] for entry in FILE["tested_law"]]
+UNITS = {entry["quantity"]: entry["unit"] for entry in FILE["worse"]}
+LONG_s = FILE["long"][0]["fields"]["duration"]
 
 
 def cases() -> list[Case]:
-    """Cases of loads, ten minutes and margins for every law."""
-    of_margins = {case.name: case for law in LAWS for quantity in MARGINS for case in margin(law, quantity)}
-    return [
-        *(reaching(law, load) for law in LAWS for load in LOADS),
-        *(drift(law) for law in LAWS),
-        *of_margins.values(),
-        *(frequency_response(law) for law in LOOPS),
-    ]
+    """Cases of loads, ten minutes and margins, and of a multisine on a rotor at rest."""
+    return [with_multisine(case) if case.columns.get("part") == "response" else case for case in FILE.cases]
 
 
-def reaching(law: ComparedLaw, load: float) -> Case:
-    """Case from rest under a load."""
-    return _case(law, f"L {load:g}", {"disturbance.load": load}, (Status.COMPLETED,))
-
-
-def drift(law: ComparedLaw) -> Case:
-    """Case of ten minutes."""
-    return _case(law, f"{LONG_s:g} s", {"duration": LONG_s}, EXPECTED)
-
-
-def margin(law: ComparedLaw, quantity: Margin) -> list[Case]:
-    """Cases of a law at every step of a margin."""
-    conditions = [_worse(quantity, step) for step in quantity.steps]
-    return [_case(law, *condition, EXPECTED)._replace(comparable=False) for condition in conditions]
-
-
-def frequency_response(law: ComparedLaw) -> Case:
-    """Case of the multisine on a rotor at rest."""
-    return Case(
-        name=f"{law.law}: frequency response",
-        scenario="hold",
-        fields={"controller.law": law.law, **responses.fields()},
-        details={"condition": "frequency response"},
-        single_run=True,
-    )
-
-
-def _worse(quantity: Margin, step: float) -> tuple[str, dict[str, Any]]:
-    if quantity is DELAY:  # no law knows it
-        return f"delay {step:g} ms", {"drive.delay_s": 1e-3 * step, "nominal.delay_s": 0.0}
-    if quantity in (HEAVIER, LIGHTER):
-        return f"m {step:g}", {"plant.modelling_error": float(step)}
-    period_s = 1 / step
-    return f"{step:g} Hz", {"controller.period_s": period_s, "plant.step_s": min(STEP_s, period_s)}
-
-
-def _case(law: ComparedLaw, condition: str, fields: dict[str, Any], expected: tuple[Status, ...]) -> Case:
-    return Case(
-        name=f"{law.law}: {condition}",
-        scenario=SCENARIO,
-        fields={"controller.law": law.law, **fields},
-        details={"condition": condition},
-        single_run=True,
-        expected_statuses=expected,
-    )
+def with_multisine(case: Case) -> Case:
+    """Return a case with the excitation of the frequency response."""
+    return case._replace(fields={**case.fields, **responses.fields()})
 
 
 REACHED_rad_s, SLOPE = 0.05, 50.0
@@ -177,44 +103,18 @@ HOLDS_rad = 0.01
 """A law holds if its run completes with a smaller RMS error over the second half on every hinge: a twentieth
 of the amplitude."""
 
-REACHING = (
-    f"*Reached* is the first time at which |λe + ė| of every hinge is below {REACHED_rad_s:g} rad/s, with λ"
-    f" of (58), {SLOPE:g} 1/s, for every law. V is the function (44) along the run: θ* is a fit of the torque"
-    " that each axis needed, ξ* is the largest residual of that fit, and ζ* is 0. The evidence is weak, as"
-    " nearly all of V is the error of the parameters; the proof says that V never rises in continuous time,"
-    " and nothing about a sampled loop."
-)
-DRIFT = (
-    f"The sinusoid for {LONG_s:g} s. ξ̂ and ζ̂ of AFSM never decrease, as printed; the table compares the last"
-    " minute with the first."
-)
-MARGIN = (
-    "One condition is made worse step by step, on the sinusoid with m = 0.2 and L = 1 (except for m itself),"
-    " and the law has no information about it. The law *holds* if the run completes with an RMS error of less"
-    f" than {1e3 * HOLDS_rad:g} mrad on every hinge over the second half. The table has the last step up to"
-    " which the law holds, and the first at which it does not. Beyond its margin a loop amplifies rounding"
-    " errors: these rows are not in the sample that is compared with MuJoCo."
-)
-
-
-RESPONSE = (
-    f"A multisine of {len(responses.LINES_Hz)} lines from {responses.LINES_Hz[0]} to"
-    f" {responses.LINES_Hz[-1]} Hz, {1e3 * responses.AMPLITUDE_Nm:g} mN·m each, acts as a disturbance on α of"
-    " a rotor at rest, on ideal hardware without lag. The response of the opened loop is the ratio of the"
-    " torque of the law to the torque that the rotor receives. The linear model has the law, differentiated"
-    " at rest, and the linear plant, sampled at the control period. AFSM is left out: its switching has no"
-    " linear model."
-)
-
 
 def sections(outcomes: Outcomes) -> list[Section]:
     """Descent and reaching, ten minutes, and margins of each law."""
-    drawings = [lambda: _draw(outcomes)] if _tested(outcomes) else []
+    reached = FILE.runs(outcomes, part="reaching")
+    reaching = table("Reaching times, and V of (44) along AFSM's runs", reached, REACHING, 2)
+    tested = _tested(outcomes)
+    drawings = [lambda: _draw(tested)] if tested else []
     return [
-        Section("Descent and reaching", REACHING, [_reaching(outcomes)]),
-        Section("Ten minutes", DRIFT, [_drift(outcomes)]),
-        Section("Margins", MARGIN, [_margins(outcomes)], drawings),
-        *_response_section(outcomes),
+        FILE.section("reaching", [reaching], reached=REACHED_rad_s, slope=SLOPE),
+        FILE.section("drift", [_drift(outcomes)]),
+        FILE.section("margins", [_margins(tested)], drawings, holds_mrad=1e3 * HOLDS_rad),
+        *_response_section(FILE.runs(outcomes, part="response")),
     ]
 
 
@@ -235,67 +135,56 @@ def ends_of(kept_within: Sequence[bool]) -> tuple[int | None, int | None]:
     return (last if last >= 0 else None), first
 
 
-def _response_section(outcomes: Outcomes) -> list[Section]:
+def _response_section(items: Sequence[CaseRuns]) -> list[Section]:
     """Section of the frequency responses, if they were run."""
-    by_law = {law: run.data.response for law in LOOPS for run in outcomes.runs(frequency_response(law))}
-    if not by_law:
+    if not items:
         return []
-    linear = {
-        law: responses.linear_loop(scenarios.load("hold", frequency_response(law).fields)).response(
-            responses.LINES_Hz
-        )
-        for law in by_law
-    }
+    by_law = {item["law"]: (item.runs[0].data.response, _linear(item.case)) for item in items}
     rows = [
-        (law.label, source, *_response_cells(responses.margins(responses.LINES_Hz, response)))
-        for law in by_law
-        for source, response in (("measured", by_law[law]), ("linear", linear[law]))
+        (BY_LAW[law].label, source, *_response_cells(responses.margins(responses.LINES_Hz, response)))
+        for law, both in by_law.items()
+        for source, response in zip(("measured", "linear"), both, strict=True)
     ]
     head = ("law", "response", "crossover, Hz", "phase margin, degrees", "gain margin, dB")
-    table = ResultTable("Gain and phase margins of the sampled loop", head, rows, 2)
-    return [Section("Frequency response", RESPONSE, [table], [lambda: _bode(by_law, linear)])]
+    margins = ResultTable("Gain and phase margins of the sampled loop", head, rows, 2)
+    values: dict[str, Any] = {"lines": len(responses.LINES_Hz), "amplitude_mNm": 1e3 * responses.AMPLITUDE_Nm}
+    values |= {"first": responses.LINES_Hz[0], "last": responses.LINES_Hz[-1]}
+    return [FILE.section("response", [margins], [lambda: _bode(by_law)], **values)]
+
+
+def _linear(case: Case) -> responses.Response:
+    scenario = scenarios.load(case.scenario, with_multisine(case).fields)
+    return responses.linear_loop(scenario).response(responses.LINES_Hz)
 
 
 def _response_cells(margins: responses.Margins) -> tuple[str, ...]:
     return tuple(NONE if np.isnan(value) else f"{value:.1f}" for value in margins)
 
 
-def _bode(
-    measured: dict[ComparedLaw, responses.Response], linear: dict[ComparedLaw, responses.Response]
-) -> Drawing:
+def _bode(by_law: dict[str, tuple[responses.Response, responses.Response]]) -> Drawing:
     from spheretwin.viz.figures import frequency_response as figures
 
     frequency_Hz = np.array(responses.LINES_Hz, np.float64)
     figure = figures.bode(
-        {law.law: figures.LoopResponse(frequency_Hz, measured[law], linear[law]) for law in measured},
-        {law.law: law.label for law in measured},
+        {law: figures.LoopResponse(frequency_Hz, *both) for law, both in by_law.items()},
+        {law: BY_LAW[law].label for law in by_law},
         "Loop of alpha, opened at the torque of the law",
     )
-    caption = (
-        "Gain and phase of the opened loop of α at rest. Markers: measured with a multisine; lines: linear"
-        " model of the sampled loop. Dashed: gain 1 and −180 degrees."
-    )
-    return Drawing("stability_frequency_response.svg", caption, figure)
+    return FILE.drawing("response", figure)
 
 
-def _reaching_runs(outcomes: Outcomes) -> list[tuple[ComparedLaw, float, StabilityMeasures]]:
-    return [
-        (law, load, run.data) for law in LAWS for load in LOADS for run in outcomes.runs(reaching(law, load))
-    ]
-
-
-def _drift_runs(outcomes: Outcomes) -> list[tuple[ComparedLaw, StabilityMeasures, Span, Span]]:
-    """Runs of ten minutes with their first and last minute."""
-    return [
-        (law, run.data, run.data.early, run.data.late)
-        for law in LAWS
-        for run in outcomes.runs(drift(law))
-        if run.data.early and run.data.late
-    ]
+def _drift_runs(outcomes: Outcomes) -> list[tuple[str, StabilityMeasures, Span, Span]]:
+    """Label of the law, measures, and first and last minute of each run of ten minutes."""
+    items = [(item["label"], item.runs[0].data) for item in FILE.runs(outcomes, part="drift")]
+    return [(law, data, data.early, data.late) for law, data in items if data.early and data.late]
 
 
 def _descent_findings(outcomes: Outcomes) -> list[Finding]:
-    courses = [(load, data.descent) for _, load, data in _reaching_runs(outcomes) if data.descent]
+    courses = [
+        (item["L"], course)
+        for item in FILE.runs(outcomes, part="reaching")
+        if (course := item.runs[0].data.descent)
+    ]
     if not courses:
         return []
     texts = ", ".join(
@@ -314,7 +203,7 @@ def _descent_findings(outcomes: Outcomes) -> list[Finding]:
 
 def _drift_findings(outcomes: Outcomes) -> list[Finding]:
     texts = [
-        f"{law.label} {early.variation_A_s:.0f} to {late.variation_A_s:.0f} A/s"
+        f"{law} {early.variation_A_s:.0f} to {late.variation_A_s:.0f} A/s"
         for law, _, early, late in _drift_runs(outcomes)
     ]
     if not texts:
@@ -322,30 +211,36 @@ def _drift_findings(outcomes: Outcomes) -> list[Finding]:
     return [Finding(None, f"variation of the commands, first to last of ten minutes: {', '.join(texts)}")]
 
 
-def _reaching(outcomes: Outcomes) -> ResultTable:
-    rows = []
-    for law, load, data in _reaching_runs(outcomes):
-        reached = "not within the run" if data.reached_s is None else f"{data.reached_s:.2f} s"
-        rows.append((law.label, f"{load:g}", reached, *_descent_cells(data.descent)))
-    head = (
-        "law", "L", "reached after", "V rises at", "all rises / V₀", "fallen / V₀", "parameters' share of V₀",
-    )  # fmt: skip
-    return ResultTable("Reaching times, and V of (44) along AFSM's runs", head, rows, 2)
+def _reached(item: CaseRuns) -> str:
+    reached_s = item.runs[0].data.reached_s
+    return "not within the run" if reached_s is None else f"{reached_s:.2f} s"
 
 
-def _descent_cells(course: Descent | None) -> tuple[str, ...]:
-    if course is None:
-        return (NONE,) * 4
-    share = f"{100 * course.of_parameters:.2f} %"
-    return f"{100 * course.rises:.2g} %", f"{course.risen:.1e}", f"{course.fallen:.1e}", share
+def _of_descent(text: Callable[[Descent], str]) -> Callable[[CaseRuns], str]:
+    def cell(item: CaseRuns) -> str:
+        course: Descent | None = item.runs[0].data.descent
+        return NONE if course is None else text(course)
+
+    return cell
+
+
+REACHING: Cells = {
+    "law": column("label"),
+    "L": column("L", "{:g}"),
+    "reached after": _reached,
+    "V rises at": _of_descent(lambda course: f"{100 * course.rises:.2g} %"),
+    "all rises / V₀": _of_descent(lambda course: f"{course.risen:.1e}"),
+    "fallen / V₀": _of_descent(lambda course: f"{course.fallen:.1e}"),
+    "parameters' share of V₀": _of_descent(lambda course: f"{100 * course.of_parameters:.2f} %"),
+}
 
 
 def _drift(outcomes: Outcomes) -> ResultTable:
     rows = []
     for law, data, early, late in _drift_runs(outcomes):
         gains = NONE if data.gains is None else " / ".join(f"{gain:.0f}" for gain in data.gains)
-        rows.append((law.label, "first", *_span_cells(early), ""))
-        rows.append((law.label, "last", *_span_cells(late), gains))
+        rows.append((law, "first", *_span_cells(early), ""))
+        rows.append((law, "last", *_span_cells(late), gains))
     head = (
         "law", "minute", "RMS error, mrad", "torque, N·m", "variation, A/s", "at the limit",
         "ξ̂ / ζ̂ at the end",
@@ -362,72 +257,54 @@ def _span_cells(span: Span) -> tuple[str, ...]:
     )
 
 
-Steps = list[tuple[float, Outcome]]
+Tested = dict[str, dict[str, list[CaseRuns]]]
+"""Steps that were run, by margin and law."""
 
 
-def _tested(outcomes: Outcomes) -> dict[Margin, dict[ComparedLaw, Steps]]:
-    """Steps with their outcomes, by margin and law, of everything that was run."""
-    by_margin = {
-        quantity: {
-            law: [
-                (step, run)
-                for step, case in zip(quantity.steps, margin(law, quantity), strict=True)
-                for run in outcomes.runs(case)
-            ]
-            for law in LAWS
-        }
-        for quantity in MARGINS
-    }
-    return {quantity: by_law for quantity, by_law in by_margin.items() if any(by_law.values())}
+def _tested(outcomes: Outcomes) -> Tested:
+    by_margin: Tested = {}
+    for item in FILE.runs(outcomes, part="margin"):
+        by_margin.setdefault(item["quantity"], {law.law: [] for law in LAWS})[item["law"]].append(item)
+    return {quantity: by_margin[quantity] for quantity in UNITS if quantity in by_margin}
 
 
-def _margins(outcomes: Outcomes) -> ResultTable:
-    rows = [
-        (quantity.name, *(_cell(quantity, steps) for steps in by_law.values()))
-        for quantity, by_law in _tested(outcomes).items()
-    ]
-    head = ("made worse", *(f"{law.label}: last that holds / first that does not" for law in LAWS))
-    return ResultTable("Margins", head, rows)
+def _margins(tested: Tested) -> ResultTable:
+    heads = {law.law: f"{law.label}: last that holds / first that does not" for law in LAWS}
+    cells = {"made worse": str} | {head: _ends(tested, law) for law, head in heads.items()}
+    return table("Margins", tested, cells)
 
 
-def _cell(quantity: Margin, steps: Steps) -> str:
-    ends = ends_of([holds(run) for _, run in steps])
-    texts = [f"{steps[index][0]:g}" if index is not None else "none tried" for index in ends]
-    return f"{' / '.join(texts)} {quantity.unit}".strip()
+def _ends(tested: Tested, law: str) -> Callable[[str], str]:
+    def cell(quantity: str) -> str:
+        steps = tested[quantity][law]
+        ends = ends_of([holds(item.runs[0]) for item in steps])
+        texts = [f"{steps[index]['step']:g}" if index is not None else "none tried" for index in ends]
+        return f"{' / '.join(texts)} {UNITS[quantity]}".strip()
+
+    return cell
 
 
-def _draw(outcomes: Outcomes) -> Drawing:
+def _draw(tested: Tested) -> Drawing:
     from spheretwin.viz.figures import conditions as figures
 
     panels = [
         figures.MarginPanel(
-            f"{quantity.name}{f', {quantity.unit}' if quantity.unit else ''}",
+            ", ".join(filter(None, (quantity, UNITS[quantity]))),
             {
-                law.law: np.array([(step, run.tail_rms_error.max(), holds(run)) for step, run in steps])
+                law: np.array(
+                    [(item["step"], item.runs[0].tail_rms_error.max(), holds(item.runs[0])) for item in steps]
+                )
                 for law, steps in by_law.items()
                 if steps
             },
         )
-        for quantity, by_law in _tested(outcomes).items()
+        for quantity, by_law in tested.items()
     ]
     labels = {law.law: law.label for law in LAWS}
     figure = figures.margins(
         panels, labels, HOLDS_rad, "RMS error of the worst hinge, second half, mrad", "Margins"
     )
-    caption = (
-        "RMS error of the worst hinge over the second half of the run, as one thing is made worse; hollow"
-        f" where the law does not hold; dashed, {1e3 * HOLDS_rad:g} mrad."
-    )
-    return Drawing("stability_margins.svg", caption, figure)
+    return FILE.drawing("margins", figure, holds_mrad=1e3 * HOLDS_rad)
 
 
-EXPERIMENT = Experiment(
-    name="stability",
-    title="Stability beyond the proof",
-    summary="The sinusoid with m = 0.2 on ideal hardware, one seed: V of (44), reaching times, ten minutes on"
-    " end, and how much delay, inertia and control rate each law bears.",
-    cases=cases,
-    sections=sections,
-    reduce=reduce,
-    findings=findings,
-)
+EXPERIMENT = FILE.experiment(cases=cases, sections=sections, reduce=reduce, findings=findings)

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
 
 from spheretwin.control.laws import LAWS
-from spheretwin.paper.experiment import Array, Finding, Outcomes, Section
-from spheretwin.paper.experiment_file import CaseRuns, ExperimentFile, table
+from spheretwin.paper.experiment import Array, Finding, Outcomes, ResultTable, Section
+from spheretwin.paper.experiment_file import CaseRuns, ExperimentFile
 from spheretwin.run import Run
 from spheretwin.scenario.plant_sections import PlantSection
 
@@ -40,12 +39,16 @@ def reduce(run: Run) -> Trace:
     return Trace(table["q_rad"][::every].copy(), float(table["t_s"][-1]) if len(table) else 0.0)
 
 
-def costs(outcomes: Outcomes) -> dict[tuple[str, str, float], Cost]:
-    """Difference of each run by law, scenario and step in ms; none if it or its fine one was not run."""
+Costs = dict[tuple[str, str, float], Cost]
+"""Differences by law, scenario and step in ms."""
+
+
+def costs(outcomes: Outcomes) -> Costs:
+    """Difference of each run; none if it or its fine one was not run."""
     items = FILE.runs(outcomes)
     fine = {_motion(item): item.runs[0] for item in items if item["step_s"] == FINE_s}
     of_steps = [item for item in items if item["step_s"] != FINE_s and _motion(item) in fine]
-    every = {}
+    every: Costs = {}
     for item in of_steps:
         coarse, reference = (run.data.q_rad for run in (item.runs[0], fine[_motion(item)]))
         if rows := min(len(coarse), len(reference)):
@@ -60,23 +63,22 @@ def _motion(item: CaseRuns) -> tuple[str, str, float]:
 
 
 def sections(outcomes: Outcomes) -> list[Section]:
-    """Sections with a table for each scenario."""
+    """Section with a table for each scenario."""
     every = costs(outcomes)
-    steps_ms = sorted(step["ms"] for step in FILE["step"] if step["step_s"] != FINE_s)
-    tables = []
-    for scenario in (motion["scenario"] for motion in FILE["motion"]):
-        cells: dict[str, Callable[[str], str]] = {"law": str}
-        cells |= {
-            f"{ms:g} ms": lambda law, scenario=scenario, ms=ms: _cell(every.get((law, scenario, ms)))
-            for ms in steps_ms
-        }
-        items = FILE.runs(outcomes, scenario=scenario, step_s=DEFAULT_s)
-        errors = {item["law"]: f"{1e3 * np.max(item.runs[0].max_abs_error):.3g}" for item in items}
-        cells[f"tracking error at {1e3 * DEFAULT_s:g} ms"] = lambda law, errors=errors: errors.get(
-            law, "not run"
-        )
-        tables.append(table(f"Difference in mrad: {scenario}", LAWS, cells))
+    tables = [_table(outcomes, every, motion["scenario"]) for motion in FILE["motion"]]
     return [FILE.section("steps", tables)]
+
+
+def _table(outcomes: Outcomes, every: Costs, scenario: str) -> ResultTable:
+    steps_ms = sorted(step["ms"] for step in FILE["step"] if step["step_s"] != FINE_s)
+    items = FILE.runs(outcomes, scenario=scenario, step_s=DEFAULT_s)
+    errors = {item["law"]: f"{1e3 * np.max(item.runs[0].max_abs_error):.3g}" for item in items}
+    rows = [
+        (law, *(_cell(every.get((law, scenario, ms))) for ms in steps_ms), errors.get(law, "not run"))
+        for law in LAWS
+    ]
+    head = ("law", *(f"{ms:g} ms" for ms in steps_ms), f"tracking error at {1e3 * DEFAULT_s:g} ms")
+    return ResultTable(f"Difference in mrad: {scenario}", head, rows)
 
 
 def findings(outcomes: Outcomes) -> list[Finding]:

@@ -82,12 +82,16 @@ def test_a_law_holds_by_its_error_and_its_end():
 def test_margins_begin_at_what_is_healthy_and_are_compared_with_no_other_plant():
     cases = stability.cases()
     assert len({case.name for case in cases}) == len(cases)
+    healthy = {"unknown delay": 0, "control rate, slower": 1000, "control rate, faster": 1000}
     for law in stability.LAWS:
-        for quantity in stability.MARGINS:
-            for step, case in zip(quantity.steps, stability.margin(law, quantity), strict=True):
+        for quantity in stability.UNITS:
+            steps = [entry["step"] for entry in stability.FILE["worse"] if entry["quantity"] == quantity]
+            assert steps[0] == healthy.get(quantity, 0)
+            for step in steps:
+                case = stability.FILE.case(law=law.law, quantity=quantity, step=step)
                 scenario = scenario_of(case, None)
                 assert not case.comparable
-                if quantity is stability.DELAY:
+                if quantity == "unknown delay":
                     assert scenario.drive.delay_s == pytest.approx(1e-3 * step)
                     assert scenario.nominal.delay_s == 0.0  # no law knows it
     jobs = make_plan(stability.EXPERIMENT, seeds=1).sample
@@ -96,14 +100,13 @@ def test_margins_begin_at_what_is_healthy_and_are_compared_with_no_other_plant()
 
 
 def test_frequency_responses_are_a_section_with_margins_and_a_figure():
-    law = stability.LOOPS[0]
-    case = stability.frequency_response(law)
+    case = stability.with_multisine(stability.FILE.case(part="response"))
     response = linear_loop(scenarios.load("hold", case.fields)).response(LINES_Hz)
     data = stability.StabilityMeasures(None, None, None, None, None, response)
     outcomes = Outcomes({case.name: [outcome(0.0)._replace(data=data)]})
     section = stability.sections(outcomes)[-1]
     measured, linear = section.tables[0].rows
-    assert measured[:2] == (law.label, "measured")
+    assert measured[:2] == ("tuned PID", "measured")
     assert measured[2:] == linear[2:]  # as the response is that of the linear loop
     assert "–" not in "".join(measured)
     assert [len(axes.lines) for axes in section.drawings[0]().figure.axes] == [3, 3]
