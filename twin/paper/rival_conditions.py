@@ -1,23 +1,24 @@
-"""Tuned gains of every law, frozen by `make tune-rivals`, and the conditions that they run under."""
+"""Cases of the comparison of laws: gains of every law, frozen by `make tune-rivals`, under each condition."""
 
 from __future__ import annotations
 
 import importlib.util
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from functools import cache
 from importlib import resources
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 
 from spheretwin.casadi import nmpc_file
 from spheretwin.control.laws.afsm_eso import PRESETS
 from spheretwin.models import actuator
-from spheretwin.models.telemetry.status import Status
-from spheretwin.paper import experiment
 from spheretwin.paper.experiment import Case
-from spheretwin.study.study import Study, load
+from spheretwin.paper.experiment_file import ExperimentFile
+from spheretwin.paper.laws import BY_LAW
+from spheretwin.study.optimise import Optimise
+from spheretwin.study.study import load
 
 FOLDER = resources.files("spheretwin.paper")
 
@@ -38,12 +39,6 @@ class TunedGains(NamedTuple):
     def label(self) -> str:
         """Law and limit."""
         return f"{self.law}, {self.limit_A_s:g} A/s"
-
-
-@cache
-def study(name: str) -> Study:
-    """Study that tuned the gains."""
-    return load(name)
 
 
 @cache
@@ -70,61 +65,10 @@ def _nested(fields: Mapping[str, float]) -> dict[str, Any]:
     return nested
 
 
-# A law that loses the rotor under a condition that it was not tuned for is reported, and no failure.
-EXPECTED = (Status.COMPLETED, Status.LEFT_WORKSPACE, Status.DIVERGED, Status.FAILSAFE)
-
 GROUP_GAIN = 0.03
 """Largest deviation of the torque of a group from its nominal value."""
 
-COMPLETE = "prototype"
-"""Hardware set with every imperfection, and the condition with it."""
-
-SEEDS = 60
-"""Runs of a case with sensors, whose noise moves an error by more than most laws differ."""
-
 STAGE = 977  # of the random stream of the group gains
-
-
-class Condition(NamedTuple):
-    """Difference of a run from the others of its hardware."""
-
-    name: str
-    fields: Mapping[str, Any]
-    seeded_fields: Callable[[int], Mapping[str, Any]] = lambda seed: {}
-    """Fields that depend on the seed."""
-    perturbed: bool = False
-    """Whether the nominal model is wrong: a column of robustness."""
-
-
-class Hardware(NamedTuple):
-    """Hardware and motion for which the laws were tuned."""
-
-    name: str
-    title: str
-    study: str
-    """Name of the study that tuned the gains."""
-    hinges: tuple[int, ...]
-    """Hinges of which the worst one counts."""
-    in_degrees: bool
-    conditions: tuple[Condition, ...]
-    presets: tuple[str, ...]
-    """Of AFSM-ESO, reported as shipped."""
-
-    @property
-    def scenario(self) -> str:
-        """Name of the scenario."""
-        return study(self.study).scenario
-
-    @property
-    def fields(self) -> Mapping[str, Any]:
-        """Fields of every run."""
-        return study(self.study).fields
-
-    @property
-    def limits_A_s(self) -> tuple[float, ...]:
-        """Limits on the variation of the currents."""
-        optimise = study(self.study).optimise
-        return optimise.limits if optimise else ()
 
 
 def group_gains(seed: int) -> dict[str, Any]:
@@ -134,128 +78,98 @@ def group_gains(seed: int) -> dict[str, Any]:
     return {"plant.group_gain": (1.0 + deviation).tolist()}
 
 
-def _load(m: float, L: float) -> dict[str, Any]:
-    return {"plant.modelling_error": m, "disturbance.load": L}
+OUR_LAW = "afsm_eso"
 
 
-def _friction(m: float) -> dict[str, Any]:
-    return {"plant.coulomb_Nm": [5e-3] * 3, "nominal.coulomb_Nm": [2e-3] * 3, "plant.modelling_error": m}
+class Hardware:
+    """Hardware and motion for which a study tuned the laws.
+
+    Parameters
+    ----------
+    name, title : str
+    hinges : tuple of int
+        Hinges of which the worst one counts.
+    in_degrees : bool
+        Unit of the errors on the page, instead of mrad.
+    presets : tuple of str
+        Of AFSM-ESO, reported as shipped.
+    """
+
+    def __init__(
+        self, name: str, title: str, hinges: tuple[int, ...], in_degrees: bool, presets: tuple[str, ...]
+    ) -> None:
+        self.name, self.title, self.hinges = name, title, hinges
+        self.in_degrees, self.presets = in_degrees, presets
+        self.study = load(f"rivals_{name}")
+        self.search = cast(Optimise, self.study.optimise)
+        self.tuned = tuned_gains(self.study.name)
+
+    @property
+    def setting(self) -> dict[str, Any]:
+        """Columns and fields of all cases."""
+        return {"setting": self.name, "scenario": self.study.scenario, "fields": self.study.fields}
+
+    @property
+    def candidates(self) -> list[dict[str, Any]]:
+        """Tuned laws by limit, then presets as shipped: their columns and fields."""
+        tuned = [
+            {
+                "candidate": gains.label,
+                "law": gains.law,
+                "row": BY_LAW[gains.law].label,
+                "limit_A_s": gains.limit_A_s,
+                "tuned": dict(gains.gains),
+                "fields": {"controller.law": gains.law, **gains.fields},
+            }
+            for gains in self.tuned
+        ]
+        return tuned + [
+            {
+                "candidate": f"preset {preset}",
+                "law": OUR_LAW,
+                "row": f"{BY_LAW[OUR_LAW].label}, preset `{preset}`",
+                "preset": preset,
+                "fields": {"controller.law": OUR_LAW, "controller.preset": preset},
+            }
+            for preset in self.presets
+        ]
 
 
-def _delay(delay_s: float) -> dict[str, Any]:
-    return {"drive.delay_s": delay_s + 1e-3, "nominal.delay_s": delay_s}
-
-
-CONVERTER_ERRORS: dict[str, Any] = {"sensors.adc.offset_V": 1e-3, "sensors.adc.gain_error": 1e-3}
-
-LIGHT = _load(0.2, 1.0)
-IDEAL = Hardware(
-    "ideal",
-    "sinusoid, ideal hardware",
-    "rivals_ideal",
-    (0, 1, 2),
-    False,
-    (
-        Condition("m 0.2, L 1", LIGHT),
-        Condition("m 0.5, L 5", _load(0.5, 5.0)),
-        Condition("m 0, L 0", _load(0.0, 0.0)),
-        Condition("friction 5 mN·m, nominal 2 mN·m", {**LIGHT, **_friction(0.2)}, perturbed=True),
-        Condition("m 0.5", _load(0.5, 1.0), perturbed=True),
-        Condition("1 ms of unknown delay", {**LIGHT, **_delay(0.0)}, perturbed=True),
-        Condition("group gains ±3 %", LIGHT, group_gains, perturbed=True),
-    ),
-    ("ideal", "fast"),
-)
-
+IDEAL = Hardware("ideal", "sinusoid, ideal hardware", (0, 1, 2), False, ("ideal", "fast"))
 ELECTRONICS = Hardware(
     "electronics",
     "tilt, prototype's electronics",
-    "rivals_electronics",
     # The encoder of γ has steps that no law can resolve.
     (0, 1),
     True,
-    (
-        Condition("without offset and gain errors", {}),
-        Condition("with them", CONVERTER_ERRORS),
-        Condition("friction 5 mN·m, nominal 2 mN·m", _friction(0.0), perturbed=True),
-        Condition("m 0.5", {"plant.modelling_error": 0.5}, perturbed=True),
-        Condition("1 ms of unknown delay", _delay(1e-3), perturbed=True),
-        Condition("group gains ±3 %", {}, group_gains, perturbed=True),
-        Condition(COMPLETE, {"hardware": COMPLETE, **CONVERTER_ERRORS}, perturbed=True),
-    ),
-    tuple(preset for preset in PRESETS if preset not in ("ideal", "fast")),
+    tuple(preset for preset in PRESETS if preset not in IDEAL.presets),
 )
 HARDWARE = (IDEAL, ELECTRONICS)
 
-# All that the currents give against the error of the rate, from the first tick on: a rate feedback whose
-# torque is far beyond the limit.
-FULL_CURRENT: dict[str, Any] = {
-    "controller.law": "pd",
-    "controller.stiffness": 1e-6,
-    "controller.damping": 2e4,
-    "duration": 0.02,
-}
-ALLOCATIONS = ("least_norm", "bounded")
-
-
 # Without its package no case is run, and the page has no section of it.
-PREDICTIVE = ELECTRONICS.conditions if importlib.util.find_spec("casadi") else ()
+HAS_PREDICTIVE = importlib.util.find_spec("casadi") is not None
+PREDICTIVE = {
+    "candidate": "predictive control",
+    "comparable": False,
+    "fields": {"controller.law": nmpc_file()},
+}
+
+
+def _file() -> ExperimentFile:
+    file = ExperimentFile("rivals")
+    lists = {hardware.name: [hardware.setting] for hardware in HARDWARE}
+    lists |= {f"{hardware.name}_candidate": hardware.candidates for hardware in HARDWARE}
+    lists["ideal_candidate"] += file["full_current"]
+    return ExperimentFile("rivals", "", **lists, predictive=[PREDICTIVE] if HAS_PREDICTIVE else [])
+
+
+FILE = _file()
 
 
 def cases() -> list[Case]:
     """Cases of every tuned law under every condition, then of presets and of the full current."""
     return [
-        case
-        for hardware in HARDWARE
-        for condition in hardware.conditions
-        for case in (
-            *(tuned_case(hardware, condition, gains) for gains in tuned_gains(hardware.study)),
-            *(preset_case(hardware, condition, preset) for preset in hardware.presets),
-            *(limit_case(condition, allocation) for allocation in _allocations(hardware, condition)),
-        )
-    ] + [predictive_case(condition) for condition in PREDICTIVE]
-
-
-def tuned_case(hardware: Hardware, condition: Condition, gains: TunedGains) -> Case:
-    """Case of a law with the gains of one limit under one condition."""
-    fields = {"controller.law": gains.law, **gains.fields}
-    reported = {"limit_A_s": gains.limit_A_s, "gains": dict(gains.gains)}
-    return _case(hardware, condition, gains.label, fields, reported)
-
-
-def preset_case(hardware: Hardware, condition: Condition, preset: str) -> Case:
-    """Case of AFSM-ESO with a preset, as shipped."""
-    fields = {"controller.law": "afsm_eso", "controller.preset": preset}
-    return _case(hardware, condition, f"preset {preset}", fields, {"preset": preset})
-
-
-def limit_case(condition: Condition, allocation: str) -> Case:
-    """Case with the full current at the start of the sinusoid."""
-    fields = {**FULL_CURRENT, "allocation": allocation}
-    return _case(IDEAL, condition, f"full current, {allocation}", fields, {"limit": allocation})
-
-
-def predictive_case(condition: Condition) -> Case:
-    """Case of predictive control under a condition of the tilt; one run, as it takes half a minute."""
-    case = _case(ELECTRONICS, condition, "predictive control", {"controller.law": nmpc_file()}, {})
-    return case._replace(single_run=True, comparable=False)
-
-
-def _allocations(hardware: Hardware, condition: Condition) -> tuple[str, ...]:
-    return ALLOCATIONS if hardware is IDEAL and not condition.perturbed else ()
-
-
-def _case(
-    hardware: Hardware, condition: Condition, name: str, fields: dict[str, Any], reported: dict[str, Any]
-) -> Case:
-    return Case(
-        name=f"{hardware.name}, {condition.name}: {name}",
-        scenario=hardware.scenario,
-        fields={**hardware.fields, **condition.fields, **fields},
-        details={"setting": hardware.name, "condition": condition.name, **reported},
-        expected_statuses=EXPECTED,
-        # Beyond its nominal model a loop of high gain may hunt, and then amplifies what rounding leaves.
-        comparable=not condition.perturbed,
-        seeds=SEEDS if hardware is ELECTRONICS else experiment.SEEDS,
-        seeded_fields=condition.seeded_fields,
-    )
+        case._replace(seeded_fields=group_gains) if "group_gains" in case.columns else case
+        for case in FILE.cases
+        if case.comparable or "limit" not in case.columns  # full current needs no nominal model
+    ]

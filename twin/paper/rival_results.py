@@ -7,25 +7,18 @@ from typing import NamedTuple
 
 import numpy as np
 
-from spheretwin.paper import rival_conditions as conditions
 from spheretwin.paper.experiment import Array, Finding, Outcome, Outcomes, ResultTable
+from spheretwin.paper.experiment_file import table
 from spheretwin.paper.laws import BY_LAW
 from spheretwin.paper.page import ERRORS, NONE, figures_named
-from spheretwin.paper.rival_conditions import (
-    ALLOCATIONS,
-    COMPLETE,
-    ELECTRONICS,
-    HARDWARE,
-    Condition,
-    Hardware,
-    study,
-    tuned_gains,
-)
+from spheretwin.paper.rival_conditions import ELECTRONICS, FILE, HARDWARE, OUR_LAW, Hardware
 from spheretwin.run import Run
 from spheretwin.scenario.fields import quantity_text
+from spheretwin.study.optimise import Gain
 from spheretwin.study.statistics import interval
 
-OUR_LAW = "afsm_eso"
+COMPLETE = "prototype"
+"""Condition with every imperfection."""
 
 
 class Result(NamedTuple):
@@ -35,6 +28,7 @@ class Result(NamedTuple):
     label: str
     limit_A_s: float | None
     """None of a preset, which was not searched here."""
+    preset: str | None
     largest_rad: float
     low_rad: float
     high_rad: float
@@ -54,32 +48,24 @@ class Result(NamedTuple):
         return self.low_rad <= other.high_rad and other.low_rad <= self.high_rad
 
 
-def results(
-    hardware: Hardware, condition: Condition, outcomes: Outcomes, seeds: int | None = None
-) -> list[Result]:
+def conditions(hardware: Hardware, perturbed: bool) -> list[str]:
+    """Return the names of the conditions with a right or with a wrong nominal model."""
+    every = FILE[f"{hardware.name}_condition"]
+    return [one["condition"] for one in every if one.get("comparable", True) is not perturbed]
+
+
+def results(hardware: Hardware, condition: str, outcomes: Outcomes, seeds: int | None = None) -> list[Result]:
     """Results under a condition: tuned laws by limit, then presets; of the first seeds, or of all."""
-    tuned = [
-        (
-            gains.law,
-            BY_LAW[gains.law].label,
-            gains.limit_A_s,
-            conditions.tuned_case(hardware, condition, gains),
-        )
-        for gains in conditions.tuned_gains(hardware.study)
-    ]
-    shipped = [
-        (
-            OUR_LAW,
-            f"{BY_LAW[OUR_LAW].label}, preset `{preset}`",
-            None,
-            conditions.preset_case(hardware, condition, preset),
-        )
-        for preset in hardware.presets
-    ]
     return [
-        Result(law, label, limit, *_medians(hardware, runs))
-        for law, label, limit, case in (*tuned, *shipped)
-        if (runs := outcomes.runs(case)[:seeds])
+        Result(
+            columns["law"],
+            columns["row"],
+            columns.get("limit_A_s"),
+            columns.get("preset"),
+            *_medians(hardware, item.runs[:seeds]),
+        )
+        for item in FILE.runs(outcomes, setting=hardware.name, condition=condition)
+        if {"limit_A_s", "preset"} & (columns := item.case.columns).keys()
     ]
 
 
@@ -89,12 +75,12 @@ def within(results: Sequence[Result], limit_A_s: float) -> list[Result]:
     return sorted(of_limit, key=lambda result: (result.is_lost, result.largest_rad))
 
 
-def current_limits_rad(condition: Condition, outcomes: Outcomes) -> dict[str, float]:
-    """Error at the start under full current, by allocation."""
+def current_limits_rad(condition: str, outcomes: Outcomes) -> dict[str, float]:
+    """Error at the start under full current, by the name of its row."""
     return {
-        allocation: float(np.median([np.max(run.data) for run in runs]))
-        for allocation in ALLOCATIONS
-        if (runs := outcomes.runs(conditions.limit_case(condition, allocation)))
+        item["row"]: float(np.median([np.max(run.data) for run in item.runs]))
+        for item in FILE.runs(outcomes, condition=condition)
+        if "limit" in item.case.columns
     }
 
 
@@ -122,40 +108,32 @@ def _medians(hardware: Hardware, runs: Sequence[Outcome]) -> tuple[float, ...]:
     return float(np.median(largest)), *ends, max(largest), float(variation), float(np.median(tail))
 
 
-ALLOCATION_LABELS = {"least_norm": "full current, least norm", "bounded": "full current, bounded allocation"}
-
-
 def ranges(hardware: Hardware) -> ResultTable:
     """Gains that the search varies, their ranges and the reasons."""
-    optimise = study(hardware.study).optimise
-    rows: list[tuple[str, ...]] = [
-        (
-            BY_LAW[gain.law].label if gain.law else "all laws",
-            _gain_name(gain.called),
-            gain.reason,
-            f"{gain.low:g}",
-            f"{gain.high:g}",
-            "yes" if gain.optional else "no",
-        )
-        for gain in (optimise.gain if optimise else ())
-    ]
-    head = ("law", "gain", "reason", "from", "to", "may be off")
-    return ResultTable(f"Ranges of the search, {hardware.title}", head, rows, 3)
+    cells: dict[str, Callable[[Gain], str]] = {
+        "law": lambda gain: BY_LAW[gain.law].label if gain.law else "all laws",
+        "gain": lambda gain: _gain_name(gain.called),
+        "reason": lambda gain: gain.reason,
+        "from": lambda gain: f"{gain.low:g}",
+        "to": lambda gain: f"{gain.high:g}",
+        "may be off": lambda gain: "yes" if gain.optional else "no",
+    }
+    return table(f"Ranges of the search, {hardware.title}", hardware.search.gain, cells, 3)
 
 
 def gains_table(hardware: Hardware) -> ResultTable:
     """Gains of the search, by law and limit."""
-    by_law = {(tuned.law, tuned.limit_A_s): tuned.gains for tuned in tuned_gains(hardware.study)}
+    by_law = {(tuned.law, tuned.limit_A_s): tuned.gains for tuned in hardware.tuned}
     names = {(law, name) for (law, _), gains in by_law.items() for name in gains}
-    rows: list[tuple[str, ...]] = [
+    rows = [
         (
             BY_LAW[law].label,
             _gain_name(name),
-            *(_gain_text(by_law.get((law, limit)), name) for limit in hardware.limits_A_s),
+            *(_gain_text(by_law.get((law, limit)), name) for limit in hardware.search.limits),
         )
         for law, name in sorted(names, key=lambda gain: (list(BY_LAW).index(gain[0]), gain[1]))
     ]
-    head = ("law", "gain", *(f"limit {limit:g} A/s" for limit in hardware.limits_A_s))
+    head = ("law", "gain", *(f"limit {limit:g} A/s" for limit in hardware.search.limits))
     return ResultTable(f"Gains found, {hardware.title}", head, rows, 2)
 
 
@@ -172,70 +150,58 @@ def _gain_text(gains: Mapping[str, float | None] | None, name: str) -> str:
 
 def errors(hardware: Hardware, outcomes: Outcomes) -> list[ResultTable]:
     """Largest error, variation and RMS error of every law within each limit; errors at full current."""
-    conditions = [condition for condition in hardware.conditions if not condition.perturbed]
-    largest, *others = _tables(hardware, hardware.title, conditions, outcomes)
-    if not hardware.in_degrees:
-        largest = largest._replace(rows=[*largest.rows, *_current_limits(conditions, outcomes)])
-    return [largest, *others]
+    right = conditions(hardware, perturbed=False)
+    largest, *others = _tables(hardware, hardware.title, right, outcomes)
+    limits = [current_limits_rad(condition, outcomes) for condition in right]
+    if hardware.in_degrees or not any(limits):
+        return [largest, *others]
+    rows = [
+        ("physical", name, *(f"{1e3 * limit[name]:.3f}" if name in limit else NONE for limit in limits))
+        for name in dict.fromkeys(name for limit in limits for name in limit)
+    ]
+    return [largest._replace(rows=[*largest.rows, *rows]), *others]
 
 
 def robustness(hardware: Hardware, outcomes: Outcomes) -> list[ResultTable]:
     """Largest error and variation under a wrong nominal model, with the gains of the tables before."""
-    first = hardware.conditions[0]
-    conditions = [first, *(condition for condition in hardware.conditions if condition.perturbed)]
-    return _tables(hardware, f"{hardware.title}, wrong nominal model", conditions, outcomes)[:2]
+    compared = [conditions(hardware, perturbed=False)[0], *conditions(hardware, perturbed=True)]
+    return _tables(hardware, f"{hardware.title}, wrong nominal model", compared, outcomes)[:2]
 
 
 def complete_prototype(hardware: Hardware, outcomes: Outcomes) -> list[ResultTable]:
     """Median and worst error with every imperfection; no table for hardware without this condition."""
-    complete = [condition for condition in hardware.conditions if condition.name == COMPLETE]
-    every = [result for condition in complete for result in results(hardware, condition, outcomes)]
-    rows: list[tuple[str, ...]] = [
-        (NONE if result.limit_A_s is None else f"{result.limit_A_s:g}", result.label, *_spread(result))
-        for result in sorted(every, key=_by_limit_and_error)
-    ]
-    head = (
-        "limit, A/s", "law", "median error, degrees", "worst error of the seeds, degrees", "variation, A/s",
-    )  # fmt: skip
-    return [ResultTable(f"{hardware.title} with every imperfection", head, rows, 2)] if every else []
+    cells: dict[str, Callable[[Result], str]] = {
+        "limit, A/s": lambda result: NONE if result.limit_A_s is None else f"{result.limit_A_s:g}",
+        "law": lambda result: result.label,
+        "median error, degrees": lambda result: _cell(result, lambda one: _error(hardware, one)),
+        "worst error of the seeds, degrees": lambda result: _cell(
+            result, lambda one: f"{np.degrees(one.worst_rad):.3f}", NONE
+        ),
+        "variation, A/s": lambda result: _cell(result, _variation, NONE),
+    }
+    every = sorted(results(hardware, COMPLETE, outcomes), key=_by_limit_and_error)
+    return [table(f"{hardware.title} with every imperfection", every, cells, 2)] if every else []
 
 
 def predictive_control(outcomes: Outcomes) -> list[ResultTable]:
     """Largest error and variation of predictive control, PID and AFSM-ESO on the seeds of the first."""
-    compared = (OUR_LAW, "pid")
-    rows: list[tuple[str, ...]] = []
-    for condition in conditions.PREDICTIVE:
-        own = outcomes.runs(conditions.predictive_case(condition))
-        if not own:
-            continue
-        rows.append((condition.name, "predictive control", *_predictive_cells(_medians(ELECTRONICS, own))))
-        rows += [
-            (condition.name, result.label, *_predictive_cells(result[3:]))
-            for result in _by_limit_and_preset(results(ELECTRONICS, condition, outcomes, len(own)))
-            if result.law in compared
+    compared, limits = (OUR_LAW, "pid"), (max(ELECTRONICS.search.limits), None)
+    every: list[tuple[str, Result]] = []
+    for own in FILE.runs(outcomes, candidate="predictive control"):
+        condition, figures = own["condition"], _medians(ELECTRONICS, own.runs)
+        every.append((condition, Result("", "predictive control", None, None, *figures)))
+        every += [
+            (condition, result)
+            for result in results(ELECTRONICS, condition, outcomes, len(own.runs))
+            if result.law in compared and result.limit_A_s in limits
         ]
-    head = ("condition", "law", "largest error, degrees", "variation, A/s")
-    return [ResultTable("Predictive control of the tilt", head, rows, 2)] if rows else []
-
-
-def _by_limit_and_preset(every: Sequence[Result]) -> list[Result]:
-    """Tuned laws within the largest limit, and the presets as shipped."""
-    limit = max(ELECTRONICS.limits_A_s)
-    return [result for result in every if result.limit_A_s in (limit, None)]
-
-
-def _predictive_cells(figures: Sequence[float]) -> tuple[str, str]:
-    largest_rad, variation_A_s = figures[0], figures[4]
-    if not np.isfinite(largest_rad):
-        return "lost", NONE
-    return f"{np.degrees(largest_rad):.3f}", f"{variation_A_s:.1f}"
-
-
-def _spread(result: Result) -> tuple[str, str, str]:
-    if result.is_lost:
-        return "lost", NONE, NONE
-    worst_deg = np.degrees(result.worst_rad)
-    return _error(ELECTRONICS, result), f"{worst_deg:.3f}", f"{result.variation_A_s:.1f}"
+    cells: dict[str, Callable[[tuple[str, Result]], str]] = {
+        "condition": lambda row: row[0],
+        "law": lambda row: row[1].label,
+        "largest error, degrees": lambda row: _cell(row[1], lambda one: f"{np.degrees(one.largest_rad):.3f}"),
+        "variation, A/s": lambda row: _cell(row[1], _variation, NONE),
+    }
+    return [table("Predictive control of the tilt", every, cells, 2)] if every else []
 
 
 def _by_limit_and_error(result: Result) -> tuple[float, bool, float]:
@@ -244,18 +210,18 @@ def _by_limit_and_error(result: Result) -> tuple[float, bool, float]:
 
 
 def _tables(
-    hardware: Hardware, title: str, conditions: Sequence[Condition], outcomes: Outcomes
+    hardware: Hardware, title: str, conditions: Sequence[str], outcomes: Outcomes
 ) -> list[ResultTable]:
     """A table for each measure: a row for each law, by limit and by the error under the first condition."""
-    unit = _unit(hardware)
+    unit = "degrees" if hardware.in_degrees else "mrad"
     measures: dict[str, Callable[[Result], str]] = {
         f"largest error, {unit}": lambda result: _error(hardware, result),
-        "variation of the commands, A/s": lambda result: f"{result.variation_A_s:.1f}",
+        "variation of the commands, A/s": _variation,
         f"RMS error of the second half, {unit}": lambda result: _angle(hardware, result.tail_rad),
     }
     by_condition = [results(hardware, condition, outcomes) for condition in conditions]
     by_law = [{(result.limit_A_s, result.label): result for result in of_one} for of_one in by_condition]
-    head = ("limit, A/s", "law", *(condition.name for condition in conditions))
+    head = ("limit, A/s", "law", *conditions)
 
     def rows(text: Callable[[Result], str]) -> list[tuple[str, ...]]:
         return [
@@ -273,17 +239,21 @@ def _tables(
 def _order(hardware: Hardware, of_first: Sequence[Result]) -> list[tuple[float | None, str]]:
     """Limits and laws of the rows: tuned laws by their error, those without gains in the limit, presets."""
     order: list[tuple[float | None, str]] = []
-    for limit in hardware.limits_A_s:
+    for limit in hardware.search.limits:
         tuned = [result.label for result in within(of_first, limit)]
         others = [law.label for law in BY_LAW.values() if tuned and law.label not in tuned]
         order += [(limit, label) for label in (*tuned, *others)]
     return order + [(None, result.label) for result in of_first if result.limit_A_s is None]
 
 
-def _cell(result: Result | None, text: Callable[[Result], str]) -> str:
+def _cell(result: Result | None, text: Callable[[Result], str], lost: str = "lost") -> str:
     if result is None:
         return NONE
-    return "lost" if result.is_lost else text(result)
+    return lost if result.is_lost else text(result)
+
+
+def _variation(result: Result) -> str:
+    return f"{result.variation_A_s:.1f}"
 
 
 def _error(hardware: Hardware, result: Result) -> str:
@@ -298,38 +268,26 @@ def _angle(hardware: Hardware, value_rad: float) -> str:
     return f"{np.degrees(value_rad):.4f}" if hardware.in_degrees else f"{1e3 * value_rad:.3f}"
 
 
-def _unit(hardware: Hardware) -> str:
-    return "degrees" if hardware.in_degrees else "mrad"
-
-
-def _current_limits(conditions: Sequence[Condition], outcomes: Outcomes) -> list[tuple[str, ...]]:
-    limits = [current_limits_rad(condition, outcomes) for condition in conditions]
-    return [
-        ("physical", label, *(f"{1e3 * limit[name]:.3f}" if name in limit else NONE for limit in limits))
-        for name, label in ALLOCATION_LABELS.items()
-        if any(name in limit for limit in limits)
-    ]
-
-
 def findings(outcomes: Outcomes) -> list[Finding]:
     """Law with the smallest error within each limit, and laws that are level with or better than our own."""
     return [
-        Finding(None, f"{hardware.title}, {condition.name}: {'; '.join(statements)}")
+        Finding(None, f"{hardware.title}, {condition}: {'; '.join(statements)}")
         for hardware in HARDWARE
-        for condition in hardware.conditions
+        for perturbed in (False, True)
+        for condition in conditions(hardware, perturbed)
         if (statements := _by_limit(hardware, condition, outcomes))
     ]
 
 
-def _by_limit(hardware: Hardware, condition: Condition, outcomes: Outcomes) -> list[str]:
+def _by_limit(hardware: Hardware, condition: str, outcomes: Outcomes) -> list[str]:
     """Statements on the order of the laws, each with the limits for which it is true."""
     every = results(hardware, condition, outcomes)
     complete = [result for result in every if not result.is_lost]
     # A limit on the cases may leave out our own law, of which nothing is known then.
-    tuned = {gains.limit_A_s for gains in tuned_gains(hardware.study) if gains.law == OUR_LAW}
+    tuned = {gains.limit_A_s for gains in hardware.tuned if gains.law == OUR_LAW}
     left_out = tuned - {result.limit_A_s for result in every if result.law == OUR_LAW}
     limits: dict[str, list[str]] = {}
-    for limit in hardware.limits_A_s:
+    for limit in hardware.search.limits:
         if limit not in left_out and (ordered := within(complete, limit)):
             limits.setdefault(_comparison(ordered), []).append(f"{limit:g}")
     return [f"within {_listed(texts)} A/s {statement}" for statement, texts in limits.items()]

@@ -12,14 +12,13 @@ from spheretwin.models.telemetry.status import Status
 from spheretwin.paper import rival_conditions, rival_results
 from spheretwin.paper.experiment import Outcomes
 from spheretwin.paper.laws import BY_LAW
-from spheretwin.paper.rival_conditions import ELECTRONICS, FOLDER, HARDWARE, IDEAL, tuned_gains
+from spheretwin.paper.rival_conditions import ELECTRONICS, FILE, FOLDER, HARDWARE, IDEAL
 from spheretwin.paper.rival_results import results, start_error, within
 from spheretwin.paper.rivals import EXPERIMENT
 from spheretwin.paper.runner import make_plan, run_plan, scenario_of
 from spheretwin.study.grid import Grid
 from spheretwin.study.row import Rows
 from spheretwin.study.statistics import interval
-from spheretwin.study.study import load
 from spheretwin.study.tuning import gains as tuning_gains
 from spheretwin.study.tuning import trials
 from spheretwin.viz.theme import LAW_COLOURS, LAW_MARKS
@@ -29,7 +28,7 @@ COMPILES = pytest.mark.release("compiles a loop for 12 s; the rows of ideal hard
 
 
 def frozen(hardware):
-    return json.loads((FOLDER / f"{hardware.study}.json").read_text(encoding="utf-8"))["laws"]
+    return json.loads((FOLDER / f"{hardware.study.name}.json").read_text(encoding="utf-8"))["laws"]
 
 
 def test_every_law_has_a_label_and_marks_of_its_own():
@@ -39,7 +38,7 @@ def test_every_law_has_a_label_and_marks_of_its_own():
 
 @pytest.mark.parametrize("hardware", HARDWARE, ids=lambda each: each.name)
 def test_every_law_is_searched_with_all_of_its_gains_and_the_same_budget(hardware):
-    study = load(hardware.study)
+    study = hardware.study
     assert [law["law"] for law in study.law] == list(dict.fromkeys(law["law"] for law in study.law))
     assert {law["law"] for law in study.law} == set(LAWS)
     assert study.common_seeds
@@ -63,12 +62,12 @@ def test_every_law_is_searched_with_all_of_its_gains_and_the_same_budget(hardwar
 
 @pytest.mark.parametrize("hardware", HARDWARE, ids=lambda each: each.name)
 def test_frozen_gains_are_within_their_ranges_and_limits(hardware):
-    study = load(hardware.study)
+    study = hardware.study
     ranges = {(gain.law, gain.called): gain for gain in study.optimise.gain}
     assert set(frozen(hardware)) == set(LAWS)
     for law, result in frozen(hardware).items():
         for each in result:
-            assert each["limit"] in hardware.limits_A_s
+            assert each["limit"] in hardware.search.limits
             assert list(each["values"].values())[1] <= each["limit"]
             for name, value in each["gains"].items():
                 gain = ranges.get((law, name)) or ranges["", name]
@@ -83,7 +82,7 @@ def test_frozen_gains_are_within_their_ranges_and_limits(hardware):
 )
 def test_frozen_gains_give_what_the_search_recorded(hardware, law):
     """A spot check: rows of the search run again with the gains of the file."""
-    study = load(hardware.study)
+    study = hardware.study
     searched = Rows(tuning_gains.judged(study))
     rows_of_law = [row for row in Grid(searched.study) if row.law == {"law": law}]
     assert frozen(hardware)[law]
@@ -97,12 +96,13 @@ def test_frozen_gains_give_what_the_search_recorded(hardware, law):
 
 def test_seeds_of_the_search_are_none_of_the_page():
     for hardware in HARDWARE:
-        assert min(row.seed for row in Grid(load(hardware.study))) > 1000
+        assert min(row.seed for row in Grid(hardware.study)) > 1000
 
 
 def test_conditions_state_what_the_controller_knows():
     for hardware in HARDWARE:
-        by_name = {each.name: {**hardware.fields, **each.fields} for each in hardware.conditions}
+        listed = FILE[f"{hardware.name}_condition"]
+        by_name = {each["condition"]: {**hardware.study.fields, **each.get("fields", {})} for each in listed}
         friction = by_name["friction 5 mN·m, nominal 2 mN·m"]
         assert friction["plant.coulomb_Nm"] == [5e-3] * 3
         assert friction["nominal.coulomb_Nm"] == [2e-3] * 3
@@ -111,8 +111,7 @@ def test_conditions_state_what_the_controller_knows():
 
 
 def test_group_gains_are_drawn_from_the_seed_of_each_run():
-    condition = next(each for each in IDEAL.conditions if each.name.startswith("group gains"))
-    case = rival_conditions.tuned_case(IDEAL, condition, tuned_gains(IDEAL.study)[0])
+    case = next(case for case in rival_conditions.cases() if "group gains" in case.name)
     first, again, other = (case.fields_of(seed)["plant.group_gain"] for seed in (0, 0, 1))
     assert first == again != other
     drawn = np.array([case.fields_of(seed)["plant.group_gain"] for seed in range(200)])
@@ -128,10 +127,17 @@ def outcome(error, variation, status=Status.COMPLETED):
     return cases.outcome(error, status, np.full(3, error / 20), **figures)
 
 
+LIGHT = "m 0.2, L 1"
+"""First condition of ideal hardware."""
+
+
+def tuned_case(law, limit_A_s):
+    return FILE.case(setting="ideal", condition=LIGHT, law=law, limit_A_s=limit_A_s)
+
+
 def made_up(limit, by_law):
     """Outcomes of laws by the errors of their seeds."""
-    tuned = {gains.law: gains for gains in tuned_gains(IDEAL.study) if gains.limit_A_s == limit}
-    of_law = {law: rival_conditions.tuned_case(IDEAL, IDEAL.conditions[0], tuned[law]) for law in by_law}
+    of_law = {law: tuned_case(law, limit) for law in by_law}
     return Outcomes({of_law[law].name: [outcome(e, limit) for e in by_law[law]] for law in by_law})
 
 
@@ -141,7 +147,7 @@ def test_results_are_medians_and_no_numbers_if_a_run_was_lost():
     outcomes[lost][1] = outcome(1e-3, 30.0, Status.FAILSAFE)
     complete = next(name for name in outcomes if "pid" in name)
     outcomes[complete][2] = outcome(9e-3, 90.0)
-    first, second = within(results(IDEAL, IDEAL.conditions[0], outcomes), 30.0)
+    first, second = within(results(IDEAL, LIGHT, outcomes), 30.0)
     assert (first.law, first.largest_rad, first.tail_rad) == ("pid", 4e-3, 4e-4)
     assert (first.worst_rad, first.variation_A_s) == (9e-3, 30.0)
     assert second.is_lost
@@ -166,7 +172,7 @@ def seeds_about(median):
 def test_findings_rank_no_laws_whose_intervals_overlap(errors, expected):
     outcomes = made_up(30.0, {law: seeds_about(error) for law, error in errors.items()})
     (finding,) = rival_results.findings(outcomes)
-    assert finding.text == f"{IDEAL.title}, {IDEAL.conditions[0].name}: within 30 A/s {expected}"
+    assert finding.text == f"{IDEAL.title}, {LIGHT}: within 30 A/s {expected}"
 
 
 def test_too_few_seeds_rank_nothing():
@@ -185,7 +191,7 @@ def test_tables_have_the_interval_of_each_error():
 def test_laws_with_sensors_have_more_seeds():
     jobs = make_plan(EXPERIMENT).jobs
     counted = Counter(job.case.name for job in jobs if "prototype" in job.case.name)
-    assert {counted[name] for name in counted if "predictive" not in name} == {rival_conditions.SEEDS}
+    assert {counted[name] for name in counted if "predictive" not in name} == {60}
 
 
 def test_nothing_is_found_where_nothing_or_not_our_law_ran():
@@ -215,13 +221,11 @@ LIGHT_LOAD = {
 @pytest.mark.release("60 runs, whose loops compile for 20 s")
 def test_pid_reaches_the_limit_of_the_currents_at_the_light_load_too():
     """With gains of a search for this load, and with those of computed torque from the search for both."""
-    light, of_torque = IDEAL.conditions[0], ("computed_torque", 30.0)
-    tuned = next(gains for gains in tuned_gains(IDEAL.study) if (gains.law, gains.limit_A_s) == of_torque)
-    searched, borrowed = (
-        rival_conditions.tuned_case(IDEAL, light, tuned._replace(law="pid", fields=fields, limit_A_s=limit))
-        for limit, fields in ((30.0, LIGHT_LOAD), (30.1, tuned.fields))
-    )
-    full_current = rival_conditions.limit_case(light, "least_norm")
+    torque = tuned_case("computed_torque", 30.0)
+    light = {name: torque.fields[name] for name in ("plant.modelling_error", "disturbance.load")}
+    borrowed = torque._replace(name="borrowed", fields={**torque.fields, "controller.law": "pid"})
+    searched = torque._replace(name="searched", fields={**light, "controller.law": "pid", **LIGHT_LOAD})
+    full_current = FILE.case(setting="ideal", condition=LIGHT, limit="least_norm")
     cases = [searched, borrowed, full_current]
     outcomes = run_plan(make_plan(EXPERIMENT._replace(cases=lambda: cases)))
     limits_rad = [np.max(run.data) for run in outcomes[full_current.name]]
@@ -241,12 +245,12 @@ def test_full_current_is_below_what_any_law_reaches_with_bounded_allocation():
         if "limit_A_s" not in case.details or case.fields["controller.law"] in ("afsm_eso", "pid")
     ]
     outcomes = run_plan(make_plan(EXPERIMENT._replace(cases=lambda: short), seeds=1))
-    for condition in IDEAL.conditions:
-        if condition.perturbed:
-            continue
+    for condition in rival_results.conditions(IDEAL, perturbed=False):
         limits = {
-            allocation: np.max(outcomes[rival_conditions.limit_case(condition, allocation).name][0].data)
-            for allocation in rival_conditions.ALLOCATIONS
+            allocation: np.max(
+                outcomes.runs(FILE.case(setting="ideal", condition=condition, limit=allocation))[0].data
+            )
+            for allocation in ("least_norm", "bounded")
         }
         assert limits["bounded"] < limits["least_norm"]
         reached = [each.largest_rad for each in results(IDEAL, condition, outcomes)]
