@@ -15,7 +15,7 @@ from importlib import import_module
 from importlib.metadata import version
 from itertools import pairwise
 
-from spheretwin.cli.options import Parser
+from spheretwin.cli.options import Parser, Verb
 from spheretwin.models.base.errors import (
     InputError,
     SpheretwinError,
@@ -188,12 +188,18 @@ def _parser(arguments: Sequence[str]) -> Parser:
     }
     called = next((argument for argument in arguments if not argument.startswith("-")), None)
     if called in parsers:
-        import_module(f"spheretwin.cli.{called}").declare(parsers[called])
+        parsers[called].define(_verb(called))
     return parser
+
+
+def _verb(name: str) -> Verb | dict[str, Verb]:
+    """Return a verb, or its parts, from its module."""
+    module = import_module(f"spheretwin.cli.{name}")
+    return getattr(module, "PARTS", None) or module.run
 
 
 def parsers_of(verb: str) -> dict[str, Parser]:
     """Return the parser of a verb, and those of its parts, by what is typed for each."""
     parser = Parser(prog=f"spheretwin {verb}", conflict_handler="resolve")
-    import_module(f"spheretwin.cli.{verb}").declare(parser)
+    parser.define(_verb(verb))
     return {verb: parser, **{f"{verb} {name}": part for name, part in parser.parts().items()}}

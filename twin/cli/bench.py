@@ -28,9 +28,9 @@ from spheretwin.bench.folder_files import FolderFiles
 from spheretwin.bench.modes import Limits
 from spheretwin.bench.operators import GONE_s, Operators
 from spheretwin.cli.common import interruptible, print_message, warn
-from spheretwin.cli.drive import add_link_options, limited_rate, open_link
-from spheretwin.cli.machine import STANDARD_STREAMS, add_frame_option
-from spheretwin.cli.options import Parser, from_zero, number, whole
+from spheretwin.cli.drive import LIMITS, LINK, limited_rate, open_link
+from spheretwin.cli.machine import FRAME, STANDARD_STREAMS
+from spheretwin.cli.options import from_zero, number, verb, whole
 from spheretwin.control.laws import LAWS
 from spheretwin.faults.targets import TARGETS
 from spheretwin.machine.link.controller_scenario import left_out
@@ -220,34 +220,31 @@ EXAMPLE = "bench"
 LARGEST_PORT = 65_535
 
 
-def declare(parser: Parser) -> None:
-    """Declare the arguments of the verb."""
-    parser.usage = "spheretwin bench [SCENARIO] [options] [--section.field VALUE ...]"
-    parser.define(
-        run,
-        "Drive the running twin from a browser. Any field of the scenario is a flag",
-        f"""
-        [SCENARIO]={EXAMPLE}  {", ".join(shipped())}, or a .toml file; {EXAMPLE} unless given
-        --port P={PORT}     port of the page, on 127.0.0.1; {PORT} unless given, 0 for any free port
-        --no-browser      only print the address of the page
-        --hold-after S={GONE_s:g}  time for which the twin continues after its page is closed; {GONE_s:g} s
-            unless given
-        --record FILE.rrd  record from the start
-        --folder DIR      files that the page names are below it; the working folder unless given
-        --machine ADDRESS  drive a machine at udp://HOST:PORT or serial:DEVICE@BAUD, with the options of
-            `drive`: --arm, --frame, --limit-angle-deg, …
-        """,
-        has_fields=True,
-        port=whole(LARGEST_PORT, first=0, name="a port"),
-        hold_after=number("a time from 0 s on", from_zero),
-        folder={"type": Path, "default": Path()},
-    )
-    add_link_options(parser, listed=False)
-    add_frame_option(parser, listed=False)
-
-
+@verb(
+    f"""
+    [SCENARIO]={EXAMPLE}  {", ".join(shipped())}, or a .toml file; {EXAMPLE} unless given
+    --port P={PORT}     port of the page, on 127.0.0.1; {PORT} unless given, 0 for any free port
+    --no-browser      only print the address of the page
+    --hold-after S={GONE_s:g}  time for which the twin continues after its page is closed; {GONE_s:g} s
+        unless given
+    --record FILE.rrd  record from the start
+    --folder DIR      files that the page names are below it; the working folder unless given
+    --machine ADDRESS  drive a machine at udp://HOST:PORT or serial:DEVICE@BAUD, with the options of
+        `drive`: --arm, --frame, --limit-angle-deg, …
+    """,
+    has_fields=True,
+    port=whole(LARGEST_PORT, first=0, name="a port"),
+    hold_after=number("a time from 0 s on", from_zero),
+    folder={"type": Path, "default": Path()},
+    usage="[SCENARIO]",
+    unlisted=LINK + FRAME,
+    **LIMITS,
+)
 def run(options: argparse.Namespace) -> bool:
-    """Run the verb until it is interrupted; return True if all recordings are complete."""
+    """Drive the running twin from a browser.
+
+    Any field of the scenario is a flag
+    """
     if find_spec("viser") is None:
         raise missing("bench", "viser", "bench")
     scenario = scenarios.load(options.scenario, reading.overrides(options.fields))

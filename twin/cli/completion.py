@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from importlib import import_module
 
 from spheretwin import cli
-from spheretwin.cli.options import Parser
+from spheretwin.cli.options import Parser, verb
 
 SCRIPTS = {
     "bash": """_spheretwin() {
@@ -31,26 +31,21 @@ compdef _spheretwin spheretwin
 }
 """Script of each shell; the last word that it passes is the one that is being typed."""
 
-INSTALLATION = """To install it:
-  bash: spheretwin completion bash >> ~/.bashrc
-  zsh:  spheretwin completion zsh >> ~/.zshrc, after compinit
-  fish: spheretwin completion fish > ~/.config/fish/completions/spheretwin.fish"""
 
-
-def declare(parser: Parser) -> None:
-    """Declare the arguments of the verb."""
-    parser.formatter_class = argparse.RawDescriptionHelpFormatter
-    parser.define(
-        run,
-        f"Print the completion of a shell: verbs, options, scenarios, fields.\n\n{INSTALLATION}",
-        f"SHELL  {', '.join(SCRIPTS)}",
-        shell=(*SCRIPTS, "words"),
-    )
-    parser.add_options("WORD", listed=False, word={"nargs": argparse.REMAINDER})
-
-
+@verb(
+    f"SHELL  {', '.join(SCRIPTS)}",
+    unlisted="WORD",
+    shell=(*SCRIPTS, "words"),
+    word={"nargs": argparse.REMAINDER},
+)
 def run(options: argparse.Namespace) -> bool:
-    """Run the verb."""
+    """Print the completion of a shell: verbs, options, scenarios, fields.
+
+    To install it:
+      bash: spheretwin completion bash >> ~/.bashrc
+      zsh:  spheretwin completion zsh >> ~/.zshrc, after compinit
+      fish: spheretwin completion fish > ~/.config/fish/completions/spheretwin.fish
+    """
     if options.shell == "words":
         print("\n".join(words(options.word)))
     else:

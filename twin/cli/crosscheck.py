@@ -6,7 +6,7 @@ import argparse
 import time
 
 from spheretwin.cli.common import print_json, report_broken, warn_about_model
-from spheretwin.cli.options import Parser, whole
+from spheretwin.cli.options import verb, whole
 from spheretwin.crosscheck import suite
 from spheretwin.crosscheck.suite import STATES
 from spheretwin.models import actuator as actuators
@@ -19,27 +19,23 @@ from spheretwin.viz.terminal.tables import print_checks
 MOST_STATES = 1_000_000  # some three minutes and a gigabyte
 
 
-def declare(parser: Parser) -> None:
-    """Declare the arguments of the verb."""
-    parser.define(
-        run,
-        "Compare the engine (MuJoCo) with the Lagrangian model and, if it is installed, with"
-        " Pinocchio: state by state, along trajectories, without torque, driven by coils, and in the closed"
-        " loop. Exit code 1 when a bound is broken.",
-        f"""
-        --out
-        --figure-format
-        --json              print the checks as JSON, alone on stdout
-        --states N={STATES}  random states, {STATES} unless given
-        --mjcf
-        --verbose
-        """,
-        states=whole(MOST_STATES, name="a number of states"),
-    )
-
-
+@verb(
+    f"""
+    --out
+    --figure-format
+    --json              print the checks as JSON, alone on stdout
+    --states N={STATES}  random states, {STATES} unless given
+    --mjcf
+    --verbose
+    """,
+    states=whole(MOST_STATES, name="a number of states"),
+)
 def run(options: argparse.Namespace) -> bool:
-    """Run the verb; return True if no bound is broken."""
+    """Compare the engine (MuJoCo) with the Lagrangian model and, if it is installed, with Pinocchio.
+
+    They are compared state by state, along trajectories, without torque, driven by coils, and in the
+    closed loop. Exit code 1 when a bound is broken.
+    """
     actuators.load(options.mjcf)  # before the folder is created
     warn_about_model(options.mjcf)
     if options.out:

@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 from spheretwin.cli.bench import PORT
 from spheretwin.cli.common import print_json
-from spheretwin.cli.options import Parser
+from spheretwin.cli.options import verb
 from spheretwin.machine.link.real_time import PRIORITY, real_time
 from spheretwin.models.base import cache
 from spheretwin.models.base.extras import PURPOSES, install_command, missing_packages
@@ -39,19 +39,14 @@ class Finding(NamedTuple):
     """Advice with its purpose; empty if nothing is missing."""
 
 
-def declare(parser: Parser) -> None:
-    """Declare the arguments of the verb."""
-    parser.define(
-        run,
-        "Print versions, compile cache, cores, vector width, viewer, browser, ports, permissions for real"
-        " time, and the extras that are missing with the command that installs each. Nothing is changed, and"
-        " no other machine is contacted.",
-        "--json  print the findings as JSON, alone on stdout",
-    )
-
-
+@verb("--json  print the findings as JSON, alone on stdout")
 def run(options: argparse.Namespace) -> bool:
-    """Run the verb; return True if everything that a run needs is there."""
+    """Print what is installed, and what is missing for which purpose.
+
+    It prints versions, compile cache, cores, vector width, viewer, browser, ports, permissions for real time,
+    and the extras that are missing with the command that installs each. Nothing is changed, and no other
+    machine is contacted.
+    """
     groups = report()
     if options.json:
         print_json({name: [finding._asdict() for finding in group] for name, group in groups.items()})

@@ -8,8 +8,8 @@ from collections.abc import Callable
 from typing import Any
 
 from spheretwin.cli.common import interruptible, print_message, warn
-from spheretwin.cli.machine import OUTPUTS, add_frame_option, read_scenario, rehearse_run, run_session
-from spheretwin.cli.options import Parser, from_zero, number
+from spheretwin.cli.machine import OUTPUTS, read_scenario, rehearse_run, run_session
+from spheretwin.cli.options import from_zero, number, verb
 from spheretwin.machine.files import conditions_of
 from spheretwin.machine.link.controller_scenario import left_out
 from spheretwin.machine.link.limits import Limits
@@ -26,59 +26,42 @@ DEFAULTS = LinkSettings()
 LOCKSTEP_TIMEOUT_s = 1.0
 
 
-def declare(parser: Parser) -> None:
-    """Declare the arguments of the verb."""
-    parser.usage = "spheretwin drive SCENARIO --machine ADDRESS [options] [--section.field VALUE ...]"
-    parser.add_options(
-        f"""
-        [SCENARIO]         {", ".join(shipped())}, or a .toml file
-        --machine ADDRESS  udp://HOST:PORT, serial:DEVICE@BAUD, or - for stdin and stdout
-        """
-    )
-    add_link_options(parser)
-    parser.add_options(
-        """
-        --shadow FILE.parquet  write what the shadow estimates in parallel
-        --log LOG.parquet      write currents and angles as a log
-        """
-    )
-    add_frame_option(parser)
-    parser.define(
-        run,
-        "Drive a machine with the controller of a scenario. Without --arm it is a dry run: frames are"
-        " exchanged and shown, and all currents are 0.",
-        OUTPUTS,
-        has_fields=True,
-    )
+LINK = f"""
+    --arm            send currents
+    --lockstep       wait for the reply of the machine in each tick, not for the clock
+    --ramp-s S       time in which the currents rise to those commanded; {DEFAULTS.ramp_s:g} unless given
+    --timeout-ms MS  age of the newest measurement at which the currents are removed;
+        {1e3 * DEFAULTS.timeout_s:g}, in lockstep {1e3 * LOCKSTEP_TIMEOUT_s:g} unless given
+    --limit-current-A A  largest current of a group; nominal.current_limit_A unless given
+    --limit-angle-deg DEG  largest tilt, the magnitude of α and β; the range of the hinges unless given
+    --limit-rate-rad-s RAD/S  largest rate of a hinge; watchdog.largest_rate_rad_s unless given
+    --limit-temperature-degC DEGC  highest temperature of a coil, reported or estimated from the currents;
+        {Limits(current_A=1.0).temperature_degC:g} unless given"""
+"""Options of how a machine is driven."""
+
+LIMITS: dict[str, Any] = {
+    "ramp_s": number("a number of s from 0 on", from_zero),
+    "limit_angle_deg": number("a number of ° above 0"),
+    "limit_rate_rad_s": number("a number of rad/s above 0"),
+    "limit_temperature_degC": number("a number of °C above 0"),
+}
 
 
-def add_link_options(parser: Parser, *, listed: bool = True) -> None:
-    """Declare how a machine is driven; the help leaves it out unless it is `listed`."""
-    parser.add_options(
-        f"""
-        --arm            send currents
-        --lockstep       wait for the reply of the machine in each tick, not for the clock
-        --ramp-s S       time in which the currents rise to those commanded; {DEFAULTS.ramp_s:g} unless given
-        --timeout-ms MS  age of the newest measurement at which the currents are removed;
-            {1e3 * DEFAULTS.timeout_s:g}, in lockstep {1e3 * LOCKSTEP_TIMEOUT_s:g} unless given
-        --limit-current-A A  largest current of a group; nominal.current_limit_A unless given
-        --limit-angle-deg DEG  largest tilt, the magnitude of α and β; the range of the hinges unless given
-        --limit-rate-rad-s RAD/S  largest rate of a hinge; watchdog.largest_rate_rad_s unless given
-        --limit-temperature-degC DEGC  highest temperature of a coil, reported or estimated from the currents;
-            {Limits(current_A=1.0).temperature_degC:g} unless given
-        """,
-        listed=listed,
-        ramp_s=number("a number of s from 0 on", from_zero),
-        timeout_ms=number("a number of ms above 0"),
-        limit_current_A=number("a number of A above 0"),
-        limit_angle_deg=number("a number of ° above 0"),
-        limit_rate_rad_s=number("a number of rad/s above 0"),
-        limit_temperature_degC=number("a number of °C above 0"),
-    )
-
-
+@verb(
+    f"""
+    [SCENARIO]         {", ".join(shipped())}, or a .toml file
+    --machine ADDRESS  udp://HOST:PORT, serial:DEVICE@BAUD, or - for stdin and stdout{LINK}
+    --shadow FILE.parquet  write what the shadow estimates in parallel
+    --log LOG.parquet      write currents and angles as a log{OUTPUTS}""",
+    has_fields=True,
+    usage="SCENARIO --machine ADDRESS",
+    **LIMITS,
+)
 def run(options: argparse.Namespace) -> bool:
-    """Run the verb; return True if the run completed."""
+    """Drive a machine with the controller of a scenario.
+
+    Without --arm it is a dry run: frames are exchanged and shown, and all currents are 0.
+    """
     scenario = limited_rate(read_scenario(options, "machine"), options.limit_rate_rad_s)
     warn(left_out(scenario))
     shadow = RunningShadow(Shadow(scenario)) if options.shadow else None

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 from spheretwin import scenario as scenarios
 from spheretwin.active_config import initial_config
 from spheretwin.cli.common import print_json
-from spheretwin.cli.options import Parser
+from spheretwin.cli.options import verb
 from spheretwin.models.actuator import Actuator
 from spheretwin.models.base.errors import InputError, did_you_mean, shown
 from spheretwin.scenario import reading
@@ -33,22 +33,17 @@ class FieldFacts(NamedTuple):
     meaning: str
 
 
-def declare(parser: Parser) -> None:
-    """Declare the arguments of the verb."""
-    parser.define(
-        run,
-        "Print value, unit, distribution and origin: of a hardware set (explain hardware prototype), of the"
-        " fields that a scenario sets (explain scenario nutation), or of a field (explain plant.coulomb_Nm).",
-        """
-        SUBJECT...  hardware NAME, scenario NAME or FILE, or a field
-        --all       of a scenario also the fields that have their defaults
-        --json      print the result as JSON, alone on stdout
-        """,
-    )
-
-
+@verb("""
+    SUBJECT...  hardware NAME, scenario NAME or FILE, or a field
+    --all       of a scenario also the fields that have their defaults
+    --json      print the result as JSON, alone on stdout
+    """)
 def run(options: argparse.Namespace) -> bool:
-    """Run the verb."""
+    """Print value, unit, distribution and origin of fields.
+
+    They are those of a hardware set (explain hardware prototype), those that a scenario sets (explain
+    scenario nutation), or those of a field (explain plant.coulomb_Nm).
+    """
     facts = list(_facts(options.subjects, options.all))
     if options.json:
         print_json({"fields": [fact._asdict() for fact in facts]})

@@ -7,57 +7,41 @@ from pathlib import Path
 
 from spheretwin.cli.common import print_json, print_message
 from spheretwin.cli.log_options import changes_of
-from spheretwin.cli.options import Parser
+from spheretwin.cli.options import verb
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.base.files import check_writable
 from spheretwin.viz.terminal import runs
 
 BOTH = ("plant", "controller")
 
+INPUTS = ("currents", "voltages")
 
-def declare(parser: Parser) -> None:
-    """Declare the arguments of the verb."""
-    parts = parser.add_subparsers(metavar="PART", required=True)
-    inputs = """
-        [SCENARIO]         name or file
-        --inputs=currents  inputs of the plant: commanded currents, or voltages at the groups
-            (default: currents)
-        --twin
-        --json             print what was written as JSON, alone on stdout"""
-    text = "write the plant as a functional mock-up unit"
-    parts.add_parser("fmu", help=text, conflict_handler="resolve").define(
-        run_fmu,
-        "Write the plant of a scenario as an FMU: C99 without Python, with its sources, and with a binary for"
-        " this machine if it has a C compiler.",
-        f"""{inputs}
-        --fmi=2               version of the interface (default: 2)
-        --kind=co-simulation  with the fixed-step method of the twin, or for the solver of the tool (default:
-            co-simulation)
-        --target PLATFORM...  also for other platforms, such as x86_64-windows, by the extra cross; repeatable
-        --out FILE.fmu        (default: the name of the scenario)
-        """,
-        has_fields=True,
-        inputs=("currents", "voltages"),
-        fmi=(2, 3),
-        kind=("co-simulation", "model-exchange"),
-    )
-    text = "write plant and control tick as C files"
-    parts.add_parser("c", help=text, conflict_handler="resolve").define(
-        run_c,
-        "Write the plant of a scenario as a C99 library, and one control tick of its controller (estimator,"
-        " law, allocation) for a microcontroller.",
-        f"""{inputs}
-        --part     only this one (default: both)
-        --out DIR  (default: the name of the scenario, and _c)
-        """,
-        has_fields=True,
-        inputs=("currents", "voltages"),
-        part=BOTH,
-    )
+COMMON = """
+    [SCENARIO]         name or file
+    --inputs=currents  inputs of the plant: commanded currents, or voltages at the groups
+        (default: currents)
+    --twin
+    --json             print what was written as JSON, alone on stdout"""
 
 
+@verb(
+    f"""{COMMON}
+    --fmi=2               version of the interface (default: 2)
+    --kind=co-simulation  with the fixed-step method of the twin, or for the solver of the tool (default:
+        co-simulation)
+    --target PLATFORM...  also for other platforms, such as x86_64-windows, by the extra cross; repeatable
+    --out FILE.fmu        (default: the name of the scenario)
+    """,
+    has_fields=True,
+    inputs=INPUTS,
+    fmi=(2, 3),
+    kind=("co-simulation", "model-exchange"),
+)
 def run_fmu(options: argparse.Namespace) -> bool:
-    """Write an FMU; return True."""
+    """Write the plant as a functional mock-up unit.
+
+    It is C99 without Python, with its sources, and with a binary for this machine if it has a C compiler.
+    """
     from spheretwin.export.fmu import write_fmu
     from spheretwin.export.plant_code import plant_code
 
@@ -87,8 +71,21 @@ def run_fmu(options: argparse.Namespace) -> bool:
     return True
 
 
+@verb(
+    f"""{COMMON}
+    --part     only this one (default: both)
+    --out DIR  (default: the name of the scenario, and _c)
+    """,
+    has_fields=True,
+    inputs=INPUTS,
+    part=BOTH,
+)
 def run_c(options: argparse.Namespace) -> bool:
-    """Write C files; return True."""
+    """Write plant and control tick as C files.
+
+    The plant of a scenario becomes a C99 library, and one control tick of its controller (estimator, law,
+    allocation) code for a microcontroller.
+    """
     from spheretwin.export.c_library import write_c
     from spheretwin.export.controller_code import controller_code
     from spheretwin.export.plant_code import plant_code
@@ -112,3 +109,6 @@ def run_c(options: argparse.Namespace) -> bool:
 def _check_scenario(options: argparse.Namespace) -> None:
     if not options.scenario:
         raise InputError("command line: expected SCENARIO, received none")
+
+
+PARTS = {"fmu": run_fmu, "c": run_c}

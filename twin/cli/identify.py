@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import argparse
+from pathlib import Path
 
 from spheretwin.cli.common import print_json, print_message
-from spheretwin.cli.log_options import add_logs, changes_of, check_given, read_logs, scenario_of
-from spheretwin.cli.options import Parser, from_zero, number, whole
+from spheretwin.cli.log_options import LOGS, changes_of, check_given, read_logs, scenario_of
+from spheretwin.cli.options import from_zero, number, verb, whole
 from spheretwin.machine.excitation import DesignSettings, design
 from spheretwin.machine.identification import Identified, IdentifySettings, identify
 from spheretwin.machine.parameters import KINDS
@@ -22,36 +23,31 @@ from spheretwin.viz.terminal.progress import counted, tracked
 DEFAULT = ("torque_scale", "plant.coulomb_Nm")
 
 
-def declare(parser: Parser) -> None:
-    """Declare the arguments of the verb."""
-    add_logs(parser, many=True)
-    parser.define(
-        run,
-        "Identify parameters of a machine from logs, with 95 % intervals, judged by held-out windows."
-        " Exit code 1 if the data do not determine the parameters or the result is not better.",
-        f"""
-        --design             instead of logs take a scenario, and find the motion whose log determines the
-            parameters best
-        --payload KG...      known payload of all logs, or of each in their order; repeatable. With --design:
-            of its runs
-        --candidates N       motions that a design tries (default: 24)
-        --currents FILE.csv  write the currents of the design
-        --parameter NAME...  parameter, or one part of it such as plant.coulomb_Nm.0; repeatable (default:
-            {", ".join(DEFAULT)}): {", ".join(KINDS)}
-        --window S           length of the windows (default: 0.2 s), or of a designed experiment
-            (default: 4 s)
-        --out FILE.toml      write the twin, if it is accepted; or the designed scenario
-        --json
-        """,
-        has_fields=True,
-        payload=number("a number of kg, at least 0", from_zero),
-        candidates=whole(10_000, first=2),
-        window=number("a number of s above 0"),
-    )
-
-
+@verb(
+    f"""{LOGS}
+    --design             instead of logs take a scenario, and find the motion whose log determines the
+        parameters best
+    --payload KG...      known payload of all logs, or of each in their order; repeatable. With --design:
+        of its runs
+    --candidates N       motions that a design tries (default: 24)
+    --currents FILE.csv  write the currents of the design
+    --parameter NAME...  parameter, or one part of it such as plant.coulomb_Nm.0; repeatable (default:
+        {", ".join(DEFAULT)}): {", ".join(KINDS)}
+    --window S           length of the windows (default: 0.2 s), or of a designed experiment
+        (default: 4 s)
+    --out FILE.toml      write the twin, if it is accepted; or the designed scenario
+    --json
+    """,
+    has_fields=True,
+    logs=Path,
+    payload=number("a number of kg, at least 0", from_zero),
+    candidates=whole(10_000, first=2),
+)
 def run(options: argparse.Namespace) -> bool:
-    """Run the verb; return True if the result is accepted."""
+    """Identify parameters of a machine from logs, with 95 % intervals, judged by held-out windows.
+
+    Exit code 1 if the data do not determine the parameters or the result is not better.
+    """
     check_given(options)
     for path, suffix in ((options.out, ".toml"), (options.currents, ".csv")):
         if path:

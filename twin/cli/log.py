@@ -10,7 +10,7 @@ from spheretwin import machine
 from spheretwin import scenario as scenarios
 from spheretwin.cli.common import print_json, print_message
 from spheretwin.cli.log_options import for_each_log
-from spheretwin.cli.options import Parser
+from spheretwin.cli.options import verb
 from spheretwin.machine.findings import FINDINGS, check_names
 from spheretwin.machine.identification import identifiability
 from spheretwin.machine.log import Log
@@ -22,28 +22,20 @@ from spheretwin.viz.terminal.texts import print_findings
 _LEAST_ROWS = 1000
 
 
-def declare(parser: Parser) -> None:
-    """Declare the arguments of the verb."""
-    check = parser.add_subparsers(metavar="PART", required=True).add_parser(
-        "check", help="give a verdict on logs"
-    )
-    check.define(
-        run,
-        "Check logs of a machine: times, units, order and signs, clock offset, saturation, excitation. Exit"
-        " code 1 if a log is not accepted, with advice on what to record instead.",
-        f"""
-        FILE...                 log (.parquet, .csv or .mcap)
-        --columns MAP.toml...   column map: names, units, signs, order and scales; one for all logs, or one
-            for each; the names of our exports unless given
-        --scenario SCENARIO=hold  scenario of the machine: its plant, hardware and limits (default: hold)
-        --accept FINDING...     accept a finding; repeatable: {", ".join(FINDINGS)}
-        --json                  print the verdict as JSON, alone on stdout
-        """,
-    )
-
-
+@verb(f"""
+    FILE...                 log (.parquet, .csv or .mcap)
+    --columns MAP.toml...   column map: names, units, signs, order and scales; one for all logs, or one
+        for each; the names of our exports unless given
+    --scenario SCENARIO=hold  scenario of the machine: its plant, hardware and limits (default: hold)
+    --accept FINDING...     accept a finding; repeatable: {", ".join(FINDINGS)}
+    --json                  print the verdict as JSON, alone on stdout
+    """)
 def run(options: argparse.Namespace) -> bool:
-    """Run the verb; return True if every log is accepted."""
+    """Give a verdict on logs of a machine.
+
+    It checks times, units, order and signs, clock offset, saturation, excitation. Exit code 1 if a log is
+    not accepted, with advice on what to record instead.
+    """
     accepted = check_names(options.accept)
     maps = for_each_log(options.columns, len(options.files), "--columns")
     scenario = scenarios.load(options.scenario)
@@ -108,3 +100,6 @@ def _report_unused(accepted: Sequence[str], verdicts: Sequence[Verdict]) -> None
     names = {finding.name for verdict in verdicts for finding in verdict.findings}
     if unused := [name for name in accepted if name not in names]:
         print_message(f"log check: accepted, but not found: {', '.join(unused)}")
+
+
+PARTS = {"check": run}

@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from spheretwin.cli.common import keep_viewer, print_message
-from spheretwin.cli.options import Parser
 from spheretwin.machine.files import read
 from spheretwin.machine.link import frame_format
 from spheretwin.machine.link.frame_format import DEFAULT_FRAME, shipped
@@ -31,19 +30,31 @@ if TYPE_CHECKING:
 T = TypeVar("T")
 
 
-def add_logs(parser: Parser, *, many: bool) -> None:
-    """Declare logs, their columns, the scenario of the machine and its twin."""
-    columns = "column map of all logs, or one for each in their order" if many else "column map of the log"
-    parser.add_options(
-        f"""
-        [LOG...]              Parquet, CSV or MCAP
-        --columns MAP.toml...  {columns}
-        --scenario SCENARIO   scenario of the machine (default: hold)
-        --twin TWIN.toml      identified parameters of the machine
-        --accept FINDING...   accept a finding of `log check`; repeatable
-        """,
-        logs=Path if many else {"nargs": "?"},
-    )
+LOGS = """
+    [LOG...]              Parquet, CSV or MCAP
+    --columns MAP.toml...  column map of all logs, or one for each in their order
+    --scenario SCENARIO   scenario of the machine (default: hold)
+    --twin TWIN.toml      identified parameters of the machine
+    --accept FINDING...   accept a finding of `log check`; repeatable
+"""
+"""Logs, their columns, the scenario of the machine and its twin."""
+
+LOG = LOGS.replace("all logs, or one for each in their order", "the log")
+
+ONE: dict[str, Any] = {"logs": {"nargs": "?"}}
+"""Reader of a single log."""
+
+STREAM = f"""{LOG}
+    --frame NAME={DEFAULT_FRAME}  frames of a stream, which udp://:PORT, serial:DEVICE@BAUD or - in place
+        of LOG names: {", ".join(shipped())}, or a .toml file (default: {DEFAULT_FRAME})
+    --currents  currents of a stream: sent to the amplifiers and held, or measured in the coils (default:
+        as the frames state)
+    --live      follow the data in a viewer on 127.0.0.1; a file is played at the pace of its times
+"""
+"""One log, or the address of a stream."""
+
+STREAMED: dict[str, Any] = {**ONE, "currents": (COMMANDED, MEASURED)}
+"""Readers of a stream."""
 
 
 def scenario_of(options: argparse.Namespace) -> str:
@@ -61,21 +72,6 @@ def check_given(options: argparse.Namespace) -> None:
     """
     if not options.logs:
         raise InputError("command line: expected LOG, received none")
-
-
-def add_stream(parser: Parser) -> None:
-    """Declare one log, or the address of a stream."""
-    add_logs(parser, many=False)
-    parser.add_options(
-        f"""
-        --frame NAME={DEFAULT_FRAME}  frames of a stream, which udp://:PORT, serial:DEVICE@BAUD or - in place
-            of LOG names: {", ".join(shipped())}, or a .toml file (default: {DEFAULT_FRAME})
-        --currents  currents of a stream: sent to the amplifiers and held, or measured in the coils (default:
-            as the frames state)
-        --live      follow the data in a viewer on 127.0.0.1; a file is played at the pace of its times
-        """,
-        currents=(COMMANDED, MEASURED),
-    )
 
 
 def file_log(options: argparse.Namespace) -> Log | None:

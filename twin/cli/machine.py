@@ -11,7 +11,7 @@ from tempfile import TemporaryDirectory
 from spheretwin import outputs
 from spheretwin import scenario as scenarios
 from spheretwin.cli.common import interruptible, print_json, print_message
-from spheretwin.cli.options import Parser, number
+from spheretwin.cli.options import verb
 from spheretwin.machine.link import frame_format
 from spheretwin.machine.link.channel import Channel
 from spheretwin.machine.link.frame_format import DEFAULT_FRAME
@@ -37,46 +37,33 @@ from spheretwin.viz.terminal import runs
 
 STANDARD_STREAMS = "-"
 
-OUTPUTS = """
---record
---telemetry
---json
+FRAME = f"""
+    --frame NAME={DEFAULT_FRAME}  frames: {", ".join(frame_format.shipped())}, or a .toml file;
+        {DEFAULT_FRAME} unless given"""
+
+OUTPUTS = f"""{FRAME}
+    --record
+    --telemetry
+    --json
 """
-"""Options of the outputs of a verb with an external part."""
+"""Frames and files of a verb with an external part."""
 
 
-def declare(parser: Parser) -> None:
-    """Declare the arguments of the verb."""
-    parser.usage = "spheretwin machine SCENARIO --listen ADDRESS [options] [--section.field VALUE ...]"
-    parser.add_options(
-        f"""
-        [SCENARIO]        {", ".join(shipped())}, or a .toml file
-        --listen ADDRESS  udp://HOST:PORT, serial:DEVICE@BAUD, or - for stdin and stdout
-        --real-time       advance by the clock; the newest command applies
-        --timeout-ms MS=20  in real time: age of a command at which the currents are removed; 20 unless given
-        --idle-s S=60     time without commands after which the run ends; 60 unless given
-        """,
-        timeout_ms=number("a number of ms above 0"),
-        idle_s=number("a number of s above 0"),
-    )
-    add_frame_option(parser)
-    parser.define(
-        run,
-        "Simulate the machine (drive, plant, sensors) for a controller in another program. By default each"
-        " command advances it by one control period (lockstep).",
-        OUTPUTS,
-        has_fields=True,
-    )
-
-
-def add_frame_option(parser: Parser, *, listed: bool = True) -> None:
-    """Add the option that names the frames of a link; the help leaves it out unless it is `listed`."""
-    names = f"{', '.join(frame_format.shipped())}, or a .toml file; {DEFAULT_FRAME} unless given"
-    parser.add_options(f"--frame NAME={DEFAULT_FRAME}  frames: {names}", listed=listed)
-
-
+@verb(
+    f"""
+    [SCENARIO]        {", ".join(shipped())}, or a .toml file
+    --listen ADDRESS  udp://HOST:PORT, serial:DEVICE@BAUD, or - for stdin and stdout
+    --real-time       advance by the clock; the newest command applies
+    --timeout-ms MS=20  in real time: age of a command at which the currents are removed; 20 unless given
+    --idle-s S=60     time without commands after which the run ends; 60 unless given{OUTPUTS}""",
+    has_fields=True,
+    usage="SCENARIO --listen ADDRESS",
+)
 def run(options: argparse.Namespace) -> bool:
-    """Run the verb; return True if the run completed."""
+    """Simulate the machine (drive, plant, sensors) for a controller in another program.
+
+    By default each command advances it by one control period (lockstep).
+    """
     scenario = read_scenario(options, "listen")
     if scenario.manual.on:
         raise InputError(

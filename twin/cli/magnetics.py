@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from spheretwin.cli.common import print_json, print_message, report_broken, warn, warn_about_model
-from spheretwin.cli.options import Parser, number, whole
+from spheretwin.cli.options import number, verb, whole
 from spheretwin.models import actuator as actuators
 from spheretwin.models import torque_curve
 from spheretwin.models.actuator import TORQUE_CURVE_PATH
@@ -30,12 +30,12 @@ from spheretwin.viz.terminal.tables import print_checks, terminal_console
 CURVE = "torque curve from 0 to 180 degrees, columns phi_deg,torque_Nm_per_A"
 
 MODEL = """
-        --mjcf
-        --json
-        --verbose"""
+    --mjcf
+    --json
+    --verbose"""
 
 OF_CURVE = f"""
-        --csv FILE.csv  {CURVE}, or a torque field (default: the file of the model file)"""
+    --csv FILE.csv  {CURVE}, or a torque field (default: the file of the model file)"""
 
 MOST_DEGREE = 300  # some gigabytes
 
@@ -47,69 +47,22 @@ HOOP = "docs/scripts/iron_hoop.py"
 STEEPEST_DEG = 85.0
 
 
-def declare(parser: Parser) -> None:
-    """Declare the arguments of the verb."""
-    parts = parser.add_subparsers(metavar="PART", required=True)
-    parts.add_parser(
-        "curve", help="compute the torque curve of a pole and a coil, or check another curve"
-    ).define(
-        run_curve,
-        "Compute the torque curve f_t(φ) from the geometry of the model file, with magpylib; or compare"
-        " finite-element or measured data with it.",
-        f"""{MODEL}
-        --out FILE.csv  write the curve here, not to stdout
-        --csv FILE.csv  check this {CURVE}
-        """,
-    )
-    parts.add_parser("field", help="compute the torque field of any arrangement of magnets").define(
-        run_field,
-        "Compute the torque of one ampere in a coil as a vector function of its direction in the rotor frame"
-        " from the magnets and the coils of the model file, with magpylib.",
-        f"""{MODEL}
-        --out FILE.csv   write the field here, not to stdout
-        --step DEG=1     step of the samples, degrees (default: 1)
-        --degree N={rotor_field.DEGREE}  largest degree of the harmonics (default: {rotor_field.DEGREE})
-        --on-iron        put the back of each magnet on an infinite plane of iron, by its mirror image
-        """,
-        step=number("a divisor of 180 from 0.25 to 30", lambda step: 0.25 <= step <= 30 and not 180 % step),
-        degree=whole(MOST_DEGREE, first=3),
-    )
-    parts.add_parser("hoop", help=f"moved to {HOOP} of the repository").define(
-        run_hoop, f"The effect of the iron behind the poles is computed by {HOOP} of the repository.", MODEL
-    )
-    text = "compare the torque matrix with the summed field of all poles on all windings"
-    parts.add_parser("check", help=text).define(
-        run_check,
-        "Compare G_t(q)·I with the exact field of all magnets on the current of all windings"
-        " (magpylib), in random poses and for random currents.",
-        f"""{MODEL}{OF_CURVE}
-        --poses N=15  number of poses (default: 15)
-        --seed N=0    seed of poses and currents (default: 0)
-        --out
-        --figure-format
-        """,
-        poses=whole(MOST_POSES),
-        seed=whole(10**18, first=0),
-    )
-    text = "map the torque that is available in every direction over the workspace"
-    parts.add_parser("map", help=text).define(
-        run_map,
-        "Map, over tilt, its direction and spin: the torque available in every direction at the current"
-        " limit, the torque matrix's smallest singular value and condition number, and the copper loss.",
-        f"""{MODEL}{OF_CURVE}
-        --need NM         fail if less torque (N·m) is available at a pose
-        --largest-tilt DEG={LARGEST_TILT_DEG:g}  largest tilt of the shaft, degrees
-            (default: {LARGEST_TILT_DEG:g})
-        --out
-        --figure-format
-        """,
-        need=number("a number above 0"),
-        largest_tilt=number(f"degrees from 0 to {STEEPEST_DEG:g}", lambda tilt: 0 <= tilt <= STEEPEST_DEG),
-    )
-
-
+@verb(
+    f"""{MODEL}{OF_CURVE}
+    --poses N=15  number of poses (default: 15)
+    --seed N=0    seed of poses and currents (default: 0)
+    --out
+    --figure-format
+    """,
+    poses=whole(MOST_POSES),
+    seed=whole(10**18, first=0),
+)
 def run_check(options: argparse.Namespace) -> bool:
-    """Run the part; return True if no bound is broken."""
+    """Compare the torque matrix with the summed field of all poles on all windings.
+
+    G_t(q)·I is compared with the exact field of all magnets on the current of all windings (magpylib), in
+    random poses and for random currents.
+    """
     actuator = actuators.load(options.mjcf, options.csv)
     if options.out:
         prepare(options.out)
@@ -132,8 +85,23 @@ def run_check(options: argparse.Namespace) -> bool:
     return _report(options, "check", verdict._asdict(), verdict.checks, tables, text, written)
 
 
+@verb(
+    f"""{MODEL}{OF_CURVE}
+    --need NM         fail if less torque (N·m) is available at a pose
+    --largest-tilt DEG={LARGEST_TILT_DEG:g}  largest tilt of the shaft, degrees
+        (default: {LARGEST_TILT_DEG:g})
+    --out
+    --figure-format
+    """,
+    need=number("a number above 0"),
+    largest_tilt=number(f"degrees from 0 to {STEEPEST_DEG:g}", lambda tilt: 0 <= tilt <= STEEPEST_DEG),
+)
 def run_map(options: argparse.Namespace) -> bool:
-    """Run the part; return True if no bound is broken."""
+    """Map the torque that is available in every direction over the workspace.
+
+    The map is over tilt, its direction and spin, and has the torque available in every direction at the
+    current limit, the torque matrix's smallest singular value and condition number, and the copper loss.
+    """
     actuator = actuators.load(options.mjcf, options.csv)
     if options.out:
         prepare(options.out)
@@ -150,8 +118,16 @@ def run_map(options: argparse.Namespace) -> bool:
     return _report(options, "map", verdict._asdict(), verdict.checks, tables, text, written)
 
 
+@verb(f"""{MODEL}
+    --out FILE.csv  write the curve here, not to stdout
+    --csv FILE.csv  check this {CURVE}
+    """)
 def run_curve(options: argparse.Namespace) -> bool:
-    """Run the part; return True if no bound is broken."""
+    """Compute the torque curve of a pole and a coil, or check another curve.
+
+    The curve f_t(φ) follows from the geometry of the model file, with magpylib; finite-element or
+    measured data are compared with it.
+    """
     if options.csv and options.out:
         raise InputError("command line: expected --out or --csv, received both")
     if options.csv:
@@ -181,8 +157,22 @@ def run_curve(options: argparse.Namespace) -> bool:
     return _report_csv(options, "curve", figures, computed.checks, tables, computed.csv)
 
 
+@verb(
+    f"""{MODEL}
+    --out FILE.csv   write the field here, not to stdout
+    --step DEG=1     step of the samples, degrees (default: 1)
+    --degree N={rotor_field.DEGREE}  largest degree of the harmonics (default: {rotor_field.DEGREE})
+    --on-iron        put the back of each magnet on an infinite plane of iron, by its mirror image
+    """,
+    step=number("a divisor of 180 from 0.25 to 30", lambda step: 0.25 <= step <= 30 and not 180 % step),
+    degree=whole(MOST_DEGREE, first=3),
+)
 def run_field(options: argparse.Namespace) -> bool:
-    """Run the part; return True if no bound is broken."""
+    """Compute the torque field of any arrangement of magnets.
+
+    It is the torque of one ampere in a coil as a vector function of its direction in the rotor frame,
+    from the magnets and the coils of the model file, with magpylib.
+    """
     if options.out:
         check_writable(Path(options.out), ".csv")
     computed = rotor_field.compute(
@@ -198,14 +188,9 @@ def run_field(options: argparse.Namespace) -> bool:
     return _report_csv(options, "field", figures, computed.checks, [], computed.csv)
 
 
+@verb(MODEL)
 def run_hoop(options: argparse.Namespace) -> bool:
-    """Name the script that computes the effect of the iron.
-
-    Raises
-    ------
-    InputError
-        Always.
-    """
+    """Moved to docs/scripts/iron_hoop.py of the repository."""
     raise InputError(f"magnetics hoop: expected `python {HOOP}` in a clone of the repository: it moved there")
 
 
@@ -279,3 +264,6 @@ def _report(
             print_checks(f"magnetics {part}", checks, options.verbose)
         runs.print_written(written)
     return report_broken(f"magnetics {part}", checks)
+
+
+PARTS = {"curve": run_curve, "field": run_field, "hoop": run_hoop, "check": run_check, "map": run_map}

@@ -8,7 +8,7 @@ import shlex
 from importlib import resources
 from pathlib import Path
 
-from spheretwin.cli.options import Parser
+from spheretwin.cli.options import verb
 from spheretwin.models.base.errors import InputError, shown
 from spheretwin.models.base.files import check_writable, whole_file
 
@@ -22,21 +22,15 @@ TEMPLATES = {
 """Suffix of the file, and a command that uses it, by the kind of template."""
 
 
-def declare(parser: Parser) -> None:
-    """Declare the arguments of the verb."""
-    parser.define(
-        run,
-        "Write a commented template that runs, NAME.py, NAME.xml or NAME.toml.",
-        f"""
-        KIND  {", ".join(TEMPLATES)}
-        NAME  name of the file without its ending, or its path
-        """,
-        kind=tuple(TEMPLATES),
-    )
-
-
+@verb(
+    f"""
+    KIND  {", ".join(TEMPLATES)}
+    NAME  name of the file without its ending, or its path
+    """,
+    kind=tuple(TEMPLATES),
+)
 def run(options: argparse.Namespace) -> bool:
-    """Run the verb."""
+    """Write a commented template that runs, NAME.py, NAME.xml or NAME.toml."""
     suffix, command = TEMPLATES[options.kind]
     path = Path(options.name).expanduser()
     name = path.name.removesuffix(f".{suffix}")

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import argparse
+import inspect
 import math
 import re
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from textwrap import dedent
-from typing import Any, NoReturn
+from typing import Any, NamedTuple, NoReturn
 
 from spheretwin.models.actuator import MJCF_PATH
 from spheretwin.models.base.errors import InputError, did_you_mean, shown
@@ -32,133 +33,6 @@ MOST = 10**12
 
 _FILE = re.compile(r"FILE|DIR|[A-Z]+\.[a-z]+")
 """Placeholders of paths."""
-
-
-class _Formatter(argparse.HelpFormatter):
-    """Help with short lines for long options."""
-
-    def __init__(self, prog: str) -> None:
-        super().__init__(prog, max_help_position=27)
-
-
-class Parser(argparse.ArgumentParser):
-    """Parser of the command or of one verb.
-
-    Attributes
-    ----------
-    expected : list of str
-        Names of the arguments, for the message about an unknown argument.
-    """
-
-    def __init__(self, **settings: Any) -> None:
-        self.expected: list[str] = []
-        super().__init__(**settings, allow_abbrev=False, formatter_class=_Formatter)
-
-    def define(
-        self,
-        run: Callable[[argparse.Namespace], bool],
-        description: str,
-        options: str,
-        *,
-        has_fields: bool = False,
-        **readers: Any,
-    ) -> None:
-        """Define a verb by its function, its description and its options.
-
-        Parameters
-        ----------
-        run : callable
-            Function of the verb; takes the options, and returns True if it succeeded.
-        description : str
-        options : str
-            See `add_options`.
-        has_fields : bool
-            Whether any field of a scenario is a flag.
-        **readers
-            See `add_options`.
-        """
-        self.description = description
-        self.add_options(options, **readers)
-        self.set_defaults(run=run, parser=self, has_fields=has_fields)
-        if has_fields:
-            text = "show this help, or the fields of a section, or all"
-            self.add_argument("-h", "--help", nargs="?", const="", metavar="SECTION", help=text)
-
-    def add_options(self, text: str, *, listed: bool = True, **readers: Any) -> None:
-        """Add the arguments of a text, which has them as the help prints them.
-
-        Each begins a line, as ``--rate HZ=10  rows per second``: its placeholder, its default, and after two
-        spaces its help, which indented lines continue. An option without a placeholder is a switch; brackets
-        make an argument optional, and dots after the placeholder make it repeatable.
-
-        Parameters
-        ----------
-        text : str
-        listed : bool
-            Whether the help lists them.
-        **readers : callable, sequence or dict
-            By name: the function that reads a value, its valid values, or settings for argparse. By default,
-            placeholders of files and folders are paths, others texts.
-        """
-        readers = {"figure_format": FIGURE_FORMATS, "mjcf": {"type": Path, "default": MJCF_PATH}} | readers
-        common = {re.split("[ =]", spec)[0]: (spec, meaning) for spec, meaning in _entries(COMMON)}
-        for spec, meaning in _entries(text):
-            spec, standard = common.get(spec, (spec, ""))
-            self._add_option(spec, meaning or standard if listed else argparse.SUPPRESS, readers)
-
-    def _add_option(self, spec: str, meaning: str, readers: dict[str, Any]) -> None:
-        left, _, default = spec.partition("=")
-        names, _, placeholder = left.rpartition(" ") if " " in left or left[0] != "-" else (left, "", "")
-        many, optional = "..." in placeholder, placeholder.startswith("[")
-        placeholder = placeholder.strip("[]").removesuffix("...")
-        name = names or placeholder.lower() + "s" * many
-        reader = readers.get(name.strip("-").replace("-", "_"), ...)
-        settings: dict[str, Any] = {"help": meaning}
-        if placeholder:
-            settings["metavar"] = placeholder
-        if default:
-            settings["default"] = default
-        if callable(reader):
-            settings["type"] = reader
-        elif isinstance(reader, dict):
-            settings |= reader
-        elif reader is not ...:
-            settings |= {"choices": tuple(reader), "type": type(next(iter(reader)))}
-        elif _FILE.fullmatch(placeholder):
-            settings["type"] = Path
-        elif not placeholder:
-            settings["action"] = "store_true"
-        if many and names:
-            settings |= {"action": "append", "default": []}
-        elif many or optional:
-            settings.setdefault("nargs", ("*" if optional else "+") if many else "?")
-        self.expected.append(names or placeholder)
-        self.add_argument(name, **settings)
-
-    def parts(self) -> dict[str, Parser]:
-        """Return the parsers of the parts of a verb by their names; empty if it has none."""
-        return next((one.choices for one in self._actions if isinstance(one, argparse._SubParsersAction)), {})
-
-    def error(self, message: str) -> NoReturn:
-        """Refuse the command line with exit code 2."""
-        raise InputError(f"command line: {message}")
-
-    def _check_value(self, action: argparse.Action, value: Any) -> None:
-        """Refuse a value that is not a valid choice, with the nearest valid one."""
-        if action.choices is not None and value not in action.choices:
-            valid = list(map(str, action.choices))
-            name = action.metavar or "/".join(action.option_strings)
-            raise InputError(
-                f"command line: expected {name} {', '.join(valid)},"
-                f" received {shown(value)}{did_you_mean(f'{value}', valid)}"
-            )
-
-
-def _entries(text: str) -> Iterator[tuple[str, str]]:
-    """Yield each option of a text, and its help."""
-    for entry in re.split(r"\n(?=\S)", dedent(text).strip("\n")):
-        spec, _, meaning = entry.partition("  ")
-        yield spec.strip(), " ".join(meaning.split())
 
 
 def whole(last: int = MOST, *, first: int = 1, name: str = "a whole number") -> Callable[[str], int]:
@@ -196,3 +70,163 @@ def number(name: str, is_valid: Callable[[float], bool] = positive) -> Callable[
         return value
 
     return read
+
+
+READERS: dict[str, Any] = {
+    "A": number("a number of A above 0"),
+    "HZ": number("a number of Hz above 0"),
+    "MS": number("a number of ms above 0"),
+    "N": whole(),
+    "ROWS": whole(),
+    "S": number("a number of s above 0"),
+}
+"""Functions that read the values of placeholders, unless a verb states another one."""
+
+
+class Verb(NamedTuple):
+    """Verb, or a part of one, with its options."""
+
+    run: Callable[[argparse.Namespace], bool]
+    """Returns True if it succeeded. Its docstring is the description in the help."""
+    options: str
+    has_fields: bool
+    """Whether any field of a scenario is a flag."""
+    usage: str
+    unlisted: str
+    readers: dict[str, Any]
+
+
+def verb(
+    options: str, *, has_fields: bool = False, usage: str = "", unlisted: str = "", **readers: Any
+) -> Callable[[Callable[[argparse.Namespace], bool]], Verb]:
+    """Return a decorator that makes a function a verb.
+
+    Each argument begins a line of the text, as the help prints it, as ``--rate HZ=10  rows per second``: its
+    placeholder, its default, and after two spaces its help, which indented lines continue. An option without
+    a placeholder is a switch; brackets make an argument optional, and dots after the placeholder make it
+    repeatable.
+
+    Parameters
+    ----------
+    options : str
+        Arguments.
+    has_fields : bool
+        Whether any field of a scenario is a flag.
+    usage : str
+        Required arguments; default: the positional ones.
+    unlisted : str
+        Further arguments, which the help does not list.
+    **readers : callable, sequence or dict
+        By name: the function that reads a value, its valid values, or settings for argparse. By default,
+        placeholders of files and folders are paths, and those without a reader texts.
+    """
+    return lambda run: Verb(run, options, has_fields, usage, unlisted, readers)
+
+
+class _Formatter(argparse.HelpFormatter):
+    """Help with short lines for long options; a description with indented lines keeps its lines."""
+
+    def __init__(self, prog: str) -> None:
+        super().__init__(prog, max_help_position=27)
+
+    def _fill_text(self, text: str, width: int, indent: str) -> str:
+        return text if "\n  " in text else super()._fill_text(text, width, indent)
+
+
+class Parser(argparse.ArgumentParser):
+    """Parser of the command or of one verb.
+
+    Attributes
+    ----------
+    expected : list of str
+        Names of the arguments, for the message about an unknown argument.
+    """
+
+    def __init__(self, **settings: Any) -> None:
+        self.expected: list[str] = []
+        super().__init__(**settings, allow_abbrev=False, formatter_class=_Formatter)
+
+    def define(self, verb: Verb | dict[str, Verb]) -> None:
+        """Define a verb, or its parts by their names."""
+        if isinstance(verb, dict):
+            parts = self.add_subparsers(metavar="PART", required=True)
+            for name, part in verb.items():
+                summary = _description(part).partition("\n")[0].rstrip(".")
+                summary = summary[:1].lower() + summary[1:]
+                parts.add_parser(name, help=summary, conflict_handler="resolve").define(part)
+            return
+        self.description = _description(verb)
+        self._add_options(verb.options, verb.readers)
+        self._add_options(verb.unlisted, verb.readers, listed=False)
+        self.set_defaults(run=verb.run, parser=self, has_fields=verb.has_fields)
+        if verb.has_fields:
+            needed = verb.usage or self.expected[0]
+            self.usage = f"{self.prog} {needed} [options] [--section.field VALUE ...]"
+            text = "show this help, or the fields of a section, or all"
+            self.add_argument("-h", "--help", nargs="?", const="", metavar="SECTION", help=text)
+
+    def _add_options(self, text: str, readers: dict[str, Any], *, listed: bool = True) -> None:
+        readers = {"figure_format": FIGURE_FORMATS, "mjcf": {"type": Path, "default": MJCF_PATH}} | readers
+        common = {re.split("[ =]", spec)[0]: (spec, meaning) for spec, meaning in _entries(COMMON)}
+        for spec, meaning in _entries(text):
+            spec, standard = common.get(spec, (spec, ""))
+            self._add_option(spec, meaning or standard if listed else argparse.SUPPRESS, readers)
+
+    def _add_option(self, spec: str, meaning: str, readers: dict[str, Any]) -> None:
+        left, _, default = spec.partition("=")
+        names, _, placeholder = left.rpartition(" ") if " " in left or left[0] != "-" else (left, "", "")
+        many, optional = "..." in placeholder, placeholder.startswith("[")
+        placeholder = placeholder.strip("[]").removesuffix("...")
+        name = names or placeholder.lower() + "s" * many
+        is_file = _FILE.fullmatch(placeholder)
+        reader = readers.get(
+            name.strip("-").replace("-", "_"), READERS.get(placeholder, Path if is_file else ...)
+        )
+        settings: dict[str, Any] = {"help": meaning}
+        if placeholder:
+            settings["metavar"] = placeholder
+        if default:
+            settings["default"] = default
+        if callable(reader):
+            settings["type"] = reader
+        elif isinstance(reader, dict):
+            settings |= reader
+        elif reader is not ...:
+            settings |= {"choices": tuple(reader), "type": type(next(iter(reader)))}
+        elif not placeholder:
+            settings["action"] = "store_true"
+        if many and names:
+            settings |= {"action": "append", "default": []}
+        elif many or optional:
+            settings.setdefault("nargs", ("*" if optional else "+") if many else "?")
+        self.expected.append(names or placeholder)
+        self.add_argument(name, **settings)
+
+    def parts(self) -> dict[str, Parser]:
+        """Return the parsers of the parts of a verb by their names; empty if it has none."""
+        return next((one.choices for one in self._actions if isinstance(one, argparse._SubParsersAction)), {})
+
+    def error(self, message: str) -> NoReturn:
+        """Refuse the command line with exit code 2."""
+        raise InputError(f"command line: {message}")
+
+    def _check_value(self, action: argparse.Action, value: Any) -> None:
+        """Refuse a value that is not a valid choice, with the nearest valid one."""
+        if action.choices is not None and value not in action.choices:
+            valid = list(map(str, action.choices))
+            name = action.metavar or "/".join(action.option_strings)
+            raise InputError(
+                f"command line: expected {name} {', '.join(valid)},"
+                f" received {shown(value)}{did_you_mean(f'{value}', valid)}"
+            )
+
+
+def _description(verb: Verb) -> str:
+    return inspect.cleandoc(verb.run.__doc__ or "")
+
+
+def _entries(text: str) -> Iterator[tuple[str, str]]:
+    """Yield each option of a text, and its help."""
+    for entry in filter(None, re.split(r"\n+(?=\S)", dedent(text).strip())):
+        spec, _, meaning = entry.partition("  ")
+        yield spec.strip(), " ".join(meaning.split())

@@ -7,7 +7,7 @@ import time
 from collections.abc import Sequence
 
 from spheretwin.cli.common import print_json, print_message, report_broken
-from spheretwin.cli.options import Parser, whole
+from spheretwin.cli.options import verb, whole
 from spheretwin.models.base.errors import InputError, did_you_mean, shown
 from spheretwin.models.base.mujoco_library import timers_stopped
 from spheretwin.models.telemetry.run_record import versions
@@ -27,33 +27,29 @@ ALL = "all"
 TWIN = "twin"
 
 
-def declare(parser: Parser) -> None:
-    """Declare the arguments of the verb."""
-    parser.define(
-        run,
-        "Run the paper's experiments over several seeds: a verdict for each, tables, figures, one page."
-        f" {TWIN} runs the workflow of a digital twin on a hidden machine, from design to watch. Exit code 1"
-        " if a run ended unexpectedly or a check failed.",
-        f"""
-        NAME...    {", ".join(EXPERIMENTS)}, or {ALL}; or {TWIN} alone
-        --out
-        --figure-format
-        --json     print the rows as JSON, alone on stdout
-        --verbose  also print every result and every table
-        --seeds N  runs of each case; unless given {SEEDS}, and more where small differences or rare cases
-            count
-        --limit N  only the first N cases of each experiment
-        --plant    engine of rows that do not name one; lagrangian if the model allows it unless given, and a
-            sample of the rows also on mujoco
-        """,
-        seeds=whole(MOST),
-        limit=whole(MOST),
-        plant=tuple(ENGINES),
-    )
-
-
+@verb(
+    f"""
+    NAME...    {", ".join(EXPERIMENTS)}, or {ALL}; or {TWIN} alone
+    --out
+    --figure-format
+    --json     print the rows as JSON, alone on stdout
+    --verbose  also print every result and every table
+    --seeds N  runs of each case; unless given {SEEDS}, and more where small differences or rare cases
+        count
+    --limit N  only the first N cases of each experiment
+    --plant    engine of rows that do not name one; lagrangian if the model allows it unless given, and a
+        sample of the rows also on mujoco
+    """,
+    seeds=whole(MOST),
+    limit=whole(MOST),
+    plant=tuple(ENGINES),
+)
 def run(options: argparse.Namespace) -> bool:
-    """Run the verb; return True if every run ended as expected."""
+    """Run the paper's experiments over several seeds: a verdict for each, tables, figures, one page.
+
+    twin runs the workflow of a digital twin on a hidden machine, from design to watch. Exit code 1 if a
+    run ended unexpectedly or a check failed.
+    """
     if TWIN in options.names:
         return _twin(options)
     plans = [

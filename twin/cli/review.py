@@ -11,7 +11,7 @@ from spheretwin.analysis.recorded_run import Reviewed
 from spheretwin.analysis.review import Review, review
 from spheretwin.analysis.tolerances import Exceeded
 from spheretwin.cli.common import print_json, print_message, warn
-from spheretwin.cli.options import Parser
+from spheretwin.cli.options import verb
 from spheretwin.metrics.tracking import BAND_rad
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.base.files import check_writable
@@ -21,29 +21,25 @@ from spheretwin.viz.terminal.reviews import SignalTolerance
 from spheretwin.viz.terminal.runs import print_written
 
 
-def declare(parser: Parser) -> None:
-    """Declare the arguments of the verb."""
-    parser.define(
-        run,
-        "Print facts, figures and events of runs from their files; with several runs also the"
-        " differences from the first. Exit code 1 if a run exceeds the tolerances.",
-        f"""
-        RUN...                 telemetry (.parquet) or a recording (.rrd), also of a killed process
-        --tolerance FILE.toml  compare the other runs with the first, signal by signal; a file or a shipped
-            one: {", ".join(tolerances.shipped())}
-        --export FILE    write the columns of the run as .csv, .parquet or .mcap, one for each number
-        --merge OUT.rrd  write all runs into one new recording, with a layout for comparison
-        --figures DIR    draw all runs: SVG and one page with interactive plots, without viewer or network
-        --figure-format
-        --json           print the result as JSON, alone on stdout
-        """,
-        runs=Path,
-        tolerance=str,
-    )
-
-
+@verb(
+    f"""
+    RUN...                 telemetry (.parquet) or a recording (.rrd), also of a killed process
+    --tolerance FILE.toml  compare the other runs with the first, signal by signal; a file or a shipped
+        one: {", ".join(tolerances.shipped())}
+    --export FILE    write the columns of the run as .csv, .parquet or .mcap, one for each number
+    --merge OUT.rrd  write all runs into one new recording, with a layout for comparison
+    --figures DIR    draw all runs: SVG and one page with interactive plots, without viewer or network
+    --figure-format
+    --json           print the result as JSON, alone on stdout
+    """,
+    runs=Path,
+    tolerance=str,
+)
 def run(options: argparse.Namespace) -> bool:
-    """Run the verb; return True if all runs are within the tolerances, if any are given."""
+    """Print facts, figures and events of runs from their files.
+
+    With several runs also the differences from the first. Exit code 1 if a run exceeds the tolerances.
+    """
     _check(options)
     reviewed = review(*options.runs, tolerance=options.tolerance)
     runs, summaries, over = reviewed.runs, reviewed.figures, reviewed.exceeded

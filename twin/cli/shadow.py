@@ -11,7 +11,8 @@ import numpy as np
 from spheretwin import outputs
 from spheretwin.cli.common import interruptible, print_json, print_message
 from spheretwin.cli.log_options import (
-    add_stream,
+    STREAM,
+    STREAMED,
     blocks,
     check_given,
     file_log,
@@ -19,7 +20,7 @@ from spheretwin.cli.log_options import (
     live_view,
     scenario_of,
 )
-from spheretwin.cli.options import Parser
+from spheretwin.cli.options import verb
 from spheretwin.machine.log import Log
 from spheretwin.machine.model import model_of
 from spheretwin.machine.noise_fit import fit_noise
@@ -38,26 +39,23 @@ from spheretwin.models.telemetry.table import Table
 from spheretwin.viz.terminal import runs
 
 
-def declare(parser: Parser) -> None:
-    """Declare the arguments of the verb."""
-    add_stream(parser)
-    parser.define(
-        run,
-        "Estimate angles, rates and disturbance torque of a machine from a log, by an extended Kalman filter"
-        " on the plant of a scenario. Exit code 1 if model and log are not consistent.",
-        """
-        --fit      fit noise and delay to the log first
-        --offsets  estimate the offsets of the angle sensors as well
-        --telemetry FILE.parquet  write the estimates
-        --record
-        --json
-        """,
-        has_fields=True,
-    )
-
-
+@verb(
+    f"""{STREAM}
+    --fit      fit noise and delay to the log first
+    --offsets  estimate the offsets of the angle sensors as well
+    --telemetry FILE.parquet  write the estimates
+    --record
+    --json
+    """,
+    has_fields=True,
+    **STREAMED,
+)
 def run(options: argparse.Namespace) -> bool:
-    """Run the verb; return True if model and log are consistent."""
+    """Estimate angles, rates and disturbance torque of a machine from a log.
+
+    The estimator is an extended Kalman filter on the plant of a scenario. Exit code 1 if model and log
+    are not consistent.
+    """
     check_given(options)
     outputs.check(options.record, options.telemetry)
     settings = ShadowSettings(offset_walk_rad=1e-5 if options.offsets else None)

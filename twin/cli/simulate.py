@@ -13,7 +13,7 @@ import numpy as np
 from spheretwin import outputs, replay
 from spheretwin import scenario as scenarios
 from spheretwin.cli.common import interruptible, keep_viewer, print_json, print_message, warn
-from spheretwin.cli.options import Parser, number
+from spheretwin.cli.options import verb
 from spheretwin.machine import export
 from spheretwin.machine.twin_file import read_twin
 from spheretwin.metrics.tracking import BAND_rad
@@ -37,36 +37,30 @@ from spheretwin.viz.terminal import runs
 from spheretwin.viz.terminal.progress import Progress
 
 
-def declare(parser: Parser) -> None:
-    """Declare the arguments of the verb."""
-    parser.usage = "spheretwin simulate SCENARIO [options] [--section.field VALUE ...]"
-    parser.define(
-        run,
-        "Run a scenario. Any field of it is a flag: --controller.law pd",
-        f"""
-        [SCENARIO]               {", ".join(shipped())}, or a .toml file
-        --record
-        --record-rate HZ         rows per second of the recording; default: all
-        --telemetry
-        --live                   run in real time, with a viewer on 127.0.0.1
-        --live-window S          time that the live plots show; default: {LIVE_WINDOW_S:g} s
-        --view TAB               first tab of the recording: {", ".join(VIEW_NAMES)}
-        --replay RUN.parquet     replay the run of a telemetry file
-        --twin
-        --export-log FILE        write what a laboratory would record (.parquet)
-        --export-truth FILE      write true parameters (.json) and states (.parquet)
-        --metric FILE.py:NAME...  own metric: a function of the run; repeatable
-        --json
-        """,
-        has_fields=True,
-        record_rate=number("a number of Hz above 0"),
-        live_window=number("a number of s above 0"),
-        view=VIEW_NAMES,
-    )
-
-
+@verb(
+    f"""
+    [SCENARIO]               {", ".join(shipped())}, or a .toml file
+    --record
+    --record-rate HZ         rows per second of the recording; default: all
+    --telemetry
+    --live                   run in real time, with a viewer on 127.0.0.1
+    --live-window S          time that the live plots show; default: {LIVE_WINDOW_S:g} s
+    --view TAB               first tab of the recording: {", ".join(VIEW_NAMES)}
+    --replay RUN.parquet     replay the run of a telemetry file
+    --twin
+    --export-log FILE        write what a laboratory would record (.parquet)
+    --export-truth FILE      write true parameters (.json) and states (.parquet)
+    --metric FILE.py:NAME...  own metric: a function of the run; repeatable
+    --json
+    """,
+    has_fields=True,
+    view=VIEW_NAMES,
+)
 def run(options: argparse.Namespace) -> bool:
-    """Run the verb; return True if the run completed."""
+    """Run a scenario.
+
+    Any field of it is a flag: --controller.law pd
+    """
     rest: list[str] = options.fields
     if _is_bare(options, rest):
         runs.print_scenarios({name: scenarios.load(name).description for name in shipped()})

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from spheretwin.cli.common import interruptible, print_json, print_message
-from spheretwin.cli.options import Parser, whole
+from spheretwin.cli.options import verb, whole
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.base.extras import install_command
 from spheretwin.models.base.mujoco_library import timers_stopped
@@ -43,39 +43,33 @@ DRAWS = 100
 GO_ON = "sweep: finished rows are stored; the same command continues from there"
 
 
-def declare(parser: Parser) -> None:
-    """Declare the arguments of the verb."""
-    parser.define(
-        run,
-        "Run a study on all cores. Rows in its journal are not run again: an interrupted"
-        " study continues. Exit code 1 if it is not complete, or if a row ended as"
-        " failsafe or by an exception of a law or a metric.",
-        f"""
-        STUDY              {", ".join(shipped())}, or a .toml file
-        --out DIR          folder of journal and table; NAME_study unless given
-        --threads N        as many as there are cores unless given
-        --engine=local     local, threads on this machine, unless given; the table is the same
-        --address HOST     for ray: auto, or HOST[:PORT] of a cluster that this machine is a node of; a
-            cluster on this machine alone unless given
-        --limit ROWS       run only the first rows; finished later rows stay in the table
-        --row KEY          run only the row of this key, and print its figures
-        --optimise         tune the gains that the section [optimise] of the study names
-        --trials N         trials of each law, with --optimise
-        --twin TWIN.toml   run each row on machines drawn from the covariance of an identified twin
-        --draws N          machines of --twin; {DRAWS} unless given
-        --figure-format
-        --json             print the result as JSON, alone on stdout
-        """,
-        threads=whole(MOST_THREADS),
-        engine=tuple(ENGINES),
-        limit=whole(),
-        trials=whole(),
-        draws=whole(100_000),
-    )
-
-
+@verb(
+    f"""
+    STUDY              {", ".join(shipped())}, or a .toml file
+    --out DIR          folder of journal and table; NAME_study unless given
+    --threads N        as many as there are cores unless given
+    --engine=local     local, threads on this machine, unless given; the table is the same
+    --address HOST     for ray: auto, or HOST[:PORT] of a cluster that this machine is a node of; a
+        cluster on this machine alone unless given
+    --limit ROWS       run only the first rows; finished later rows stay in the table
+    --row KEY          run only the row of this key, and print its figures
+    --optimise         tune the gains that the section [optimise] of the study names
+    --trials N         trials of each law, with --optimise
+    --twin TWIN.toml   run each row on machines drawn from the covariance of an identified twin
+    --draws N          machines of --twin; {DRAWS} unless given
+    --figure-format
+    --json             print the result as JSON, alone on stdout
+    """,
+    threads=whole(MOST_THREADS),
+    engine=tuple(ENGINES),
+    draws=whole(100_000),
+)
 def run(options: argparse.Namespace) -> bool:
-    """Run the verb; return True if all requested rows are finished and none has failed."""
+    """Run a study on all cores.
+
+    Rows in its journal are not run again: an interrupted study continues. Exit code 1 if it is not
+    complete, or if a row ended as failsafe or by an exception of a law or a metric.
+    """
     study = load(options.study)
     if options.twin:
         study = _over_twin(study, options.twin, options.draws or DRAWS)

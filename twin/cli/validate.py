@@ -5,8 +5,8 @@ from __future__ import annotations
 import argparse
 
 from spheretwin.cli.common import print_json, print_message
-from spheretwin.cli.log_options import add_logs, changes_of, check_given, read_logs, scenario_of
-from spheretwin.cli.options import Parser
+from spheretwin.cli.log_options import LOG, ONE, changes_of, check_given, read_logs, scenario_of
+from spheretwin.cli.options import verb
 from spheretwin.machine.residuals import CHI2, QUANTITIES
 from spheretwin.machine.state_estimation import chi2_text
 from spheretwin.machine.twin_file import read_uncertainty
@@ -16,20 +16,13 @@ from spheretwin.viz.terminal import runs
 MOST_LINES = 5
 
 
-def declare(parser: Parser) -> None:
-    """Declare the arguments of the verb."""
-    add_logs(parser, many=False)
-    parser.define(
-        run,
-        "Judge a twin by a log: residuals by hinge, pose and rate, and what would explain those that noise"
-        " does not. Exit code 1 if the twin is not accepted.",
-        "--json",
-        has_fields=True,
-    )
-
-
+@verb(f"{LOG}    --json", has_fields=True, **ONE)
 def run(options: argparse.Namespace) -> bool:
-    """Run the verb; return True if the twin is accepted."""
+    """Judge a twin by a log.
+
+    It prints residuals by hinge, pose and rate, and what would explain those that noise does not. Exit
+    code 1 if the twin is not accepted.
+    """
     check_given(options)
     (log,) = read_logs(options)
     uncertainty = read_uncertainty(options.twin) if options.twin else None

@@ -8,7 +8,8 @@ import numpy as np
 
 from spheretwin.cli.common import interruptible, print_json, print_message
 from spheretwin.cli.log_options import (
-    add_stream,
+    STREAM,
+    STREAMED,
     blocks,
     check_given,
     file_log,
@@ -16,7 +17,7 @@ from spheretwin.cli.log_options import (
     live_view,
     scenario_of,
 )
-from spheretwin.cli.options import Parser, number
+from spheretwin.cli.options import number, verb
 from spheretwin.machine.log import Log
 from spheretwin.machine.model import model_of
 from spheretwin.machine.state_estimation import Shadow, signals
@@ -27,25 +28,21 @@ MOST_VARIANCE = 1.5
 """Mean square of the residuals, over that of the noise, above which the twin is not that of the machine."""
 
 
-def declare(parser: Parser) -> None:
-    """Declare the arguments of the verb."""
-    add_stream(parser)
-    parser.define(
-        run,
-        "Watch over a machine: print a line of JSON for each change of its parameters. Exit code 1 if there"
-        " was one.",
-        f"""
-        --parameter NAME...      parameter to watch; repeatable (default: {", ".join(WATCHED)})
-        --false-alarms RATE=0.1  largest mean rate of alarms without a change, 1/h (default: 0.1)
-        --json  print nothing but the lines of JSON, also no summary on stderr
-        """,
-        has_fields=True,
-        false_alarms=number("a number above 0"),
-    )
-
-
+@verb(
+    f"""{STREAM}
+    --parameter NAME...      parameter to watch; repeatable (default: {", ".join(WATCHED)})
+    --false-alarms RATE=0.1  largest mean rate of alarms without a change, 1/h (default: 0.1)
+    --json  print nothing but the lines of JSON, also no summary on stderr
+    """,
+    has_fields=True,
+    **STREAMED,
+    false_alarms=number("a number above 0"),
+)
 def run(options: argparse.Namespace) -> bool:
-    """Run the verb; return True if nothing has changed."""
+    """Watch over a machine: print a line of JSON for each change of its parameters.
+
+    Exit code 1 if there was one.
+    """
     check_given(options)
     settings = WatchSettings(false_alarms_per_hour=options.false_alarms)
     scenario, log = scenario_of(options), file_log(options)

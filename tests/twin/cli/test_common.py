@@ -60,7 +60,8 @@ def test_the_effect_of_a_second_signal_is_explained_once_and_only_after_the_firs
 
 
 def test_ctrl_c_outside_of_a_run_is_one_line_and_exit_1(monkeypatch, capsys):
-    monkeypatch.setattr(explain, "run", Mock(side_effect=KeyboardInterrupt))
+    stopped = explain.run._replace(run=Mock(side_effect=KeyboardInterrupt, __doc__="Stop."))
+    monkeypatch.setattr(explain, "run", stopped)
     assert cli.main(["explain", "seed"]) == cli.FAILED == 1
     assert capsys.readouterr() == ("", "spheretwin: interrupted\n")
 

@@ -8,20 +8,22 @@ import pytest
 from spheretwin import cli
 from spheretwin.models.actuator import MJCF_PATH
 
-PART = {"curve": "run_curve", "check": "run_check", "map": "run_map"}
-
 
 @pytest.fixture
 def received(monkeypatch):
     """Return the options that a verb receives in place of its run."""
 
     def parse(*arguments):
-        verb = arguments[0]
-        run = PART[arguments[1]] if verb == "magnetics" else "run"
+        module = import_module(f"spheretwin.cli.{arguments[0]}")
         calls = []
-        monkeypatch.setattr(
-            import_module(f"spheretwin.cli.{verb}"), run, lambda given: not calls.append(given)
-        )
+
+        def replaced(verb):
+            return verb._replace(run=lambda given: not calls.append(given))
+
+        if parts := getattr(module, "PARTS", {}):
+            monkeypatch.setitem(parts, arguments[1], replaced(parts[arguments[1]]))
+        else:
+            monkeypatch.setattr(module, "run", replaced(module.run))
         assert cli.main(list(arguments)) == cli.DONE
         (options,) = calls
         return vars(options)
