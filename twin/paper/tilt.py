@@ -61,14 +61,14 @@ def errors_drawing(items: Sequence[CaseRuns]) -> Drawing:
     for item in items:
         columns = item.case.columns
         origin = f"paper {paper_text(item)}°" if "paper_deg" in columns else item["gains"]
-        courses[f"{item['label']} ({origin})"] = figures.ErrorCourse(
+        courses[f"{item['label']} ({origin})"] = figures.ErrorBand(
             item["law"],
-            np.degrees(page.padded([run.data for run in item.runs])),
-            columns.get("paper_deg", 0.0),
+            page.padded([run.data for run in item.runs]),
+            np.radians(columns.get("paper_deg", 0.0)),
             tuple(columns.get("paper_axes", ())),
         )
     title = "Tilt with the prototype's electronics: measured error"
-    figure = figures.courses(courses, WINDOW_s, ("α", "β"), title)
+    figure = figures.errors(courses, WINDOW_s, ("α", "β"), title)
     return FILE.drawing("printed", figure, window_ms=1e3 * WINDOW_s)
 
 

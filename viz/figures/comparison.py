@@ -31,13 +31,12 @@ from spheretwin.viz.figures.style import (
     FAINT,
     INK,
     MOST_BINS,
-    WIDTH_in,
     draw_line,
-    name_axes,
+    legend_below,
     name_runs,
-    panel_column,
     plain,
     run_styles,
+    sheet,
 )
 from spheretwin.viz.quantities import Array, Quantity
 
@@ -71,10 +70,9 @@ def currents(runs: Sequence[ComparedRun], title: str, most_cells: int = MOST_CEL
     most_cells : int
         Cells of a row.
     """
-    figure = Figure(figsize=(WIDTH_in, 1.2 + 2.3 * len(runs)), layout="constrained")
-    panels = figure.subplots(2 * len(runs), 1, sharex=True, squeeze=False, height_ratios=[7, 1] * len(runs))[
-        :, 0
-    ]
+    ratios = [7, 1] * len(runs)
+    figure, grid = sheet(1.2 + 2.3 * len(runs), 2 * len(runs), title=title, sharex=True, height_ratios=ratios)
+    panels = grid[:, 0]
     largest_A = max(float(np.nanmax(np.abs(run.table["current_A"]))) for run in runs) or 1.0
     scale = {"cmap": "RdBu_r", "vmin": -largest_A, "vmax": largest_A}
     lane_scale = {"cmap": "Greys", "vmin": 0.0, "vmax": largest_A / 2}
@@ -96,7 +94,6 @@ def currents(runs: Sequence[ComparedRun], title: str, most_cells: int = MOST_CEL
     bar: dict[str, Any] = {"shrink": 0.9, "aspect": 30}
     figure.colorbar(means, ax=list(panels), label="mean current of a cell, A", **bar)
     figure.colorbar(deviations, ax=list(panels), label="standard deviation within a cell, A", **bar)
-    figure.suptitle(title, fontsize="medium")
     return figure
 
 
@@ -111,8 +108,7 @@ def events_figure(runs: Sequence[ComparedRun], title: str) -> Figure:
     runs : sequence of ComparedRun
     title : str
     """
-    figure = Figure(figsize=(WIDTH_in, 1.5 + 0.45 * len(runs)), layout="constrained")
-    axes = figure.subplots()
+    figure, ((axes,),) = sheet(1.5 + 0.45 * len(runs), title=title)
     for row, (run, look) in enumerate(zip(runs, run_styles(runs), strict=True)):
         t_s = run.table["t_s"]
         axes.plot([t_s[0], t_s[-1]], [row, row], color=look.colour, linewidth=2.5, alpha=0.6)
@@ -125,8 +121,8 @@ def events_figure(runs: Sequence[ComparedRun], title: str) -> Figure:
     axes.set_ylim(len(runs) - 0.5, -0.5)
     plain(axes, "")
     axes.grid(visible=True, axis="x", color=FAINT, alpha=0.35)
-    name_axes(axes, x="time, s", title=title)
-    figure.legend(loc="outside lower center", ncols=3, frameon=False, fontsize="small")
+    axes.set_xlabel("time, s")
+    legend_below(figure, [axes], 3, fontsize="small")
     return figure
 
 
@@ -148,8 +144,8 @@ def spectra(
     each_octave : int
         Lines of each octave.
     """
-    figure = Figure(figsize=(WIDTH_in, 7.0), layout="constrained")
-    panels = panel_column(figure, len(ANGLES))
+    figure, grid = sheet(7.0, len(ANGLES), title=title, sharex=True)
+    panels = grid[:, 0]
     for axis, (panel, name) in enumerate(zip(panels, ANGLES, strict=True)):
         panel.set(xscale="log", yscale="log")
         for run, look, of_run in zip(runs, run_styles(runs), of_runs, strict=True):
@@ -161,7 +157,6 @@ def spectra(
                     frequency_Hz, amplitude_mrad, "o", color=look.colour, markersize=4, label=f"_{run.label}"
                 )
         plain(panel, f"error of {name},\namplitude, mrad")
-    panels[0].set_title(title, fontsize="medium")
     panels[-1].set_xlabel("frequency, Hz")
     name_runs(figure, panels[0])
     return figure
@@ -189,8 +184,8 @@ def over_time(
     panels_of = [(quantity, False) for quantity in quantities]
     panels_of += [(quantity, True) for quantity in quantities if quantity.group == "whole"]
     height_in = 1.3 + 1.75 * len(panels_of) + LEGEND_ROW_in * len(runs)
-    figure = Figure(figsize=(WIDTH_in, height_in), layout="constrained")
-    panels = panel_column(figure, len(panels_of))
+    figure, grid = sheet(height_in, len(panels_of), title=title, sharex=True)
+    panels = grid[:, 0]
     for panel, (quantity, logarithmic) in zip(panels, panels_of, strict=True):
         of_runs = [quantity.column(run.rows) for run in runs]
         if logarithmic:
@@ -206,14 +201,18 @@ def over_time(
         for place in leading:
             if quantity.desired:
                 name = "reference" if len(leading) == 1 else f"reference of {runs[place].label}"
-                look = {"label": name, "color": INK, "linewidth": 0.7, "linestyle": (0, (4, 3))}
+                look: dict[str, Any] = {
+                    "label": name,
+                    "color": INK,
+                    "linewidth": 0.7,
+                    "linestyle": (0, (4, 3)),
+                }
                 draw_line(
                     panel, runs[place].table["t_s"], quantity.desired(runs[place].rows), *detail, **look
                 )
         panel.set_ylim(*limits)
         unit = f"{quantity.unit}, logarithmic" if logarithmic else quantity.unit
         plain(panel, f"{quantity.title},\n{unit}")
-    figure.suptitle(title, fontsize="medium")
     panels[-1].set_xlabel("time, s")
     name_runs(figure, panels[0])
     return figure
@@ -251,8 +250,8 @@ def overview(table: Table, title: str) -> Figure:
         Telemetry with at least one row.
     title : str
     """
-    figure = Figure(figsize=(WIDTH_in, 6.0), layout="constrained")
-    angles, errors, currents = figure.subplots(3, 1, sharex=True)
+    figure, grid = sheet(6.0, 3, title=title, sharex=True)
+    angles, errors, currents = grid[:, 0]
     t_s = table["t_s"]
     for i, (name, colour) in enumerate(zip(ANGLES, AXES, strict=True)):
         look = {"color": colour, "linestyle": DASHES[i], "linewidth": 1.1}
@@ -269,9 +268,7 @@ def overview(table: Table, title: str) -> Figure:
     draw_line(currents, t_s, largest, color=INK, linewidth=1.1)
     for panel, heading in ((angles, "angle, °"), (errors, "error, mrad"), (currents, "largest current, A")):
         plain(panel, heading)
-    figure.suptitle(title, fontsize="medium")
-    lines, labels = angles.get_legend_handles_labels()  # references last
-    figure.legend(lines, labels, loc="outside lower left", ncols=4, frameon=False, fontsize="small")
+    legend_below(figure, [angles], loc="outside lower left", fontsize="small")
     currents.set_xlabel("time, s")
     return figure
 

@@ -17,8 +17,11 @@ from spheretwin.viz.figures.style import (
     LawStyle,
     WIDTH_in,
     faint_grid,
+    law_keys,
+    legend_below,
     name_axes,
     on_errors,
+    sheet,
     styles,
 )
 
@@ -50,8 +53,7 @@ def by_condition(
     hinges : sequence of str
     x, quantity, title : str
     """
-    figure = Figure(figsize=(1.2 * WIDTH_in, 4.6), layout="constrained")
-    panels = figure.subplots(1, len(hinges), sharey=True, squeeze=False)[0]
+    figure, (panels,) = sheet(4.6, 1, len(hinges), title, 1.2 * WIDTH_in, sharey=True)
     looks = styles([series.law for series in by_label.values()])
     for hinge, (panel, name) in enumerate(zip(panels, hinges, strict=True)):
         for place, (label, series) in enumerate(by_label.items()):
@@ -66,7 +68,6 @@ def by_condition(
     on_errors(panels, errors.min() / MARGIN, errors.max() * MARGIN)
     panels[0].set_ylabel(f"{quantity}, mrad")
     _legend(figure, panels[0], by_label)
-    figure.suptitle(title, fontsize="medium")
     return figure
 
 
@@ -104,8 +105,7 @@ def _legend(figure: Figure, panel: Axes, by_label: Mapping[str, ErrorsByConditio
     if not all(series.whole.all() for series in by_label.values()):
         hollow: dict[str, Any] = {"color": INK, "markerfacecolor": "white", "linestyle": "", "marker": "o"}
         handles += panel.plot([], [], label="ended early", markersize=6, **hollow)
-    figure.legend(handles=handles, loc="outside lower center", ncols=min(len(handles), 6), frameon=False,
-                  handlelength=3.2)  # fmt: skip
+    legend_below(figure, [], 6, handles, handlelength=3.2)
 
 
 WIDE = 9.0
@@ -134,8 +134,7 @@ def margins(
     """
     across = min(3, len(panels))
     down = -(-len(panels) // across)
-    figure = Figure(figsize=(1.2 * WIDTH_in, 1.2 + 2.7 * down), layout="constrained")
-    grid = figure.subplots(down, across, sharey=True, squeeze=False)
+    figure, grid = sheet(1.2 + 2.7 * down, down, across, title, 1.2 * WIDTH_in, sharey=True)
     looks = styles(list(labels))
     for spare in grid.flat[len(panels) :]:
         spare.set_visible(False)
@@ -157,13 +156,10 @@ def margins(
         axes.set_xlabel(panel.name)
         faint_grid(axes)
     figure.supylabel(quantity, fontsize="medium")
-    handles = [
-        grid.flat[0].plot([], [], style.marker, markersize=6, label=labels[law], **style.line())[0]
-        for law, style in looks.items()
-    ]
-    handles += grid.flat[0].plot([], [], "o", color=INK, markerfacecolor="white", label="does not hold")
-    figure.legend(handles=handles, loc="outside lower center", ncols=5, frameon=False, handlelength=3.2)
-    figure.suptitle(title, fontsize="medium")
+    first = grid[0, 0]
+    handles = law_keys(first, labels)
+    handles += first.plot([], [], "o", color=INK, markerfacecolor="white", label="does not hold")
+    legend_below(figure, [], 5, handles, handlelength=3.2)
     return figure
 
 
@@ -186,8 +182,7 @@ def ratios(rows: Sequence[RatioRow], labels: Mapping[str, str], quantity: str, t
     labels : mapping of law to label
     quantity, title : str
     """
-    figure = Figure(figsize=(WIDTH_in, 1.5 + ROW_in * len(rows)), layout="constrained")
-    axes = figure.subplots()
+    figure, ((axes,),) = sheet(1.5 + ROW_in * len(rows), title=title)
     looks = styles(list(labels))
     for y, row in enumerate(rows):
         for place, (law, values) in enumerate(row.by_law.items()):
@@ -200,12 +195,12 @@ def ratios(rows: Sequence[RatioRow], labels: Mapping[str, str], quantity: str, t
     axes.set_xscale("log")
     axes.set_yticks(range(len(rows)), [row.label for row in rows])
     axes.set_ylim(len(rows) - 0.5, -0.5)
-    name_axes(axes, x=quantity, title=title)
+    axes.set_xlabel(quantity)
     axes.xaxis.set_major_formatter("{x:g}")
     faint_grid(axes, axis="x")
     for y in range(1, len(rows)):
         axes.axhline(y - 0.5, color=FAINT, linewidth=0.4)
-    figure.legend(loc="outside lower center", ncols=4, frameon=False)
+    legend_below(figure, [axes])
     return figure
 
 
@@ -235,8 +230,8 @@ def estimators(bandwidths_rad_s: Array, curves: Mapping[str, Curve], title: str)
     curves : mapping of estimator to Curve
     title : str
     """
-    figure = Figure(figsize=(WIDTH_in, 6.4), layout="constrained")
-    above, below = figure.subplots(2, 1, sharex=True)
+    title = f"{title}\ndots measured, lines derived, dashed the defaults"
+    figure, ((above,), (below,)) = sheet(6.4, 2, title=title, sharex=True)
     for colour, marker, (name, curve) in zip(SERIES, "osD^v", curves.items(), strict=False):
         dots = {"linestyle": "", "marker": marker, "color": colour, "markersize": 5}
         above.plot(bandwidths_rad_s, curve.rms_error_rad_s, label=name, **dots)
@@ -257,6 +252,5 @@ def estimators(bandwidths_rad_s: Array, curves: Mapping[str, Curve], title: str)
         axes.set_ylabel(quantity)
         faint_grid(axes, which="both")
         axes.legend(loc="center left", bbox_to_anchor=(1.01, 0.5))
-    above.set_title(f"{title}\ndots measured, lines derived, dashed the defaults", fontsize="medium")
     below.set_xlabel("bandwidth, rad/s")
     return figure

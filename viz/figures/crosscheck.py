@@ -14,17 +14,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from spheretwin.models.telemetry.signals import ANGLES
-from spheretwin.viz.figures.style import (
-    AXES,
-    BROKEN,
-    INK,
-    SERIES,
-    WIDTH_in,
-    common_legend,
-    faint_grid,
-    name_axes,
-    panel_column,
-)
+from spheretwin.viz.figures.style import AXES, BROKEN, INK, SERIES, faint_grid, legend_below, name_axes, sheet
 
 Array = NDArray[np.float64]
 
@@ -56,8 +46,7 @@ def margins(values: Mapping[str, float], title: str) -> Figure:
         Value over bound.
     title : str
     """
-    figure = Figure(figsize=(WIDTH_in, 0.8 + 0.26 * len(values)), layout="constrained")
-    axes = figure.subplots()
+    figure, ((axes,),) = sheet(0.8 + 0.26 * len(values), title=title)
     rows = np.arange(len(values))
     shares = np.clip(list(values.values()), LEAST_SHARE, 1 / LEAST_SHARE)
     for within, colour, label in (
@@ -73,9 +62,9 @@ def margins(values: Mapping[str, float], title: str) -> Figure:
     axes.set_xlim(LEAST_SHARE, 10 * max(1.0, *shares))
     axes.set_yticks(rows, list(values))
     axes.set_ylim(len(values) - 0.4, -0.6)
-    _finish(axes, "value over bound", "", title)
-    axes.grid(visible=False, axis="y")
-    figure.legend(loc="outside lower center", ncols=3)
+    axes.set_xlabel("value over bound")
+    faint_grid(axes, axis="x")
+    legend_below(figure, [axes], 3)
     return figure
 
 
@@ -92,8 +81,7 @@ def spreads(
     title : str
     """
     quantities = list(bounds)
-    figure = Figure(figsize=(WIDTH_in, 1.3 + 0.62 * len(quantities)), layout="constrained")
-    axes = figure.subplots()
+    figure, ((axes,),) = sheet(1.3 + 0.62 * len(quantities), title=title)
     offsets = np.linspace(-0.16, 0.16, len(differences)) if len(differences) > 1 else np.zeros(1)
     for colour, offset, (source, by_quantity) in zip(SERIES, offsets, differences.items(), strict=False):
         for row, quantity in enumerate(quantities):
@@ -111,8 +99,9 @@ def spreads(
     axes.set_xscale("log")
     axes.set_yticks(range(len(quantities)), quantities)
     axes.set_ylim(len(quantities) - 0.5, -0.5)
-    _finish(axes, "relative difference", "", title)
-    figure.legend(loc="outside lower center", ncols=4)
+    axes.set_xlabel("relative difference")
+    faint_grid(axes)
+    legend_below(figure, [axes])
     return figure
 
 
@@ -126,19 +115,17 @@ def motion(t_s: Array, q_rad: Array, difference_rad: Array, bound_rad: float, ti
     bound_rad : float, rad
     title : str
     """
-    figure = Figure(figsize=(WIDTH_in, 6.0), layout="constrained")
-    tilt, spin, apart = figure.subplots(3, 1, sharex=True, height_ratios=[2, 1, 2])
+    figure, grid = sheet(6.0, 3, title=title, sharex=True, height_ratios=[2, 1, 2])
+    tilt, spin, apart = grid[:, 0]
     for axis, (colour, name) in enumerate(zip(AXES, ANGLES, strict=True)):
         where = spin if axis == 2 else tilt
         where.plot(t_s, q_rad[:, axis], color=colour, label=name)
         apart.plot(t_s, _positive(difference_rad[:, axis]), color=colour, linewidth=1, label=name)
     apart.set_yscale("log")
     _draw_bound(apart, bound_rad, "rad")
-    _finish(tilt, "", "tilt, rad", title)
-    _finish(spin, "", "spin, rad", "")
-    _finish(apart, "time, s", "|difference|, rad", "")
-    for axes in (tilt, spin, apart):
-        axes.legend(loc="center left", bbox_to_anchor=(1.01, 0.5))
+    apart.set_xlabel("time, s")
+    for axes, quantity in ((tilt, "tilt, rad"), (spin, "spin, rad"), (apart, "|difference|, rad")):
+        _finish(axes, quantity)
     return figure
 
 
@@ -150,8 +137,7 @@ def convergence(slopes: Mapping[str, Slope], title: str) -> Figure:
     slopes : mapping of method to Slope
     title : str
     """
-    figure = Figure(figsize=(WIDTH_in, 4.6), layout="constrained")
-    axes = figure.subplots()
+    figure, ((axes,),) = sheet(4.6, title=title)
     for colour, marker, size, (name, slope) in zip(
         SERIES, "osDx^", (8, 9, 5, 6, 6), slopes.items(), strict=False
     ):
@@ -165,8 +151,8 @@ def convergence(slopes: Mapping[str, Slope], title: str) -> Figure:
     steps_ms = 1e3 * np.unique(np.concatenate([slope.steps_s for slope in slopes.values()]))
     axes.set_xticks(steps_ms, [f"{step:g}" for step in steps_ms])
     axes.minorticks_off()
-    _finish(axes, "step, ms", "largest error of a hinge angle, rad", title)
-    axes.legend(loc="center left", bbox_to_anchor=(1.01, 0.5))
+    axes.set_xlabel("step, ms")
+    _finish(axes, "largest error of a hinge angle, rad")
     return figure
 
 
@@ -179,15 +165,13 @@ def drifts(t_s: Array, panels: Mapping[str, Mapping[str, Bounded]], title: str) 
     panels : mapping of quantity (with its unit) to mapping of series to Bounded
     title : str
     """
-    figure = Figure(figsize=(WIDTH_in, 2.1 * len(panels)), layout="constrained")
-    for axes, (quantity, series) in zip(panel_column(figure, len(panels)), panels.items(), strict=True):
+    figure, grid = sheet(2.1 * len(panels), len(panels), title=title, sharex=True)
+    for axes, (quantity, series) in zip(grid[:, 0], panels.items(), strict=True):
         for colour, (name, drift) in zip(SERIES, series.items(), strict=False):
             axes.plot(t_s, _positive(drift.values), color=colour, linewidth=1, label=name)
             _draw_bound(axes, drift.bound, "", colour)
         axes.set_yscale("log")
-        _finish(axes, "", quantity, title)
-        title = ""
-        axes.legend(loc="center left", bbox_to_anchor=(1.01, 0.5))
+        _finish(axes, quantity)
     axes.set_xlabel("time, s")
     return figure
 
@@ -212,8 +196,7 @@ def closed_loops(
         Names of the plants.
     title : str
     """
-    figure = Figure(figsize=(WIDTH_in, 4.8), layout="constrained")
-    above, below = figure.subplots(2, len(errors), sharex=True, squeeze=False)
+    figure, (above, below) = sheet(4.8, 2, len(errors), title, sharex=True)
     for top, bottom, (law, pair) in zip(above, below, errors.items(), strict=True):
         for axis, (colour, name) in enumerate(zip(AXES, ANGLES, strict=True)):
             top.plot(t_s[: len(pair[0])], pair[0][:, axis], color=colour, label=f"{name}, {sources[0]}")
@@ -223,10 +206,11 @@ def closed_loops(
         bottom.plot(t_s[: len(values)], values, color=SERIES[0], linewidth=1, label="worst hinge")
         bottom.set_yscale("log")
         _draw_bound(bottom, apart[law].bound, "rad")
-        _finish(top, "", "tracking error, rad", law)
-        _finish(bottom, "time, s", "|difference|, rad", "")
-    common_legend(figure, (above[0], below[0]), ncols=4)
-    figure.suptitle(title, fontsize="medium")
+        name_axes(top, law, y="tracking error, rad")
+        name_axes(bottom, "", "time, s", "|difference|, rad")
+        faint_grid(top)
+        faint_grid(bottom)
+    legend_below(figure, (above[0], below[0]))
     return figure
 
 
@@ -241,7 +225,8 @@ def _draw_bound(axes: Axes, bound: float | None, unit: str, colour: str = INK) -
         axes.axhline(bound, color=colour, linestyle="--", linewidth=1.2, label=name)
 
 
-def _finish(axes: Axes, x: str, y: str, title: str) -> None:
-    """Set labels and a faint grid; remove the box."""
-    name_axes(axes, x=x, y=y, title=title)
+def _finish(axes: Axes, y: str) -> None:
+    """Set label, legend and a faint grid; remove the box."""
+    axes.set_ylabel(y)
+    axes.legend(loc="center left", bbox_to_anchor=(1.01, 0.5))
     faint_grid(axes)

@@ -13,7 +13,7 @@ from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 from spheretwin.viz.figures.maps import fit_scale
-from spheretwin.viz.figures.style import FAINT, INK, WIDTH_in, faint_grid
+from spheretwin.viz.figures.style import FAINT, INK, WIDTH_in, faint_grid, legend_below, sheet
 from spheretwin.viz.theme import law_colours
 
 Array = NDArray[np.float64]
@@ -48,8 +48,7 @@ def distributions(
     title : str
     """
     down, colours = -(-len(figures) // ACROSS), law_colours(list(totals))
-    sheet = Figure(figsize=(1.15 * WIDTH_in, 1.0 + 2.1 * down), layout="constrained")
-    grid = sheet.subplots(down, ACROSS, sharey=True, squeeze=False)
+    figure, grid = sheet(1.0 + 2.1 * down, down, ACROSS, title, 1.15 * WIDTH_in, sharey=True)
     for spare in grid.flat[len(figures) :]:
         spare.set_visible(False)
     for axes, (name, by_law) in zip(grid.flat, figures.items(), strict=False):
@@ -59,14 +58,13 @@ def distributions(
             axes.step(numbers, share, where="post", color=colours[law], linewidth=1.3)
         fit_scale(axes, "x", np.concatenate(list(by_law.values())))
         axes.set_ylim(0, 1.02)
-        _plain(axes, name, "")
+        _plain(axes, name)
     for axes in grid[:, 0]:
         axes.set_ylabel("share of rows", fontsize="small")
     for law in totals:
         grid.flat[0].plot([], [], color=colours[law], label=law)
-    sheet.legend(loc="outside lower center", ncols=min(len(totals), 5), frameon=False)
-    sheet.suptitle(title, fontsize="medium")
-    return sheet
+    legend_below(figure, [grid[0, 0]], 5)
+    return figure
 
 
 def ranks(names: Sequence[str], by_law: Mapping[str, Rank], title: str) -> Figure:
@@ -80,8 +78,7 @@ def ranks(names: Sequence[str], by_law: Mapping[str, Rank], title: str) -> Figur
         In the same order.
     title : str
     """
-    figure = Figure(figsize=(WIDTH_in, 1.4 + len(names) * (0.14 + 0.13 * len(by_law))), layout="constrained")
-    axes = figure.subplots()
+    figure, ((axes,),) = sheet(1.4 + len(names) * (0.14 + 0.13 * len(by_law)), title=title)
     thick, colours = 0.76 / len(by_law), law_colours(list(by_law))
     for place, (law, rank) in enumerate(by_law.items()):
         y = np.arange(len(names)) + (place - (len(by_law) - 1) / 2) * thick
@@ -95,8 +92,8 @@ def ranks(names: Sequence[str], by_law: Mapping[str, Rank], title: str) -> Figur
     axes.set_yticks(range(len(names)), list(names))
     axes.set_ylim(len(names) - 0.5, -0.5)
     partial = all(rank.is_partial for rank in by_law.values())
-    _plain(axes, "partial rank correlation" if partial else "rank correlation", title)
-    figure.legend(loc="outside lower center", ncols=min(len(by_law) + 2, 4), frameon=False, fontsize="small")
+    _plain(axes, "partial rank correlation" if partial else "rank correlation")
+    legend_below(figure, [axes], fontsize="small")
     return figure
 
 
@@ -116,8 +113,8 @@ def scatters(
     """
     across, colours = min(4, len(axes_values)), law_colours(list(figure_values))
     down = -(-len(axes_values) // across)
-    figure = Figure(figsize=(max(2.6 * across, WIDTH_in / 2), 1.1 + 2.2 * down), layout="constrained")
-    grid = figure.subplots(down, across, sharey=True, squeeze=False)
+    width_in = max(2.6 * across, WIDTH_in / 2)
+    figure, grid = sheet(1.1 + 2.2 * down, down, across, title, width_in, sharey=True)
     for spare in grid.flat[len(axes_values) :]:
         spare.set_visible(False)
     for axes, (name, by_law) in zip(grid.flat, axes_values.items(), strict=False):
@@ -125,12 +122,10 @@ def scatters(
             _scatter(axes, x, figure_values[law], colours[law], law)
         fit_scale(axes, "y", np.concatenate(list(figure_values.values())))
         axes.xaxis.set_major_locator(MaxNLocator(4))
-        _plain(axes, name, "")
+        _plain(axes, name)
     for axes in grid[:, 0]:
         axes.set_ylabel(quantity, fontsize="small")
-    named, labels = grid.flat[0].get_legend_handles_labels()
-    figure.legend(named, labels, loc="outside lower center", ncols=4, frameon=False, fontsize="small")
-    figure.suptitle(title, fontsize="medium")
+    legend_below(figure, [grid[0, 0]], fontsize="small")
     return figure
 
 
@@ -144,8 +139,7 @@ def _scatter(axes: Axes, x: Array, y: Array, colour: str, law: str) -> None:
         axes.plot(*zip(*middles, strict=True), color=colour, linewidth=2, label=f"{law}, median")
 
 
-def _plain(axes: Axes, x: str, title: str) -> None:
+def _plain(axes: Axes, x: str) -> None:
     axes.set_xlabel(x, fontsize="small")
-    axes.set_title(title, fontsize="medium")
     axes.tick_params(labelsize="small")
     faint_grid(axes, 0.3)

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import NullFormatter
 from numpy.typing import NDArray
 
-from spheretwin.viz.figures.style import INK, SERIES, WIDTH_in, faint_grid, name_axes
+from spheretwin.viz.figures.style import INK, SERIES, WIDTH_in, faint_grid, name_axes, sheet
 
 Array = NDArray[np.float64]
 
@@ -28,8 +28,7 @@ def shares(by_name: Mapping[str, Mapping[int, float]], x: str, y: str, title: st
     by_name : mapping of name to mapping of number to share, 0 to 1
     x, y, title : str
     """
-    figure = Figure(figsize=(WIDTH_in, 4.2), layout="constrained")
-    axes = figure.subplots()
+    figure, ((axes,),) = sheet(4.2, title=title)
     for (name, by_number), colour, marker in zip(by_name.items(), SERIES, MARKERS, strict=False):
         percent = [100 * share for share in by_number.values()]
         axes.plot(
@@ -39,7 +38,7 @@ def shares(by_name: Mapping[str, Mapping[int, float]], x: str, y: str, title: st
     axes.set_xticks(numbers)
     axes.set_ylim(-3, 103)
     faint_grid(axes, 0.4, axis="y")
-    name_axes(axes, x=x, y=y, title=title)
+    axes.set(xlabel=x, ylabel=y)
     axes.legend(frameon=False)
     return figure
 
@@ -53,8 +52,7 @@ def remaining(by_name: Mapping[str, Sequence[float]], x: str, y: str, title: str
         Positive; infinite times never come.
     x, y, title : str
     """
-    figure = Figure(figsize=(WIDTH_in, 4.2), layout="constrained")
-    axes = figure.subplots()
+    figure, ((axes,),) = sheet(4.2, title=title)
     finite = [time for times in by_name.values() for time in times if np.isfinite(time)]
     end = max(finite, default=1.0)
     for (name, times), colour in zip(by_name.items(), SERIES, strict=False):
@@ -65,7 +63,7 @@ def remaining(by_name: Mapping[str, Sequence[float]], x: str, y: str, title: str
     axes.set(xscale="log", yscale="log")
     faint_grid(axes, 0.4)
     axes.yaxis.set_major_formatter("{x:g}")
-    name_axes(axes, x=x, y=y, title=title)
+    axes.set(xlabel=x, ylabel=y)
     axes.legend(frameon=False)
     return figure
 
@@ -87,8 +85,7 @@ def triangles(panels: Mapping[str, Array], label: str, quantity: str, bound: flo
     values = np.concatenate([panel[np.isfinite(panel)] for panel in panels.values()])
     lowest, highest = min(float(values.min(initial=1.0)), 1.0), max(float(values.max(initial=0.0)), 2 * bound)
     scale = LogNorm(vmin=lowest, vmax=highest)
-    figure = Figure(figsize=(1.4 * WIDTH_in, 4.1), layout="constrained")
-    sides = figure.subplots(1, len(panels), sharey=True, squeeze=False)[0]
+    figure, (sides,) = sheet(4.1, 1, len(panels), title, 1.4 * WIDTH_in, sharey=True)
     for axes, (name, panel) in zip(sides, panels.items(), strict=True):
         image = axes.imshow(panel, norm=scale, cmap=COLOURS)
         rows, columns = np.nonzero(panel > bound)
@@ -106,7 +103,6 @@ def triangles(panels: Mapping[str, Array], label: str, quantity: str, bound: flo
     ticks_at = [tick for tick in (1, 1.5, 2, 3, 4, 6, 8, 10, 20, 50, 100) if lowest <= tick <= highest]
     bar.set_ticks(ticks_at, labels=[f"{tick:g}" for tick in ticks_at])
     bar.ax.minorticks_off()
-    figure.suptitle(title, fontsize="medium")
     return figure
 
 
@@ -129,8 +125,7 @@ def clouds(
     """
     numbers = sorted({point[2] for points in panels.values() for point in points})
     scale = BoundaryNorm([*numbers, numbers[-1] + 1], 256)
-    figure = Figure(figsize=(1.25 * WIDTH_in, 4.6), layout="constrained")
-    sides = figure.subplots(1, len(panels), sharex=True, sharey=True, squeeze=False)[0]
+    figure, (sides,) = sheet(4.6, 1, len(panels), title, 1.25 * WIDTH_in, sharex=True, sharey=True)
     for axes, (name, points) in zip(sides, panels.items(), strict=True):
         finite = [point for point in points if np.all(np.isfinite(point))]
         x, y, number = np.array(finite).reshape(-1, 3).T
@@ -151,7 +146,6 @@ def clouds(
     bar.set_ticks(middles, labels=[str(number) for number in numbers])
     bar.ax.tick_params(length=0)
     bar.ax.minorticks_off()
-    figure.suptitle(title, fontsize="medium")
     return figure
 
 

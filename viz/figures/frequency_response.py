@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
-from spheretwin.viz.figures.style import INK, WIDTH_in, faint_grid, styles
+from spheretwin.viz.figures.style import INK, faint_grid, legend_below, sheet, styles
 
 Array = NDArray[np.float64]
 Response = NDArray[np.complex128]
@@ -37,8 +37,7 @@ def bode(by_law: Mapping[str, LoopResponse], labels: Mapping[str, str], title: s
     labels : mapping of law to label
     title : str
     """
-    figure = Figure(figsize=(WIDTH_in, 5.6), layout="constrained")
-    upper, lower = figure.subplots(2, 1, sharex=True)
+    figure, ((upper,), (lower,)) = sheet(5.6, 2, title=title, sharex=True)
     looks = styles(list(by_law))
     for law, response in by_law.items():
         style, f, label = looks[law], response.frequency_Hz, labels[law]
@@ -54,13 +53,11 @@ def bode(by_law: Mapping[str, LoopResponse], labels: Mapping[str, str], title: s
     lower.set_ylabel("phase, degrees")
     lower.set_xlabel("frequency, Hz")
     lower.xaxis.set_major_formatter("{x:g}")
-    upper.set_title(title, fontsize="medium")
     handles = [
-        *upper.get_legend_handles_labels()[0],
         Line2D([], [], color=INK, linewidth=1.4, label="linear model of the sampled loop"),
         Line2D([], [], color=INK, marker="o", linestyle="", markersize=4.5, label="measured"),
     ]
-    figure.legend(handles=handles, loc="outside lower center", ncols=2, frameon=False, handlelength=3.2)
+    legend_below(figure, [upper], 2, handles, handlelength=3.2)
     return figure
 
 

@@ -17,8 +17,10 @@ from spheretwin.viz.figures.style import (
     LawStyle,
     WIDTH_in,
     faint_grid,
+    law_keys,
+    legend_below,
     name_axes,
-    panel_column,
+    sheet,
     styles,
 )
 from spheretwin.viz.theme import law_colour
@@ -53,17 +55,12 @@ def fronts(panels: Sequence[FrontPanel], labels: Mapping[str, str], cost: str) -
     cost : str
         Label of the axis.
     """
-    figure = Figure(figsize=(0.65 * WIDTH_in * max(len(panels), 2), 5.2), layout="constrained")
-    grid = figure.subplots(1, max(len(panels), 1), squeeze=False)
+    figure, grid = sheet(5.2, 1, max(len(panels), 1), width_in=0.65 * WIDTH_in * max(len(panels), 2))
     looks = styles(list(labels))
     for axes, panel in zip(grid.flat, panels, strict=False):
         _panel(axes, panel, looks)
         axes.set_xlabel(cost)
-    handles = [
-        grid.flat[0].plot([], [], style.marker, markersize=_size(style), label=labels[law], **style.line())[0]
-        for law, style in looks.items()
-    ]
-    figure.legend(handles=handles, loc="outside lower center", ncols=5, frameon=False, handlelength=3.2)
+    legend_below(figure, [], 5, law_keys(grid[0, 0], labels, _size), handlelength=3.2)
     return figure
 
 
@@ -84,9 +81,7 @@ def _panel(axes: Axes, panel: FrontPanel, looks: Mapping[str, LawStyle]) -> None
             axes.annotate(name, (x, y), (-9, -1), textcoords="offset points", ha="right", va="center",
                           fontsize="small", zorder=5)  # fmt: skip
     name_axes(axes, y=panel.error, title=panel.title)
-    axes.grid(visible=True, color=FAINT, alpha=0.25, linewidth=0.5)
-    axes.set_axisbelow(True)
-    axes.spines[["top", "right"]].set_visible(False)
+    faint_grid(axes, 0.25)
 
 
 def _set_limits(axes: Axes, panel: FrontPanel) -> None:
@@ -140,17 +135,15 @@ def progress(by_label: Mapping[str, Trials], objectives: Sequence[str], title: s
     objectives : sequence of str
     title : str
     """
-    figure = Figure(figsize=(WIDTH_in, 1.4 + 2.4 * len(objectives)), layout="constrained")
-    panels = panel_column(figure, len(objectives))
+    figure, grid = sheet(1.4 + 2.4 * len(objectives), len(objectives), title=title, sharex=True)
+    panels = grid[:, 0]
     for place, (panel, name) in enumerate(zip(panels, objectives, strict=True)):
         for label, trials in by_label.items():
             _progress(panel, label, trials, place)
         _finish(panel, [trials.values[trials.completed, place] for trials in by_label.values()], "y")
         panel.set_ylabel(name, fontsize="small")
-    panels[0].set_title(title, fontsize="medium")
     panels[-1].set_xlabel("trial")
-    handles, labels = panels[0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=4, frameon=False)
+    legend_below(figure, panels)
     return figure
 
 
@@ -164,8 +157,7 @@ def front(by_label: Mapping[str, Trials], objectives: Sequence[str], title: str)
         Two.
     title : str
     """
-    figure = Figure(figsize=(WIDTH_in, 5.6), layout="constrained")
-    panel = figure.subplots()
+    figure, ((panel,),) = sheet(5.6, title=title)
     for label, trials in by_label.items():
         colour, chosen = law_colour(trials.law), trials.values[trials.best]
         panel.plot(*trials.values[trials.completed].T, "o", color=colour, markersize=3, alpha=0.35,
@@ -180,8 +172,8 @@ def front(by_label: Mapping[str, Trials], objectives: Sequence[str], title: str)
             panel.plot(*trials.values[0], "*", color=INK, markersize=13, label=f"{label}, start", zorder=5)
     for which, place in (("x", 0), ("y", 1)):
         _finish(panel, [trials.values[trials.completed, place] for trials in by_label.values()], which)
-    name_axes(panel, x=objectives[0], y=objectives[1], title=title)
-    figure.legend(loc="outside lower center", ncols=4, frameon=False)
+    panel.set(xlabel=objectives[0], ylabel=objectives[1])
+    legend_below(figure, [panel])
     return figure
 
 

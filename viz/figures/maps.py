@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from spheretwin.models.design.capability import Capability
 from spheretwin.models.design.workspace import Workspace
-from spheretwin.viz.figures.style import FAINT, INK, SERIES, WIDTH_in, faint_grid, name_axes
+from spheretwin.viz.figures.style import FAINT, INK, SERIES, WIDTH_in, faint_grid, sheet
 from spheretwin.viz.theme import law_colours
 
 Array = NDArray[np.float64]
@@ -54,8 +54,9 @@ def heat(
     side_by_side = len(columns) <= MOST_SIDE_BY_SIDE
     down, across = (1, len(panels)) if side_by_side else (len(panels), 1)
     height_in = 1.8 + ROW_in * len(rows) * down
-    figure = Figure(figsize=(1.35 * WIDTH_in, height_in), layout="constrained")
-    sides = figure.subplots(down, across, sharex=not side_by_side, sharey=side_by_side, squeeze=False).ravel()
+    share = {"sharex": not side_by_side, "sharey": side_by_side}
+    figure, grid = sheet(height_in, down, across, title, 1.35 * WIDTH_in, **share)
+    sides = grid.ravel()
     for axes, (name, panel) in zip(sides, panels.items(), strict=True):
         image = axes.imshow(np.clip(panel.changes, -FAR, FAR), norm=scale, cmap="RdBu_r", aspect="auto")
         _write_cells(axes, panel, scale)
@@ -67,7 +68,6 @@ def heat(
     bar = figure.colorbar(image, ax=list(sides), shrink=0.8, aspect=30, extend="both", label=change)
     bar.set_ticks(list(TICKS), labels=[f"{tick:+g}" if tick else "0" for tick in TICKS])
     bar.ax.minorticks_off()
-    figure.suptitle(title, fontsize="medium")
     return figure
 
 
@@ -130,11 +130,10 @@ def maps(
     count, colours = len(panels), law_colours(list(panels))
     across, down = min(count, 3), -(-count // 3)
     cells = [min(len(names), MOST_WRITTEN) * CELL_in for names in labels]
-    figure = Figure(
-        figsize=(max(WIDTH_in, across * (cells[1] + 0.5) + 1.6), 1.5 + down * (cells[0] + 0.9)),
-        layout="constrained",
-    )
-    grid = figure.subplots(down, across, sharex=True, sharey=True, squeeze=False)
+    lost = any(np.any(panel.lost) for panel in panels.values())
+    title = f"{title}\n× not all runs completed" if lost else title
+    width_in, height_in = max(WIDTH_in, across * (cells[1] + 0.5) + 1.6), 1.5 + down * (cells[0] + 0.9)
+    figure, grid = sheet(height_in, down, across, title, width_in, sharex=True, sharey=True)
     values = np.concatenate([panel.values.ravel() for panel in panels.values()])
     scale = _scale(values)
     for spare in grid.flat[count:]:
@@ -157,8 +156,6 @@ def maps(
     if is_wide(values):
         _in_plain_numbers(bar.ax.yaxis, float(np.nanmax(values) / np.nanmin(values)))
     bar.ax.tick_params(labelsize="small")
-    lost = any(np.any(panel.lost) for panel in panels.values())
-    figure.suptitle(f"{title}\n× not all runs completed" if lost else title, fontsize="medium")
     return figure
 
 
@@ -173,8 +170,7 @@ def lines(
     x : (n,) array, or names
     axis_name, quantity, title : str
     """
-    figure = Figure(figsize=(WIDTH_in, 4.2), layout="constrained")
-    axes = figure.subplots()
+    figure, ((axes,),) = sheet(4.2, title=title)
     named, colours = not isinstance(x, np.ndarray), law_colours(list(by_law))
     places = np.arange(len(x)) if named else np.asarray(x)
     for law, line in by_law.items():
@@ -188,7 +184,7 @@ def lines(
         axes.set_xticks(places, list(x), rotation=20, ha="right")
     values = np.concatenate([line.median for line in by_law.values()])
     fit_scale(axes, "y", values)
-    name_axes(axes, x=axis_name, y=quantity, title=title)
+    axes.set(xlabel=axis_name, ylabel=quantity)
     faint_grid(axes, 0.3, which="both")
     axes.legend(frameon=False)
     return figure
@@ -252,7 +248,12 @@ def capability_map(workspace: Workspace, on_grid: Capability, limit_A: float) ->
     limit_A : float, A
         Current limit, for the title.
     """
-    figure = Figure(figsize=(1.25 * WIDTH_in, 1.2 * WIDTH_in), layout="constrained")
+    title = (
+        f"Worst direction and worst spin at {limit_A:g} A; radius: tilt of the shaft in degrees, angle: its"
+    )
+    title += " azimuth"
+    polar = {"subplot_kw": {"projection": "polar"}}
+    figure, grid = sheet(1.2 * WIDTH_in, 2, 2, title, 1.25 * WIDTH_in, **polar)
     least_norm, best, singular_value = (
         _over_spin(workspace, values, np.min)
         for values in (on_grid.least_norm_Nm, on_grid.best_Nm, on_grid.singular_value_Nm_per_A)
@@ -265,13 +266,8 @@ def capability_map(workspace: Workspace, on_grid: Capability, limit_A: float) ->
         ("least singular value, N·m/A", singular_value, None, "viridis"),
         ("condition number", condition, None, "viridis_r"),
     )
-    grid = figure.subplots(2, 2, subplot_kw={"projection": "polar"})
-    for axes, (title, values, scale, colours) in zip(grid.flat, maps, strict=True):
-        _polar(figure, axes, workspace, values, scale, title, colours)
-    figure.suptitle(
-        f"Worst direction and worst spin at {limit_A:g} A; radius: tilt of the shaft in degrees, angle: its"
-        " azimuth"
-    )
+    for axes, (name, values, scale, colours) in zip(grid.flat, maps, strict=True):
+        _polar(figure, axes, workspace, values, scale, name, colours)
     return figure
 
 
@@ -288,8 +284,8 @@ def capability_by_tilt(
         Worst figures at each reachable tilt, searched between the grid's poses: ``least_norm_Nm``,
         ``best_Nm`` and ``copper_W_per_Nm2``.
     """
-    figure = Figure(figsize=(WIDTH_in, 6.0), layout="constrained")
-    torque, copper = figure.subplots(2, 1, sharex=True, height_ratios=[3, 2])
+    title = f"Torque capability at {limit_A:g} A a group"
+    figure, ((torque,), (copper,)) = sheet(6.0, 2, title=title, sharex=True, height_ratios=[3, 2])
     tilt = np.degrees(workspace.tilt_rad)
     series = (("best currents", "best_Nm"), ("least-norm currents", "least_norm_Nm"))
     for colour, (name, figure_of_merit) in zip(SERIES, series, strict=False):
@@ -300,7 +296,6 @@ def capability_by_tilt(
         torque.plot(tilt, middle, color=colour, linestyle=":", label=f"{name}: median")
     torque.set_ylim(bottom=0.0)
     torque.set_ylabel("torque in every direction, N·m")
-    torque.set_title(f"Torque capability at {limit_A:g} A a group", loc="left")
     _, middle, _ = _spread(workspace, on_grid.copper_W_per_Nm2)
     high = _at_all_tilts(workspace, worst["copper_W_per_Nm2"])
     copper.plot(tilt, high, color=INK, label="worst pose")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Literal, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -13,22 +13,22 @@ from matplotlib.ticker import NullFormatter
 from mpl_toolkits.mplot3d import Axes3D
 from numpy.typing import NDArray
 
-from spheretwin.viz.figures.style import INK, LawStyle, WIDTH_in, faint_grid, on_errors, panel_column, styles
+from spheretwin.viz.figures.style import (
+    INK,
+    LawStyle,
+    WIDTH_in,
+    faint_grid,
+    legend_below,
+    on_errors,
+    sheet,
+    styles,
+)
 from spheretwin.viz.theme import law_colour
 
 Array = NDArray[np.float64]
 
 LEAST_deg = 1e-3  # less is drawn as this much, on a logarithmic axis
 LINE_in = 0.235
-
-
-class ErrorCourse(NamedTuple):
-    """Errors of one law over time."""
-
-    law: str
-    errors_deg: Array  # (seeds, windows, axes)
-    paper_deg: float
-    paper_axes: tuple[int, ...]  # axes for which the paper prints it; empty if it does not have the law
 
 
 class ErrorLine(NamedTuple):
@@ -48,37 +48,6 @@ class ErrorGroup(NamedTuple):
     paper_deg: float | None
 
 
-def courses(
-    by_label: Mapping[str, ErrorCourse], window_s: float, axes_names: Sequence[str], title: str
-) -> Figure:
-    """Errors over time: a panel an axis, a colour a law, the median a line and the range a band.
-
-    Parameters
-    ----------
-    by_label : mapping of label to ErrorBand
-    window_s : float, s
-        Length of what each entry is the largest error of.
-    axes_names : sequence of str
-    title : str
-    """
-    figure = Figure(figsize=(WIDTH_in, 6.6), layout="constrained")
-    panels = figure.subplots(len(axes_names), 1, sharex=True, sharey=True, squeeze=False)[:, 0]
-    looks = styles([course.law for course in by_label.values()])
-    for axis, (panel, name) in enumerate(zip(panels, axes_names, strict=True)):
-        for place, (label, course) in enumerate(by_label.items()):
-            values, style = np.maximum(course.errors_deg[:, :, axis], LEAST_deg), looks[course.law]
-            _band(panel, label, values, style, window_s, place / len(by_label))
-            if axis in course.paper_axes:
-                panel.axhline(course.paper_deg, color=style.colour, linestyle=":", linewidth=1.4, zorder=1)
-        _on_logarithmic(panel, "y")
-        panel.set_ylabel(f"|error| of {name}, degrees")
-    panels[0].set_title(title, fontsize="medium")
-    panels[-1].set_xlabel("time, s")
-    handles, labels = panels[0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=2, frameon=False, handlelength=3.2)
-    return figure
-
-
 def lines(groups: Sequence[ErrorGroup], quantity: str, title: str) -> Figure:
     """Largest errors by law and condition: a row a condition, a dot the median, a line the range.
 
@@ -90,8 +59,9 @@ def lines(groups: Sequence[ErrorGroup], quantity: str, title: str) -> Figure:
     title : str
     """
     rows = [len(group.lines) for group in groups]
-    figure = Figure(figsize=(WIDTH_in, 1.2 + LINE_in * (sum(rows) + 2 * len(rows))), layout="constrained")
-    panels = figure.subplots(len(groups), 1, sharex=True, squeeze=False, height_ratios=rows)[:, 0]
+    height_in = 1.2 + LINE_in * (sum(rows) + 2 * len(rows))
+    figure, grid = sheet(height_in, len(groups), title=title, sharex=True, height_ratios=rows)
+    panels = grid[:, 0]
     for panel, group in zip(panels, groups, strict=True):
         colour = law_colour(group.law)
         for row, line in enumerate(group.lines):
@@ -101,14 +71,16 @@ def lines(groups: Sequence[ErrorGroup], quantity: str, title: str) -> Figure:
             panel.axvline(group.paper_deg, color=INK, linestyle=":", linewidth=1.4, zorder=1)
         panel.set_yticks(range(len(group.lines)), [line.label for line in group.lines])
         panel.set_ylim(len(group.lines) - 0.5, -0.5)
-        _on_logarithmic(panel, "x")
+        panel.set_xscale("log")
+        panel.xaxis.set_major_formatter("{x:g}")
+        panel.xaxis.set_minor_formatter(NullFormatter())
+        faint_grid(panel, 0.3, which="both", axis="x")
         panel.set_title(group.label, fontsize="small", loc="left", color=colour, fontweight="bold")
     panels[-1].set_xlabel(quantity)
     for inside, label in ((INK, "measured"), ("white", "true")):
         panels[-1].plot([], [], "o", color=INK, markerfacecolor=inside, markersize=5, label=label)
     panels[-1].plot([], [], ":", color=INK, linewidth=1.4, label="the paper's figure")
-    figure.legend(loc="outside lower center", ncols=3, frameon=False)
-    figure.suptitle(title, fontsize="medium")
+    legend_below(figure, panels, 3)
     return figure
 
 
@@ -147,17 +119,9 @@ def _spread(panel: Axes, y: float, values: Array, colour: str, inside: str) -> N
     panel.plot(middle, y, "o", color=colour, markerfacecolor=inside, markersize=5)
 
 
-def _on_logarithmic(panel: Axes, which: Literal["x", "y"]) -> None:
-    """Make a logarithmic axis in plain numbers, with a faint grid and no box."""
-    axis = panel.yaxis if which == "y" else panel.xaxis
-    (panel.set_yscale if which == "y" else panel.set_xscale)("log")
-    axis.set_major_formatter("{x:g}")
-    axis.set_minor_formatter(NullFormatter())
-    faint_grid(panel, 0.3, which="both", axis=which)
-
-
 LEAST_mrad = 0.2  # less is drawn as this much, on a logarithmic axis
 MARKS = 9  # markers along a line
+ENDED: dict[str, Any] = {"marker": "x", "color": INK, "markersize": 9, "markeredgewidth": 2, "linestyle": ""}
 OUTLINED = [withStroke(linewidth=1.6, foreground="white")]  # visible on a dark line too
 
 
@@ -166,6 +130,8 @@ class ErrorBand(NamedTuple):
 
     law: str
     error_rad: Array  # (seeds, windows, hinges) largest within each; no numbers after the end of a run
+    paper_rad: float = 0.0  # printed in the paper, for some hinges
+    paper_hinges: tuple[int, ...] = ()
 
 
 class AngleTraces(NamedTuple):
@@ -182,6 +148,8 @@ class AngleTraces(NamedTuple):
 def errors(by_label: Mapping[str, ErrorBand], window_s: float, hinges: Sequence[str], title: str) -> Figure:
     """Errors over time: the median over the seeds a line, their range a band, a cross where runs end early.
 
+    A dotted line is a printed error.
+
     Parameters
     ----------
     by_label : mapping of label to ErrorBand
@@ -190,8 +158,8 @@ def errors(by_label: Mapping[str, ErrorBand], window_s: float, hinges: Sequence[
     hinges : sequence of str
     title : str
     """
-    figure = Figure(figsize=(WIDTH_in, 7.4), layout="constrained")
-    panels = panel_column(figure, len(hinges))
+    figure, grid = sheet(7.4, len(hinges), title=title, sharex=True)
+    panels = grid[:, 0]
     looks = styles([course.law for course in by_label.values()])
     highest = max(float(np.nanmax(1e3 * course.error_rad)) for course in by_label.values())
     longest = max(course.error_rad.shape[1] for course in by_label.values())
@@ -201,15 +169,14 @@ def errors(by_label: Mapping[str, ErrorBand], window_s: float, hinges: Sequence[
             t_s, middle = _band(panel, label, values, style, window_s, place / len(by_label))
             if len(t_s) < longest and len(t_s):
                 panel.plot(t_s[-1], middle[-1], "x", color=style.colour, markersize=9, markeredgewidth=2)
+            if hinge in course.paper_hinges:
+                panel.axhline(1e3 * course.paper_rad, color=style.colour, linestyle=":", linewidth=1.4)
         on_errors([panel], LEAST_mrad, 1.3 * highest)
         panel.set_ylabel(f"|error| of {name}, mrad")
     panels[-1].set_xlabel("time, s")
-    handles, labels = panels[0].get_legend_handles_labels()
     if any(_ends_early(course, longest) for course in by_label.values()):
-        handles += panels[0].plot([], [], "x", color=INK, markersize=9, markeredgewidth=2, linestyle="")
-        labels.append("ended early")
-    figure.legend(handles, labels, loc="outside lower center", ncols=5, frameon=False, handlelength=3.2)
-    figure.suptitle(title, fontsize="medium")
+        panels[0].plot([], [], label="ended early", **ENDED)
+    legend_below(figure, panels[:1], 5 if max(map(len, by_label)) < 20 else 2, handlelength=3.2)
     return figure
 
 
@@ -226,8 +193,8 @@ def angles(by_label: Mapping[str, AngleTraces], hinges: Sequence[str], title: st
     hinges : sequence of str
     title : str
     """
-    figure = Figure(figsize=(max(2.5 * len(by_label), WIDTH_in), 5.6), layout="constrained")
-    grid = figure.subplots(len(hinges), len(by_label), sharex=True, sharey="row", squeeze=False)
+    width_in = max(2.5 * len(by_label), WIDTH_in)
+    figure, grid = sheet(5.6, len(hinges), len(by_label), title, width_in, sharex=True, sharey="row")
     looks = styles([motion.law for motion in by_label.values()])
     for column, (place, (label, motion)) in zip(grid.T, enumerate(by_label.items()), strict=True):
         colour = looks[motion.law].colour
@@ -243,14 +210,12 @@ def angles(by_label: Mapping[str, AngleTraces], hinges: Sequence[str], title: st
         column[-1].set_xlabel("time, s")
     for panel, name in zip(grid[:, 0], hinges, strict=True):
         panel.set_ylabel(f"{name}, rad")
-    key = [
-        grid[0, 0].plot([], [], color=INK, linewidth=2.2, label="q, in the colour of its law")[0],
-        grid[0, 0].plot([], [], color=INK, linewidth=1, linestyle=(0, (4, 2)), label="q_d, desired")[0],
-    ]
+    first = grid[0, 0]
+    first.plot([], [], color=INK, linewidth=2.2, label="q, in the colour of its law")
+    first.plot([], [], color=INK, linewidth=1, linestyle=(0, (4, 2)), label="q_d, desired")
     if not all(motion.whole for motion in by_label.values()):
-        key += grid[0, 0].plot([], [], "x", color=INK, markersize=9, markeredgewidth=2, label="ended early")
-    figure.legend(handles=key, loc="outside lower center", ncols=3, frameon=False)
-    figure.suptitle(title, fontsize="medium")
+        first.plot([], [], label="ended early", **ENDED)
+    legend_below(figure, [first], 3)
     return figure
 
 
@@ -278,24 +243,23 @@ def paths(by_label: Mapping[str, TipPath], title: str) -> Figure:
     every = np.concatenate([tips for path in by_label.values() for tips in (path.tip_mm, path.desired_mm)])
     reach, aside = (1.25 * float(np.abs(every[:, place]).max()) for place in range(2))
     heights = (float(every[:, 2].min()), float(every[:, 2].max()))
-    plan: Axes | None = None
+    plans: list[Axes] = []
     for place, (label, path) in enumerate(by_label.items()):
         colour = looks[path.law].colour
         space = figure.add_subplot(cells[0, place], projection="3d")
         _space(space, path, colour, (reach, aside), heights)
         space.set_title(f"({chr(ord('a') + place)}) {label}", fontsize="medium")
-        plan = figure.add_subplot(cells[1, place], sharex=plan, sharey=plan)
-        _plan(plan, path, colour, (reach, aside))
-        if place == 0:
-            plan.set_ylabel("y, mm")
-    key = [
-        plan.plot([], [], color=INK, linewidth=2, label="actual, in the colour of its law")[0],
-        plan.plot([], [], color=INK, linewidth=0.9, linestyle=(0, (4, 2)), label="desired")[0],
-        plan.plot([], [], "o", color=INK, markersize=5, label="start")[0],
-    ] if plan else []  # fmt: skip
-    if plan and not all(path.whole for path in by_label.values()):
-        key += plan.plot([], [], "x", color=INK, markersize=9, markeredgewidth=2, label="ended early")
-    figure.legend(handles=key, loc="outside lower center", ncols=4, frameon=False)
+        shared = plans[0] if plans else None
+        plans.append(figure.add_subplot(cells[1, place], sharex=shared, sharey=shared))
+        _plan(plans[-1], path, colour, (reach, aside))
+    if plans:
+        plans[0].set_ylabel("y, mm")
+        plans[0].plot([], [], color=INK, linewidth=2, label="actual, in the colour of its law")
+        plans[0].plot([], [], color=INK, linewidth=0.9, linestyle=(0, (4, 2)), label="desired")
+        plans[0].plot([], [], "o", color=INK, markersize=5, label="start")
+    if not all(path.whole for path in by_label.values()):
+        plans[0].plot([], [], label="ended early", **ENDED)
+    legend_below(figure, plans[:1])
     figure.suptitle(title, fontsize="medium")
     return figure
 

@@ -5,7 +5,7 @@ Matplotlib is used without its global state. Axes have the colours of the record
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -173,19 +173,28 @@ def draw_line(
     axes.plot(np.concatenate([t_s[:1], middles_s, t_s[-1:]]), means, **look)
 
 
-def panel_column(figure: Figure, count: int) -> NDArray[Any]:
-    """Return panels below one another with a common x axis."""
-    panels: NDArray[Any] = figure.subplots(count, 1, sharex=True, squeeze=False)[:, 0]
-    return panels
+def sheet(
+    height_in: float, rows: int = 1, columns: int = 1, title: str = "", width_in: float = WIDTH_in,
+    **options: Any,
+) -> tuple[Figure, NDArray[Any]]:  # fmt: skip
+    """Return a figure with a title and its axes by row and column; options as of `Figure.subplots`."""
+    figure = Figure(figsize=(width_in, height_in), layout="constrained")
+    if title:
+        figure.suptitle(title, fontsize="medium")
+    return figure, figure.subplots(rows, columns, squeeze=False, **options)
 
 
-def common_legend(figure: Figure, panels: Iterable[Axes], ncols: int) -> None:
-    """Draw one legend for several panels: each label once."""
+def legend_below(
+    figure: Figure, panels: Iterable[Axes] = (), ncols: int = 4, more: Iterable[Artist] = (), **options: Any
+) -> None:
+    """Draw one legend below a figure, of its panels and of more artists: each label once."""
     named: dict[str, Artist] = {}
     for axes in panels:
         handles, labels = axes.get_legend_handles_labels()
         named |= dict(zip(labels, handles, strict=True))
-    figure.legend(list(named.values()), list(named), loc="outside lower center", ncols=ncols)
+    named |= {str(artist.get_label()): artist for artist in more}
+    look = {"loc": "outside lower center", "frameon": False, **options}
+    figure.legend(list(named.values()), list(named), ncols=ncols, **look)
 
 
 class RunStyle(NamedTuple):
@@ -221,9 +230,9 @@ def name_axes(axes: Axes, title: str, x: str = "", y: str = "") -> None:
 
 def name_runs(figure: Figure, axes: Axes) -> None:
     """Name below a figure what one of its panels has lines of."""
-    lines, labels = axes.get_legend_handles_labels()
-    figure.legend(lines, labels, loc="outside lower left", ncols=1 if len(labels) > 3 else len(labels),
-                  frameon=False, fontsize="small", handlelength=3.4)  # fmt: skip
+    count = len(axes.get_legend_handles_labels()[1])
+    legend_below(figure, [axes], 1 if count > 3 else count, loc="outside lower left", fontsize="small",
+                 handlelength=3.4)  # fmt: skip
 
 
 mrad_per_degree = 1e3 * np.pi / 180
@@ -247,6 +256,17 @@ def styles(laws: Sequence[str]) -> dict[str, LawStyle]:
     """Colour, marker and dash of each law."""
     colours, marks = law_colours(laws), law_marks(laws)
     return {law: LawStyle(colours[law], *marks[law]) for law in laws}
+
+
+def law_keys(
+    axes: Axes, labels: Mapping[str, str], size: Callable[[LawStyle], float] | float = 6.0
+) -> list[Any]:
+    """Return keys of laws for a legend: marker and dash of each."""
+    return [
+        axes.plot([], [], style.marker, markersize=size(style) if callable(size) else size,
+                  label=labels[law], **style.line())[0]
+        for law, style in styles(list(labels)).items()
+    ]  # fmt: skip
 
 
 def on_errors(panels: Sequence[Axes], lowest_mrad: float, highest_mrad: float) -> None:

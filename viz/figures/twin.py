@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import NullLocator
 from numpy.typing import NDArray
 
-from spheretwin.viz.figures.style import BROKEN, FAINT, INK, SERIES, WIDTH_in, common_legend, plain
+from spheretwin.viz.figures.style import BROKEN, FAINT, INK, SERIES, legend_below, plain, sheet
 
 Array = NDArray[np.float64]
 
@@ -56,8 +56,7 @@ def errors(columns: Mapping[str, Mapping[str, ErrorTrace]], hinges: Sequence[str
     hinges : sequence of str
     title : str
     """
-    figure = Figure(figsize=(WIDTH_in, 6.0), layout="constrained")
-    grid = figure.subplots(len(hinges), len(columns), sharex=True, sharey="col", squeeze=False)
+    figure, grid = sheet(6.0, len(hinges), len(columns), title, sharex=True, sharey="col")
     for column, (quantity, by_label) in zip(grid.T, columns.items(), strict=True):
         for hinge, (panel, name) in enumerate(zip(column, hinges, strict=True)):
             for (label, trace), colour in zip(by_label.items(), COLOURS, strict=False):
@@ -71,8 +70,7 @@ def errors(columns: Mapping[str, Mapping[str, ErrorTrace]], hinges: Sequence[str
                 )
             plain(panel, f"{name}: {quantity}")
         column[-1].set_xlabel("time, s", fontsize="small")
-    common_legend(figure, [grid[0, 0]], 2)
-    figure.suptitle(title, fontsize="medium")
+    legend_below(figure, [grid[0, 0]], 2)
     return figure
 
 
@@ -85,8 +83,7 @@ def residuals(panels: Mapping[str, Mapping[str, ResidualBins]], x: str, y: str, 
         At most two labels.
     x, y, title : str
     """
-    figure = Figure(figsize=(WIDTH_in, 3.2), layout="constrained")
-    row = figure.subplots(1, len(panels), sharey=True, squeeze=False)[0]
+    figure, (row,) = sheet(3.2, 1, len(panels), title, sharey=True)
     for panel, (name, by_label) in zip(row, panels.items(), strict=True):
         for (label, bins), colour, marker in zip(by_label.items(), COLOURS, "os", strict=False):
             panel.plot(bins.middle, bins.mean, color=colour, marker=marker, markersize=4, label=label)
@@ -94,8 +91,7 @@ def residuals(panels: Mapping[str, Mapping[str, ResidualBins]], x: str, y: str, 
         plain(panel, "")
         panel.set_xlabel(f"{name}: {x}", fontsize="small")
     row[0].set_ylabel(y, fontsize="small")
-    common_legend(figure, row, 2)
-    figure.suptitle(title, fontsize="medium")
+    legend_below(figure, row, 2)
     return figure
 
 
@@ -109,35 +105,22 @@ def sums(panels: Mapping[str, Sums], threshold: float, title: str) -> Figure:
         Of an alarm.
     title : str
     """
-    figure = Figure(figsize=(WIDTH_in, 1.0 + 1.35 * len(panels)), layout="constrained")
-    column = figure.subplots(len(panels), 1, sharex=True, sharey=True, squeeze=False)[:, 0]
+    figure, grid = sheet(1.0 + 1.35 * len(panels), len(panels), title=title, sharex=True, sharey=True)
+    column = grid[:, 0]
     for panel, (name, watched) in zip(column, panels.items(), strict=True):
         for what, values in watched.by_name.items():
             if what != watched.named:
                 panel.plot(watched.t_s, values, color=FAINT, linewidth=0.6, label="other changes")
         if watched.named:
-            panel.plot(
-                watched.t_s,
-                watched.by_name[watched.named],
-                color=SERIES[0],
-                linewidth=1.8,
-                label="change that took place",
-            )
+            named = {"color": SERIES[0], "linewidth": 1.8, "label": "change that took place"}
+            panel.plot(watched.t_s, watched.by_name[watched.named], **named)
         panel.axhline(threshold, color=BROKEN, linestyle="--", linewidth=1.0, label="threshold")
         if watched.change_s is not None:
             panel.axvline(
                 watched.change_s, color=INK, linestyle=":", linewidth=1.2, label="the machine changes"
             )
-        panel.plot(
-            watched.alarms_s,
-            [threshold] * len(watched.alarms_s),
-            "v",
-            color=BROKEN,
-            markersize=7,
-            linestyle="",
-            label="alarm",
-            zorder=4,
-        )
+        alarm = {"color": BROKEN, "markersize": 7, "linestyle": "", "label": "alarm", "zorder": 4}
+        panel.plot(watched.alarms_s, [threshold] * len(watched.alarms_s), "v", **alarm)
         plain(panel, "sum")
         panel.set_title(name, fontsize="small", loc="left")
     # Linear up to the threshold: a large change exceeds it hundreds of times within a window.
@@ -146,6 +129,5 @@ def sums(panels: Mapping[str, Sums], threshold: float, title: str) -> Figure:
     column[0].set_yticks([0, 10, 100, 1000], ["0", "10", "100", "1000"])
     column[0].yaxis.set_minor_locator(NullLocator())
     column[-1].set_xlabel("time, s", fontsize="small")
-    common_legend(figure, column, 3)
-    figure.suptitle(title, fontsize="medium")
+    legend_below(figure, column, 3)
     return figure

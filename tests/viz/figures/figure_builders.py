@@ -72,10 +72,10 @@ WINDOWS = 0.1 + np.linspace(0, 1, 40)[None, :, None] + 0.1 * np.arange(3)[:, Non
 def courses(windows: np.ndarray = WINDOWS) -> Figure:
     """Return errors in windows of time, of two laws."""
     by_label = {
-        "AFSM": over_time.ErrorCourse("afsm", windows, 0.12, (0,)),
-        "PID": over_time.ErrorCourse("pid", windows, 0.0, ()),
+        "AFSM": over_time.ErrorBand("afsm", np.radians(windows), np.radians(0.12), (0,)),
+        "PID": over_time.ErrorBand("pid", np.radians(windows)),
     }
-    return over_time.courses(by_label, 0.02, ("α", "β"), "courses")
+    return over_time.errors(by_label, 0.02, ("α", "β"), "courses")
 
 
 SIZES = np.array([0.1, 0.3, 0.2])
