@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from importlib import import_module
 from typing import Any
 
@@ -10,7 +11,10 @@ from numpy.typing import NDArray
 
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.base.extras import missing
+from spheretwin.models.kinematics import generalised_torque, rotation_rows
+from spheretwin.models.lagrangian import acceleration_entries
 from spheretwin.models.magnetics import KNEE, NARROW_PER_UNIT, WIDE_PER_UNIT
+from spheretwin.models.symbolic import on_symbols, turns_by
 from spheretwin.plant.plant_step import Parameters
 
 Array = NDArray[np.float64]
@@ -85,18 +89,17 @@ def dynamics(parameters: Parameters) -> Any:
     groups = len(parameters.torque_gain)
     x, u, p = ca.MX.sym("x", 6), ca.MX.sym("u", groups), ca.MX.sym("p", len(NAMES))
     q, qdot = x[:3], x[3:]
-    torque_q = _rate_jacobian(ca, q).T @ (torque_matrix(parameters)(q) @ u)
+    on_hinges: list[Any] = [None] * 3
+    torque_S = ca.vertsplit(torque_matrix(parameters)(q) @ u)
+    _symbolic(ca, generalised_torque)(ca.vertsplit(q), torque_S, on_hinges)
     friction = p[4:7] + p[7:10] / ca.sqrt(qdot**2 + parameters.friction_smoothing_rad_s**2)
-    net = torque_q - friction * qdot - p[10:13] * q - p[13:16]
+    net = ca.vertcat(*on_hinges) - friction * qdot - p[10:13] * q - p[13:16]
     acceleration = rigid_body()(q, qdot, net, p[:4])
     return ca.Function("f", [x, u, p], [ca.vertcat(qdot, acceleration)], ["x", "u", "p"], ["xdot"])
 
 
 def rigid_body() -> Any:
-    """Return the hinge accelerations of a rigid rotor on three ideal hinges.
-
-    The Coriolis torque is the derivative of the kinetic energy, and not the closed form of
-    `models.lagrangian`.
+    """Return the hinge accelerations of a rigid rotor on three ideal hinges: `lagrangian.acceleration`.
 
     Returns
     -------
@@ -106,13 +109,11 @@ def rigid_body() -> Any:
     """
     ca = library()
     q, qdot, torque, p = (ca.SX.sym(name, size) for name, size in (("q", 3), ("v", 3), ("t", 3), ("p", 4)))
-    cb, sb, cg, sg = ca.cos(q[1]), ca.sin(q[1]), ca.cos(q[2]), ca.sin(q[2])
-    B = ca.vertcat(ca.horzcat(cb * cg, sg, 0), ca.horzcat(-cb * sg, cg, 0), ca.horzcat(sb, 0, 1))
-    M = B.T @ ca.diag(p[:3]) @ B
-    momentum = M @ qdot
-    potential = p[3] * ca.cos(q[0]) * ca.cos(q[1])
-    bias = ca.jtimes(momentum, q, qdot) - ca.gradient(ca.dot(qdot, momentum) / 2 - potential, q)
-    return ca.Function("rigid_body", [q, qdot, torque, p], [ca.inv(M) @ (torque - bias)])
+    *inertia, weight_moment = ca.vertsplit(p)
+    at = turns_by(ca.cos, ca.sin)(ca.vertsplit(q))
+    vectors = ca.vertsplit(qdot), ca.vertsplit(torque)
+    qddot = _symbolic(ca, acceleration_entries)(at, *vectors, inertia, weight_moment)
+    return ca.Function("rigid_body", [q, qdot, torque, p], [ca.vertcat(*qddot)])
 
 
 def torque_matrix(parameters: Parameters) -> Any:
@@ -137,7 +138,9 @@ def torque_matrix(parameters: Parameters) -> Any:
             " CasADi function"
         )
     q = ca.MX.sym("q", 3)
-    axes_S = ca.DM(model.line_axes) @ _rotation(ca, q).T  # (lines, 3)
+    rows = _symbolic(ca, rotation_rows)(ca.vertsplit(q))
+    rotation = ca.vertcat(*(ca.horzcat(*row) for row in rows))
+    axes_S = ca.DM(model.line_axes) @ rotation.T  # (lines, 3)
     cosine = ca.fmin(ca.fmax(axes_S @ ca.DM(model.group_axes), -1), 1)  # (lines, n)
     side, shape = ca.if_else(cosine < 0, -1, 1), cosine.shape
     scatters = model.pair_gain.shape[1] > 0
@@ -178,18 +181,6 @@ def _curve(ca: Any, table: Array) -> Any:
     return ca.Function("h", [cosine], [pieces])
 
 
-def _rotation(ca: Any, q: Any) -> Any:
-    """Return R_SR of `kinematics.rotation`."""
-    turns = []
-    for axis in range(3):
-        c, s, i, j = ca.cos(q[axis]), ca.sin(q[axis]), (axis + 1) % 3, (axis + 2) % 3
-        R = ca.MX.eye(3)
-        R[i, i], R[i, j], R[j, i], R[j, j] = c, -s, s, c
-        turns.append(R)
-    return turns[0] @ turns[1] @ turns[2]
-
-
-def _rate_jacobian(ca: Any, q: Any) -> Any:
-    """Return E of `kinematics.rate_jacobian`."""
-    c, s, cb, sb = ca.cos(q[0]), ca.sin(q[0]), ca.cos(q[1]), ca.sin(q[1])
-    return ca.vertcat(ca.horzcat(1, 0, sb), ca.horzcat(0, c, -s * cb), ca.horzcat(0, s, c * cb))
+def _symbolic(ca: Any, function: Callable[..., Any]) -> Callable[..., Any]:
+    """Return a function of the model on symbols of CasADi."""
+    return on_symbols(function, turns=turns_by(ca.cos, ca.sin))

@@ -19,6 +19,7 @@ from spheretwin.control.law import Law
 from spheretwin.control.law_components import feedback
 from spheretwin.control.laws import afsm, afsm_eso, pd
 from spheretwin.export.c_text import constant, definitions, header, source
+from spheretwin.export.motion_code import controller_motion
 from spheretwin.export.plant_code import NUMBERS, magnetic_tables
 from spheretwin.models.base.errors import InputError
 from spheretwin.scenario.sections import ResolvedScenario
@@ -98,6 +99,7 @@ def controller_code(scenario: str, changes: Mapping[str, Any] | None = None) -> 
     return ControllerCode(
         files={
             **{name: source(name) for name in names},
+            "st_controller_motion.h": controller_motion(),
             "st_controller_model.h": _model_header(resolved, law, controller, groups),
             "st_controller_tables.h": _table_header(
                 resolved, controller, config.files.nominal.hinge_range_rad, law_files[0], estimator_file

@@ -13,12 +13,13 @@ from typing import Literal, NamedTuple
 from spheretwin.export.c_text import header, source
 from spheretwin.export.compiler import Platform, compile_library, cross_compiler, host_compiler, this_machine
 from spheretwin.export.model_description import InterfaceKind, build_description, model_description
+from spheretwin.export.motion_code import plant_motion
 from spheretwin.export.plant_code import SMALLEST, PlantCode, Variable
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.base.files import whole_file
 
 PLANT_SOURCES = ("st_plant.c",)
-PLANT_HEADERS = ("st_plant.h", "st_equations.h", "st_joint_chain.h", "st_rates.h")
+PLANT_HEADERS = ("st_plant.h", "st_equations.h", "st_rates.h")
 _EPOCH = (1980, 1, 1, 0, 0, 0)  # of all entries: the same plant gives the same file
 
 
@@ -36,6 +37,7 @@ def plant_files(model: PlantCode) -> dict[str, str]:
     return {
         **{name: source(name) for name in (*PLANT_SOURCES, *PLANT_HEADERS)},
         "st_plant_model.h": model.model_header(),
+        "st_plant_motion.h": plant_motion(model.step.joint[0]),
         "st_plant_tables.h": model.table_header(),
         "st_plant_bounds.h": model.bounds_header(),
     }

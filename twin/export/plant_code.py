@@ -131,13 +131,6 @@ class PlantCode(NamedTuple):
             *(f"    {_initialiser(one)}, /* {one.name} */" for one in self.parameters),
             "};",
         ]
-        if joint.on:
-            lines += [
-                constant("ST_HINGE_AXES", joint.axes, "double"),
-                constant("ST_HINGE_POINTS", joint.points, "double"),
-                constant("ST_MASSES", joint.masses, "double"),
-                constant("ST_GRAVITY", joint.gravity, "double"),
-            ]
         return header(lines)
 
 

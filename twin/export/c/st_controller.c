@@ -7,7 +7,7 @@
 #define ST_NUMBER st_real
 #include "st_controller_tables.h" /* generated */
 
-#define ST_GENERAL_JOINT 0
+#define ST_MOTION "st_controller_motion.h"
 #define T st_real
 #define NAME(x) st_##x
 #define RE(x) (x)
@@ -69,16 +69,6 @@ void st_controller_start(st_controller *controller)
         }
     }
 #endif
-}
-
-/* Torque on the rotor in frame S of a torque on the hinges: E^-T torque_q. */
-static void st_cartesian_torque(const st_real q[3], const st_real torque_q[3], st_real torque_S[3])
-{
-    const st_turns at = st_turns_of(q);
-    const st_real in_plane = (torque_q[2] - at.sb * torque_q[0]) / at.cb;
-    torque_S[0] = torque_q[0];
-    torque_S[1] = at.ca * torque_q[1] - at.sa * in_plane;
-    torque_S[2] = at.sa * torque_q[1] + at.ca * in_plane;
 }
 
 #if ST_APPLIED_TORQUE

@@ -6,10 +6,11 @@ static void st_feed_forward(
     st_controller *controller, st_real reference[3][3], st_real applied_torque[3], st_real fed[3])
 {
     const st_turns at = st_turns_of(reference[0]);
-    const st_inertia M = st_inertia_of(&at, ST_FEED_FORWARD_INERTIA);
     const st_real *v = reference[1], *a = reference[2], f = ST_FEED_FORWARD_FRACTION;
+    st_inertia M;
     st_real C[3][3], inertial[3];
     int i, row;
+    st_inertia_of(&at, ST_FEED_FORWARD_INERTIA, &M);
     st_coriolis(&at, v, ST_FEED_FORWARD_INERTIA, C);
     inertial[0] = M.alpha * a[0] + M.alpha_beta * a[1] + M.alpha_gamma * a[2];
     inertial[1] = M.alpha_beta * a[0] + M.beta * a[1];

@@ -23,7 +23,8 @@ static st_turns st_operating_point(const st_real q[3])
 
 static void st_inertial_torque(const st_turns *at, const st_real acceleration[3], st_real torque[3])
 {
-    const st_inertia M = st_inertia_of(at, ST_LAW_PARAMETERS + ST_INERTIA);
+    st_inertia M;
+    st_inertia_of(at, ST_LAW_PARAMETERS + ST_INERTIA, &M);
     torque[0] = M.alpha * acceleration[0] + M.alpha_beta * acceleration[1] + M.alpha_gamma * acceleration[2];
     torque[1] = M.alpha_beta * acceleration[0] + M.beta * acceleration[1];
     torque[2] = M.alpha_gamma * acceleration[0] + M.gamma * acceleration[2];
@@ -40,10 +41,11 @@ static void st_operating_coriolis(const st_turns *at, const st_real v[3], st_rea
 static void st_advance_motion(st_real q[3], st_real v[3], const st_real torque[3], st_real time_s)
 {
     const st_turns at = st_operating_point(q);
-    const st_inertia M = st_inertia_of(&at, ST_LAW_PARAMETERS + ST_INERTIA);
     const st_real half = time_s * time_s / 2;
+    st_inertia M;
     st_real C[3][3], net[3], acceleration[3];
     int i;
+    st_inertia_of(&at, ST_LAW_PARAMETERS + ST_INERTIA, &M);
     st_operating_coriolis(&at, v, C);
     for (i = 0; i < 3; i++) {
         net[i] = torque[i] - C[i][0] * v[0] - C[i][1] * v[1] - C[i][2] * v[2];

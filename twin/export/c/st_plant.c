@@ -6,6 +6,7 @@
 #include <math.h>
 
 #define ST_NUMBER double
+#define ST_MOTION "st_plant_motion.h"
 #include "st_plant_bounds.h" /* generated */
 #include "st_plant_tables.h"
 
@@ -19,9 +20,6 @@
 #define ARC_SINE asin
 #define ARC_TANGENT atan2
 #include "st_equations.h"
-#if ST_GENERAL_JOINT
-#include "st_joint_chain.h"
-#endif
 #include "st_rates.h"
 #undef T
 #undef NAME
@@ -72,9 +70,6 @@ static st_complex st_arc_tangent(st_complex y, st_complex x)
 }
 #endif
 #include "st_equations.h"
-#if ST_GENERAL_JOINT
-#include "st_joint_chain.h"
-#endif
 #include "st_rates.h"
 
 /* Imaginary parts are directions times this: their products vanish, and no direction underflows. */

@@ -1,68 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* Rates of the states of the plant, for one type of numbers T; included after st_equations.h. */
 
-/* Inertia matrix at a pose. */
-static inline void NAME(mass_matrix)(const st_parameters *p, const T q[3], NAME(inertia) *M)
-{
-#if ST_GENERAL_JOINT
-    T bias[3];
-    const T rest[3] = {0, 0, 0};
-    (void)p;
-    NAME(chain_equations)(q, rest, M, bias);
-#else
-    const NAME(turns) at = NAME(turns_of)(q);
-    *M = NAME(inertia_of)(&at, p->inertia_kg_m2);
-#endif
-}
-
-/* Accelerations of the hinges under a torque on them. */
-static inline void NAME(hinge_acceleration)(
-    const st_parameters *p, const T q[3], const T v[3], const T torque[3], T acceleration[3])
-{
-#if ST_GENERAL_JOINT
-    NAME(inertia) M;
-    T bias[3], net[3];
-    int i;
-    (void)p;
-    NAME(chain_equations)(q, v, &M, bias);
-    for (i = 0; i < 3; i++) {
-        net[i] = torque[i] - bias[i];
-    }
-    NAME(solve_inertia)(&M, net, acceleration);
-#else
-    NAME(accelerate)(p->inertia_kg_m2, p->weight_moment_Nm, q, v, torque, acceleration);
-#endif
-}
-
-/* Angles and rates of ideal hinges with the orientation of the rotor. */
-static inline void NAME(coil_motion)(const T q[3], const T v[3], T coil_q[3], T coil_v[3])
-{
-#if ST_GENERAL_JOINT
-    NAME(ideal_motion)(q, v, coil_q, coil_v);
-#else
-    int i;
-    for (i = 0; i < 3; i++) {
-        coil_q[i] = q[i];
-        coil_v[i] = v[i];
-    }
-#endif
-}
-
-/* Torque on the hinges of a torque on the rotor in frame S. */
-static inline void NAME(hinge_torque_of)(const T q[3], const T torque_S[3], T torque[3])
-{
-#if ST_GENERAL_JOINT
-    NAME(chain) chain;
-    int i;
-    NAME(chain_at)(q, &chain);
-    for (i = 0; i < 3; i++) {
-        torque[i] = NAME(dot)(chain.hinge[i], torque_S);
-    }
-#else
-    NAME(generalised_torque)(q, torque_S, torque);
-#endif
-}
-
 /* Torque of a group over that of the torque matrix, at the temperature of the rotor. */
 static inline T NAME(gain)(const st_parameters *p, int group, T rotor_degC)
 {
@@ -78,12 +16,11 @@ static inline T NAME(gain)(const st_parameters *p, int group, T rotor_degC)
 static inline void NAME(back_emf)(const st_parameters *p, T rotor_degC, const T q[3], const T v[3], T G[3][ST_GROUPS],
     T e[ST_GROUPS])
 {
-    const NAME(turns) at = NAME(turns_of)(q);
-    const T x = v[0] + at.sb * v[2], y = at.ca * v[1] - at.sa * at.cb * v[2];
-    const T z = at.sa * v[1] + at.ca * at.cb * v[2];
+    T w[3];
     int j;
+    NAME(angular_velocity)(q, v, w);
     for (j = 0; j < ST_GROUPS; j++) {
-        e[j] = NAME(gain)(p, j, rotor_degC) * (G[0][j] * x + G[1][j] * y + G[2][j] * z);
+        e[j] = NAME(gain)(p, j, rotor_degC) * (G[0][j] * w[0] + G[1][j] * w[1] + G[2][j] * w[2]);
     }
 }
 
