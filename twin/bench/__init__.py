@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import time
 from collections.abc import Callable
 from types import TracebackType
@@ -20,7 +21,7 @@ from spheretwin.bench.command_queue import (
     check_arguments,
     settled_ticket,
 )
-from spheretwin.bench.commands import SIMULATED_ONLY, find_command
+from spheretwin.bench.commands import documentation, find_command
 from spheretwin.bench.cycle import CommandProcessor, Cycle, Thread
 from spheretwin.bench.folder import Folder
 from spheretwin.bench.history import Bins
@@ -56,49 +57,12 @@ class Bench:
         may be anywhere.
     machine : Session, optional
         Session of the scenario whose plant is a machine, from `machine.Link.session`. Commands that stop or
-        change the time, or that only a simulated plant can follow, are refused: `SIMULATED_ONLY`.
+        change the time, or that only a simulated plant can follow, are refused.
 
     Notes
     -----
     Commands, with their arguments:
 
-    ==================================  ================================================================
-    ``start``, ``pause``                run or pause the time
-    ``step``, ticks=1                   while paused: run this many control ticks
-    ``speed``, factor                   0.1 to as fast as possible (1e6); 1 is the clock's pace
-    ``stop``                            STOP: currents to zero, latched until ``reset``
-    ``stop_mode``, mode                 ``off``: so; ``hold``: STOP holds until the rotor rests, then so
-    ``reset``                           tick 0 of the present settings and the pending ones; paused
-    ``load``, source, overrides={}      tick 0 of another scenario, by name or file; paused
-    ``snapshot``, ``restore``, name     save the complete state of the twin; return to it
-    ``off``                             no currents; the rotor is free
-    ``hold``                            come to rest at the present pose
-    ``point``, pose_rad                 go there, within ``limits``
-    ``trajectory``, fields=None         follow ``{"shape": "sinusoid", ...}``; default: the last one
-    ``jog``, rates_rad_s                turn at these rates, up to the edge of the workspace
-    ``manual``                          currents_A=None, group=None, current_A=1.0: these currents, or a
-                                        single group at a current
-    ``replay``, file                    show the rows of a recorded run; the twin is paused meanwhile, and
-                                        any mode, for example ``hold``, ends the replay
-    ``seek``, t_s                       show the row of the replay at a time
-    ``limits``                          rate_rad_s=None, acceleration_rad_s2=None: of the approach to a
-                                        pose or a shape
-    ``set``, name, value                any field of the scenario, dotted; fixed ones wait for ``reset``
-    ``add_fault``, fault                ``{"target": "coil.07", "mode": "open"}``; default start: now
-    ``clear_faults``                    place=None, target=None: all of them, one by its place, or those of
-                                        a target
-    ``record``                          recording=None, telemetry=None, rate_Hz=None: write .rrd and
-                                        .parquet from now on; an existing name is numbered; the .rrd with
-                                        all rows, or with some a second, extremes and events
-    ``capture``, on                     signal="error_rad", entry=0, level=0.0, edge="rising", before_s=0.5,
-                                        length_s=2.0: keep every row around the next event: ``level``,
-                                        ``fault`` or ``saturation``; ``off`` for none; `captured` returns
-                                        them
-    ``keep``                            end that, and complete the files
-    ``save``, file                      write the present settings as a scenario (TOML)
-    ``hello``, ``beat``, ``leave``      a client connects, is present, or leaves (client=...)
-    ``ask``; ``grant``, to              a watching client asks to operate; the operator grants it
-    ==================================  ================================================================
     """
 
     def __init__(
@@ -139,7 +103,7 @@ class Bench:
         try:
             command = find_command(name)
             values = check_arguments(command, arguments)
-            if self._bench_state.is_machine and name in SIMULATED_ONLY:
+            if self._bench_state.is_machine and command.simulated_only:
                 raise InputError(f"bench: expected a command for a real machine, received {name}")
             if command.by is By.CLIENT:
                 return self._client_command(command, client, values)
@@ -312,3 +276,6 @@ class Bench:
             raise InputError(f"bench: expected {command.name} of a client, received none")
         command.action(self._bench_state.operators, client, **values)
         return settled_ticket()
+
+
+Bench.__doc__ = f"{inspect.cleandoc(Bench.__doc__ or '')}\n\n{documentation()}"

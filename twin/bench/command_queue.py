@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import inspect
 import json
 import threading
 import time
 from collections import OrderedDict
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Generator, Mapping
 from enum import Enum, StrEnum
 from typing import Annotated, Any, NamedTuple
 
@@ -20,6 +21,7 @@ _CONFIG = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=Fal
 
 Text = Annotated[str, Field(min_length=1, max_length=4096)]
 Place = Annotated[int, Field(ge=0)]
+Current = Annotated[float, Field(ge=-1e3, le=1e3)]
 
 
 class By(Enum):
@@ -31,31 +33,44 @@ class By(Enum):
     """Any client that names itself: the command is about the client and is executed at once."""
 
 
-def arguments(**fields: Any) -> type[BaseModel]:
-    """Return the arguments of a command: each is a type and its default, or ``...`` if it is required."""
-    return create_model("Arguments", __config__=_CONFIG, **fields)
-
-
-_NONE = arguments()
+Work = Callable[[], Any]
+"""Work that is done outside the loop."""
 
 
 class Command(NamedTuple):
     """Definition of a command."""
 
     name: str
-    action: Callable[..., None]
-    """Takes the bench state, the result of `prepare`, and the arguments by name; for a client's command, the
-    operators and the client."""
+    action: Callable[..., Generator[Work, Any, None] | None]
+    """Takes the bench state, or the operators and the client for a client's command, and the arguments by
+    name. What it yields is done outside the loop, and then it continues with the result."""
+    arguments: type[BaseModel]
+    parameters: tuple[str, ...]
+    """Arguments with their defaults, as text."""
+    text: str
     replace_equal: tuple[str, ...] | None = None
     """Arguments that must be equal for a new command to replace a waiting one; None if none is replaced."""
     by: By = By.OPERATOR
-    prepare: Callable[..., Callable[[], Any] | None] | None = None
-    """Takes the bench state and the arguments by name; returns work to do outside the loop before, if any."""
     urgent: bool = False
     """True if it is executed before all others."""
     cancelled_by_stop: bool = False
     """True if an urgent command that was given later cancels it."""
-    arguments: type[BaseModel] = _NONE
+    simulated_only: bool = False
+    """True if a real machine cannot follow it, or if it would leave that without frames."""
+
+
+def command_of(name: str, action: Callable[..., Any], **settings: Any) -> Command:
+    """Return the command of a function: its arguments are those after the state, and after the client."""
+    parameters = list(inspect.signature(action, eval_str=True).parameters.values())
+    parameters = parameters[2 if settings.get("by") is By.CLIENT else 1 :]
+    required = inspect.Parameter.empty
+    fields: dict[str, Any] = {
+        one.name: (one.annotation, ... if one.default is required else one.default) for one in parameters
+    }
+    texts = (one.name if one.default is required else f"{one.name}={one.default!r}" for one in parameters)
+    arguments = create_model("Arguments", __config__=_CONFIG, **fields)
+    text = " ".join((inspect.getdoc(action) or "").split("\n\nRaises")[0].split())
+    return Command(name, action, arguments, tuple(texts), text, **settings)
 
 
 def check_arguments(command: Command, given: Mapping[str, Any]) -> dict[str, Any]:
@@ -146,6 +161,17 @@ class QueuedCommand:
 
     def __init__(self, command: Command, arguments: dict[str, Any]) -> None:
         self.command, self.arguments, self.ticket = command, arguments, Ticket()
+        self._steps: Generator[Work, Any, None] | None = None
+
+    def advance(self, bench_state: object, result: Callable[[], Any]) -> Work | None:
+        """Begin the command, or continue it with the result of its work; return more work, if any."""
+        if self._steps is None:
+            self._steps = self.command.action(bench_state, **self.arguments)
+            return next(self._steps, None) if self._steps else None
+        try:
+            return self._steps.send(result())
+        except StopIteration:
+            return None
 
 
 class Queue:

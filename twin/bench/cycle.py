@@ -132,7 +132,7 @@ class CommandProcessor:
             following = self._bench_state.queue.next()
             if following is None:
                 return
-            self._begin(following)
+            self._act(following, lambda: None)
 
     def close(self) -> None:
         """Abandon the command that is being prepared."""
@@ -142,30 +142,20 @@ class CommandProcessor:
     def _process_urgent(self) -> None:
         while self._urgent:
             waiting = self._urgent[0]  # it stays until it is executed: after an error it is tried again
-            waiting.command.action(self._bench_state, None, **waiting.arguments)
+            waiting.command.action(self._bench_state, **waiting.arguments)
             self.outcomes.append((self._urgent.pop(0).ticket, None))
 
-    def _begin(self, waiting: QueuedCommand) -> None:
-        """Execute a command, or start its preparation."""
-        prepare = waiting.command.prepare
-        try:
-            work = prepare(self._bench_state, **waiting.arguments) if prepare else None
-        except InputError as error:
-            self._settle(waiting, f"{error}")
-            return
-        if work is None:
-            self._act(waiting, lambda: None)
-        else:
-            self._preparing = waiting, Preparation(waiting.command.name, work)
-
-    def _act(self, waiting: QueuedCommand, prepared: Callable[[], Any]) -> None:
-        """Execute a command, or refuse it with the reason."""
+    def _act(self, waiting: QueuedCommand, result: Callable[[], Any]) -> None:
+        """Execute a command up to work outside the loop, or to its end; refuse it with the reason."""
         command, refused = waiting.command, None
         try:
             if command.cancelled_by_stop and waiting.ticket.created_s <= self._urgent_s:
                 raise InputError(f"bench: expected {command.name} after STOP, received it before")
             with only_loaded():
-                command.action(self._bench_state, prepared(), **waiting.arguments)
+                work = waiting.advance(self._bench_state, result)
+            if work:
+                self._preparing = waiting, Preparation(command.name, work)
+                return
         # A command loads files and laws of the user, which may raise anything: it is refused.
         except Exception as error:
             refused = f"{error}" if isinstance(error, SpheretwinError) else error_text(error)

@@ -6,6 +6,7 @@ import json
 from typing import Any, NamedTuple
 
 from spheretwin.bench import modes
+from spheretwin.bench.command_queue import Current, Place, Text
 from spheretwin.bench.modes import Limits
 from spheretwin.models.base.errors import InputError, exception_text
 from spheretwin.models.telemetry.run_record import RunRecord
@@ -18,6 +19,7 @@ from spheretwin.scenario.reading import override, validated
 from spheretwin.scenario.sections import Scenario
 from spheretwin.session import Session
 from spheretwin.snapshot import Snapshot
+from spheretwin.trajectories.rounding import Triple
 from spheretwin.trajectories.trajectory import Shape
 
 FIELDS_OF_MODES = ("trajectory.approach", "manual")
@@ -159,7 +161,7 @@ class Driver:
         if self.reason is not None:
             return None
         if self._release_s is not None and self.session.t_s >= self._release_s:
-            self._switch_off()
+            self.off()
         try:
             rows = self.session.advance(ticks)
         except Exception as error:  # a law of the user's may raise anything: the run ends
@@ -190,20 +192,23 @@ class Driver:
             return
         if mode == "hold" and not again and self.mode != "off":
             try:
-                self._hold()
+                self.hold()
             except InputError:  # a trajectory of the user's gives no motion to begin with
-                self._switch_off()
+                self.off()
         else:
-            self._switch_off()
+            self.off()
 
     def off(self) -> None:
-        """No currents."""
-        self._check_available("off")
-        self._switch_off()
+        """Switch the currents off; the rotor is free."""
+        self._set_currents("off", [0.0] * len(self.session.actuator.groups))
 
-    def manual(self, currents_A: tuple[float, ...] | None, group: int | None, current_A: float) -> None:
+    def manual(
+        self,
+        currents_A: tuple[Current, ...] | None = None,
+        group: Place | None = None,
+        current_A: Current = 1.0,
+    ) -> None:
         """Apply stated currents, or the current of a single group."""
-        self._check_available("manual")
         groups = len(self.session.actuator.groups)
         if (currents_A is None) == (group is None):
             raise InputError("bench: manual: expected either currents_A or group, received both or none")
@@ -213,24 +218,24 @@ class Driver:
         self._set_currents("manual", one_group if currents_A is None else list(currents_A))
 
     def hold(self) -> None:
-        """Come to rest at the present pose."""
-        self._check_available("hold")
-        self._hold()
+        """Come to rest at the present pose; after STOP, switch the currents off then."""
+        initial_motion = modes.current_motion(self.session)
+        self._approach("hold", modes.hold_shape(initial_motion, self.limits, self._range))
+        if self.stopped:
+            approach = self.session.scenario.trajectory.approach
+            self._release_s = self.session.t_s + (approach.lasts_s if approach else 0.0) + HELD_s
 
-    def point(self, pose_rad: tuple[float, float, float]) -> None:
+    def point(self, pose_rad: Triple) -> None:
         """Approach a pose and rest there."""
-        self._check_available("point")
         self._approach("point", modes.point_shape(pose_rad, self._range))
 
-    def jog(self, rates_rad_s: tuple[float, float, float]) -> None:
+    def jog(self, rates_rad_s: Triple) -> None:
         """Turn at steady rates."""
-        self._check_available("jog")
         initial_motion = modes.current_motion(self.session)
         self._approach("jog", modes.jog_shape(initial_motion, rates_rad_s, self.limits, self._range))
 
     def trajectory(self, fields: dict[str, Any] | None, trial: Trial | None = None) -> None:
         """Follow a shape from its beginning; default: the last one."""
-        self._check_available("trajectory")
         after = self.settings
         if fields is not None:
             after = self._after("trajectory", trial.value if trial else fields, trial)
@@ -264,7 +269,7 @@ class Driver:
             self.session.set(name, value, trial.session if trial else None)
         self.settings = after
 
-    def clear_faults(self, place: int | None, target: str | None = None) -> None:
+    def clear_faults(self, place: Place | None = None, target: Text | None = None) -> None:
         """Clear all faults, one by its place, or those of a target."""
         planned = self.settings.model_dump(mode="json")[FAULT]
         if place is not None and place >= len(planned):
@@ -275,7 +280,7 @@ class Driver:
             self.session.set(FAULT, _without(active, place, target))
         self.settings = after
 
-    def snapshot(self, name: str) -> None:
+    def snapshot(self, name: Text = "last") -> None:
         """Save the complete state of the twin."""
         if name not in self.snapshots and len(self.snapshots) >= MOST_SNAPSHOTS:
             raise InputError(f"bench: expected at most {MOST_SNAPSHOTS} snapshots, received one more")
@@ -295,7 +300,7 @@ class Driver:
             The name is unknown, the snapshot is of another model, or STOP is latched.
         """
         if self.stopped:
-            self._check_available("restore")
+            self.check_available("restore")
         if name not in self.snapshots:
             raise InputError(
                 f"bench: expected one of {', '.join(self.snapshots) or 'no snapshots'}, received {name}"
@@ -319,7 +324,14 @@ class Driver:
     def _range(self) -> modes.Array:
         return self.session.actuator.hinge_range_rad
 
-    def _check_available(self, name: str) -> None:
+    def check_available(self, name: str) -> None:
+        """Check that a mode can be entered.
+
+        Raises
+        ------
+        InputError
+            STOP is latched, or the run has ended; the message names the command `name`.
+        """
         if self.stopped:
             raise InputError(f"bench: expected reset after STOP, received {name}")
         if self.reason is not None:
@@ -334,17 +346,6 @@ class Driver:
     def _set_currents(self, mode: str, currents_A: list[float]) -> None:
         self.session.set(CURRENTS, currents_A)
         self.mode, self._release_s = mode, None
-
-    def _switch_off(self) -> None:
-        self._set_currents("off", [0.0] * len(self.session.actuator.groups))
-
-    def _hold(self) -> None:
-        """Come to rest at the present pose; after STOP, switch the currents off then."""
-        initial_motion = modes.current_motion(self.session)
-        self._approach("hold", modes.hold_shape(initial_motion, self.limits, self._range))
-        if self.stopped:
-            approach = self.session.scenario.trajectory.approach
-            self._release_s = self.session.t_s + (approach.lasts_s if approach else 0.0) + HELD_s
 
     def _approach(self, mode: str, shape: Shape, shape_s: float = 0.0) -> None:
         """Approach a shape, at a time of the shape, from the present motion."""

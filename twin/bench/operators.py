@@ -6,6 +6,7 @@ import threading
 import time
 from collections.abc import Callable
 
+from spheretwin.bench.command_queue import Text
 from spheretwin.models.base.errors import InputError, shown
 
 GONE_s = 2.0
@@ -86,7 +87,7 @@ class Operators:
             elif client != self.operator and client not in self._asking:
                 self._asking.append(client)
 
-    def grant(self, client: str, to: str) -> None:
+    def grant(self, client: str, to: Text) -> None:
         """Let another client operate.
 
         Raises
