@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 
 import viser
 
+from spheretwin.models.base.errors import InputError
 from spheretwin.viz.bench.protocols import BenchProtocol, TicketProtocol
 
 # Time that a refusal without a field is shown.
@@ -35,11 +36,11 @@ class Note:
     ----------
     gui : viser.GuiApi
         In the container of the field.
-    order : float
-        Order of the field.
+    order : float, optional
+        Order in the container; default: after what it has.
     """
 
-    def __init__(self, gui: viser.GuiApi, order: float) -> None:
+    def __init__(self, gui: viser.GuiApi, order: float | None = None) -> None:
         self._html = gui.add_html("", order=order, visible=False)
         self._lock, self._removed = threading.Lock(), False
 
@@ -131,11 +132,6 @@ class EventHandlers:
         with self._lock:
             self._open = [*self._open[-MOST_TICKETS:], PendingCommand(name, ticket, note, time.monotonic())]
 
-    def send_selected(self, event: Event) -> None:
-        """Send the command that is the value of a group of buttons."""
-        if event.target.value in event.target.options:
-            self.send(event, event.target.value)
-
     def show_refusal(self, text: str, note: Note | None = None) -> None:
         """Show a refusal at its field, or in the status panel."""
         if note:
@@ -154,28 +150,45 @@ class EventHandlers:
             elif pending.note:
                 pending.note.say(None)
 
-    def button(self, gui: viser.GuiApi, label: str, name: str, /, **more: Any) -> Any:
-        """Add a button for a command without arguments."""
-        button = gui.add_button(label, **more)
-        on_press(button, lambda event: self.send(event, name))
-        return button
-
-    def on_change(self, line: Any, act: Callable[[Event], object] | None = None) -> None:
-        """Call a function at each change; `guard_values` has refused those of pages that do not operate.
+    def button(
+        self,
+        gui: viser.GuiApi,
+        label: str,
+        name: str,
+        arguments: Callable[[], dict[str, Any]] | None = None,
+        **more: Any,
+    ) -> None:
+        """Add a button for a command, and under it a line for its refusal if it has arguments.
 
         Parameters
         ----------
-        line : viser's handle
-            Handle of a field, a slider or a box, which all pages share.
-        act : callable, optional
-            Called with the event of each change.
+        gui : viser.GuiApi
+            In the container.
+        label : str
+            Label of the button.
+        name : str
+            Name of the command.
+        arguments : callable, optional
+            Returns the arguments; an `InputError` is shown as a refusal.
+        **more
+            Settings of the button.
         """
+        button = gui.add_button(label, **more)
+        note = Note(gui) if arguments else None
 
-        async def update(event: Event) -> None:
-            if act and event.client_id is not None:
-                act(event)
+        def press(event: Event) -> None:
+            try:
+                given = arguments() if arguments else {}
+            except InputError as error:
+                self.show_refusal(str(error), note)
+            else:
+                self.send(event, name, note, **given)
 
-        line.on_update(update)
+        on_press(button, press)
+
+    def follow(self, line: Any, name: str, note: Note, arguments: Callable[[], dict[str, Any]]) -> None:
+        """Send a command at each change of a slider, with the latest arguments."""
+        on_change(line, lambda event: self.send_latest(event, name, note, **arguments()))
 
     def accepts(self, event: Event) -> bool:
         """Return True if a page operates; notify it otherwise."""
@@ -197,6 +210,24 @@ class EventHandlers:
 
 ANYONES = ("stop", "ask", "hello", "leave", "beat")
 """Commands that the bench also accepts from watching pages."""
+
+
+def on_change(line: Any, act: Callable[[Event], object]) -> None:
+    """Call a function at each change; `guard_values` has refused those of pages that do not operate.
+
+    Parameters
+    ----------
+    line : viser's handle
+        Handle of a field, a slider or a box, which all pages share.
+    act : callable
+        Called with the event of each change.
+    """
+
+    async def update(event: Event) -> None:
+        if event.client_id is not None:
+            act(event)
+
+    line.on_update(update)
 
 
 def on_press(button: Any, act: Callable[[Event], object]) -> None:

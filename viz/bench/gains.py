@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import viser
 
-from spheretwin.viz.bench.event_handlers import Event, EventHandlers, on_press
+from spheretwin.viz.bench.event_handlers import Event, on_change, on_press
 from spheretwin.viz.bench.protocols import BenchProtocol, FieldSetting
 
 SLOTS = ("A", "B")
@@ -31,18 +31,15 @@ class GainSliders:
     ----------
     gui : viser.GuiApi
         In the tab.
-    handlers : EventHandlers
-        Handlers that accept changes of the operator.
     apply : callable
         Takes an event, the name of a field and its text, and sets it.
     """
 
-    def __init__(self, gui: viser.GuiApi, handlers: EventHandlers, apply: Any) -> None:
-        self._gui, self._handlers, self._apply = gui, handlers, apply
+    def __init__(self, gui: viser.GuiApi, apply: Any) -> None:
+        self._gui, self._apply = gui, apply
         self._folder = gui.add_folder("gains")
         with self._folder:
             self._linked = gui.add_checkbox("all axes together", False, hint="a slider moves all of its gain")
-        handlers.on_change(self._linked)
         self._sliders: dict[str, list[Any]] = {}
         self._shown: tuple[Any, ...] = ()
 
@@ -78,7 +75,7 @@ class GainSliders:
                     for entry, number in zip(entries, numbers, strict=True)
                 ]
                 for place, slider in enumerate(self._sliders[name]):
-                    self._handlers.on_change(slider, partial(self._moved, name, place))
+                    on_change(slider, partial(self._moved, name, place))
 
     def _moved(self, name: str, place: int, event: Event) -> None:
         sliders = self._sliders.get(name, [])

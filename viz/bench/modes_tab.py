@@ -11,7 +11,7 @@ import viser
 
 from spheretwin.models.actuator import Actuator
 from spheretwin.models.base.errors import InputError
-from spheretwin.viz.bench.event_handlers import Event, EventHandlers, Note, on_press
+from spheretwin.viz.bench.event_handlers import Event, EventHandlers, Note, on_change
 from spheretwin.viz.bench.protocols import BenchProtocol, Choices, FieldSetting
 from spheretwin.viz.bench.scene import Scene
 from spheretwin.viz.bench.settings_tab import Form
@@ -131,21 +131,20 @@ class ModesTab:
                 self._angles.append(
                     gui.add_slider(f"{axis}, °", round(degrees(low)), round(degrees(high)), 0.1, 0.0)
                 )
-            note = Note(gui, self._angles[-1].order + 0.5)
+            note = Note(gui)
             for place, slider in enumerate(self._angles):
-                self._handlers.on_change(slider, partial(self._on_slider, place, note))
+                on_change(slider, partial(self._on_slider, place, note))
             rate_rad_s, acceleration_rad_s2 = choices.limits
             rate = gui.add_number(
                 "rate, rad/s", rate_rad_s, step=0.1, hint="largest rate of the approach to a pose"
             )
             acceleration = gui.add_number("acceleration, rad/s²", acceleration_rad_s2, step=0.1)
             self._limits = (rate, acceleration)
-            limits = Note(gui, acceleration.order + 0.5)
+            limits = Note(gui)
             for name, line in (("rate_rad_s", rate), ("acceleration_rad_s2", acceleration)):
-                self._handlers.on_change(line, partial(self._on_limit, name, limits))
+                on_change(line, partial(self._on_limit, name, limits))
             with gui.add_folder("pose as numbers", expand_by_default=False):
-                self._pose = Form(gui, self._handlers, "Go to this pose", whole=True)
-            self._pose.on_apply(self._on_pose)
+                self._pose = Form(gui, "Go to this pose", self._on_pose, whole=True)
             self._pose.show(_pose_settings(self._pose_rad))
 
     def _on_limit(self, name: str, note: Note, event: Event) -> None:
@@ -178,7 +177,6 @@ class ModesTab:
             present = self._present
             shapes = list(dict.fromkeys([*choices.shapes, present]))
             self._shapes: Any = gui.add_dropdown("shape", shapes, initial_value=present)
-            form = self._shape = Form(gui, self._handlers, "Follow this trajectory", whole=True)
 
             def follow(event: Event, fields: dict[str, str]) -> None:
                 try:
@@ -190,21 +188,21 @@ class ModesTab:
                     event, "trajectory", form.note, fields={"shape": self._shapes.value, **read}
                 )
 
-            form.on_apply(follow)
+            form = self._shape = Form(gui, "Follow this trajectory", follow, whole=True)
             form.show(choices.shape(present))
-            self._handlers.on_change(self._shapes, lambda event: form.show(choices.shape(event.target.value)))
+            on_change(self._shapes, lambda event: form.show(choices.shape(event.target.value)))
 
     def _jog(self, gui: viser.GuiApi) -> None:
         with gui.add_folder("jog: rates of the hinges", expand_by_default=False):
             most = FASTEST_JOG_DEG_S
             self._rates = [gui.add_slider(f"{axis}, °/s", -most, most, 1.0, 0.0) for axis in AXES]
-            note = Note(gui, self._rates[-1].order + 0.5)
+            note = Note(gui)
             for slider in self._rates:
-                self._handlers.on_change(
+                self._handlers.follow(
                     slider,
-                    lambda event: self._handlers.send_latest(
-                        event, "jog", note, rates_rad_s=[radians(rate.value) for rate in self._rates]
-                    ),
+                    "jog",
+                    note,
+                    lambda: {"rates_rad_s": [radians(rate.value) for rate in self._rates]},
                 )
             self._handlers.button(gui, "Hold", "hold")
 
@@ -212,25 +210,23 @@ class ModesTab:
         groups, limit = len(actuator.groups), float(actuator.group.current_limit_A)
         with gui.add_folder("manual currents: or click a coil", expand_by_default=False):
             chosen = gui.add_slider("group", 0, groups - 1, 1, 0)
-            self._handlers.on_change(chosen)
-            alone = gui.add_button(f"Only this group, at {ONLY_THIS_A:g} A")
-            note = Note(gui, alone.order + 0.5)
-            on_press(
-                alone,
-                lambda event: self._handlers.send(
-                    event, "manual", note, group=int(chosen.value), current_A=ONLY_THIS_A
-                ),
+            self._handlers.button(
+                gui,
+                f"Only this group, at {ONLY_THIS_A:g} A",
+                "manual",
+                lambda: {"group": int(chosen.value), "current_A": ONLY_THIS_A},
             )
+            note = Note(gui)
             with gui.add_folder("all groups", expand_by_default=False):
                 self._currents = [
                     gui.add_slider(f"{group:02}, A", -limit, limit, 0.05, 0.0) for group in range(groups)
                 ]
             for slider in self._currents:
-                self._handlers.on_change(
+                self._handlers.follow(
                     slider,
-                    lambda event: self._handlers.send_latest(
-                        event, "manual", note, currents_A=[float(line.value) for line in self._currents]
-                    ),
+                    "manual",
+                    note,
+                    lambda: {"currents_A": [float(line.value) for line in self._currents]},
                 )
 
     def _replay(self, gui: viser.GuiApi) -> None:
@@ -239,14 +235,10 @@ class ModesTab:
             self._file: Any = gui.add_dropdown(
                 "file", runs, hint="telemetry (.parquet) and recordings (.rrd) of the folder"
             )
-            self._handlers.on_change(self._file)
-            play = gui.add_button("Replay")
+            self._handlers.button(gui, "Replay", "replay", lambda: {"file": self._file.value})
             self._scrubber: Any = gui.add_slider("time, s", 0.0, 1.0, 0.01, 0.0, visible=False)
-            note = Note(gui, self._scrubber.order + 0.5)
-            on_press(play, lambda event: self._handlers.send(event, "replay", note, file=self._file.value))
-            self._handlers.on_change(
-                self._scrubber,
-                lambda event: self._handlers.send_latest(event, "seek", note, t_s=float(event.target.value)),
+            self._handlers.follow(
+                self._scrubber, "seek", Note(gui), lambda: {"t_s": float(self._scrubber.value)}
             )
 
     def _keys(self, gui: viser.GuiApi) -> None:

@@ -9,7 +9,7 @@ from typing import Any
 import viser
 
 from spheretwin.models.base.errors import InputError
-from spheretwin.viz.bench.event_handlers import Event, EventHandlers, Note, on_press
+from spheretwin.viz.bench.event_handlers import Event, EventHandlers, Note, on_change, on_press
 from spheretwin.viz.bench.gains import GainHistory, GainSliders
 from spheretwin.viz.bench.protocols import BenchProtocol, Choices, FieldSetting
 
@@ -23,10 +23,10 @@ class Form:
     ----------
     gui : viser.GuiApi
         GUI of the container.
-    handlers : EventHandlers
-        Handlers that send the values.
-    apply : str
+    label : str
         Label of its button.
+    act : callable
+        Receives the fields: texts by name.
     whole : bool
         Whether all of the fields are sent, or only the changed ones.
 
@@ -36,15 +36,14 @@ class Form:
         Under all of them.
     """
 
-    def __init__(self, gui: viser.GuiApi, handlers: EventHandlers, apply: str, whole: bool = False) -> None:
-        self._gui, self._handlers, self._whole = gui, handlers, whole
+    def __init__(self, gui: viser.GuiApi, label: str, act: ApplyFields, whole: bool = False) -> None:
+        self._gui, self._act, self._whole = gui, act, whole
         self._settings: list[FieldSetting] = []
         self._lines: dict[str, Any] = {}
         self._notes: dict[str, Note] = {}
-        self._act: ApplyFields = lambda event, fields: None
         self._form = gui.add_form(None)
         with self._form:
-            self._button = gui.add_button(apply, order=1e9)
+            self._button = gui.add_button(label, order=1e9)
             self.note = Note(gui, 2e9)
 
         @self._form.on_submit
@@ -56,10 +55,6 @@ class Form:
         async def _(event: Event) -> None:
             self._apply(event)
             self._form.submit()  # no line is marked as changed any more
-
-    def on_apply(self, act: ApplyFields) -> None:
-        """Set the function that receives the fields: texts by name."""
-        self._act = act
 
     def note_of(self, name: str) -> Note:
         """Return the line under a field."""
@@ -96,8 +91,6 @@ class Form:
             note.remove()
         with self._form:
             self._lines = {setting.name: self._line(setting) for setting in settings}
-            for line in self._lines.values():
-                self._handlers.on_change(line)
             self._notes = {name: Note(self._gui, line.order + 0.5) for name, line in self._lines.items()}
 
     def _line(self, setting: FieldSetting) -> Any:
@@ -180,15 +173,12 @@ class SettingsTab:
         self._laws = gui.add_dropdown("law", self._choices.laws(), hint="of the package and of the folder")
         with gui.add_folder("load law from file", expand_by_default=False):
             own = gui.add_text("law file", "", hint="FILE.py:NAME, on this machine")
-            self._handlers.on_change(own)
             take = gui.add_button("Load law from file")
-        note = Note(gui, take.order + 0.5)
-        self._handlers.on_change(
-            self._laws, lambda event: self._set_gain(event, LAW, event.target.value, note)
-        )
+        note = Note(gui)
+        on_change(self._laws, lambda event: self._set_gain(event, LAW, event.target.value, note))
         on_press(take, lambda event: self._set_gain(event, LAW, own.value, note))
         self._history = GainHistory(gui, bench, self._set)
-        self._sliders = GainSliders(gui, self._handlers, self._set_gain)
+        self._sliders = GainSliders(gui, self._set_gain)
         with gui.add_folder("all fields of the controller", expand_by_default=False):
             self._gains = self._form(gui, "Set gains")
         defaults = gui.add_button("Reset gains to defaults")
@@ -203,17 +193,15 @@ class SettingsTab:
         )
         sections = [setting for setting in sections if setting not in ELSEWHERE]
         self._sections = gui.add_dropdown("section", sections, initial_value=FIRST_SECTION)
-        self._handlers.on_change(self._sections, lambda event: self.show())
+        on_change(self._sections, lambda event: self.show())
         self._fields = self._form(gui, "Set these")
 
     def _form(self, gui: viser.GuiApi, apply: str) -> Form:
-        form = Form(gui, self._handlers, apply)
-
         def set_all(event: Event, fields: dict[str, str]) -> None:
             for name, text in fields.items():
                 self._set_gain(event, name, text, form.note_of(name))
 
-        form.on_apply(set_all)
+        form = Form(gui, apply, set_all)
         return form
 
     def _reset_gains(self, event: Event) -> None:

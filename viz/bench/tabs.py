@@ -7,8 +7,7 @@ from typing import Any
 
 import viser
 
-from spheretwin.models.base.errors import InputError
-from spheretwin.viz.bench.event_handlers import Event, EventHandlers, Note, on_press
+from spheretwin.viz.bench.event_handlers import Event, EventHandlers, Note, on_change, on_press
 from spheretwin.viz.bench.protocols import BenchProtocol, Choices
 
 
@@ -35,35 +34,26 @@ class FaultsTab:
         reported = gui.add_checkbox(
             "report to controller", False, hint="the allocation receives the fault and its group"
         )
-        add = gui.add_button("Add from now on", color="orange")
-        note = Note(gui, add.order + 0.5)
 
         def retarget(event: Event) -> None:
             mode.options = list(targets[target.value]) if target.value in targets else []
             mode.value = mode.options[0] if mode.options else ""
 
-        def add_fault(event: Event) -> None:
+        def fault() -> dict[str, Any]:
             fault: dict[str, Any] = {"target": target.value, "mode": mode.value}
             if value.value.strip():
-                try:
-                    fault["value"] = choices.read("fault.0.value", value.value)
-                except InputError as error:
-                    handlers.show_refusal(str(error), note)
-                    return
+                fault["value"] = choices.read("fault.0.value", value.value)
             boxes = {"detection": detection, "reported_to_controller": reported}
-            fault |= {name: True for name, box in boxes.items() if box.value}
-            handlers.send(event, "add_fault", note, fault=fault)
+            return {"fault": fault | {name: True for name, box in boxes.items() if box.value}}
 
-        handlers.on_change(target, retarget)
-        for line in (mode, value, detection, reported):
-            handlers.on_change(line)
-        on_press(add, add_fault)
+        on_change(target, retarget)
+        handlers.button(gui, "Add from now on", "add_fault", fault, color="orange")
         self._list = gui.add_html("")
         self._shown: tuple[str, ...] | None = None
         place = gui.add_number("place", 0, min=0, step=1)
-        handlers.on_change(place)
-        one = gui.add_button("Clear the fault at this place")
-        on_press(one, lambda event: handlers.send(event, "clear_faults", note, place=int(place.value)))
+        handlers.button(
+            gui, "Clear the fault at this place", "clear_faults", lambda: {"place": int(place.value)}
+        )
         handlers.button(gui, "Clear all", "clear_faults")
 
     def show(self, state: Any) -> None:
@@ -103,33 +93,23 @@ class FilesTab:
             rate: Any = gui.add_dropdown(
                 "rate", list(RATES), hint="rows of the recording a second, and extremes and events"
             )
-            record = gui.add_button("Record from now on", color="red")
-            for line in (recording, telemetry, rate):
-                handlers.on_change(line)
-            note = Note(gui, record.order + 0.5)
 
-            def begin(event: Event) -> None:
-                files = {"recording": recording.value.strip(), "telemetry": telemetry.value.strip()}
-                given: dict[str, Any] = {kind: file for kind, file in files.items() if file}
-                rate_Hz = RATES[rate.value]
-                if rate_Hz and "recording" in given:
+            def files() -> dict[str, Any]:
+                named = {"recording": recording.value.strip(), "telemetry": telemetry.value.strip()}
+                given: dict[str, Any] = {kind: file for kind, file in named.items() if file}
+                if (rate_Hz := RATES[rate.value]) and "recording" in given:
                     given["rate_Hz"] = rate_Hz
-                handlers.send(event, "record", note, **given)
+                return given
 
-            on_press(record, begin)
+            handlers.button(gui, "Record from now on", "record", files, color="red")
             handlers.button(gui, "Stop and complete the files", "keep")
         with gui.add_folder("scenario"):
             source = self._scenarios = gui.add_dropdown(
                 "restart with", choices.scenarios(), hint="of the package and of the folder"
             )
-            load = gui.add_button("Load")
+            handlers.button(gui, "Load", "load", lambda: {"source": source.value})
             file = gui.add_text("save as", "bench.toml")
-            save = gui.add_button("Save the present settings")
-            handlers.on_change(source)
-            handlers.on_change(file)
-            saved = Note(gui, save.order + 0.5)
-            on_press(load, lambda event: handlers.send(event, "load", saved, source=source.value))
-            on_press(save, lambda event: handlers.send(event, "save", saved, file=file.value))
+            handlers.button(gui, "Save the present settings", "save", lambda: {"file": file.value})
         with gui.add_folder("as a command line"):
             shown: Any = gui.add_text("copy", "", multiline=True)
 
@@ -139,11 +119,9 @@ class FilesTab:
             on_press(gui.add_button("Show the present command line"), show_command_line)
         with gui.add_folder("snapshot"):
             name = gui.add_text("name", "last")
-            handlers.on_change(name)
-            keep = gui.add_button("Save a snapshot")
+            handlers.button(gui, "Save a snapshot", "snapshot", lambda: {"name": name.value})
             self._snapshots: Any = gui.add_button_group("restore", NONE_YET, visible=False)
-            note = Note(gui, self._snapshots.order + 0.5)
-            on_press(keep, lambda event: handlers.send(event, "snapshot", note, name=name.value))
+            note = Note(gui)
 
             def go_back(event: Event) -> None:
                 if event.target.value in event.target.options:

@@ -67,7 +67,7 @@ def test_a_form_begins_with_the_active_values(page):
         FieldSetting("plant.yes_or_no", "true", "false", "a flag"),
         FieldSetting("plant.number", "0.25", "1", "a number"),
     ]
-    Form(page._server.gui, page._handlers, "Apply").show(settings)
+    Form(page._server.gui, "Apply", lambda event, fields: None).show(settings)
     known = page._server.gui._gui_input_handle_from_uuid
     values = [known[handle_of(page, label)].value for label in ("one_of_two", "yes_or_no", "number")]
     assert values == ["Euler", True, "0.25"]
@@ -78,7 +78,7 @@ def test_a_form_follows_the_active_values_and_keeps_a_change_in_progress(page):
         FieldSetting("plant.first_number", "1", "0", "a number"),
         FieldSetting("plant.second_number", "2", "0", "a number"),
     ]
-    form = Form(page._server.gui, page._handlers, "Apply")
+    form = Form(page._server.gui, "Apply", lambda event, fields: None)
     form.show(settings)
     known = page._server.gui._gui_input_handle_from_uuid
     first, second = (known[handle_of(page, label)] for label in ("first_number", "second_number"))

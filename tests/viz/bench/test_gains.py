@@ -26,7 +26,7 @@ def apply_to(applied):
 
 
 def test_sliders_follow_and_their_range_includes_the_value(page, applied):
-    sliders = GainSliders(page._server.gui, page._handlers, apply_to(applied))
+    sliders = GainSliders(page._server.gui, apply_to(applied))
     sliders.show([STIFFNESS, LAYER])
     (alpha, *_), (layer,) = (sliders._sliders[of.name] for of in (STIFFNESS, LAYER))
     assert (alpha.min, alpha.max, alpha.value, layer.value) == (0.0, 8.0, 4.0, 0.1)
@@ -43,7 +43,7 @@ def test_sliders_follow_and_their_range_includes_the_value(page, applied):
 
 
 def test_axes_move_together_if_they_are_linked(page, applied):
-    sliders = GainSliders(page._server.gui, page._handlers, apply_to(applied))
+    sliders = GainSliders(page._server.gui, apply_to(applied))
     sliders.show([STIFFNESS])
     sliders._sliders[STIFFNESS.name][1].value = 6.5
     sliders._moved(STIFFNESS.name, 1, None)
