@@ -33,6 +33,7 @@ from spheretwin.scenario.reading import described_fields
 from spheretwin.scenario.sections import Scenario
 from spheretwin.scenario.writing import as_command, as_toml
 from spheretwin.session import Session
+from spheretwin.trajectories.trajectory import Shape
 
 # Period at which `until` looks at the status.
 POLL_s = 0.005
@@ -81,6 +82,11 @@ class Bench:
     def actuator(self) -> Actuator:
         """Actuator of the present run."""
         return self._bench_state.driver.session.actuator
+
+    @property
+    def trajectory(self) -> Shape:
+        """Shape that the settings have, whatever the mode."""
+        return self._bench_state.driver.settings.trajectory
 
     def command(self, name: str, /, *, client: str | None = None, **arguments: Any) -> Ticket:
         """Submit a command; never waits.
@@ -225,9 +231,8 @@ class Bench:
 
         The trajectory is the one that is set, whatever the mode.
         """
-        driver = self._bench_state.driver
-        active = driver.session.scenario.model_copy(update={"trajectory": driver.settings.trajectory})
-        return described_fields(active)
+        active = self._bench_state.driver.session.scenario
+        return described_fields(active.model_copy(update={"trajectory": self.trajectory}))
 
     def advance(self, ticks: int) -> int:
         """Execute the waiting commands, then run control ticks, at once; return how many were run.

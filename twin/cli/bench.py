@@ -10,12 +10,11 @@ import sys
 import tempfile
 import warnings
 import webbrowser
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, Literal, get_args, get_origin
 
-from annotated_types import Ge, Gt, Le, Lt
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
@@ -45,8 +44,6 @@ from spheretwin.session import Session
 from spheretwin.trajectories import SHAPES
 from spheretwin.viz.bench.protocols import Choices, FieldSetting
 from spheretwin.viz.terminal import runs
-
-TRAJECTORY = "trajectory"
 
 # Numbers of the controller that are not gains.
 NO_GAINS = ("controller.period_s",)
@@ -79,15 +76,10 @@ def settings_of(fields: list[tuple[str, Any, FieldInfo]]) -> list[FieldSetting]:
 
 def shape_settings(name: str, bench: Bench) -> list[FieldSetting]:
     """Return the fields of a shape: present values for the active shape, defaults for another."""
-    present = {
-        dotted.partition(".")[2]: value
-        for dotted, value, _ in bench.fields()
-        if dotted.startswith(f"{TRAJECTORY}.")
-    }
-    kind = SHAPES.get(name)
+    kind, present = SHAPES.get(name), bench.trajectory
     if kind is None:
         return []
-    known = _gathered(present) if present.get("shape") == name else {}
+    known = present.model_dump() if present.shape == name else {}
     return [
         FieldSetting(
             field,
@@ -103,7 +95,7 @@ def shape_settings(name: str, bench: Bench) -> list[FieldSetting]:
 
 def written(value: Any) -> str:
     """Return the text of a value for the command line, with all digits; empty for None."""
-    if isinstance(value, tuple) and not any(isinstance(entry, tuple) for entry in value):
+    if isinstance(value, tuple) and not any(isinstance(entry, tuple | dict) for entry in value):
         return " ".join(map(written, value))
     if isinstance(value, tuple | dict | list | bool):
         return json.dumps(value, ensure_ascii=False)
@@ -135,21 +127,6 @@ def read(name: str, text: str) -> Any:
     return reading.overrides([f"--{name}", *tokens])[name]
 
 
-def _gathered(fields: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the fields of a shape, with each list of tables as one list."""
-    gathered: dict[str, Any] = {}
-    for dotted, value in fields.items():
-        name, _, inside = dotted.partition(".")
-        place, _, last = inside.partition(".")
-        if not inside:
-            gathered[name] = value
-        elif place.isdigit():
-            rows = gathered.setdefault(name, [])
-            rows.extend({} for _ in range(int(place) + 1 - len(rows)))
-            rows[int(place)][last] = value
-    return gathered
-
-
 def _setting(name: str, value: Any, field: FieldInfo) -> FieldSetting:
     choices = families(Scenario).get(without_indices(name)) or _literals(field.annotation)
     limits = _range(name, value, field)
@@ -165,14 +142,10 @@ def _range(name: str, value: Any, field: FieldInfo) -> tuple[float, float] | Non
     default = _default(field)
     defaults = default if isinstance(default, tuple) else (default,)
     largest = max((abs(number) for number in defaults if isinstance(number, int | float)), default=0.0)
-    low, high = 0.0, 4 * largest or 1.0
-    for mark in (*field.metadata, *_marks(field.annotation)):
-        match mark:
-            case Ge(ge=bound) | Gt(gt=bound):
-                low = float(bound)  # type: ignore[arg-type]
-            case Le(le=bound) | Lt(lt=bound):
-                high = min(high, float(bound))  # type: ignore[arg-type]
-    return low, high
+    bounds = dict(_bounds(field))
+    low = float(bounds.get("ge", bounds.get("gt", 0.0)))
+    high = 4 * largest or 1.0
+    return low, min([high, *(float(bounds[sign]) for sign in ("le", "lt") if sign in bounds)])
 
 
 def _default(field: FieldInfo) -> Any:
@@ -184,22 +157,20 @@ def _default_text(field: FieldInfo) -> str | None:
     return None if field.is_required() else written(_default(field))
 
 
+SIGNS = {"ge": "≥", "gt": ">", "le": "≤", "lt": "<"}
+
+
 def _meaning(field: FieldInfo) -> str:
-    return ", ".join([field.description or "", *dict.fromkeys(_bounds(field))])
+    bounds = [f"{SIGNS[sign]} {bound:g}" for sign, bound in _bounds(field)]
+    return ", ".join([field.description or "", *dict.fromkeys(bounds)])
 
 
-def _bounds(field: FieldInfo) -> Iterator[str]:
-    """Bounds of a field, or of the numbers in it."""
+def _bounds(field: FieldInfo) -> Iterator[tuple[str, Any]]:
+    """Yield the bounds of a field, or of the numbers in it."""
     for mark in (*field.metadata, *_marks(field.annotation)):
-        match mark:
-            case Ge(ge=bound):
-                yield f"≥ {bound:g}"
-            case Gt(gt=bound):
-                yield f"> {bound:g}"
-            case Le(le=bound):
-                yield f"≤ {bound:g}"
-            case Lt(lt=bound):
-                yield f"< {bound:g}"
+        for sign in SIGNS:
+            if hasattr(mark, sign):
+                yield sign, getattr(mark, sign)
 
 
 def _marks(annotation: Any) -> Iterator[Any]:
