@@ -35,7 +35,7 @@ def test_the_gains_are_those_of_the_law_that_is_in_force():
 
 
 def test_a_name_of_any_alphabet_is_shown_as_it_is():
-    assert written(({"file": "Wärme.csv"},)) == '{"file": "Wärme.csv"}'
+    assert written(({"file": "Wärme.csv"},)) == '[{"file": "Wärme.csv"}]'
 
 
 def test_text_is_read_as_by_the_command_line():
