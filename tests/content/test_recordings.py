@@ -60,7 +60,7 @@ def recovered() -> str:
 def live_view() -> str:
     session = session_of(duration=2.0, **{"controller.law": "pid"})
     view = LiveView(session.actuator, session.signals, facts_of(session.scenario), window_s=1.5)
-    pieces = view._page._broadcast.read()
+    pieces = view._broadcast.read()
     write(view, rows_of(session, 600), Status.INTERRUPTED)
     view.close()
     path = _file("live")

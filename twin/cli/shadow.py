@@ -77,7 +77,7 @@ def run(options: argparse.Namespace) -> bool:
         def show(part: Log, telemetry: Table, verdict: Verdict) -> None:
             if view:
                 text = verdict.markdown(part)
-                view.write(telemetry, part.current_A, text)
+                view.show(telemetry, part.current_A, text)
 
         started_s = time.process_time()
         log, result = followed(blocks(options, log, model.groups, stop_requested), model, settings, show)

@@ -65,7 +65,7 @@ def run(options: argparse.Namespace) -> bool:
                 print_json({**alarm._asdict(), **of_log})
             if view and estimator:
                 view.judge(watch.judged, [(alarm.t_s, alarm.text()) for alarm in alarms])
-                view.write(estimator.advance(block), block.current_A)
+                view.show(estimator.advance(block), block.current_A)
             count += len(alarms)
             seconds += len(block) * float(np.median(np.diff(block.t_s)))
     if seconds <= settings.calibration_s + settings.window_s:

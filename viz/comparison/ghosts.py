@@ -2,42 +2,113 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+from typing import Any, NamedTuple, cast
+
 import numpy as np
 import rerun as rr
 from numpy.typing import NDArray
+from rerun.chunk import Chunk
 
 from spheretwin.models.telemetry.table import Table
 from spheretwin.viz import theme
-from spheretwin.viz.recording.currents import CoilCurrents
 from spheretwin.viz.recording.part import RecordingPart, RecordingSubject, scalars, strips, time_index
 from spheretwin.viz.recording.recorder import MOST_ROWS
-from spheretwin.viz.recording.scene3d import Frames, MovingActuator
+from spheretwin.viz.recording.scene3d import Frames
 from spheretwin.viz.scene.entities import body_quaternions, shaft_tip
 from spheretwin.viz.scene.meshes import WORLD
 
 Array = NDArray[np.float64]
 
 
-def send_line(
-    recording: rr.RecordingStream,
-    entity: str,
-    label: str,
-    t_s: Array,
-    values: Array,
-    colour: theme.Colour,
-    width: float = 1.5,
-) -> None:
-    """Send one line of a plot, (n,); of ticks that share a pixel, the lowest and the highest are drawn."""
+class SubtreeStream:
+    """Stream that logs everything below one path of a recording.
+
+    Parameters
+    ----------
+    recording : RecordingStream
+    path : str
+        Without a slash at its end.
+    """
+
+    def __init__(self, recording: rr.RecordingStream, path: str) -> None:
+        self._recording, self._path = recording, path
+
+    def log(self, entity: str, *values: Any, **options: Any) -> None:
+        """Log below the path."""
+        self._recording.log(f"{self._path}/{entity}", *values, **options)
+
+    def send_columns(self, entity: str, indexes: Any, columns: Any) -> None:
+        """Send many rows below the path."""
+        self._recording.send_columns(f"{self._path}/{entity}", indexes, columns)
+
+    def send_chunks(self, chunks: Iterable[Chunk]) -> None:
+        """Send chunks below the path."""
+        self._recording.send_chunks(
+            chunk.with_entity_path(f"{self._path}/{chunk.entity_path.removeprefix('/')}") for chunk in chunks
+        )
+
+    def flush(self) -> None:
+        """Send pending data."""
+        self._recording.flush()
+
+
+def below(recording: rr.RecordingStream, path: str) -> rr.RecordingStream:
+    """Return a stream that logs below a path."""
+    return cast(rr.RecordingStream, SubtreeStream(recording, path))
+
+
+class PartBelow(RecordingPart):
+    """Part of a recording below a path.
+
+    Parameters
+    ----------
+    path : str
+    part : RecordingPart
+    """
+
+    def __init__(self, path: str, part: RecordingPart) -> None:
+        super().__init__(part.subject)
+        self._path, self._part = path, part
+
+    def begin(self, recording: rr.RecordingStream) -> None:
+        """Log what stays the same."""
+        self._part.begin(below(recording, self._path))
+
+    def write(self, recording: rr.RecordingStream, rows: Table) -> None:
+        """Log the rows of one chunk."""
+        self._part.write(below(recording, self._path), rows)
+
+
+def write_part(recording: rr.RecordingStream, table: Table, part: RecordingPart) -> None:
+    """Write a part of the recording of a table, in chunks."""
+    part.begin(recording)
+    for first in range(0, len(table), MOST_ROWS):
+        part.write(recording, table.rows(first, first + MOST_ROWS))
+
+
+class Line(NamedTuple):
+    """A line of a plot for some rows, and its style."""
+
+    label: str
+    values: Array
+    colour: theme.Colour
+    width: float = 1.5
+
+
+def send_lines(recording: rr.RecordingStream, entity: str, t_s: Array, *lines: Line) -> None:
+    """Send the lines of one entity; of rows that share a pixel, the lowest and the highest are drawn."""
     look = rr.SeriesLines(
-        names=[label],
-        colors=[colour],
-        widths=[width],
+        names=[line.label for line in lines],
+        colors=[line.colour for line in lines],
+        widths=[line.width for line in lines],
         aggregation_policy=rr.components.AggregationPolicy.MinMax,
     )
     recording.log(entity, look, static=True)
+    values = np.stack([line.values for line in lines], axis=1)
     for first in range(0, len(t_s), MOST_ROWS):
         rows = slice(first, first + MOST_ROWS)
-        recording.send_columns(entity, time_index(t_s[rows]), [scalars(values[rows], 1)])
+        recording.send_columns(entity, time_index(t_s[rows]), [scalars(values[rows], len(lines))])
 
 
 def style_point(recording: rr.RecordingStream, entity: str, label: str, colour: theme.Colour) -> None:
@@ -91,11 +162,13 @@ class Ghost(RecordingPart):
     ----------
     subject : RecordingSubject
     colour : Colour
+    angles : str
+        Signal of the hinge angles, rad.
     """
 
-    def __init__(self, subject: RecordingSubject, colour: theme.Colour) -> None:
+    def __init__(self, subject: RecordingSubject, colour: theme.Colour, angles: str = "q_rad") -> None:
         super().__init__(subject)
-        self._colour, self._frames = colour, Frames()
+        self._colour, self._angles, self._frames = colour, angles, Frames()
 
     def begin(self, recording: rr.RecordingStream) -> None:
         """Log the rotor's meshes."""
@@ -110,9 +183,9 @@ class Ghost(RecordingPart):
 
     def write(self, recording: rr.RecordingStream, rows: Table) -> None:
         """Record the ticks that fall on a frame."""
-        new = self._frames.of(rows)
+        new = self._frames.of(rows, self._angles)
         if len(new):
-            pose = rr.Transform3D.columns(quaternion=body_quaternions(rows["q_rad"][new])["rotor"])
+            pose = rr.Transform3D.columns(quaternion=body_quaternions(rows[self._angles][new])["rotor"])
             recording.send_columns(ROTOR, time_index(rows["t_s"][new]), pose)
 
 
@@ -152,8 +225,3 @@ class Tip(RecordingPart):
                 send_point(recording, f"{self._entity}/point", t_s, tips)
             send_path(recording, f"{self._entity}/path", t_s, tips, self._last)
             self._last = tips[-1:]
-
-
-def bodies(subject: RecordingSubject, colour: theme.Colour, *, ghost: bool) -> list[RecordingPart]:
-    """Return the bodies of a run: the whole actuator with its currents, or its rotor as a ghost."""
-    return [Ghost(subject, colour)] if ghost else [MovingActuator(subject), CoilCurrents(subject)]

@@ -3,21 +3,18 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, cast
 
 import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
-from rerun.chunk import Chunk
 from rerun.components import MarkerShape
 
 from spheretwin.models.base.files import whole_file
-from spheretwin.models.telemetry.table import Table
 from spheretwin.viz import theme
-from spheretwin.viz.comparison.ghosts import Array, Tip, bodies, send_line
+from spheretwin.viz.comparison.ghosts import Array, Ghost, Line, Tip, below, send_lines, write_part
 from spheretwin.viz.comparison.layout import (
     COMPARE,
     END,
@@ -36,43 +33,13 @@ from spheretwin.viz.layout.extents import labelled
 from spheretwin.viz.layout.styles import MIDDLE, THICK, THIN
 from spheretwin.viz.layout.view import SCENARIO
 from spheretwin.viz.quantities import Quantity, compared_quantities
+from spheretwin.viz.recording.currents import CoilCurrents
 from spheretwin.viz.recording.part import RecordingPart, RecordingSubject, drawable, scalars, time_index
-from spheretwin.viz.recording.recorder import MOST_ROWS, PIPE_PATHS, FilePipe
+from spheretwin.viz.recording.recorder import PIPE_PATHS, FilePipe
+from spheretwin.viz.recording.scene3d import MovingActuator
 from spheretwin.viz.recording.signals import Signals
 from spheretwin.viz.recording.status import StateChanges, StateLanes, log_lines
 from spheretwin.viz.scene.entities import size_of
-
-
-class SubtreeStream:
-    """Stream that logs everything below one path of a recording.
-
-    Parameters
-    ----------
-    recording : RecordingStream
-    path : str
-        Without a slash at its end.
-    """
-
-    def __init__(self, recording: rr.RecordingStream, path: str) -> None:
-        self._recording, self._path = recording, path
-
-    def log(self, entity: str, *values: Any, **options: Any) -> None:
-        """Log below the path."""
-        self._recording.log(f"{self._path}/{entity}", *values, **options)
-
-    def send_columns(self, entity: str, indexes: Any, columns: Any) -> None:
-        """Send many rows below the path."""
-        self._recording.send_columns(f"{self._path}/{entity}", indexes, columns)
-
-    def send_chunks(self, chunks: Iterable[Chunk]) -> None:
-        """Send chunks below the path."""
-        self._recording.send_chunks(
-            chunk.with_entity_path(f"{self._path}/{chunk.entity_path.removeprefix('/')}") for chunk in chunks
-        )
-
-    def flush(self) -> None:
-        """Send pending data."""
-        self._recording.flush()
 
 
 @contextmanager
@@ -162,27 +129,26 @@ def write(path: Path, runs: Sequence[ComparedRun], subjects: Sequence[RecordingS
         recording.log(RUNS, rr.TextDocument(text, media_type=rr.MediaType.MARKDOWN), static=True)
         _log_legend(recording, runs, colours)
         for place, (run, subject, colour) in enumerate(zip(runs, subjects, colours, strict=True)):
-            below = cast(rr.RecordingStream, SubtreeStream(recording, run.name))
-            parts = [
+            of_run = below(recording, run.name)
+            bodies = [Ghost(subject, colour)] if place else [MovingActuator(subject), CoilCurrents(subject)]
+            parts: list[RecordingPart] = [
                 Signals(subject),
-                *bodies(subject, colour, ghost=place > 0),
+                *bodies,
                 Tip(subject, TIP, "q_rad", f"{place + 1}", colour),
                 StateLanes(subject),
             ]
-            _write_run(below, run, parts)
+            _write_run(of_run, run, parts)
             for quantity, plot in zip(quantities, view.plots, strict=True):
                 values = quantity.column(run.rows)
                 width = THICK if quantity.desired else MIDDLE  # the reference is drawn over it
                 entity = f"{COMPARE}/{quantity.name}"
-                send_line(below, entity, run.label, run.table["t_s"], values, colour, width)
-                _send_marks(below, f"{MARKS}/{quantity.name}", run, values, colour, (place, len(runs)))
+                send_lines(of_run, entity, run.table["t_s"], Line(run.label, values, colour, width))
+                _send_marks(of_run, f"{MARKS}/{quantity.name}", run, values, colour, (place, len(runs)))
                 if run.early_end:
-                    _send_end(below, f"{END}/{quantity.name}", run, _visible(values, plot.limits), colour)
+                    _send_end(of_run, f"{END}/{quantity.name}", run, _visible(values, plot.limits), colour)
         for place in leading:
-            run, reference = runs[place], SubtreeStream(recording, f"{REFERENCE}/{runs[place].name}")
-            _write_reference(
-                cast(rr.RecordingStream, reference), run, subjects[place], quantities, alone=len(leading) == 1
-            )
+            run, reference = runs[place], below(recording, f"{REFERENCE}/{runs[place].name}")
+            _write_reference(reference, run, subjects[place], quantities, alone=len(leading) == 1)
     return path
 
 
@@ -191,7 +157,7 @@ def _write_run(recording: rr.RecordingStream, run: ComparedRun, parts: Sequence[
     recording.log(SCENARIO, rr.AnyValues(record=json.dumps(dict(run.record))), static=True)
     log_lines(recording, list(run.events))
     for part in parts:
-        _write_part(recording, run, part)
+        write_part(recording, run.table, part)
 
 
 def _write_reference(
@@ -204,18 +170,11 @@ def _write_reference(
 ) -> None:
     """Write the reference: lines, and the path of the tip."""
     colour, label = theme.DESIRED_TRACE, "reference" if alone else f"reference of {run.label}"
-    _write_part(recording, run, Tip(subject, TIP, "q_ref_rad", "", colour))
+    write_part(recording, run.table, Tip(subject, TIP, "q_ref_rad", "", colour))
     for quantity in quantities:
         if quantity.desired:
-            send_line(
-                recording,
-                quantity.name,
-                label,
-                run.table["t_s"],
-                quantity.desired(run.rows),
-                theme.COMMAND,
-                THIN,
-            )
+            line = Line(label, quantity.desired(run.rows), theme.COMMAND, THIN)
+            send_lines(recording, quantity.name, run.table["t_s"], line)
 
 
 def _plot(quantity: Quantity, of_quantity: PlotRange) -> Plot:
@@ -316,15 +275,3 @@ def _send_end(
         look = rr.SeriesPoints(names=[run.legend], colors=[colour], markers=["Cross"], marker_sizes=[6.0])
         recording.log(entity, look, static=True)
         recording.send_columns(entity, time_index(run.table["t_s"][finite]), [scalars(values[finite], 1)])
-
-
-def _write_part(recording: rr.RecordingStream, run: ComparedRun, part: RecordingPart) -> None:
-    part.begin(recording)
-    for rows in _chunks(run.table):
-        part.write(recording, rows)
-
-
-def _chunks(table: Table) -> Iterator[Table]:
-    """Rows as many as one chunk of a recording has."""
-    for first in range(0, len(table), MOST_ROWS):
-        yield table.rows(first, first + MOST_ROWS)

@@ -14,32 +14,28 @@ from spheretwin.models.telemetry.signals import Signal
 from spheretwin.models.telemetry.status import Level
 from spheretwin.models.telemetry.table import Table
 from spheretwin.viz import theme
+from spheretwin.viz.comparison.ghosts import Line, send_lines
 from spheretwin.viz.comparison.shadow_recording import (
-    BANDS,
     TEXT,
-    Line,
-    ShadowContent,
     layout,
-    plots_of,
-    send_lines,
-    settled_rows,
+    log_text,
+    parts_of_shadow,
     titles_of,
+    with_currents,
 )
-from spheretwin.viz.decimation import FirstRows
 from spheretwin.viz.layout.layout import blueprint
 from spheretwin.viz.layout.plots import following_axis
 from spheretwin.viz.layout.styles import MIDDLE, THIN
 from spheretwin.viz.layout.view import LIVE_WINDOW_S, application_of
-from spheretwin.viz.recording.live import TOGETHER_S, LivePage
+from spheretwin.viz.recording.live import LiveStream
 from spheretwin.viz.recording.part import RecordingSubject, drawable, time_index
-from spheretwin.viz.scene.entities import FRAME_RATE_Hz
 
 Array = NDArray[np.float64]
 
 WINDOWS, ALARMS = "watch/windows", "watch/alarms"
 
 
-class ShadowView:
+class ShadowView(LiveStream):
     """Live view of a shadow, with 60 rows a second, for any number of viewers.
 
     Parameters
@@ -62,29 +58,18 @@ class ShadowView:
     def __init__(
         self, subject: RecordingSubject, signals: Sequence[Signal], *, watched: bool = False
     ) -> None:
-        rr.set_strict_mode(True)  # otherwise a mistake is a warning, and its data are dropped
         subject, titles = replace(subject, live=True), titles_of(signals)
-        _ = subject.meshes  # a missing one is reported before there is a page
-        key = repr((subject.view, *titles, watched))
-        self._recording = rr.RecordingStream(application_of("spheretwin-shadow-live", key))
-        self._recording.set_log_time_enabled(False)
-        self._page = LivePage(self._recording)
-        self._frames = FirstRows(FRAME_RATE_Hz)
-        self._tables: list[Table] = []
-        self._currents: list[Array] = []
-        self._text = ""
         axis = following_axis(LIVE_WINDOW_S)
         below = _lane(axis) if watched else rrb.TextDocumentView(origin=f"/{TEXT}", name="verdict")
-        self._recording.send_blueprint(blueprint(layout(subject, titles, axis, below), live=True))
-        self._content = ShadowContent(self._recording, subject)
-        self._page.send()
+        self._text = ""
+        super().__init__(
+            subject,
+            parts_of_shadow(subject),
+            application_of("spheretwin-shadow-live", repr((subject.view, *titles, watched))),
+            blueprint(layout(subject, titles, axis, below), live=True),
+        )
 
-    @property
-    def address(self) -> str:
-        """Page to open in a browser."""
-        return self._page.address
-
-    def write(self, telemetry: Table, current_A: Array, text: str = "") -> None:
+    def show(self, telemetry: Table, current_A: Array, text: str = "") -> None:
         """Show the next rows, together with others of one second.
 
         Parameters
@@ -96,11 +81,14 @@ class ShadowView:
         text : str
             Verdict on all rows so far, in Markdown.
         """
-        self._tables.append(telemetry)
-        self._currents.append(current_A)
         self._text = text
-        if telemetry["t_s"][-1] - self._tables[0]["t_s"][0] >= TOGETHER_S:
-            self.flush()
+        self.write(with_currents(telemetry, current_A))
+
+    def send(self) -> None:
+        """Send viewers the data and the verdict."""
+        if self._text:
+            log_text(self.recording, self._text)
+        super().send()
 
     def judge(
         self, windows: Sequence[tuple[float, float, float]], alarms: Sequence[tuple[float, str]]
@@ -121,36 +109,13 @@ class ShadowView:
                 Line("largest sum over its threshold", evidence, theme.WARNING, MIDDLE),
                 Line("alarm", np.ones(len(t_s)), theme.FAILURE, THIN),
             ]
-            send_lines(self._recording, WINDOWS, t_s, lines)
+            send_lines(self.recording, WINDOWS, t_s, *lines)
         if alarms:
             times, texts = zip(*alarms, strict=True)
             columns = rr.TextLog.columns(
                 text=[drawable(text) for text in texts], level=[Level.WARN] * len(texts)
             )
-            self._recording.send_columns(ALARMS, time_index(np.array(times)), columns)
-
-    def close(self) -> None:
-        """Stop the server."""
-        self._page.close()
-
-    def flush(self) -> None:
-        """Show the rows that wait."""
-        if not self._tables:
-            return
-        rows = Table(self._tables[0].signals, np.vstack([table.values for table in self._tables]))
-        current_A = np.vstack(self._currents)
-        self._tables, self._currents = [], []
-        for name in BANDS:
-            if name in (signal.name for signal in rows.signals):
-                rows[name][~settled_rows(rows, name)] = np.nan
-        places = self._frames.first_places(rows["t_s"])
-        if len(places):
-            shown = Table(rows.signals, rows.values[places])
-            self._content.write(shown, current_A[places], plots_of(shown))
-        if self._text:
-            document = rr.TextDocument(drawable(self._text), media_type=rr.MediaType.MARKDOWN)
-            self._recording.log(TEXT, document, static=True)
-        self._page.send()
+            self.recording.send_columns(ALARMS, time_index(np.array(times)), columns)
 
 
 def _lane(axis: rrb.TimeAxis) -> rrb.Container:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import NamedTuple, cast
+from typing import NamedTuple
 
 import numpy as np
 import rerun as rr
@@ -14,16 +14,18 @@ from numpy.typing import NDArray
 from spheretwin.models.telemetry.signals import ANGLES, Signal
 from spheretwin.models.telemetry.table import Table
 from spheretwin.viz import theme
-from spheretwin.viz.comparison.ghosts import ROTOR, bodies
-from spheretwin.viz.comparison.merged_recording import SubtreeStream, recorded
+from spheretwin.viz.comparison.ghosts import ROTOR, Ghost, Line, PartBelow, send_lines, write_part
+from spheretwin.viz.comparison.merged_recording import recorded
+from spheretwin.viz.decimation import FirstRows
 from spheretwin.viz.layout.extents import labelled
 from spheretwin.viz.layout.layout import blueprint, eye
 from spheretwin.viz.layout.plots import time_axis
 from spheretwin.viz.layout.styles import MIDDLE, THICK, THIN
 from spheretwin.viz.layout.view import application_of
-from spheretwin.viz.recording.part import RecordingSubject, drawable, scalars, time_index
-from spheretwin.viz.recording.recorder import MOST_ROWS
-from spheretwin.viz.scene.entities import size_of
+from spheretwin.viz.recording.currents import CoilCurrents
+from spheretwin.viz.recording.part import RecordingPart, RecordingSubject, drawable
+from spheretwin.viz.recording.scene3d import MovingActuator
+from spheretwin.viz.scene.entities import FRAME_RATE_Hz, size_of
 from spheretwin.viz.scene.meshes import WORLD
 
 Array = NDArray[np.float64]
@@ -34,15 +36,6 @@ CONFIDENCE = 1.96
 """Standard deviations on each side of a 95 % band."""
 
 _FARTHEST = 8.0  # innovations beyond it are cut
-
-
-class Line(NamedTuple):
-    """A line of a plot for some rows, and its style."""
-
-    label: str
-    values: Array
-    colour: theme.Colour
-    width: float
 
 
 class Plot(NamedTuple):
@@ -72,49 +65,49 @@ TITLES = {
 
 def titles_of(signals: Sequence[Signal]) -> dict[str, str]:
     """Return the titles of the plots of a shadow with some signals."""
-    names = {signal.name for signal in signals}
-    return {name: title for name, title in TITLES.items() if name not in BANDS or name in names}
+    own = {ANGLE, INNOVATION, *_bands(signals)}
+    return {name: title for name, title in TITLES.items() if name in own}
 
 
-class ShadowContent:
-    """Content of the recording of a shadow: bodies and lines.
+class ShadowPlots(RecordingPart):
+    """Lines of the plots; of a live view the rows of every frame, without bands that are wide at first."""
 
-    Parameters
-    ----------
-    recording : RecordingStream
-    subject : RecordingSubject
-        Actuator and facts; its signals are not used.
-    """
+    def __init__(self, subject: RecordingSubject) -> None:
+        super().__init__(subject)
+        self._frames = FirstRows(FRAME_RATE_Hz)
 
-    def __init__(self, recording: rr.RecordingStream, subject: RecordingSubject) -> None:
-        self._recording = recording
-        self._bodies = [
-            (cast(rr.RecordingStream, SubtreeStream(recording, below)), part, angles)
-            for below, angles in ((MACHINE, "q_measured_rad"), (TWIN, "q_estimated_rad"))
-            for part in bodies(subject, theme.ESTIMATE, ghost=below == TWIN)
-        ]
-        for stream, part, _ in self._bodies:
-            part.begin(stream)
-
-    def write(self, telemetry: Table, current_A: Array, plots: Sequence[Plot]) -> None:
-        """Record rows of the telemetry, the currents (n, groups) in A, and the plots of the rows."""
-        for stream, part, angles in self._bodies:
-            part.write(stream, _motion(telemetry["t_s"], telemetry[angles], current_A))
-        for plot in plots:
-            send_lines(self._recording, f"{PLOTS}/{plot.name}", telemetry["t_s"], plot.lines)
+    def write(self, recording: rr.RecordingStream, rows: Table) -> None:
+        """Record the rows of a chunk."""
+        if self.subject.live:
+            places = self._frames.first_places(rows["t_s"])
+            shown = Table(rows.signals, rows.values[places])
+            for name in _bands(rows.signals):
+                shown[name][~settled_rows(rows, name)[places]] = np.nan
+            rows = shown
+        for plot in plots_of(rows) if len(rows) else ():
+            send_lines(recording, f"{PLOTS}/{plot.name}", rows["t_s"], *plot.lines)
 
 
-def send_lines(recording: rr.RecordingStream, entity: str, t_s: Array, lines: Sequence[Line]) -> None:
-    """Send some lines of one plot; of rows that share a pixel, the lowest and the highest are drawn."""
-    look = rr.SeriesLines(
-        names=[line.label for line in lines],
-        colors=[line.colour for line in lines],
-        widths=[line.width for line in lines],
-        aggregation_policy=rr.components.AggregationPolicy.MinMax,
-    )
-    recording.log(entity, look, static=True)
-    values = np.stack([line.values for line in lines], axis=1)
-    recording.send_columns(entity, time_index(t_s), [scalars(values, len(lines))])
+def parts_of_shadow(subject: RecordingSubject) -> list[RecordingPart]:
+    """Return the parts of the recording of a shadow: bodies, currents and plots."""
+    return [
+        PartBelow(MACHINE, MovingActuator(subject, "q_measured_rad")),
+        PartBelow(MACHINE, CoilCurrents(subject)),
+        PartBelow(TWIN, Ghost(subject, theme.ESTIMATE, "q_estimated_rad")),
+        ShadowPlots(subject),
+    ]
+
+
+def with_currents(telemetry: Table, current_A: Array) -> Table:
+    """Return the telemetry of a shadow with the currents (n, groups) of the log; NaN is 0."""
+    currents = Signal("current_A", "A", current_A.shape[1], "group currents")
+    values = np.hstack([telemetry.values, np.nan_to_num(current_A)])
+    return Table((*telemetry.signals, currents), values)
+
+
+def log_text(recording: rr.RecordingStream, text: str) -> None:
+    """Log the verdict, in Markdown."""
+    recording.log(TEXT, rr.TextDocument(drawable(text), media_type=rr.MediaType.MARKDOWN), static=True)
 
 
 def write(path: Path, telemetry: Table, current_A: Array, subject: RecordingSubject, text: str) -> None:
@@ -148,16 +141,16 @@ def write(path: Path, telemetry: Table, current_A: Array, subject: RecordingSubj
     views = layout(subject, titles, axis, text_view, limits)
     with recorded(path, application, blueprint(views)) as recording:
         recording.send_recording_name("shadow")
-        recording.log(TEXT, rr.TextDocument(drawable(text), media_type=rr.MediaType.MARKDOWN), static=True)
-        content = ShadowContent(recording, subject)
-        for first in range(0, len(telemetry), MOST_ROWS):
-            rows = slice(first, first + MOST_ROWS)
-            chunk = [plot._replace(lines=tuple(_part(line, rows) for line in plot.lines)) for plot in plots]
-            content.write(telemetry.rows(first, first + MOST_ROWS), current_A[rows], chunk)
+        log_text(recording, text)
+        table = with_currents(telemetry, current_A)
+        for part in parts_of_shadow(subject):
+            write_part(recording, table, part)
 
 
-def _part(line: Line, rows: slice) -> Line:
-    return line._replace(values=line.values[rows])
+def _bands(signals: Sequence[Signal]) -> list[str]:
+    """Return the signals with a band, among some."""
+    names = {signal.name for signal in signals}
+    return [name for name in BANDS if name in names]
 
 
 def plots_of(telemetry: Table) -> list[Plot]:
@@ -177,11 +170,10 @@ def plots_of(telemetry: Table) -> list[Plot]:
         Plot(ANGLE, (*before, *above), _range(measured)),
         Plot(INNOVATION, (*innovations, *limits), (-farthest, farthest)),
     ]
-    for name, (_, scale) in BANDS.items():
-        if name in (signal.name for signal in telemetry.signals):
-            lines = tuple(_band(telemetry, name, scale))
-            settled = settled_rows(telemetry, name)
-            plots.append(Plot(name, lines, _range(np.stack([line.values[settled] for line in lines]))))
+    for name in _bands(telemetry.signals):
+        lines = tuple(_band(telemetry, name, BANDS[name][1]))
+        settled = settled_rows(telemetry, name)
+        plots.append(Plot(name, lines, _range(np.stack([line.values[settled] for line in lines]))))
     return plots
 
 
@@ -208,16 +200,6 @@ def _band(telemetry: Table, name: str, scale: float) -> Iterator[Line]:
         yield Line(ANGLES[i], mean[:, i], colour, MIDDLE)
         yield Line(f"{ANGLES[i]} + 95 %", (mean + half)[:, i], colour, THIN)
         yield Line(f"{ANGLES[i]} − 95 %", (mean - half)[:, i], colour, THIN)
-
-
-def _motion(t_s: Array, q_rad: Array, current_A: Array) -> Table:
-    """Return the columns from which bodies and coils are drawn."""
-    signals = (
-        Signal("t_s", "s", 1, "time"),
-        Signal("q_rad", "rad", 3, "hinge angles", ANGLES),
-        Signal("current_A", "A", current_A.shape[1], "group currents"),
-    )
-    return Table(signals, np.hstack([t_s[:, None], q_rad, np.nan_to_num(current_A)]))
 
 
 def layout(

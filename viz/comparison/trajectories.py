@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from spheretwin.models.actuator import Actuator
 from spheretwin.models.telemetry.signals import ANGLES
 from spheretwin.viz import theme
-from spheretwin.viz.comparison.ghosts import send_line, send_path, send_point, style_path, style_point
+from spheretwin.viz.comparison.ghosts import Line, send_lines, send_path, send_point, style_path, style_point
 from spheretwin.viz.comparison.merged_recording import recorded
 from spheretwin.viz.layout.layout import blueprint
 from spheretwin.viz.layout.plots import time_axis, time_range
@@ -78,8 +78,9 @@ def _send_trajectory(
     t_s, error_mrad = trajectory.t_s, 1e3 * (trajectory.q_rad - trajectory.q_ref_rad)
     _send_tip(recording, label, t_s, shaft_tip(trajectory.q_rad, actuator), colour)
     for axis, angle in enumerate(ANGLES):
-        send_line(recording, f"error/{angle}/{_part(label)}", label, t_s, error_mrad[:, axis], colour)
-    send_line(recording, f"torque/{_part(label)}", label, t_s, trajectory.torque_Nm, colour)
+        line = Line(label, error_mrad[:, axis], colour)
+        send_lines(recording, f"error/{angle}/{_part(label)}", t_s, line)
+    send_lines(recording, f"torque/{_part(label)}", t_s, Line(label, trajectory.torque_Nm, colour))
 
 
 def _send_tip(

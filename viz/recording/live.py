@@ -5,21 +5,24 @@ from __future__ import annotations
 import urllib.parse
 from abc import ABC, abstractmethod
 from collections import deque
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from threading import Condition, Thread
+from uuid import uuid4
 
 import rerun as rr
+import rerun.blueprint as rrb
 
 from spheretwin.models.actuator import Actuator
 from spheretwin.models.base.errors import SpheretwinError
 from spheretwin.models.telemetry.run_record import RunFacts
 from spheretwin.models.telemetry.signals import Signal
-from spheretwin.viz.decimation import RowSelection
+from spheretwin.models.telemetry.table import Table
 from spheretwin.viz.layout.layout import opening_layout
-from spheretwin.viz.layout.view import LIVE_WINDOW_S, OVERVIEW
-from spheretwin.viz.recording.stream import Stream
+from spheretwin.viz.layout.view import LIVE_WINDOW_S, OVERVIEW, application
+from spheretwin.viz.recording.part import RecordingPart, RecordingSubject
+from spheretwin.viz.recording.stream import Stream, parts_of_run
 from spheretwin.viz.rerun_internals import HEADER_BYTES, HOST, INDEX, messages, read_assets
 
 # Kept for viewers that connect late; the oldest pieces are dropped first.
@@ -216,34 +219,53 @@ times as many it was 22 s late after half a minute, with these 2 s.
 """
 
 
-class LivePage:
-    """Page at 127.0.0.1 that shows a recording as it grows to any number of viewers.
+class LiveStream(Stream):
+    """Stream to a page at 127.0.0.1 that shows a recording as it grows to any number of viewers.
 
     Nobody waits for a viewer: viewers read a bounded buffer in memory, and one that is too far behind
     continues with the newest data. The page answers as soon as the object exists.
 
     Parameters
     ----------
-    recording : RecordingStream
-        New, without a destination.
+    subject, parts, application
+        As for `Stream`.
+    layout : Blueprint
 
     Raises
     ------
+    InputError
+        A mesh of the model cannot be read.
     SpheretwinError
         Rerun's viewer is not there.
     """
 
-    def __init__(self, recording: rr.RecordingStream) -> None:
-        self._recording = recording
-        self._bytes = rr.binary_stream(recording)
+    def __init__(
+        self,
+        subject: RecordingSubject,
+        parts: Sequence[RecordingPart],
+        application: str,
+        layout: rrb.Blueprint,
+    ) -> None:
+        super().__init__(subject, parts, application)
+        self._layout = layout
+        self._bytes = rr.binary_stream(self.recording)
         self._broadcast = Broadcast()
         self._begun = False
         self._server = ViewerServer(self._broadcast)
+        self.begin()
 
     @property
     def address(self) -> str:
         """Page to open in a browser."""
         return self._server.address
+
+    def connect(self) -> None:
+        """Send the layout before all else."""
+        self.recording.send_blueprint(self._layout)
+
+    def is_due(self, waiting: Sequence[Table]) -> bool:
+        """Return True if the waiting rows are recorded now: those of one second together."""
+        return bool(waiting[-1]["t_s"][-1] - waiting[0]["t_s"][0] >= TOGETHER_S)
 
     def send(self) -> None:
         """Send viewers the data recorded since the last call; the first call sends what each needs."""
@@ -254,20 +276,28 @@ class LivePage:
         elif piece := messages(encoded):
             self._broadcast.send(piece)
 
-    def close(self) -> None:
-        """Stop the server."""
+    def complete(self) -> None:
+        """Stop the server.
+
+        Raises
+        ------
+        SpheretwinError
+            Some of the view could not be made.
+        """
         self._broadcast.end()
         self._server.close()
-        self._recording.disconnect()
+        self.recording.disconnect()
+        if self.fault:
+            raise SpheretwinError(f"live view: {self.fault}")
 
 
-class LiveView(Stream):
+class LiveView(LiveStream):
     """Takes a run's telemetry chunk by chunk and shows it to any number of viewers.
 
     Parameters
     ----------
     actuator, signals, facts, shown, window_s
-        As for `Stream`.
+        As for `RecordingSubject`.
 
     Raises
     ------
@@ -286,36 +316,6 @@ class LiveView(Stream):
         shown: str = OVERVIEW,
         window_s: float = LIVE_WINDOW_S,
     ) -> None:
-        super().__init__(actuator, signals, facts, RowSelection(), live=True, shown=shown, window_s=window_s)
-        self._together = max(1, round(TOGETHER_S / facts.sections["controller"]["period_s"]))
-        self._page = LivePage(self.recording)
-        self.begin()
-
-    @property
-    def address(self) -> str:
-        """Page to open in a browser."""
-        return self._page.address
-
-    def connect(self) -> None:
-        """Send the layout before all else."""
-        self.recording.send_blueprint(opening_layout(self.view))
-
-    def due(self) -> int:
-        """Rows that are recorded together."""
-        return self._together
-
-    def send(self) -> None:
-        """Send viewers the data recorded since the last call."""
-        self._page.send()
-
-    def complete(self) -> None:
-        """Stop the server.
-
-        Raises
-        ------
-        SpheretwinError
-            Some of the view could not be made.
-        """
-        self._page.close()
-        if self.fault:
-            raise SpheretwinError(f"live view: {self.fault}")
+        subject = RecordingSubject(actuator, signals, facts, True, shown, uuid4().hex, window_s)
+        view = subject.view
+        super().__init__(subject, parts_of_run(subject), application(view), opening_layout(view))

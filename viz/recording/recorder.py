@@ -5,10 +5,12 @@ from __future__ import annotations
 import os
 import select
 import time
+from collections.abc import Sequence
 from contextlib import suppress
 from io import FileIO
 from pathlib import Path
 from threading import Lock, Thread
+from uuid import uuid4
 
 import rerun as rr
 
@@ -17,9 +19,11 @@ from spheretwin.models.base.errors import InputError, SpheretwinError, without_b
 from spheretwin.models.base.files import OPEN_FILES, OutputFile, PartialFile
 from spheretwin.models.telemetry.run_record import RunFacts
 from spheretwin.models.telemetry.signals import Signal
-from spheretwin.viz.decimation import FirstAndExtremeRows, RowSelection
-from spheretwin.viz.layout.view import OVERVIEW
-from spheretwin.viz.recording.stream import Stream
+from spheretwin.models.telemetry.table import Table
+from spheretwin.viz.decimation import FirstAndExtremeRows
+from spheretwin.viz.layout.view import OVERVIEW, application
+from spheretwin.viz.recording.part import RecordingSubject
+from spheretwin.viz.recording.stream import PATIENCE_s, Stream, parts_of_run
 
 PIPE_PATHS = Path("/dev/fd")
 """Folder in which a pipe has a path, by its number; Windows has none, and Rerun writes files itself."""
@@ -121,9 +125,6 @@ def _write_all(file: FileIO, block: bytes) -> None:
 # Each chunk of each entity costs some time and bytes, whatever its length. Chunks therefore grow.
 FEWEST_ROWS, MOST_ROWS = 1_500, 12_288
 
-# Time that an ending process waits for each step of the recording.
-PATIENCE_s = 2.0
-
 
 class Recorder(Stream):
     """Takes a run's telemetry chunk by chunk and writes it to a recording.
@@ -136,7 +137,7 @@ class Recorder(Stream):
     Parameters
     ----------
     actuator, signals, facts, shown, rate_Hz
-        As for `Stream`.
+        As for `RecordingSubject`.
     path : Path
         Recording to write.
 
@@ -156,8 +157,10 @@ class Recorder(Stream):
         shown: str = OVERVIEW,
         rate_Hz: float | None = None,
     ) -> None:
-        selection = FirstAndExtremeRows(rate_Hz) if rate_Hz else RowSelection()
-        super().__init__(actuator, signals, facts, selection, live=False, shown=shown, rate_Hz=rate_Hz)
+        run = uuid4().hex
+        subject = RecordingSubject(actuator, signals, facts, shown=shown, run=run, rate_Hz=rate_Hz)
+        selection = FirstAndExtremeRows(rate_Hz) if rate_Hz else None
+        super().__init__(subject, parts_of_run(subject), application(subject.view), selection)
         self._path = path
         self._output = OutputFile(path, ".rrd")
         self._pipe = _pipe_to(self._output) if PIPE_PATHS.is_dir() else None
@@ -178,9 +181,9 @@ class Recorder(Stream):
         sink = rr.FileSink((self._pipe or self._output).path)
         self.recording.set_sinks(sink)
 
-    def due(self) -> int:
-        """Rows that are recorded together: more as the recording grows."""
-        return min(max(FEWEST_ROWS, self.rows_handed_over // 4), MOST_ROWS)
+    def is_due(self, waiting: Sequence[Table]) -> bool:
+        """Return True if the waiting rows are recorded now: more together as the recording grows."""
+        return sum(map(len, waiting)) >= min(max(FEWEST_ROWS, self.rows_handed_over // 4), MOST_ROWS)
 
     def send(self) -> None:
         """Leave the recorded data to Rerun's threads, which encode them meanwhile."""

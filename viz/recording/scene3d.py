@@ -46,10 +46,10 @@ class Frames(FirstRows):
     def __init__(self, rate_Hz: float = FRAME_RATE_Hz) -> None:
         super().__init__(rate_Hz)
 
-    def of(self, rows: Table) -> NDArray[np.intp]:
-        """Return the places of the rows of a chunk that are drawn."""
+    def of(self, rows: Table, angles: str = "q_rad") -> NDArray[np.intp]:
+        """Return the places of the rows of a chunk that are drawn, at the hinge angles of a signal."""
         first = self.first_places(rows["t_s"])
-        return first[posed(rows["q_rad"][first])]
+        return first[posed(rows[angles][first])]
 
 
 def posed(q: NDArray[np.float64]) -> NDArray[np.bool_]:
@@ -59,11 +59,11 @@ def posed(q: NDArray[np.float64]) -> NDArray[np.bool_]:
 
 
 class MovingActuator(RecordingPart):
-    """Meshes, and the poses of every frame."""
+    """Meshes, and the poses of every frame, at the hinge angles of a signal."""
 
-    def __init__(self, subject: RecordingSubject) -> None:
+    def __init__(self, subject: RecordingSubject, angles: str = "q_rad") -> None:
         super().__init__(subject)
-        self._frames = Frames()
+        self._angles, self._frames = angles, Frames()
 
     def begin(self, recording: rr.RecordingStream) -> None:
         """Log the static parts."""
@@ -73,11 +73,11 @@ class MovingActuator(RecordingPart):
 
     def write(self, recording: rr.RecordingStream, rows: Table) -> None:
         """Record the ticks that fall on a frame."""
-        new = self._frames.of(rows)
+        new = self._frames.of(rows, self._angles)
         if not len(new):
             return
         index = time_index(rows["t_s"][new])
-        for body, quaternion in body_quaternions(rows["q_rad"][new]).items():
+        for body, quaternion in body_quaternions(rows[self._angles][new]).items():
             recording.send_columns(f"{WORLD}/{body}", index, rr.Transform3D.columns(quaternion=quaternion))
 
 

@@ -3,25 +3,20 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from threading import Lock, Semaphore
 from types import TracebackType
 from typing import Any
-from uuid import uuid4
 
 import numpy as np
 import rerun as rr
 
-from spheretwin.models.actuator import Actuator
 from spheretwin.models.base.errors import without_breaks
-from spheretwin.models.telemetry.run_record import RunFacts
-from spheretwin.models.telemetry.signals import Signal
 from spheretwin.models.telemetry.status import Event, Level, Status, named
 from spheretwin.models.telemetry.table import Table
 from spheretwin.viz.decimation import RowSelection
-from spheretwin.viz.layout.view import LIVE_WINDOW_S, application
 from spheretwin.viz.recording.currents import CoilCurrents, CurrentMap
 from spheretwin.viz.recording.part import RecordingPart, RecordingSubject, RowSet
 from spheretwin.viz.recording.plots import PhasePlane, PlotData
@@ -46,9 +41,17 @@ PARTS: tuple[type[RecordingPart], ...] = (
 )
 
 
+def parts_of_run(subject: RecordingSubject) -> list[RecordingPart]:
+    """Return the parts of a recording of a run, or of its live view."""
+    return [part(subject) for part in PARTS if part.in_live_view or not subject.live]
+
+
 # Chunks handed over and not yet recorded; beyond these a run waits for its recorder, so that a long one
 # does not gather in memory.
 PENDING_CHUNKS = 3
+
+PATIENCE_s = 2.0
+"""Time for which a process that ends waits for its recording."""
 
 
 class Stream(ABC):
@@ -59,27 +62,16 @@ class Stream(ABC):
 
     Parameters
     ----------
-    actuator : Actuator
-        Drawn; has as many groups as the telemetry has currents.
-    signals : tuple of Signal
-        Columns of the telemetry.
-    facts : RunFacts
-        For the text panel, the axes and the drawing.
-    row_selection : RowSelection
+    subject : RecordingSubject
+    parts : sequence of RecordingPart
+        Write the recording, in this order.
+    application : str
+        Application id: a viewer keeps one layout for each.
+    row_selection : RowSelection, optional
         Selects the rows for the parts that do not need all.
-    live : bool
-        True if it is a live view.
-    shown : str
-        The view that is open at first, one of `VIEWS`.
-    rate_Hz : float, optional
-        Rate of the rows that are kept besides the extremes; every row unless given.
-    window_s : float
-        Time before the cursor that the plots of a live view show.
 
     Attributes
     ----------
-    view : View
-        Properties of the run on which the layout depends.
     recording : rr.RecordingStream
         Recording that the parts write.
     fault : str or None
@@ -95,26 +87,18 @@ class Stream(ABC):
 
     def __init__(
         self,
-        actuator: Actuator,
-        signals: tuple[Signal, ...],
-        facts: RunFacts,
-        row_selection: RowSelection,
-        *,
-        live: bool,
-        shown: str,
-        rate_Hz: float | None = None,
-        window_s: float = LIVE_WINDOW_S,
+        subject: RecordingSubject,
+        parts: Sequence[RecordingPart],
+        application: str,
+        row_selection: RowSelection | None = None,
     ) -> None:
-        subject = RecordingSubject(actuator, signals, facts, live, shown, uuid4().hex, window_s, rate_Hz)
         rr.set_strict_mode(True)  # otherwise a mistake is a warning, and its data are dropped
         _ = subject.meshes  # a run needs none; a missing one is reported before there is a file
-        self.view = subject.view
-        self.recording = rr.RecordingStream(application(self.view))
+        self.recording = rr.RecordingStream(application)
         self.recording.set_log_time_enabled(False)  # simulated time is the only one that means anything
         self.fault: str | None = None
         self.rows_handed_over = 0
-        self._parts = [part(subject) for part in PARTS if part.in_live_view or not live]
-        self._row_selection = row_selection
+        self._parts, self._row_selection = parts, row_selection or RowSelection()
         self._waiting: list[Table] = []
         self._closed = False
         self._handing_over = Lock()
@@ -126,8 +110,8 @@ class Stream(ABC):
         """Set the destination of the recording, before any data."""
 
     @abstractmethod
-    def due(self) -> int:
-        """Rows that are recorded together."""
+    def is_due(self, waiting: Sequence[Table]) -> bool:
+        """Return True if the waiting rows are recorded now, together."""
 
     @abstractmethod
     def send(self) -> None:
@@ -158,7 +142,7 @@ class Stream(ABC):
         if self._waiting and rows.signals != self._waiting[-1].signals:
             self._hand_over()
         self._waiting.append(rows)
-        if sum(map(len, self._waiting)) >= self.due():
+        if self.is_due(self._waiting):
             self._hand_over()
 
     def note(self, t_s: float, text: str) -> None:
@@ -201,7 +185,7 @@ class Stream(ABC):
             self.rows_handed_over += sum(map(len, waiting))
             self._submit(self._write, waiting)
 
-    def flush(self, timeout_s: float) -> None:
+    def flush(self, timeout_s: float = PATIENCE_s) -> None:
         """Record the rows that wait. For a process that ends at once: any thread may call it."""
         with suppress(RuntimeError, TimeoutError):  # the worker is shut down, as all is recorded, or is slow
             self._hand_over()

@@ -14,7 +14,7 @@ from spheretwin.machine.twin_file import read_uncertainty
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.telemetry.table import read_parquet
 from spheretwin.scenario.writing import command_words
-from spheretwin.viz.recording.live import LivePage
+from spheretwin.viz.recording.live import LiveStream
 from tests.twin.cli.calls import call, refusal, succeeded
 from tests.twin.machine.machine_logs import KNOWN, SCENARIO, changing_log
 from tests.viz.recording.panels import columns, series
@@ -185,13 +185,13 @@ def test_a_stream_that_the_twin_does_not_explain_warns_before_its_first_alarm(mo
 @pytest.fixture
 def pages(monkeypatch):
     """What viewers of live pages get that were open from the start, by the order of the pages."""
-    readers, close = [], LivePage.close
+    readers, close = [], LiveStream.close
 
     def read_and_close(page):
         readers.append(page._broadcast.read())
         close(page)
 
-    monkeypatch.setattr(LivePage, "close", read_and_close)
+    monkeypatch.setattr(LiveStream, "close", read_and_close)
     return readers
 
 

@@ -4,8 +4,8 @@ import numpy as np
 import pyarrow as pa
 import pytest
 
-from spheretwin.viz.comparison import ghosts, merged_recording
-from tests.viz.comparison.compared import SIGNALS, T_s, run_of
+from spheretwin.viz.comparison import ghosts
+from tests.viz.comparison.compared import SIGNALS, T_s
 
 
 class Sent:
@@ -28,15 +28,7 @@ class Sent:
 def test_every_tick_is_sent_once(monkeypatch, name, rows):
     monkeypatch.setattr(ghosts, "MOST_ROWS", 1000)
     sent, values = Sent(), SIGNALS[name][:rows]
-    ghosts.send_line(sent, "run/compare/x", "1 run", T_s[:rows], values, (1, 2, 3))
+    ghosts.send_lines(sent, "run/compare/x", T_s[:rows], ghosts.Line("1 run", values, (1, 2, 3)))
     assert [len(t_ns) for t_ns, _ in sent.rows] == [1000] * (rows // 1000) + [rows % 1000] * (rows % 1000 > 0)
     np.testing.assert_array_equal(np.concatenate([t_ns for t_ns, _ in sent.rows]), np.round(T_s[:rows] * 1e9))
     np.testing.assert_array_equal(np.concatenate([drawn for _, drawn in sent.rows]), values)
-
-
-@pytest.mark.parametrize("rows", [1, 999, 1000, 1001, 4000])
-def test_chunks_of_a_table_have_every_row_once(monkeypatch, rows):
-    monkeypatch.setattr(merged_recording, "MOST_ROWS", 1000)
-    table = run_of(T_s[:rows]).table
-    chunks = list(merged_recording._chunks(table))
-    np.testing.assert_array_equal(np.concatenate([chunk.values for chunk in chunks]), table.values)

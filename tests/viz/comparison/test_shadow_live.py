@@ -32,7 +32,7 @@ def received(log, folder, *, watched):
     viewers = []
 
     def show(block, telemetry, verdict):
-        view.write(telemetry, block.current_A, verdict.markdown(block))
+        view.show(telemetry, block.current_A, verdict.markdown(block))
         if watched:
             view.judge([(float(block.t_s[-1]), 1.1, 0.2)], [(float(block.t_s[0]), "torque_scale -0.03")])
         viewers[:] = viewers or [urllib.request.urlopen(view.address.rstrip("/") + RECORDING)]
