@@ -71,11 +71,11 @@ def write_fmu(
         model = _with_derivatives(model)
     compilers = _compilers(fmi, targets)
     identifier = "spheretwin_" + re.sub(r"[^A-Za-z0-9]", "_", model.name)
-    files, names = plant_files(model), (f"fmi{fmi}.c", "st_fmu.c", *PLANT_SOURCES)
+    files, names = plant_files(model), ("fmi.c", "st_fmu.c", *PLANT_SOURCES)
     files |= {name: source(name) for name in (*names, "st_fmu.h")}
     unsigned = model_description(model, fmi, kind, identifier, "", names)
     token = sha256("".join([unsigned, *files.values()]).encode()).hexdigest()[:32]
-    files["st_fmu_token.h"] = header([f'#define ST_TOKEN "{token}"'])
+    files["st_fmu_token.h"] = header([f"#define ST_FMI {fmi}", f'#define ST_TOKEN "{token}"'])
     contents: dict[str, str | bytes] = {
         "modelDescription.xml": model_description(model, fmi, kind, identifier, token, names),
         **{f"sources/{name}": text for name, text in files.items()},

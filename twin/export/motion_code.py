@@ -40,6 +40,7 @@ class Term:
         True for a symbol of the type ``ST_NUMBER``, whatever ``T`` is.
     """
 
+    is_real: bool
     __array_ufunc__ = None  # an operation with a number of NumPy is one of this class
 
     def __init__(self, operator: str, operands: tuple[Any, ...] = (), is_real: bool = False) -> None:
@@ -121,9 +122,13 @@ def _filled(function: Callable[..., Any], *arguments: Any, results: int = 1) -> 
     return vectors if results > 1 else vectors[0]
 
 
+def _members(pointer: str, kind: Any) -> Any:
+    """Return a tuple of a kind with the members of a structure."""
+    return kind(*(Term(f"{pointer}->{name}") for name in kind._fields))
+
+
 Q, V, TORQUE, J = _vector("q"), _vector("v"), _vector("torque"), _vector("J", is_real=True)
-AT = Turns(*(Term(f"at->{name}") for name in Turns._fields))
-MASS_MATRIX = InertiaEntries(*(Term(f"M->{name}") for name in InertiaEntries._fields))
+AT, MASS_MATRIX = _members("at", Turns), _members("M", InertiaEntries)
 
 
 def _entries(name: str, vector: Iterable[Any]) -> Outputs:

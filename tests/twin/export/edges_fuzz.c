@@ -6,7 +6,7 @@
  * A coverage-guided fuzzer calls LLVMFuzzerTestOneInput: `make fuzz`. With ST_DRAWS the program has its own main:
  * `edges_fuzz SEED DRAWS` makes inputs from a seed, `edges_fuzz FILE...` repeats inputs.
  */
-#include "fmi3.c"
+#include "fmi.c"
 
 #include <math.h>
 #include <stdio.h>

@@ -1,5 +1,5 @@
 /* Every function that a tool calls, for the sanitizers: both kinds, saved states, directional derivatives. */
-#include "fmi3.c"
+#include "fmi.c"
 
 #include <stdio.h>
 

@@ -27,9 +27,9 @@ EVERY_PART = {
 def write_target(folder, changes, inputs="currents"):
     """Write the fuzz target for the plant and the control tick of changes."""
     write_c(folder, plant_code("nutation", changes, inputs), controller_code("nutation", changes))
-    for name in ("st_fmu.h", "st_fmu.c", "fmi3.c"):
+    for name in ("st_fmu.h", "st_fmu.c", "fmi.c"):
         (folder / name).write_text(source(name))
-    (folder / "st_fmu_token.h").write_text(header(['#define ST_TOKEN "fuzz"']))
+    (folder / "st_fmu_token.h").write_text(header(["#define ST_FMI 3", '#define ST_TOKEN "fuzz"']))
     shutil.copy(Path(__file__).with_name("edges_fuzz.c"), folder)
 
 
