@@ -30,12 +30,16 @@ class _Outside:
     """Context in which other threads may have the turn of this thread; without a turn it does nothing."""
 
     def __enter__(self) -> None:
-        if getattr(_THREAD, "has_turn", False):
+        had_turn = getattr(_THREAD, "has_turn", False)
+        _THREAD.outer_turns = [*getattr(_THREAD, "outer_turns", ()), had_turn]
+        if had_turn:
+            _THREAD.has_turn = False
             _TURN.release()
 
     def __exit__(self, *_: object) -> None:
-        if getattr(_THREAD, "has_turn", False):
+        if _THREAD.outer_turns.pop():
             _TURN.acquire()
+            _THREAD.has_turn = True
 
 
 outside_turn = _Outside()

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import PlainValidator
 
 from spheretwin.models.telemetry.status import Status
 from spheretwin.run import Run
@@ -15,11 +16,14 @@ from spheretwin.viz.pages.markdown import Drawing, Table
 if TYPE_CHECKING:
     from spheretwin.viz.comparison.trajectories import LawTrajectory
 
-Array = NDArray[np.float64]
+Array = Annotated[NDArray[np.float64], PlainValidator(lambda numbers: np.array(numbers, np.float64))]
 
 
 SEEDS = 20
 """Runs of a case, unless it has more or the command states their number."""
+
+
+STATUSES = {str(status): status for status in Status}
 
 
 class Case(NamedTuple):

@@ -10,8 +10,16 @@ from importlib import resources
 from itertools import product
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from spheretwin.models.telemetry.status import Status
-from spheretwin.paper.experiment import SEEDS, Case, Experiment, Outcome, Outcomes, ResultTable, Section
+from spheretwin.paper.experiment import (
+    SEEDS,
+    STATUSES,
+    Case,
+    Experiment,
+    Outcome,
+    Outcomes,
+    ResultTable,
+    Section,
+)
 from spheretwin.paper.laws import COMPARED_LAWS, printed_rad
 from spheretwin.viz.pages.markdown import Drawing
 
@@ -19,8 +27,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 FOLDER = resources.files("spheretwin.paper")
-
-STATUSES = {str(status): status for status in Status}
 
 T = TypeVar("T")
 

@@ -262,9 +262,10 @@ def statuses_text(outcomes: Sequence[Outcome]) -> str:
 
 def padded(arrays: Sequence[Array]) -> Array:
     """Stack arrays (n, k) of runs to (runs, longest n, k); NaN after the end of a run that ended early."""
-    stacked = np.full((len(arrays), max(map(len, arrays)), arrays[0].shape[1]), np.nan)
+    longest = max(arrays, key=len)
+    stacked = np.full((len(arrays), *longest.shape), np.nan)
     for run, array in zip(stacked, arrays, strict=True):
-        run[: len(array)] = array
+        run[: len(array)] = array.reshape(len(array), *longest.shape[1:])
     return stacked
 
 

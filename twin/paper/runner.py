@@ -7,39 +7,40 @@ import json
 import shlex
 import zlib
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import closing
+from contextlib import closing, suppress
 from functools import cache
 from itertools import islice
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, get_type_hints
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import TypeAdapter
 
-from spheretwin import scenario as scenarios
 from spheretwin.models import mjcf
 from spheretwin.models.actuator import MJCF_PATH, TORQUE_CURVE_PATH
-from spheretwin.models.base.errors import InputError
+from spheretwin.models.base.cache import cache_folder
+from spheretwin.models.base.errors import InputError, SpheretwinError
 from spheretwin.models.telemetry.run_record import versions
 from spheretwin.models.telemetry.status import Status
-from spheretwin.paper.experiment import Case, Experiment, Outcome, Outcomes
-from spheretwin.paper.outcome_cache import OutcomeCache
+from spheretwin.paper.experiment import STATUSES, Case, Experiment, Outcome, Outcomes
 from spheretwin.provenance import digest
-from spheretwin.run import Run, figures_of
-from spheretwin.scenario.changes import complete_fields
-from spheretwin.scenario.files import FilesCache
+from spheretwin.run import Run, UserMetric
 from spheretwin.scenario.reading import named_files
 from spheretwin.scenario.sections import Scenario
 from spheretwin.scenario.writing import command_words
-from spheretwin.session import Session
-from spheretwin.simulation import run_session
 from spheretwin.study.agreement import Ending, compare
 from spheretwin.study.engines.threads import run_each
-from spheretwin.study.study import FULL, fast_engine
-from spheretwin.study.template import Template, are_numbers, template_of
+from spheretwin.study.grid import Row
+from spheretwin.study.journal import Journal
+from spheretwin.study.row import Result, Rows
+from spheretwin.study.study import FULL, Study
 
 Array = NDArray[np.float64]
 
 PLANT = "plant.engine"
+
+MOST_RUNS = 1_000_000
+"""Largest number of runs of an experiment that are cached."""
 
 EVERY = 100
 """In addition to the first run of each law, one run in this many runs on MuJoCo too."""
@@ -116,6 +117,26 @@ def plant_of(case: Case, default: str | None) -> str | None:
     return plant
 
 
+MEASURED, DATA = "measured_max_abs_error_rad", "data"
+"""Figures of a run in addition to the metrics."""
+
+
+def figures_of(experiment: Experiment) -> Mapping[str, UserMetric]:
+    """Return the functions of a run by the names of their figures, in addition to the metrics."""
+    return {MEASURED: measured_max_abs_error, DATA: experiment.reduce}
+
+
+@cache
+def rows_of(experiment: Experiment | None, scenario: str) -> Rows:
+    """Return what runs the rows of an experiment that have a scenario."""
+    own = figures_of(experiment) if experiment else {}
+    return Rows(Study(name="reproduce", scenario=scenario), own=own)
+
+
+def _row(case: Case, seed: int) -> Row:
+    return Row(seed, f"{case.name} {seed}", seed, case.fields_of(seed), None, seed)
+
+
 def scenario_of(case: Case, default: str | None, seed: int = 0) -> Scenario:
     """Scenario of a run.
 
@@ -131,12 +152,11 @@ def scenario_of(case: Case, default: str | None, seed: int = 0) -> Scenario:
     InputError
         Its fields make no scenario.
     """
-    fields = {**case.fields_of(seed), "seed": seed}
-    plant = plant_of(case, default)
-    if plant is None:
-        section = scenarios.load(case.scenario, fields).plant
-        plant = fast_engine(section.mjcf, section.integrator)
-    return scenarios.load(case.scenario, {**fields, PLANT: plant})
+    return rows_of(None, case.scenario).scenario(_row(case, seed), _engine(case, default))
+
+
+def _engine(case: Case, default: str | None) -> str | None:
+    return None if PLANT in case.fields else default
 
 
 def command_line(case: Case, plant: str, seed: int = 0) -> str:
@@ -204,20 +224,62 @@ class PlanResult(NamedTuple):
     """Differences of the sample that ran on both plants."""
 
 
+class EarlierRuns:
+    """Results of earlier runs of a plan, in a journal of the cache folder.
+
+    Nothing is kept if there is no such folder, or if another process writes the journal.
+
+    Parameters
+    ----------
+    plan : Plan
+    summaries : mapping
+        `summarise` of the plan.
+    """
+
+    def __init__(self, plan: Plan, summaries: Mapping[str, CaseSummary]) -> None:
+        self._summaries, self._results = summaries, dict[str, Result]()
+        self._journal: Journal | None = None
+        if folder := cache_folder():
+            with suppress(SpheretwinError):
+                self._journal = Journal(folder / f"reproduce_{plan.experiment.name}.jsonl", "", MOST_RUNS)
+                self._results = {key: Result(*rest) for _, (key, *rest) in self._journal.records()}
+
+    def __enter__(self) -> EarlierRuns:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        if self._journal:
+            self._journal.close()
+
+    def find(self, job: Job) -> Result | None:
+        """Result of an earlier run; None if there is none."""
+        return self._results.get(self._key(job))
+
+    def add(self, job: Job, result: Result) -> None:
+        """Store a result if the journal can be written."""
+        self._results[self._key(job)] = result
+        if self._journal and self._journal.done() < MOST_RUNS:
+            with suppress(SpheretwinError):  # a full disk
+                self._journal.append(self._journal.done(), [self._key(job), *result])
+
+    def _key(self, job: Job) -> str:
+        return f"{self._summaries[job.case.name].key} {job.plant} {job.seed}"
+
+
 def run_with_cache(
     plan: Plan, summaries: Mapping[str, CaseSummary], done: Callable[[str], None]
 ) -> PlanResult:
     """Run a plan and its sample; runs in the cache are not run again."""
-    cache = OutcomeCache(plan, summaries)
-    outcomes = run_plan(plan, done, cache=cache)
-    return PlanResult(plan, summaries, outcomes, compare_plants(plan, outcomes, done, cache))
+    with EarlierRuns(plan, summaries) as earlier:
+        outcomes = run_plan(plan, done, earlier=earlier)
+        return PlanResult(plan, summaries, outcomes, compare_plants(plan, outcomes, done, earlier))
 
 
 def run_plan(
     plan: Plan,
     done: Callable[[str], None] = lambda case: None,
     threads: int | None = None,
-    cache: OutcomeCache | None = None,
+    earlier: EarlierRuns | None = None,
 ) -> Outcomes:
     """Run every case of a plan with every seed.
 
@@ -228,22 +290,22 @@ def run_plan(
         Receives the name of the case after each run.
     threads : int, optional
         Number of cores unless given.
-    cache : OutcomeCache, optional
-        Earlier runs, which are not run again.
+    earlier : EarlierRuns, optional
+        Their results are not computed again.
 
     Raises
     ------
-    InputError
-        A case cannot be run.
+    SpheretwinError
+        A case cannot be run, or a reduction failed.
     """
-    return plan.by_case(_run(plan, plan.jobs, done, threads, cache))
+    return plan.by_case(_run(plan, plan.jobs, done, threads, earlier))
 
 
 def compare_plants(
     plan: Plan,
     outcomes: Outcomes,
     done: Callable[[str], None] = lambda case: None,
-    cache: OutcomeCache | None = None,
+    earlier: EarlierRuns | None = None,
 ) -> list[float]:
     """Run the sample of a plan on MuJoCo and compare it with the runs on the Lagrangian.
 
@@ -257,7 +319,7 @@ def compare_plants(
     SpheretwinError
         A run differs between the plants.
     """
-    on_mujoco = _run(plan, plan.sample, done, None, cache)
+    on_mujoco = _run(plan, plan.sample, done, None, earlier)
     return [
         compare(
             f"reproduce {plan.experiment.name}: expected {job.name}",
@@ -274,63 +336,41 @@ def _run(
     jobs: Sequence[Job],
     done: Callable[[str], None],
     threads: int | None,
-    cache: OutcomeCache | None,
+    earlier: EarlierRuns | None,
 ) -> list[Outcome]:
     """Return outcomes in the order of the jobs."""
-    outcomes = {i: outcome for i, job in enumerate(jobs) if cache and (outcome := cache.find(job))}
-    for i in outcomes:
+    experiment = plan.experiment
+    results = {i: result for i, job in enumerate(jobs) if earlier and (result := earlier.find(job))}
+    for i in results:
         done(jobs[i].case.name)
-    missing = [i for i in range(len(jobs)) if i not in outcomes]
-    runs = _Runs()
+    missing = [i for i in range(len(jobs)) if i not in results]
 
-    def work(i: int) -> Outcome:
-        return _outcome(plan.experiment, runs.run(jobs[i]))
+    def work(i: int) -> Result:
+        case, plant, seed = jobs[i]
+        return rows_of(experiment, case.scenario).run(_row(case, seed), _engine(case, plant))
 
-    try:
-        with closing(run_each(missing, work, threads)) as results:
-            for i, outcome in results:
-                outcomes[i] = outcome
-                if cache:
-                    cache.add(jobs[i], outcome)
-                done(jobs[i].case.name)
-    finally:
-        if cache:
-            cache.save()
-    return [outcomes[i] for i in range(len(jobs))]
+    with closing(run_each(missing, work, threads)) as running:
+        for i, result in running:
+            if result.error is not None:
+                raise InputError(f"reproduce {experiment.name}, {jobs[i].name}: {result.error}")
+            results[i] = result
+            if earlier:
+                earlier.add(jobs[i], result)
+            done(jobs[i].case.name)
+    return [outcome_of(experiment, results[i]) for i in range(len(jobs))]
 
 
-class _Runs:
-    """Runs of jobs, which read each file once; those of a case differ in numbers alone."""
-
-    def __init__(self) -> None:
-        self._files = FilesCache()
-        self._templates: dict[tuple[str, str | None], Template | None] = {}
-
-    def run(self, job: Job) -> Run:
-        """Run a job."""
-        scenario = self._scenario(job)
-        with Session(scenario, files=self._files.files_of(scenario)) as session:
-            return run_session(session)
-
-    def _scenario(self, job: Job) -> Scenario:
-        case, numbers = job.case, {"seed": job.seed, **job.case.seeded_fields(job.seed)}
-        if case.single_run or not case.is_random or not are_numbers(numbers.values()):
-            return scenario_of(case, job.plant, job.seed)
-        shape = case.name, job.plant
-        if shape not in self._templates:
-            engine = scenario_of(case, job.plant, job.seed).plant.engine
-            fields = complete_fields(case.scenario, {**case.fields, **numbers, PLANT: engine})
-            self._templates[shape] = template_of(fields, tuple(numbers), case.scenario)
-        template = self._templates[shape]
-        if template is None:
-            return scenario_of(case, job.plant, job.seed)
-        return template.scenario(tuple(numbers.values()))
+def outcome_of(experiment: Experiment, result: Result) -> Outcome:
+    """Outcome of a run from its result in JSON types."""
+    figures = dict(result.figures)
+    measured = np.array(figures.pop(MEASURED), np.float64)
+    data = _data_type(experiment.reduce).validate_python(figures.pop(DATA))
+    return Outcome(STATUSES[result.status], figures, measured, data)
 
 
-def _outcome(experiment: Experiment, run: Run) -> Outcome:
-    error = np.abs(measured_error(run))
-    largest = error.max(axis=0) if len(error) else np.full(3, np.nan)
-    return Outcome(run.status, figures_of(run), largest, experiment.reduce(run))
+@cache
+def _data_type(reduce: Callable[[Run], Any]) -> TypeAdapter[Any]:
+    return TypeAdapter(get_type_hints(reduce, include_extras=True).get("return", Any))
 
 
 def _ending(outcome: Outcome) -> Ending:
@@ -345,6 +385,12 @@ def unexpected_ends(plan: Plan, outcomes: Outcomes) -> list[str]:
 
 def _unexpected(case: Case, outcomes: Sequence[Outcome]) -> list[Status]:
     return sorted({outcome.status for outcome in outcomes} - set(case.expected_statuses))
+
+
+def measured_max_abs_error(run: Run) -> Array:
+    """Largest error from the sensors, (3,) in rad; NaN if the run ended before its first tick was over."""
+    error = np.abs(measured_error(run))
+    return error.max(axis=0) if len(error) else np.full(3, np.nan)
 
 
 def measured_error(run: Run) -> Array:

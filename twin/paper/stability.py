@@ -10,7 +10,7 @@ import numpy as np
 from spheretwin import scenario as scenarios
 from spheretwin.models.telemetry.table import Table
 from spheretwin.paper import frequency_response as responses
-from spheretwin.paper.experiment import Case, Finding, Outcome, Outcomes, ResultTable, Section
+from spheretwin.paper.experiment import Array, Case, Finding, Outcome, Outcomes, ResultTable, Section
 from spheretwin.paper.experiment_file import CaseRuns, Cells, ExperimentFile, column, table
 from spheretwin.paper.laws import BY_LAW
 from spheretwin.paper.lyapunov import Descent, descent
@@ -61,15 +61,16 @@ class StabilityMeasures(NamedTuple):
     gains: tuple[float, float] | None
     """Largest ξ̂ and ζ̂ at the end; None for laws without them."""
     descent: Descent | None
-    response: responses.Response | None = None
-    """Measured response of the opened loop; None for runs without the multisine."""
+    response: Array | None = None
+    """Measured response of the opened loop, real and imaginary; None for runs without the multisine."""
 
 
 def reduce(run: Run) -> StabilityMeasures:
     """Reduce a run."""
     table, period_s = run.telemetry, run.scenario.controller.period_s
     if run.scenario.name == "hold":
-        return StabilityMeasures(None, None, None, None, None, responses.measured(table, period_s))
+        response = responses.measured(table, period_s)
+        return StabilityMeasures(None, None, None, None, None, np.stack([response.real, response.imag]))
     ticks = round(SPAN_s / period_s)
     is_long = run.scenario.duration >= LONG_s and len(table) >= 2 * ticks
     surface = SLOPE * table["error_rad"] + table["qdot_rad_s"] - table["qdot_ref_rad_s"]
@@ -139,7 +140,7 @@ def _response_section(items: Sequence[CaseRuns]) -> list[Section]:
     """Section of the frequency responses, if they were run."""
     if not items:
         return []
-    by_law = {item["law"]: (item.runs[0].data.response, _linear(item.case)) for item in items}
+    by_law = {item["law"]: (_measured(item), _linear(item.case)) for item in items}
     rows = [
         (BY_LAW[law].label, source, *_response_cells(responses.margins(responses.LINES_Hz, response)))
         for law, both in by_law.items()
@@ -150,6 +151,12 @@ def _response_section(items: Sequence[CaseRuns]) -> list[Section]:
     values: dict[str, Any] = {"lines": len(responses.LINES_Hz), "amplitude_mNm": 1e3 * responses.AMPLITUDE_Nm}
     values |= {"first": responses.LINES_Hz[0], "last": responses.LINES_Hz[-1]}
     return [FILE.section("response", [margins], [lambda: _bode(by_law)], **values)]
+
+
+def _measured(item: CaseRuns) -> responses.Response:
+    real, imaginary = item.runs[0].data.response
+    response: responses.Response = real + 1j * imaginary
+    return response
 
 
 def _linear(case: Case) -> responses.Response:

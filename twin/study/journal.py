@@ -146,6 +146,10 @@ class Journal:
         return self
 
     def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Close the file, for another process to continue it."""
         self._file.close()
 
     def done(self, below: int | None = None) -> int:

@@ -24,7 +24,7 @@ from spheretwin.models.telemetry.parquet import TelemetryFile
 from spheretwin.models.telemetry.table import TelemetryBuffer
 from spheretwin.provenance import record_of
 from spheretwin.reduction import PlannedRun
-from spheretwin.run import Figures, Run, load_metrics, own_values
+from spheretwin.run import Figures, Run, UserMetric, load_metrics, own_values
 from spheretwin.scenario import reading
 from spheretwin.scenario.changes import check_events, fields_with, is_tag
 from spheretwin.scenario.fields import INDEX, every_field, flat, new_name, without_indices
@@ -36,9 +36,12 @@ from spheretwin.simulation import Sink, follow
 from spheretwin.study.axes import Axis, DrawnAxis
 from spheretwin.study.grid import Row
 from spheretwin.study.study import Study, fast_engine
-from spheretwin.study.template import Template, are_numbers, template_of
+from spheretwin.study.template import Template, is_number, template_of
 
 ENGINE = "plant.engine"
+
+MOST_TEMPLATES = 512
+"""Largest number of templates in memory: rows of one shape follow each other."""
 
 REFUSED = "refused"
 """Status of a row whose values make no scenario."""
@@ -64,6 +67,8 @@ class Rows:
     study : Study
     telemetry : Path, optional
         Folder for the telemetry of chosen rows.
+    own : mapping of callable, optional
+        Functions of a run by the names of their figures, instead of those that the study names.
 
     Raises
     ------
@@ -71,7 +76,9 @@ class Rows:
         The scenario cannot be read, an axis names no field, or a user metric cannot be loaded.
     """
 
-    def __init__(self, study: Study, telemetry: Path | None = None) -> None:
+    def __init__(
+        self, study: Study, telemetry: Path | None = None, own: Mapping[str, UserMetric] | None = None
+    ) -> None:
         self.study = study
         self._telemetry = telemetry
         self._files = FilesCache()
@@ -85,7 +92,7 @@ class Rows:
         self._check_axes()
         self.metrics = tuple(METRICS) if not study.metrics else tuple(chosen)
         self._references = [study.path(name) for name in study.metrics if is_reference(name)]
-        self._own = load_metrics(self._references)
+        self._own = load_metrics(self._references) if own is None else own
         self.chooses_plant = study.fast and not self._names_engine()
 
     @property
@@ -107,14 +114,16 @@ class Rows:
         InputError
             Its values are out of range, or do not fit each other.
         """
-        if not are_numbers(row.values.values()):
-            return self._validated(self._fields_of(row, engine))
-        shape = json.dumps(row.law), tuple(row.values), engine
+        numbers = {name: value for name, value in row.values.items() if is_number(value)}
+        others = {name: value for name, value in row.values.items() if name not in numbers}
+        shape = json.dumps([row.law, others]), tuple(numbers), engine
         if shape not in self._templates:
+            if len(self._templates) >= MOST_TEMPLATES:
+                self._templates.clear()
             fields = self._whole(self._fields_of(row, engine))
-            self._templates[shape] = template_of(fields, ("seed", *row.values), self.study.scenario)
+            self._templates[shape] = template_of(fields, ("seed", *numbers), self.study.scenario)
         if template := self._templates[shape]:
-            return template.scenario((row.seed, *row.values.values()))
+            return template.scenario((row.seed, *numbers.values()))
         return self._validated(self._fields_of(row, engine))
 
     def run(self, row: Row, engine: str | None = None) -> Result:
@@ -178,7 +187,7 @@ class Rows:
             self._fill_list(fields, dotted)
             reading.override(fields, dotted, value)
         fields["seed"] = row.seed
-        if engine or self.chooses_plant:
+        if engine or (self.chooses_plant and ENGINE not in row.values):
             reading.override(fields, ENGINE, engine or self._fast_engine(fields))
         return fields
 

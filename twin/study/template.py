@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from itertools import chain
 from math import isfinite
 from typing import Any
@@ -99,6 +99,6 @@ def template_of(fields: dict[str, Any], gaps: Sequence[str], source: str) -> Tem
     return Template([*parts, text], order, own, kind, source)
 
 
-def are_numbers(values: Iterable[Any]) -> bool:
-    """True if values are numbers, for which a template has gaps."""
-    return all(type(value) in (float, int) for value in values)
+def is_number(value: Any) -> bool:
+    """True if a value is a number, for which a template has a gap."""
+    return type(value) in (float, int)

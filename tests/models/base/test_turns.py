@@ -62,6 +62,19 @@ def test_a_thread_without_a_turn_waits_for_none_outside():
     thread.join()
 
 
+def test_a_thread_that_is_outside_may_be_outside_again():
+    """A function of the user may run a simulation, whose loop is outside too."""
+    with ThreadPoolExecutor(1) as pool, turn():
+        with outside_turn:
+            with outside_turn:
+                pass
+            assert pool.submit(has_had_the_turn).result()
+        other = pool.submit(has_had_the_turn)
+        assert not other.done()
+        with outside_turn:
+            assert other.result()
+
+
 def test_an_exception_ends_the_turn():
     with pytest.raises(ZeroDivisionError), turn():
         raise ZeroDivisionError

@@ -7,31 +7,33 @@ import pytest
 
 from spheretwin.control.supervision.watchdog import Reason
 from spheretwin.models.telemetry.status import Status
-from spheretwin.paper import fault_outcomes, nutation, outcome_cache, runner, stability, step_size, tilt
-from spheretwin.paper.experiment import Outcome
-from spheretwin.paper.outcome_cache import OutcomeCache
+from spheretwin.paper import fault_outcomes, nutation, runner, stability, step_size, tilt
 from spheretwin.paper.page import rows
-from spheretwin.paper.runner import key_of, make_plan, run_plan, scenario_of, summarise
+from spheretwin.paper.runner import (
+    EarlierRuns,
+    key_of,
+    make_plan,
+    outcome_of,
+    run_plan,
+    scenario_of,
+    summarise,
+)
+from spheretwin.run import own_value
+from spheretwin.study.row import Result, Rows
 from tests.twin.paper.cases import IDEAL, NOISY, SHORT, experiment
 
 
 @pytest.fixture
-def entries():
-    return {}
+def ran(monkeypatch, tmp_path):
+    """Scenarios that were really run, with a cache folder of their own."""
+    real, results = Rows.run, []
+    monkeypatch.setattr(runner, "cache_folder", lambda: tmp_path)
 
+    def run(self, row, engine):
+        results.append(self.scenario(row, engine))
+        return real(self, row, engine)
 
-@pytest.fixture
-def ran(monkeypatch, entries):
-    """Scenarios that were really run, with a cache of their own, in memory."""
-    real, results = runner.run_session, []
-    monkeypatch.setattr(outcome_cache, "load_entry", entries.get)
-    monkeypatch.setattr(outcome_cache, "store_entry", entries.__setitem__)
-
-    def run_session(session):
-        results.append(session.initial_scenario)
-        return real(session)
-
-    monkeypatch.setattr(runner, "run_session", run_session)
+    monkeypatch.setattr(Rows, "run", run)
     return results
 
 
@@ -40,7 +42,8 @@ def errors(run) -> nutation.Array:
 
 
 def run_cached(plan, **options):
-    return run_plan(plan, cache=OutcomeCache(plan, summarise(plan)), **options)
+    with EarlierRuns(plan, summarise(plan)) as earlier:
+        return run_plan(plan, earlier=earlier, **options)
 
 
 def test_rows_that_were_run_are_not_run_again_and_are_the_same(ran):
@@ -72,9 +75,9 @@ FAULT = fault_outcomes.FaultData(
         (stability.reduce, stability.StabilityMeasures(0.5, SPAN, None, (1.0, 2.0), None)),
         (
             stability.reduce,
-            stability.StabilityMeasures(None, None, None, None, None, np.array([1 + 2j, -0.0 + 1j / 3])),
+            stability.StabilityMeasures(None, None, None, None, None, np.array([[1.0, -0.0], [2.0, 1 / 3]])),
         ),
-        (nutation.reduce, nutation.NutationData(np.zeros((0, 3)), None)),
+        (nutation.reduce, nutation.NutationData(np.zeros(0), None)),
         (
             nutation.reduce,
             nutation.NutationData(
@@ -86,19 +89,29 @@ FAULT = fault_outcomes.FaultData(
         (tilt.reduce, np.ones((4, 2)) / 7),
     ],
 )
-def test_an_outcome_is_the_same_from_the_cache_and_its_file_is_plain_text(ran, entries, reduce, data):
-    plan = make_plan(experiment(IDEAL, reduce=reduce), seeds=1)
-    outcome = Outcome(
-        Status.LEFT_WORKSPACE, {"rms_error_rad": [1 / 3] * 3}, np.array([0.1, np.nan, 1.0]), data
+def test_the_data_of_a_run_are_the_same_from_plain_text(reduce, data):
+    figures = {"rms_error_rad": [1 / 3] * 3, runner.MEASURED: [0.1, np.nan, 1.0]}
+    result = Result(
+        "left_workspace",
+        None,
+        None,
+        {**figures, runner.DATA: own_value("data", Mock(return_value=data), None)},
     )
-    written = OutcomeCache(plan, summarise(plan))
-    written.add(plan.jobs[0], outcome)
-    written.save()
-    (content,) = entries.values()
-    assert content.decode("ascii").count("\n") == 1
-    again = OutcomeCache(plan, summarise(plan)).find(plan.jobs[0])
-    assert repr(again) == repr(outcome)  # also the types, and each digit
-    assert again.status is outcome.status
+    outcome = outcome_of(experiment(IDEAL, reduce=reduce), result)
+    assert repr(outcome.data) == repr(data)  # also the types, and each digit
+    assert outcome.status is Status.LEFT_WORKSPACE
+    assert outcome.figures == {"rms_error_rad": [1 / 3] * 3}
+    np.testing.assert_array_equal(outcome.measured_max_abs_error, [0.1, np.nan, 1.0])
+
+
+def test_without_a_journal_everything_runs(ran):
+    plan = make_plan(experiment(NOISY), seeds=2)
+    with EarlierRuns(plan, summarise(plan)) as earlier:
+        run_plan(plan, earlier=earlier)
+        run_cached(plan)  # as in another process, which cannot write the journal
+    assert len(ran) == 4
+    run_cached(plan)
+    assert len(ran) == 4
 
 
 def test_what_was_run_before_an_interruption_is_kept(ran):

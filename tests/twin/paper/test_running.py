@@ -1,16 +1,26 @@
 """Cases and seeds over threads: each run once, in an order of their own, and what ends early is told."""
 
 import json
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from spheretwin import scenario as scenarios
 from spheretwin.models.base.errors import InputError
-from spheretwin.models.telemetry.status import Status
 from spheretwin.paper.page import rows
-from spheretwin.paper.runner import make_plan, measured_error, run_plan, unexpected_ends
+from spheretwin.paper.runner import (
+    DATA,
+    MEASURED,
+    make_plan,
+    measured_error,
+    measured_max_abs_error,
+    outcome_of,
+    run_plan,
+    unexpected_ends,
+)
 from spheretwin.simulation import simulate
+from spheretwin.study.row import Result
 from tests.twin.paper.cases import IDEAL, LOST, NOISY, allowed, experiment
 
 
@@ -68,18 +78,29 @@ def test_a_run_that_ends_early_is_told_unless_it_may():
     assert unexpected_ends(may, run_plan(may)) == []
 
 
-def test_a_run_without_a_tick_has_no_numbers(tmp_path):
+def test_a_run_without_a_tick_has_no_numbers():
+    names = ("max_abs_error_rad", "rms_error_rad", "tail_rms_error_rad")
+    figures = {**dict.fromkeys(names), MEASURED: [np.nan] * 3, DATA: None}
+    plan = make_plan(experiment(IDEAL), seeds=1)
+    outcome = outcome_of(plan.experiment, Result("diverged", None, None, figures))
+    for error in (outcome.max_abs_error, outcome.measured_max_abs_error, outcome.tail_rms_error):
+        assert np.isnan(error).all()
+    outcomes = plan.by_case([outcome])
+    assert unexpected_ends(plan, outcomes) == ["ideal (diverged)"]
+    assert rows(plan, outcomes)[0]["status"] == "diverged"
+    run = simulate(scenarios.load("tilt", IDEAL.fields))
+    none = SimpleNamespace(telemetry=run.telemetry.rows(0, 0))
+    assert np.isnan(measured_max_abs_error(none)).all()
+
+
+def test_a_law_or_a_reduction_that_fails_ends_the_experiment_in_one_line(tmp_path):
     law = tmp_path / "none.py"
     law.write_text("def step(t, reference, measurement, parameters, state, torque): torque[:] = float('nan')")
     none = IDEAL._replace(name="none", fields={**IDEAL.fields, "controller.law": f"{law}:step"})
-    plan = make_plan(experiment(none), seeds=1)
-    outcomes = run_plan(plan)
-    (outcome,) = outcomes["none"]
-    assert outcome.status == Status.DIVERGED
-    for error in (outcome.max_abs_error, outcome.measured_max_abs_error, outcome.tail_rms_error):
-        assert np.isnan(error).all()
-    assert unexpected_ends(plan, outcomes) == ["none (diverged)"]
-    assert rows(plan, outcomes)[0]["status"] == "diverged"
+    with pytest.raises(InputError, match=r"^reproduce short, none, seed 0: law step: expected a torque"):
+        run_plan(make_plan(experiment(none), seeds=1))
+    with pytest.raises(InputError, match=r"^reproduce short, ideal, seed 0: metric data: .*ZeroDivision"):
+        run_plan(make_plan(experiment(IDEAL, reduce=lambda run: 1 / 0), seeds=1))
 
 
 def test_a_case_that_cannot_be_run_is_bad_input():

@@ -102,7 +102,8 @@ def test_margins_begin_at_what_is_healthy_and_are_compared_with_no_other_plant()
 def test_frequency_responses_are_a_section_with_margins_and_a_figure():
     case = stability.with_multisine(stability.FILE.case(part="response"))
     response = linear_loop(scenarios.load("hold", case.fields)).response(LINES_Hz)
-    data = stability.StabilityMeasures(None, None, None, None, None, response)
+    parts = np.stack([response.real, response.imag])
+    data = stability.StabilityMeasures(None, None, None, None, None, parts)
     outcomes = Outcomes({case.name: [outcome(0.0)._replace(data=data)]})
     section = stability.sections(outcomes)[-1]
     measured, linear = section.tables[0].rows

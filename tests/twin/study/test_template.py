@@ -6,7 +6,7 @@ import pytest
 
 from spheretwin.models.base.errors import InputError
 from spheretwin.scenario import reading
-from spheretwin.study.template import are_numbers, template_of
+from spheretwin.study.template import is_number, template_of
 
 GAPS = ("seed", "plant.payload_kg", "plant.coulomb_Nm.1", "disturbance.load", "duration")
 SOME = (3, 0.01, 0.002, 1, 0.5)
@@ -81,5 +81,5 @@ def test_a_gap_that_is_written_over_or_whose_mark_is_in_a_text_has_no_template()
 
 
 def test_only_numbers_fill_a_gap():
-    assert are_numbers([1, 2.5])
-    assert not any(are_numbers([1, other]) for other in (True, None, "1", [1.0], {}))
+    assert all(map(is_number, (1, 2.5)))
+    assert not any(map(is_number, (True, None, "1", [1.0], {})))
