@@ -49,6 +49,8 @@ class Reason(IntEnum):
     EDGE = 7, "the rotor is at the edge of its workspace"
     CURRENT = 8, "a measured current is above its limit"
     MACHINE = 9, "the machine has switched off its currents"
+    FROZEN = 10, "the measured angles are frozen"
+    MODEL = 11, "the motion contradicts the model"
 
 
 REASONS = {int(reason): reason for reason in Reason}

@@ -23,6 +23,7 @@ from spheretwin.scenario.sections import ResolvedScenario, Scenario
 from spheretwin.session import Session
 
 DEFAULTS = LinkSettings()
+DEFAULT_LIMITS = Limits(current_A=1.0)
 LOCKSTEP_TIMEOUT_s = 1.0
 
 
@@ -36,7 +37,11 @@ LINK = f"""
     --limit-angle-deg DEG  largest tilt, the magnitude of α and β; the range of the hinges unless given
     --limit-rate-rad-s RAD/S  largest rate of a hinge; watchdog.largest_rate_rad_s unless given
     --limit-temperature-degC DEGC  highest temperature of a coil, reported or estimated from the currents;
-        {Limits(current_A=1.0).temperature_degC:g} unless given"""
+        {DEFAULT_LIMITS.temperature_degC:g} unless given
+    --limit-frozen-ticks N  identical measurements in a row, if noise is expected;
+        {DEFAULT_LIMITS.frozen_ticks} unless given
+    --limit-chi2 X   mean square of the innovations of 20 ticks over that expected by the model;
+        {DEFAULT_LIMITS.chi2:g} unless given"""
 """Options of how a machine is driven."""
 
 LIMITS: dict[str, Any] = {
@@ -44,6 +49,8 @@ LIMITS: dict[str, Any] = {
     "limit_angle_deg": number("a number of ° above 0"),
     "limit_rate_rad_s": number("a number of rad/s above 0"),
     "limit_temperature_degC": number("a number of °C above 0"),
+    "limit_chi2": number("a number above 0"),
+    "limit_frozen_ticks": number("a whole number from 2 on", lambda value: value >= 2 and value % 1 == 0),
 }
 
 
@@ -131,6 +138,8 @@ def _limits(options: argparse.Namespace, scenario: ResolvedScenario) -> Limits:
     given = {
         "tilt_rad": None if options.limit_angle_deg is None else math.radians(options.limit_angle_deg),
         "temperature_degC": options.limit_temperature_degC,
+        "frozen_ticks": options.limit_frozen_ticks and int(options.limit_frozen_ticks),
+        "chi2": options.limit_chi2,
         "current_A": options.limit_current_A or scenario.nominal.current_limit_A,
     }
     return Limits(**{name: value for name, value in given.items() if value is not None})

@@ -32,6 +32,15 @@ class Limits(SettingsModel):
     )
     temperature_degC: Positive = Field(120.0, description="highest temperature of a coil, °C (assumed)")
 
+    frozen_ticks: Annotated[int, Field(ge=2, le=1_000_000)] = Field(
+        20, description="measurements of all angles in a row, identical to the bit while noise is expected"
+    )
+    chi2: Annotated[float, Field(gt=0, le=1e12)] = Field(
+        50.0,
+        description="mean square of the innovations of 20 ticks over that expected by the model, while armed"
+        " (assumed: a healthy machine has up to 5, a frozen sensor 90 to 700)",
+    )
+
     def exceeded(self, measurement: Measurement, temperature_degC: float) -> Reason:
         """Return the reason to remove the currents for a finite measurement, if there is one."""
         angle, current = measurement.angle_rad, measurement.current_A

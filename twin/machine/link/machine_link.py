@@ -19,6 +19,7 @@ from spheretwin.machine.link.codec import Values
 from spheretwin.machine.link.controller_scenario import check_measurement, controller_scenario
 from spheretwin.machine.link.frame_format import DEFAULT_FRAME, Flags
 from spheretwin.machine.link.limits import CoilHeat, Limits
+from spheretwin.machine.link.plausibility import Plausibility
 from spheretwin.machine.link.rehearsal import rehearse
 from spheretwin.machine.link.timing import Distribution
 from spheretwin.machine.link.transports import open_transport
@@ -97,6 +98,8 @@ class Link:
     period_s : float
         Control period.
     shadow : ParallelShadow, optional
+    plausibility : Plausibility, optional
+        Checks of the motion while it is armed; default: none.
     stop_requested : callable
         True ends the run.
     now : callable
@@ -126,6 +129,7 @@ class Link:
         period_s: float,
         *,
         shadow: ParallelShadow | None = None,
+        plausibility: Plausibility | None = None,
         stop_requested: Callable[[], bool] = lambda: False,
         now: Callable[[], float] = time.monotonic,
     ) -> None:
@@ -135,7 +139,8 @@ class Link:
         self.late_ticks: set[int] = set()
         self.real_time = not settings.lockstep
         self._settings, self._limits, self._heat, self._period_s = settings, limits, heat, period_s
-        self._shadow, self._stop_requested, self._now = shadow, stop_requested, now
+        self._shadow, self._plausibility = shadow, plausibility
+        self._stop_requested, self._now = stop_requested, now
         self._sequence = 0
         self._sent_s: dict[int, float] = {}
         self._newest: Values | None = None
@@ -201,6 +206,7 @@ class Link:
         period_s = resolved.controller.period_s
         channel = Channel(open_transport(address), frames.command, frames.measurement, groups, report)
         heat = CoilHeat(resolved.drive, limits, period_s)
+        options["plausibility"] = Plausibility.of(scenario, resolved, limits)
         return cls(channel, f"a machine at {address}", settings, limits, heat, period_s, **options)
 
     def session(self, scenario: Scenario, rehearsed: Callable[[Session], object] = _rehearsed) -> Session:
@@ -244,17 +250,18 @@ class Link:
             return {"sequence": command.get("sequence"), "echo": command.get("sequence"), **still}
 
         channel, peer = self.channel.stand_in(measure)
-        heat, shadow = deepcopy(self._heat), self._shadow.new() if self._shadow else None
-        return Link(
+        link = Link(
             channel,
             self.name,
             self._settings,
             self._limits,
-            heat,
+            deepcopy(self._heat),
             self._period_s,
-            shadow=shadow,
             now=peer.now,
         )
+        link._shadow = self._shadow and self._shadow.new()
+        link._plausibility = self._plausibility and self._plausibility.unlimited()
+        return link
 
     def __enter__(self) -> Link:
         return self
@@ -301,9 +308,11 @@ class Link:
             self.ending = "the machine ended the run"
             return None
         before = self._newest
+        angle = before["angle"] if self._is_new else np.full(3, np.nan)
         if self._shadow:
-            angle = before["angle"] if self._is_new else np.full(3, np.nan)
             self._shadow.advance(t_s, current_A, angle)
+        if self._plausibility and self._settings.armed and not self._reason:
+            self._reason = self._plausibility.advance(t_s, current_A, angle)
         is_armed = self._settings.armed and self._reason == Reason.NONE
         flags = Flags.ARMED if is_armed else Flags(0)
         temperature_degC = self._heat.advance(current_A)
@@ -337,6 +346,7 @@ class Link:
         """Return counts of frames and distributions of times."""
         return {
             "armed": self._settings.armed,
+            "largest_chi2": self._plausibility.largest_chi2 if self._plausibility else None,
             "frames": self.channel.figures(),
             "latency": self.latency.figures(),
             "jitter": self.jitter.figures(),

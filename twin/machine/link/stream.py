@@ -154,5 +154,9 @@ class RunningShadow:
     def _estimate(self) -> None:
         times, currents, angles = zip(*self._rows, strict=True)
         log = Log(np.array(times), np.array(currents), np.array(angles), COMMANDED, "link")
-        self._tables.append(self.shadow.advance(log))
         self._rows.clear()
+        self._take(self.shadow.advance(log))
+
+    def _take(self, table: Table) -> None:
+        """Store the estimates of a block."""
+        self._tables.append(table)

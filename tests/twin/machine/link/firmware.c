@@ -2,7 +2,11 @@
  * rotation matrix, integrated with the Euler equations in the rotor's frame (the package: hinge angles), and
  * the torque curve is interpolated with cubics through four samples (the package: splines in the cosine).
  *
- *   firmware torque_curve.csv        prints the port, then answers each command over UDP until END
+ *   firmware torque_curve.csv [NOISE_URAD [FAULT TICK]]
+ *
+ * It prints the port, then answers each command over UDP until END. The noise of the angles has this standard
+ * deviation. From a tick on it has a fault: `frozen` angles, bit for bit; a `stuck` sensor, with its noise; a
+ * `reversed` third angle; a rotor whose coils have no torque, `limp`; 1.2 of the torque, `strong`.
  *
  * Frames as in firmware.toml: big-endian, angles in microradians, currents in milliamperes, CRC-16, CR LF. */
 
@@ -12,6 +16,7 @@
 #include <math.h>
 #include <stdint.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 #include <sys/socket.h>
 #include <sys/time.h>
@@ -122,12 +127,38 @@ static int32_t get(const unsigned char *from, int bytes)
     return (int32_t)value;
 }
 
+static double noise_urad;
+static const char *fault = "none";
+static long fault_tick, tick;
+
+static int has(const char *kind) { return tick >= fault_tick && !strcmp(fault, kind); }
+
+static double normal(void) /* the sum of twelve uniform numbers: mean 0, variance 1 */
+{
+    static uint32_t state = 12345;
+    double sum = -6;
+    for (int i = 0; i < 12; i++) sum += (state = state * 1664525u + 1013904223u) / 4294967296.0;
+    return sum;
+}
+
+static void sense(int32_t urad[3])
+{
+    static double q[3];
+    if (has("frozen")) return;
+    if (!has("stuck")) {
+        q[0] = atan2(-R[1][2], R[2][2]), q[1] = asin(R[0][2]);
+        q[2] = atan2(-R[0][1], R[0][0]) * (has("reversed") ? -1 : 1);
+    }
+    for (int i = 0; i < 3; i++) urad[i] = (int32_t)lround(1e6 * q[i] + noise_urad * normal());
+}
+
 static int measure(unsigned char *frame, uint16_t sequence, uint16_t echo, int flags)
 {
-    double q[3] = {atan2(-R[1][2], R[2][2]), asin(R[0][2]), atan2(-R[0][1], R[0][0])};
+    static int32_t urad[3];
+    sense(urad);
     unsigned char *end = frame;
     end = put(put(put(put(end, '#', 1), sequence, 2), echo, 2), flags, 1);
-    for (int i = 0; i < 3; i++) end = put(end, (int32_t)lround(1e6 * q[i]), 4);
+    for (int i = 0; i < 3; i++) end = put(end, urad[i], 4);
     for (int j = 0; j < GROUPS; j++) end = put(end, (int32_t)lround(1e3 * current[j]), 2);
     end = put(end, crc16(frame, (int)(end - frame)), 2);
     end = put(put(end, '\r', 1), '\n', 1);
@@ -138,8 +169,10 @@ int main(int count, char **arguments)
 {
     char line[256];
     double deg;
-    FILE *file = count == 2 ? fopen(arguments[1], "r") : NULL;
+    FILE *file = count >= 2 ? fopen(arguments[1], "r") : NULL;
     if (!file) return 2;
+    if (count > 2) noise_urad = atof(arguments[2]);
+    if (count > 4) fault = arguments[3], fault_tick = atol(arguments[4]);
     while (samples < 1024 && fgets(line, sizeof line, file))
         if (sscanf(line, "%lf,%lf", &deg, &curve[samples]) == 2) samples++;
     fclose(file);
@@ -171,7 +204,10 @@ int main(int count, char **arguments)
         if (number != last && !(flags & HELLO)) {
             double command[GROUPS];
             for (int j = 0; j < GROUPS; j++) command[j] = flags & ARMED ? 1e-3 * get(in + 4 + 2 * j, 2) : 0;
+            double torque = has("limp") ? 0 : has("strong") ? 1.2 : 1;
+            for (int j = 0; j < GROUPS; j++) command[j] *= torque;
             for (int i = 0; i < STEPS; i++) step(command);
+            tick++;
         }
         last = number;
         int bytes = measure(out, ++sequence, (uint16_t)number, flags & ARMED);

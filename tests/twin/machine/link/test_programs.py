@@ -35,8 +35,10 @@ def firmware(tmp_path_factory):
     program = built(HERE / "firmware.c", tmp_path_factory.mktemp("firmware"))
 
     @contextlib.contextmanager
-    def run():
-        process = subprocess.Popen([program, CURVE], stdout=subprocess.PIPE, text=True)
+    def run(noise_urad=0, fault="none", tick=0):
+        process = subprocess.Popen(
+            [program, CURVE, str(noise_urad), fault, str(tick)], stdout=subprocess.PIPE, text=True
+        )
         try:
             yield int(process.stdout.readline())
             assert process.wait() == 0  # it has heard the end
@@ -52,16 +54,16 @@ ARMED = ("--arm", "--ramp-s", "0")
 LOOPS = pytest.mark.release("compiles a loop of its own for 10 s; a run without arming has the firmware, too")
 
 
-def connected(firmware, verb, *flags):
-    """Exit code of a verb that drives the firmware in lockstep."""
-    with firmware() as port:
+def connected(firmware, verb, *flags, machine=()):
+    """Exit code of a verb that drives the firmware, with these arguments, in lockstep."""
+    with firmware(*machine) as port:
         common = [verb, "sinusoid", "--controller.law", "pid", "--estimator.kind", "kalman", "--lockstep"]
         link = ["--machine", f"udp://:{port}", "--frame", str(HERE / "firmware.toml")]
         return cli.main([*common, *link, "--timeout-ms", str(1000 * UNLIMITED_S), *flags])
 
 
-def driven(firmware, capsys, *flags):
-    code = connected(firmware, "drive", "--json", *flags)
+def driven(firmware, capsys, *flags, machine=()):
+    code = connected(firmware, "drive", "--json", *flags, machine=machine)
     return code, json.loads(capsys.readouterr().out)
 
 
@@ -142,6 +144,50 @@ def test_a_limit_ends_the_run_without_currents(firmware, capsys, tmp_path, flags
     assert np.any(rows["current_command_A"][trip - 1])
     # The measurement that is beyond a limit of the link answers the command of its tick.
     assert not np.any(rows["current_command_A"][trip + 1 :])
+
+
+NOISE_urad = 300
+NOISY = ("--hardware", "electronics")  # its data sheet states noise
+# The tick of the fault, not at the edge of a block, and the largest time until the reason. The rotor rests at
+# tick 503 and is fastest at tick 1003. A disturbance explains the first of what coils without torque lack.
+FAULTS = [
+    ("frozen", 503, (), "the motion contradicts the model", 0.2),
+    ("frozen", 1003, (), "the motion contradicts the model", 0.06),
+    ("frozen", 503, NOISY, "the measured angles are frozen", 0.02),
+    ("stuck", 503, NOISY, "the motion contradicts the model", 0.2),
+    ("stuck", 1003, NOISY, "the motion contradicts the model", 0.06),
+    ("reversed", 1003, NOISY, "the motion contradicts the model", 0.06),
+    ("limp", 1003, NOISY, "the motion contradicts the model", 0.24),
+]
+
+
+@LOOPS
+@pytest.mark.parametrize(("fault", "tick", "sheet", "reason", "within_s"), FAULTS)
+def test_a_wrong_sensor_or_motion_ends_the_run(firmware, capsys, fault, tick, sheet, reason, within_s):
+    faulty = (NOISE_urad if sheet else 0, fault, tick)
+    code, result = driven(firmware, capsys, *ARMED, "--duration", "2", *sheet, machine=faulty)
+    assert (code, result["status"], result["reason"]) == (1, "failsafe", reason)
+    rundown_s = 0.05
+    assert 0 < result["simulated_s"] - rundown_s - 1e-3 * tick <= within_s
+
+
+@LOOPS
+@pytest.mark.parametrize("sheet", [(), NOISY], ids=["ideal", "noisy"])
+def test_noise_and_an_error_of_the_torque_are_no_contradiction(firmware, capsys, sheet):
+    """Noise of 0.3 mrad on all three angles, also against an ideal data sheet, and 1.2 of the torque."""
+    code, result = driven(
+        firmware, capsys, *ARMED, "--duration", "2", *sheet, machine=(NOISE_urad, "strong", 0)
+    )
+    assert (code, result["status"]) == (0, "completed")
+    assert 0 < result["link"]["largest_chi2"] < 10
+
+
+@LOOPS
+def test_higher_limits_leave_a_frozen_sensor_alone(firmware, capsys):
+    higher = ["--limit-frozen-ticks", "10000", "--limit-chi2", "1e9"]
+    machine = (NOISE_urad, "frozen", 503)
+    code, _ = driven(firmware, capsys, *ARMED, "--duration", "0.7", *NOISY, *higher, machine=machine)
+    assert code == 0
 
 
 @LOOPS
