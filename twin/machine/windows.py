@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from spheretwin.electronics.logged_currents import mean_currents
 from spheretwin.machine.log import MEASURED, Log, check_numbers
-from spheretwin.machine.model import EDGE_SHARE
+from spheretwin.machine.model import EDGE_SHARE, Model
 from spheretwin.machine.parameters import Machine, Parameter, Setup, sensor_angles
 from spheretwin.machine.state_estimation import Shadow, hold_last_value
 from spheretwin.models.base.errors import InputError
@@ -35,14 +35,14 @@ Array = NDArray[np.float64]
 _JITTER = 0.2
 
 # Differences for the slopes by the start.
-_START_STEP = np.repeat([1e-5, 1e-4], 3)  # rad, rad/s
+START_STEP = np.repeat([1e-5, 1e-4], 3)  # rad, rad/s
 
 # Of the size of a parameter.
-_STEP_SHARE = 1e-3
+STEP_SHARE = 1e-3
 
 # Coulomb friction acts around each step: with 1 ms, angles were wrong by up to 90 µrad after a reversal, and
 # inertia had a bias of half of its standard deviation; with half of it they are within 5 µrad of MuJoCo's.
-_LONGEST_STEP_s = 5e-4
+LONGEST_STEP_s = 5e-4
 
 _START_ITERATIONS = 4
 
@@ -62,7 +62,13 @@ class Window(NamedTuple):
     start: Array
     """(6,) angles and rates at the start as the shadow estimates them."""
     rate_rad_s: Array
-    """(rows, 3) rates after the start, estimated by the shadow."""
+    """(rows, 3) rates after the start, estimated by the shadow; of `observed` alone."""
+
+    @property
+    def period_s(self) -> float:
+        """Mean time between two rows."""
+        times = self.log.t_s[self.first : self.first + self.rows + 1]
+        return float(times[-1] - times[0]) / self.rows
 
     def observed(self) -> tuple[Array, Array]:
         """Return measured angles and the standard deviations of their errors, (rows, 3), rad.
@@ -70,20 +76,58 @@ class Window(NamedTuple):
         NaN where none was measured. One that counts is an edge between counts; in a window without an edge,
         the count is used once.
         """
-        model, rows = self.machine.model, self.log.angle_rad[self.first : self.first + self.rows + 1]
-        measured, deviation = rows[1:].copy(), np.tile(model.noise_rad, (self.rows, 1))
+        measured, is_count = self.measured()
         rates_rad_s = np.vstack([self.start[3:], self.rate_rad_s])
-        turned_by_rad = 0.5 * np.abs(rates_rad_s[1:] + rates_rad_s[:-1]) * _period_s(self)
+        turned_rad = 0.5 * np.abs(rates_rad_s[1:] + rates_rad_s[:-1]) * self.period_s
+        return measured, angle_deviation(self.machine.model, turned_rad, is_count)
+
+    def measured(self) -> tuple[Array, NDArray[np.bool_]]:
+        """Return measured angles (rows, 3), rad, and where a count is used for lack of an edge."""
+        model, rows = self.machine.model, self.log.angle_rad[self.first : self.first + self.rows + 1]
+        measured, is_count = rows[1:].copy(), np.zeros((self.rows, 3), bool)
         for i in np.flatnonzero(model.half_count_rad):
-            count_rad = 2 * model.half_count_rad[i]
-            turned_rad = turned_by_rad[:, i]
             measured[:, i] = np.where(rows[:-1, i] == rows[1:, i], np.nan, 0.5 * (rows[:-1, i] + rows[1:, i]))
             if not np.any(np.isfinite(measured[:, i])):
                 measured[self.rows // 2, i] = rows[self.rows // 2, i]
-                turned_rad = np.full(self.rows, count_rad)
-            spread_rad = np.clip(turned_rad, EDGE_SHARE * count_rad, count_rad) / np.sqrt(12)
-            deviation[:, i] = np.hypot(deviation[:, i], spread_rad)
-        return measured, deviation
+                is_count[:, i] = True
+        return measured, is_count
+
+    def currents(self, delay_s: float, lag_s: PerGroup) -> Array:
+        """Return the mean currents between the rows, (rows, groups)."""
+        log, measured = self.log, self.log.currents == MEASURED
+        # Some rows before and after: for delays, for shifted clocks, and until the lag has forgotten its
+        # start.
+        first = max(self.first - _ROWS_BEFORE, 0)
+        last = min(self.first + self.rows + 1 + _ROWS_BEFORE, len(log))
+        samples = hold_last_value(log.current_A[first:last])
+        edges = log.t_s[first : self.first + self.rows + 1]
+        means = np.empty((len(edges) - 1, samples.shape[1]))
+        if measured:  # behind the drive
+            delay_s, lag_s = delay_s - self.machine.model.delay_s, 0.0
+        lags_s = np.maximum(of_each_group(lag_s, samples.shape[1]), 0.0)
+        mean_currents(
+            log.t_s[first:last], samples, edges, delay_s, lags_s, measured, samples[0].copy(), means
+        )
+        return means[self.first - first :]
+
+
+_ROWS_BEFORE = 20
+
+
+def angle_deviation(model: Model, turned_rad: Array, is_count: NDArray[np.bool_]) -> Array:
+    """Return the standard deviations of the errors of angles (rows, 3), rad.
+
+    Parameters
+    ----------
+    model : Model
+    turned_rad : (rows, 3) array
+        Angle that each hinge turns until each row: an edge has passed at some time within it.
+    is_count : (rows, 3) array of bool
+        Where a count is used for lack of an edge.
+    """
+    count_rad = 2 * model.half_count_rad
+    spread_rad = np.clip(np.where(is_count, np.inf, turned_rad), EDGE_SHARE * count_rad, count_rad)
+    return np.hypot(model.noise_rad, spread_rad / np.sqrt(12))
 
 
 class Part(NamedTuple):
@@ -174,7 +218,7 @@ class Shooting:
         slopes : bool
             False: without slopes by the parameters.
         """
-        steps = _STEP_SHARE * np.array([parameter.kind.size for parameter in self._parameters])
+        steps = STEP_SHARE * np.array([parameter.kind.size for parameter in self._parameters])
         points = [values, *(values + np.diag(steps) if slopes else ())]
         setups = {
             machine: [machine.setup(self._parameters, point) for point in points]
@@ -210,10 +254,10 @@ class Shooting:
     def _shoot(self, number: int, setup: Setup) -> tuple[Array, Array]:
         """Return residuals from the present start, and their slopes by it."""
         start = self._starts[number]
-        moved = np.vstack([start, start + np.diag(_START_STEP)])
+        moved = np.vstack([start, start + np.diag(START_STEP)])
         computed = self._angles(number, [setup] * len(moved), moved)
         residuals = self._residuals(number, computed)
-        residual, by_start = residuals[0], (residuals[1:] - residuals[0]).T / _START_STEP
+        residual, by_start = residuals[0], (residuals[1:] - residuals[0]).T / START_STEP
         if self._known:  # the start is six more measurements
             weight = np.linalg.inv(np.linalg.cholesky(self._known[number]))
             residual = np.concatenate([residual, weight @ (start - self.windows[number].start)])
@@ -225,10 +269,10 @@ class Shooting:
         window = self.windows[number]
         plants = Plants([setup.plant for setup in setups])
         plants.set_state(starts[:, :3], starts[:, 3:])
-        means = {times: _currents(window, *times) for times in {(one.delay_s, one.lag_s) for one in setups}}
+        means = {times: window.currents(*times) for times in {(one.delay_s, one.lag_s) for one in setups}}
         currents = np.stack([means[one.delay_s, one.lag_s] + one.current_offset_A for one in setups], axis=1)
-        steps = ceil(_period_s(window) / _LONGEST_STEP_s - 0.05)
-        angles_rad = plants.roll_out(currents, np.zeros(3), _period_s(window) / steps, steps)
+        steps = ceil(window.period_s / LONGEST_STEP_s - 0.05)
+        angles_rad = plants.roll_out(currents, np.zeros(3), window.period_s / steps, steps)
         reached = np.concatenate([starts[None, :, :3], angles_rad])
         return np.stack([sensor_angles(setup, reached[:, lane]) for lane, setup in enumerate(setups)])
 
@@ -238,27 +282,3 @@ class Shooting:
         computed = np.where(counted, 0.5 * (angles[:, 1:] + angles[:, :-1]), angles[:, 1:])
         difference = (measured - computed) / deviation
         return np.where(np.isnan(difference), 0.0, difference).reshape(len(computed), -1)
-
-
-def _period_s(window: Window) -> float:
-    times = window.log.t_s[window.first : window.first + window.rows + 1]
-    return float(times[-1] - times[0]) / window.rows
-
-
-def _currents(window: Window, delay_s: float, lag_s: PerGroup) -> Array:
-    """Return the mean currents between the rows of a window, (rows, groups)."""
-    log, measured = window.log, window.log.currents == MEASURED
-    # Some rows before and after: for delays, for shifted clocks, and until the lag has forgotten its start.
-    first = max(window.first - _ROWS_BEFORE, 0)
-    last = min(window.first + window.rows + 1 + _ROWS_BEFORE, len(log))
-    samples = hold_last_value(log.current_A[first:last])
-    edges = log.t_s[first : window.first + window.rows + 1]
-    means = np.empty((len(edges) - 1, samples.shape[1]))
-    if measured:  # behind the drive
-        delay_s, lag_s = delay_s - window.machine.model.delay_s, 0.0
-    lags_s = np.maximum(of_each_group(lag_s, samples.shape[1]), 0.0)
-    mean_currents(log.t_s[first:last], samples, edges, delay_s, lags_s, measured, samples[0].copy(), means)
-    return means[window.first - first :]
-
-
-_ROWS_BEFORE = 20
