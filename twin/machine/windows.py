@@ -140,7 +140,7 @@ class Part(NamedTuple):
     gradient: Array
     """(p,): Jᵀ times the residuals."""
     squares: float
-    """Sum of the squares of the residuals, those of a known start included."""
+    """Sum of the squares of the residuals."""
     used: int
     """Angles that were measured, less the six numbers of a free start."""
 
@@ -195,17 +195,10 @@ class Shooting:
     ----------
     windows : sequence of Window
     parameters : sequence of Parameter
-    known : sequence of (6, 6) arrays, optional
-        Covariance of the start of each window; free starts unless given.
     """
 
-    def __init__(
-        self,
-        windows: Sequence[Window],
-        parameters: Sequence[Parameter],
-        known: Sequence[Array] | None = None,
-    ) -> None:
-        self.windows, self._parameters, self._known = list(windows), list(parameters), known
+    def __init__(self, windows: Sequence[Window], parameters: Sequence[Parameter]) -> None:
+        self.windows, self._parameters = list(windows), list(parameters)
         self._starts = [window.start for window in self.windows]
         self.observed = [window.observed() for window in self.windows]
 
@@ -239,15 +232,13 @@ class Shooting:
             if np.linalg.norm(triangle @ move) < _ARRIVED:
                 break
         residual = residual - basis @ (basis.T @ residual)
-        angles = 3 * self.windows[number].rows
-        used = int(np.count_nonzero(np.isfinite(self.observed[number][0]))) - 6 * (not self._known)
-        squares, by_row = float(residual @ residual), residual[:angles].reshape(-1, 3)
+        used = int(np.count_nonzero(np.isfinite(self.observed[number][0]))) - 6
+        squares, by_row = float(residual @ residual), residual.reshape(-1, 3)
         if not moved:
             return Part(by_row, np.empty((0, 0)), np.empty(0), squares, used)
         starts = np.tile(self._starts[number], (len(setups), 1))
         residuals = self._residuals(number, self._angles(number, setups, starts))
-        columns = np.zeros((len(residual), len(steps)))
-        columns[:angles] = (residuals[1:] - residuals[0]).T / steps
+        columns = (residuals[1:] - residuals[0]).T / steps
         columns -= basis @ (basis.T @ columns)
         return Part(by_row, columns.T @ columns, columns.T @ residual, squares, used)
 
@@ -257,12 +248,7 @@ class Shooting:
         moved = np.vstack([start, start + np.diag(START_STEP)])
         computed = self._angles(number, [setup] * len(moved), moved)
         residuals = self._residuals(number, computed)
-        residual, by_start = residuals[0], (residuals[1:] - residuals[0]).T / START_STEP
-        if self._known:  # the start is six more measurements
-            weight = np.linalg.inv(np.linalg.cholesky(self._known[number]))
-            residual = np.concatenate([residual, weight @ (start - self.windows[number].start)])
-            by_start = np.vstack([by_start, weight])
-        return residual, by_start
+        return residuals[0], (residuals[1:] - residuals[0]).T / START_STEP
 
     def _angles(self, number: int, setups: Sequence[Setup], starts: Array) -> Array:
         """Return what the sensors report at each start and after it, (lanes, rows + 1, 3)."""

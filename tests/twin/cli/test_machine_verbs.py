@@ -141,8 +141,8 @@ def _sweep_over(twin, folder):
 
 
 def log_with_offset(path, duration_s):
-    """Write a log of a machine whose sensor of alpha has an offset after 2.4 s."""
-    write(changing_log(duration_s, (2.4, "sensors.angle_offset_rad", [2e-3, 0.0, 0.0])), path)
+    """Write a log of a machine whose sensor of alpha has an offset after 2.43 s."""
+    write(changing_log(duration_s, (2.4317, "sensors.angle_offset_rad", [2e-3, 0.0, 0.0])), path)
     return path
 
 
@@ -162,7 +162,10 @@ def test_watch_prints_a_line_of_json_for_each_alarm(tmp_path):
     alarms = [json.loads(line) for line in result.out.splitlines()]
     assert result.code == 1
     assert alarms[0]["what"] == "sensors.angle_offset_rad.0"
-    assert set(alarms[0]) == {"t_s", "what", "size", "unit", "confidence", "accepted_findings", "log_sha256"}
+    assert set(alarms[0]) == {
+        *("t_s", "what", "size", "unit", "confidence", "onset_s", "lasted_s", "shares"),
+        *("accepted_findings", "log_sha256"),
+    }
     assert alarms[0]["log_sha256"] == read(path).digest
     assert alarms[0]["accepted_findings"] == ["jitter"]
     assert "fewer than 0.1 in an hour" in result.err
@@ -197,7 +200,7 @@ def pages(monkeypatch):
 
 @pytest.mark.release("1 s and a viewer's server; tests/twin/machine has the figures")
 def test_a_live_watch_shows_windows_and_alarms(tmp_path, pages):
-    path, received = log_with_offset(tmp_path / "log.parquet", 2.6), tmp_path / "live.rrd"
+    path, received = log_with_offset(tmp_path / "log.parquet", 3.0), tmp_path / "live.rrd"
     result = call("watch", path, *MACHINE, "--live")
     alarms = [json.loads(line) for line in result.out.splitlines()]
     received.write_bytes(b"".join(*pages))
@@ -207,8 +210,8 @@ def test_a_live_watch_shows_windows_and_alarms(tmp_path, pages):
     assert [text.split()[0] for text in texts] == [alarm["what"] for alarm in alarms]
     assert "sensors.angle_offset_rad.0" in texts[0]
     _, windows = series(read, "watch/windows", "Scalars:scalars")
-    assert len(windows) == 25  # all complete ones
-    assert windows[:, 1].argmax() >= 23  # the sum exceeds its threshold after the change
+    assert len(windows) == 9  # all complete ones after the noise was measured
+    assert windows[:, 1].argmax() >= 4  # the evidence exceeds its threshold after the change
     assert windows[:, 1].max() > 1
 
 
