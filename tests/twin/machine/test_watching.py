@@ -1,15 +1,17 @@
-"""Watch over a machine: what changed, how large, how fast, and silence without a change."""
-
-from types import SimpleNamespace
+"""Watch over a machine: what changed, how large, when, how sure, and silence without a change."""
 
 import numpy as np
 import pytest
+from scipy.stats import chi2
 
 from spheretwin.machine import Log, Watch, WatchSettings
+from spheretwin.machine.change_diagnosis import evidence_of_noise
+from spheretwin.machine.explanations import UNNAMED, candidates_of, evidence
+from spheretwin.machine.parameters import Machine, selected
 from spheretwin.models.base.errors import InputError
 from tests.twin.machine.machine_logs import KNOWN, SCENARIO, changing_log
+from tests.twin.machine.random_changes import HELD_OUT, outcome_of, random_case
 
-CHANGED_s = 2.5
 ONE_WEAK = [1.0] * 5 + [0.8] + [1.0] * 12
 
 
@@ -19,6 +21,7 @@ def watch():
 
 
 OFFSET_rad = np.radians(0.1)
+OFFSETS = "sensors.angle_offset_rad"
 
 
 @pytest.mark.parametrize(
@@ -26,28 +29,88 @@ OFFSET_rad = np.radians(0.1)
     [
         ("plant.group_gain", [0.97] * 18, "torque_scale", -0.03, 0.8),
         ("plant.group_gain", ONE_WEAK, "plant.group_gain.5", -0.2, 0.8),
-        ("sensors.angle_offset_rad", [OFFSET_rad, 0.0, 0.0], "sensors.angle_offset_rad.0", OFFSET_rad, 0.2),
-        ("plant.coulomb_Nm", [4e-3] * 3, "plant.coulomb_Nm of all hinges", 2e-3, 0.3),
+        (OFFSETS, [OFFSET_rad, 0.0, 0.0], f"{OFFSETS}.0", OFFSET_rad, 0.5),
+        ("plant.coulomb_Nm", [4e-3] * 3, "plant.coulomb_Nm of all hinges", 2e-3, 0.5),
     ],
     ids=["torque", "one group", "offset", "friction"],
 )
 def test_it_names_what_changed(field, value, what, size, within_s):
-    log = changing_log(CHANGED_s + 1.0, (CHANGED_s, field, value))
-    alarm, *_ = Watch(SCENARIO, KNOWN).advance(log)
+    changed_s = float(np.random.default_rng(len(what)).uniform(2.3, 2.7))
+    log = changing_log(changed_s + 1.0, (changed_s, field, value))
+    (alarm,) = Watch(SCENARIO, KNOWN).advance(log)
     assert alarm.what == what
-    assert alarm.size == pytest.approx(size, rel=0.4)  # of a few tenths of a second
-    assert CHANGED_s < alarm.t_s <= CHANGED_s + within_s + 0.1
+    assert alarm.size == pytest.approx(size, rel=0.3)
+    assert changed_s < alarm.t_s <= changed_s + within_s + 0.1
+    assert alarm.onset_s == pytest.approx(changed_s, abs=0.02)
+    assert alarm.confidence > 0.9
+    assert alarm.shares[what] == alarm.confidence
+
+
+@pytest.mark.parametrize("changed_s", [2.4, 2.41, 2.4337, 2.45, 2.4683, 2.49])
+def test_an_offset_has_its_name_at_any_time_within_a_window(changed_s):
+    log = changing_log(3.0, (changed_s, OFFSETS, [0.0, OFFSET_rad, 0.0]))
+    (alarm,) = Watch(SCENARIO, KNOWN).advance(log)
+    assert alarm.what == f"{OFFSETS}.1"
+    assert alarm.onset_s == pytest.approx(changed_s, abs=3e-3)
+    assert alarm.size == pytest.approx(OFFSET_rad, rel=0.2)
+
+
+@pytest.mark.parametrize("lasts_s", [0.1, None], ids=["push", "load"])
+@pytest.mark.parametrize(("load_Nm", "seed"), [(0.01, 1), (-0.037, 2)])
+def test_a_load_has_its_name_and_its_duration(load_Nm, seed, lasts_s):
+    begins_s = float(np.random.default_rng(seed).uniform(2.3, 2.6))
+    changes = [(begins_s, "disturbance.load", load_Nm / 0.05)]
+    if lasts_s:
+        changes.append((begins_s + lasts_s, "disturbance.load", 0.0))
+    (alarm,) = Watch(SCENARIO, KNOWN).advance(changing_log(3.4, *changes, seed=seed))
+    assert alarm.what == "plant.modelling_torque_Nm of all hinges"
+    assert alarm.size == pytest.approx(load_Nm, rel=0.05)
+    assert alarm.lasted_s == (pytest.approx(lasts_s, abs=0.01) if lasts_s else None)
+
+
+def test_a_change_of_a_parameter_that_is_not_watched_is_unexplained():
+    log = changing_log(3.2, (2.417, "disturbance.load", 0.4))
+    alarm, *_ = Watch(SCENARIO, KNOWN, ["plant.group_gain", "plant.coulomb_Nm"]).advance(log)
+    assert (alarm.what, alarm.size) == (UNNAMED, None)
     assert alarm.confidence > 0.9
 
 
-def test_the_sums_show_what_raised_an_alarm(watch):
-    log = changing_log(3.0, (CHANGED_s, "plant.coulomb_Nm", [4e-3] * 3))
+def test_the_evidence_has_the_mean_1_without_a_change():
+    """Then it exceeds a threshold at most with the inverse of it as probability (Markov)."""
+    parameters = selected(["plant.coulomb_Nm"], Machine(SCENARIO, KNOWN).model.actuator)
+    candidates = candidates_of(parameters, np.full(3, 2e-3), parameters)
+    normal, deviation = np.linspace(-60, 150, 100_001), 0.3 / candidates[0].size
+    information = np.full(len(normal), deviation**2)
+    logs = evidence(normal * deviation, information, candidates, np.zeros(len(normal), np.int64))
+    density = np.exp(logs - 0.5 * normal**2) / np.sqrt(2 * np.pi)
+    assert np.trapezoid(density, normal) == pytest.approx(1, abs=1e-3)
+    squares, angles = np.linspace(0, 2e4, 4001), np.array([20])
+    logs = np.hstack([evidence_of_noise(np.array([value]), angles) for value in squares])
+    for factor in logs:
+        density = np.exp(factor + chi2.logpdf(squares, angles))
+        assert np.trapezoid(density, squares) == pytest.approx(1, abs=1e-3)
+
+
+def test_friction_below_0_explains_nothing():
+    """Residuals that friction of −10 mN·m would explain are no evidence of it: there are 2 mN·m to lose."""
+    parameters = selected(["plant.coulomb_Nm"], Machine(SCENARIO, KNOWN).model.actuator)
+    candidates = candidates_of(parameters, np.full(3, 2e-3), parameters)
+    information = np.full(2, 1e8)
+    logs = evidence(np.array([1.0, -1.0]) * 1e-2 * information, information, candidates, np.zeros(2, int))
+    assert logs[0] > 4000
+    assert logs[1] < logs[0] - 2500
+
+
+def test_the_evidence_shows_what_raised_an_alarm(watch):
+    log = changing_log(3.0, (2.5, "plant.coulomb_Nm", [4e-3] * 3))
     assert watch.advance(log.rows(0, 2500)) == []
     assert 0 <= max(watch.sums.values()) < watch.threshold
-    alarms, row = [], 2500
-    while not alarms:  # of the last window
-        alarms, row = watch.advance(log.rows(row, row + 100)), row + 100
-    assert watch.sums[alarms[0].what] > watch.threshold
+    largest, row = dict.fromkeys(watch.sums, 0.0), 2500
+    while row < 3000:
+        watch.advance(log.rows(row, row + 100))
+        row += 100
+        largest = {name: max(value, watch.sums[name]) for name, value in largest.items()}
+    assert largest["plant.coulomb_Nm of all hinges"] > watch.threshold
 
 
 @pytest.mark.release("1.2 s; test_it_names_what_changed has the alarms")
@@ -56,31 +119,30 @@ def test_a_healthy_machine_is_silent_for_any_cut_of_its_log():
     whole, cut = Watch(SCENARIO, KNOWN), Watch(SCENARIO, KNOWN)
     assert whole.advance(log) == []
     assert not any(cut.advance(log.rows(first, first + 790)) for first in range(0, 8000, 790))
-    assert np.array_equal(whole._sums, cut._sums)
+    assert whole.sums == cut.sums
     assert whole.variance < 1.1
 
 
 def test_the_threshold_is_that_of_the_rate_of_false_alarms():
-    """Lorden: the mean time to a false alarm of one sum is at least exp(threshold) windows."""
     watch = Watch(SCENARIO, KNOWN, ["torque_scale"], WatchSettings(window_s=0.2, false_alarms_per_hour=0.5))
-    # Up, down and the doubled variance; 18,000 windows an hour.
-    assert np.exp(watch.threshold) == pytest.approx(3 * 18_000 / 0.5)
+    assert np.exp(watch.threshold) == pytest.approx(18_000 / 0.5)  # windows of an hour
 
 
-def test_the_sums_of_pure_noise_exceed_a_threshold_as_rarely_as_stated():
-    """Normal residuals without a plant: the sums are those of the watch, with a threshold of 100 windows."""
-    watch = Watch(SCENARIO, KNOWN, ["torque_scale", "plant.coulomb_Nm"])
-    watch.threshold, generator = np.log(100 * len(watch._sums)), np.random.default_rng(1)
-    rows, count, alarms = 60, len(watch._values), 0
-    for _ in range(20_000):
-        slopes = generator.normal(0, 3, (rows, count)) / watch._changes[:count]
-        residual = generator.normal(0, 1, rows)
-        sums = {"information": slopes.T @ slopes, "gradient": slopes.T @ residual}
-        part = SimpleNamespace(**sums, squares=residual @ residual, used=rows)
-        alarms += len(watch._add(part, 0.0))
-        watch._values[:] = 1.0
-    # 200 at most on average; named after some windows at times, so fewer.
-    assert 0 < alarms <= 200
+@pytest.mark.release("300 logs, 6 min; the tests above have single changes")
+def test_the_confidence_is_the_rate_of_right_names():
+    """Of machines that change in one of 12 ways, or not, at random times, sizes, hinges and motions.
+
+    A fifth of the kinds was not used while the watch was built.
+    """
+    built = [outcome_of(random_case(seed)) for seed in range(260)]
+    held_out = [outcome_of(random_case(seed, list(HELD_OUT)[seed % 4])) for seed in range(40)]
+    assert not any(outcome.early for outcome in built + held_out)
+    assert not any(outcome.alarm for outcome in built if outcome.case.kind == "nothing")
+    for outcomes, least in ((built, 150), (held_out, 5)):
+        named = [outcome for outcome in outcomes if outcome.is_named]
+        right = np.mean([outcome.is_right for outcome in named])
+        assert len(named) > least
+        assert np.mean([outcome.alarm.confidence for outcome in named]) == pytest.approx(right, abs=0.05)
 
 
 def test_a_gap_is_not_judged():
@@ -88,6 +150,15 @@ def test_a_gap_is_not_judged():
     rows = np.r_[0:2500, 2540:4000]
     gap = Log(log.t_s[rows], log.current_A[rows], log.angle_rad[rows])
     assert Watch(SCENARIO, KNOWN).advance(gap) == []
+
+
+@pytest.mark.parametrize("shift", [2.3e-3, -8e-3])
+def test_the_watch_goes_on_from_the_changed_machine(shift):
+    """After an alarm the offset belongs to the machine; back at 0 it is the opposite change."""
+    changes = [(2.4137, OFFSETS, [0.0, 0.0, shift]), (3.2671, OFFSETS, [0.0, 0.0, 0.0])]
+    alarms = Watch(SCENARIO, KNOWN).advance(changing_log(4.2, *changes))
+    assert [alarm.what for alarm in alarms] == [f"{OFFSETS}.2"] * 2
+    assert [alarm.size for alarm in alarms] == pytest.approx([shift, -shift], rel=0.2)
 
 
 def test_what_does_not_fit_is_refused(watch):
