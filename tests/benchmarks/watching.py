@@ -2,7 +2,8 @@
 
 The machines of ``reproduce twin`` are drawn, MuJoCo plays them, and a twin is identified from a log without
 and one with a payload. The twin then watches ten minutes without a change, and a log of each of the changes
-of ``reproduce twin``. False alarms, what the first alarm after a change names, and how long after the change.
+of ``reproduce twin``, at times drawn from the seed. False alarms, what the first alarm after a change names,
+and how long after the change.
 """
 
 import argparse
@@ -60,14 +61,14 @@ def watched(seed, motion, duration_s):
         raise SystemExit(f"seed {seed}: {identified.reasons}")
     twin = {**reproduced.NOMINAL, **identified.fields}
     changes = {}
-    for place, change in enumerate(reproduced._changes(true)):
+    for place, change in enumerate(reproduced._changes(true, seed)):
         result = reproduced._watch(hidden, twin, change, 100 * seed + 10 + place)
-        alarm = next((one for one in result.alarms if one.t_s > reproduced.CHANGED_s), None)
+        alarm = next((one for one in result.alarms if one.t_s > change.t_s), None)
         changes[change.label] = {
-            "early": sum(one.t_s <= reproduced.CHANGED_s for one in result.alarms),
+            "early": sum(one.t_s <= change.t_s for one in result.alarms),
             "named": bool(alarm and result._names(alarm)),
             "what": alarm and alarm.what,
-            "after_s": alarm and round(alarm.t_s - reproduced.CHANGED_s, 6),
+            "after_s": alarm and round(alarm.t_s - change.t_s, 6),
             "size": alarm and alarm.size and alarm.size / change.size,
         }
     return {"seed": seed, "healthy": healthy_alarms(hidden, twin, duration_s, 100 * seed + 20), **changes}

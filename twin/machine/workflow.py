@@ -56,8 +56,8 @@ PAYLOADS_kg = (0.0, 0.1)
 OTHER_PAYLOAD_kg = 0.05
 """Of the log that judges the twin."""
 
-CHANGED_s, AFTER_s = 2.5, 1.0
-"""Time of a change, after the watch has measured the noise, and time that follows it."""
+CHANGED_s, AFTER_s = (2.3, 2.7), 1.0
+"""Range of the times of changes, after the watch has measured the noise, and time that follows it."""
 
 
 class WorkflowSettings(SettingsModel):
@@ -107,6 +107,7 @@ class Change(NamedTuple):
     what: str
     """Parameter that an alarm should name, or its beginning."""
     size: float
+    t_s: float
 
 
 class Watched(NamedTuple):
@@ -117,7 +118,7 @@ class Watched(NamedTuple):
     t_s: Array
     """End of each window."""
     sums: dict[str, Array]
-    """Cumulative sum of each change after each window, before an alarm resets it."""
+    """Logarithm of the evidence of each change after each window."""
     threshold: float
 
     @property
@@ -134,7 +135,7 @@ class Watched(NamedTuple):
         return list(self.alarms[:place])
 
     def _names(self, alarm: Alarm) -> bool:
-        return bool(self.change and alarm.t_s > CHANGED_s and alarm.what.startswith(self.change.what))
+        return bool(self.change and alarm.t_s > self.change.t_s and alarm.what.startswith(self.change.what))
 
 
 class Workflow(NamedTuple):
@@ -196,7 +197,8 @@ def run_workflow(
         before=_judge(judge.log, NOMINAL, None),
         after=_judge(judge.log, twin, identified.uncertainty),
         watched=tuple(
-            _watch({**hidden, **motion}, twin, change, settings.seed) for change in (None, *_changes(true))
+            _watch({**hidden, **motion}, twin, change, settings.seed)
+            for change in (None, *_changes(true, settings.seed))
         ),
     )
 
@@ -228,12 +230,12 @@ def _components(designed: Design) -> Any:
 def _play(
     fields: Mapping[str, Any], payload_kg: float, duration_s: float, seed: int, change: Change | None = None
 ) -> Played:
-    """Return what the hidden machine leaves; a change takes place at `CHANGED_s`."""
+    """Return what the hidden machine leaves; a change takes place at its time."""
     conditions = {"plant.payload_kg": payload_kg}
     scenario = scenarios.load(SCENARIO, {**fields, **conditions, "duration": duration_s, "seed": seed})
     period_s, parts = scenario.controller.period_s, []
     with Session(scenario) as session:
-        for until_s in (CHANGED_s, duration_s) if change else (duration_s,):
+        for until_s in (change.t_s, duration_s) if change else (duration_s,):
             rows = session.advance(round(until_s / period_s) - session.tick)
             parts.append([rows[name].copy() for name in _COLUMNS])
             if change and until_s < duration_s:
@@ -264,15 +266,28 @@ def _judge(log: Log, fields: Mapping[str, Any], uncertainty: Uncertainty | None)
     return Judged(shadow(log, model, settings=fitted.settings), validation)
 
 
-def _changes(true: Mapping[str, float]) -> list[Change]:
-    """Return the changes that the watch should name."""
+def _changes(true: Mapping[str, float], seed: int) -> list[Change]:
+    """Return the changes that the watch should name, at times from a seed."""
+    times_s = np.random.default_rng([seed, 1]).uniform(*CHANGED_s, 4).tolist()
     gains, friction_Nm = (_fields(true)[name] for name in ("plant.group_gain", "plant.coulomb_Nm"))
     weak = [0.8 * gain if group == _WEAK else gain for group, gain in enumerate(gains)]
     offset_rad = float(np.radians(0.1))
     return [
-        Change("torque −3 %", "plant.group_gain", [0.97 * gain for gain in gains], "torque_scale", -0.03),
         Change(
-            f"group {_WEAK} −20 %", "plant.group_gain", weak, f"plant.group_gain.{_WEAK}", -0.2 * gains[_WEAK]
+            "torque −3 %",
+            "plant.group_gain",
+            [0.97 * gain for gain in gains],
+            "torque_scale",
+            -0.03,
+            times_s[0],
+        ),
+        Change(
+            f"group {_WEAK} −20 %",
+            "plant.group_gain",
+            weak,
+            f"plant.group_gain.{_WEAK}",
+            -0.2 * gains[_WEAK],
+            times_s[1],
         ),
         Change(
             "offset of α +0.1°",
@@ -280,6 +295,7 @@ def _changes(true: Mapping[str, float]) -> list[Change]:
             [offset_rad, 0.0, 0.0],
             "sensors.angle_offset_rad.0",
             offset_rad,
+            times_s[2],
         ),
         Change(
             "friction doubled",
@@ -287,6 +303,7 @@ def _changes(true: Mapping[str, float]) -> list[Change]:
             [2 * value for value in friction_Nm],
             "plant.coulomb_Nm",
             float(np.mean(friction_Nm)),
+            times_s[3],
         ),
     ]
 
@@ -296,7 +313,7 @@ _WEAK = 5  # a group that the motion needs
 
 def _watch(hidden: Mapping[str, Any], twin: Mapping[str, Any], change: Change | None, seed: int) -> Watched:
     """Return the alarms of a log, judged window by window."""
-    log = _play(hidden, max(PAYLOADS_kg), CHANGED_s + AFTER_s, seed, change).log
+    log = _play(hidden, max(PAYLOADS_kg), CHANGED_s[1] + AFTER_s, seed, change).log
     watch = Watch(SCENARIO, {**twin, **log.conditions})
     count = round(watch.settings.window_s / float(np.median(np.diff(log.t_s))))
     alarms: list[Alarm] = []

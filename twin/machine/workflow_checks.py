@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from spheretwin.machine.intervals import Z95
 from spheretwin.machine.residuals import CHI2
-from spheretwin.machine.workflow import CHANGED_s, Judged, Workflow
+from spheretwin.machine.workflow import Judged, Workflow
 from spheretwin.models.base.checks import Check
 
 Array = NDArray[np.float64]
@@ -162,7 +162,7 @@ def _distance(result: Workflow, name: str) -> float:
 
 
 def _delays_s(result: Workflow) -> list[float]:
-    return [one.named.t_s - CHANGED_s for one in result.watched if one.named]
+    return [one.named.t_s - one.change.t_s for one in result.watched if one.change and one.named]
 
 
 def _size_errors(result: Workflow) -> list[float]:

@@ -95,9 +95,9 @@ SHADOW_TEXT = (
 )
 WATCH_TEXT = (
     "`watch`: the identified twin watches the machine with a payload in the designed motion. The first"
-    f" {CALIBRATED_s:g} s measure the noise; {CHANGED_s:g} s after the start the machine changes. The size of"
-    " an alarm is that which some windows of 0.1 s show; the watch goes on from it, and a further alarm"
-    " corrects it."
+    f" {CALIBRATED_s:g} s measure the noise. The machine changes at a time drawn from the seed,"
+    f" {CHANGED_s[0]:g} to {CHANGED_s[1]:g} s after the start. The watch goes on from the size that an alarm"
+    " states; a further alarm corrects it."
 )
 
 WORDS = (
@@ -228,7 +228,7 @@ def _watch_row(watched: Watched) -> tuple[str, ...]:
         size,
         "–" if named.size is None else f"{named.size:+.3g}",
         named.unit,
-        f"{named.t_s - CHANGED_s:.1f}",
+        f"{named.t_s - change.t_s:.2f}",
         f"{named.confidence:.3f}",
         alarms or "none",
     )
@@ -252,7 +252,7 @@ def _drawings(result: Workflow) -> list[Drawing]:
             one.t_s[one.t_s > CALIBRATED_s],
             {what: values[one.t_s > CALIBRATED_s] for what, values in one.sums.items()},
             one.named.what if one.named else None,
-            CHANGED_s if one.change else None,
+            one.change.t_s if one.change else None,
             [alarm.t_s for alarm in one.alarms],
         )
         for one in result.watched
@@ -272,10 +272,10 @@ def _drawings(result: Workflow) -> list[Drawing]:
         ),
         Drawing(
             "twin_watch.svg",
-            "Cumulative sums of the watch over time, linear up to the threshold and logarithmic above; after"
-            " an alarm the sums start again from 0. An alarm names the change that explains the windows best"
-            " with a size of its own, not the largest sum.",
-            twin.sums(panels, threshold, "Watch: sums of likelihood ratios"),
+            "Logarithm of the evidence of each change over time, linear up to the threshold and logarithmic"
+            " above; after an alarm it starts again from 0. The evidence of all changes together raises an"
+            " alarm.",
+            twin.sums(panels, threshold, "Watch: evidence of changes"),
         ),
     ]
 

@@ -1,4 +1,4 @@
-"""Figures of the twin of a machine: errors of its shadow, its residuals, and the sums of its watch."""
+"""Figures of the twin of a machine: errors of its shadow, its residuals, and the evidence of its watch."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class ResidualBins(NamedTuple):
 
 
 class Sums(NamedTuple):
-    """Cumulative sums over the windows of a log."""
+    """Logarithms of the evidence of changes over the windows of a log."""
 
     t_s: Array
     by_name: Mapping[str, Array]
@@ -96,7 +96,7 @@ def residuals(panels: Mapping[str, Mapping[str, ResidualBins]], x: str, y: str, 
 
 
 def sums(panels: Mapping[str, Sums], threshold: float, title: str) -> Figure:
-    """Draw cumulative sums over time: a panel a log, one line each change that is watched for.
+    """Draw the evidence of changes over time: a panel a log, one line each change that is watched for.
 
     Parameters
     ----------
@@ -121,7 +121,7 @@ def sums(panels: Mapping[str, Sums], threshold: float, title: str) -> Figure:
             )
         alarm = {"color": BROKEN, "markersize": 7, "linestyle": "", "label": "alarm", "zorder": 4}
         panel.plot(watched.alarms_s, [threshold] * len(watched.alarms_s), "v", **alarm)
-        plain(panel, "sum")
+        plain(panel, "log evidence")
         panel.set_title(name, fontsize="small", loc="left")
     # Linear up to the threshold: a large change exceeds it hundreds of times within a window.
     column[0].set_yscale("symlog", linthresh=threshold, linscale=1.5)
