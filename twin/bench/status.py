@@ -181,17 +181,9 @@ class BenchStatus:
 
 
 VECTORS = (
-    "q_rad",
-    "qdot_rad_s",
-    "q_ref_rad",
-    "qdot_ref_rad_s",
-    "error_rad",
-    "torque_command_Nm",
-    "torque_Nm",
-    "disturbance_Nm",
-    "current_command_A",
-    "current_A",
-)
+    "q_rad", "qdot_rad_s", "q_ref_rad", "qdot_ref_rad_s", "error_rad", "torque_command_Nm", "torque_Nm",
+    "disturbance_Nm", "current_command_A", "current_A",
+)  # fmt: skip
 
 
 def _of_row(row: Table, limit_A: float) -> dict[str, Any]:
@@ -225,30 +217,21 @@ def _start_row(session: Session) -> Table:
 
 def bench_status(bench_state: BenchState) -> BenchStatus:
     """Return the present status."""
-    driver, operators, pace, recording = (
-        bench_state.driver,
-        bench_state.operators,
-        bench_state.pace,
-        bench_state.recording,
-    )
+    driver, recording = bench_state.driver, bench_state.recording
     session = driver.session
     return BenchStatus(
+        **_attributes(bench_state, "stop_mode", "note", "refused"),
+        **_attributes(driver, "stopped", "reason", "limits"),
+        **_attributes(bench_state.pace, "speed", "chunks", "missed", "missed_share"),
+        **_attributes(bench_state.operators, "operator", "watching", "asking"),
         **_shown(bench_state),
         **_names(bench_state),
-        running=bench_state.is_active,
-        stopped=driver.stopped,
-        stop_mode=bench_state.stop_mode,
-        speed=pace.speed,
-        realtime_factor=pace.realtime_factor(),
-        chunks=pace.chunks,
-        missed=pace.missed,
-        missed_share=pace.missed_share,
-        status=str(session.status),
-        reason=driver.reason,
-        chatter_A_s=(bench_state.player or bench_state).history.chatter_A_s,
         **_faults(session),
-        limits=driver.limits,
         **_targets(bench_state),
+        running=bench_state.is_active,
+        realtime_factor=bench_state.pace.realtime_factor(),
+        status=str(session.status),
+        chatter_A_s=(bench_state.player or bench_state).history.chatter_A_s,
         capture=bench_state.capture.state,
         capture_t_s=bench_state.capture.t_s,
         pending=driver.pending_as_json(),
@@ -256,13 +239,12 @@ def bench_status(bench_state: BenchState) -> BenchStatus:
         snapshots=tuple(driver.snapshots),
         recording=recording.paths,
         completed_files=recording.completed_files,
-        note=bench_state.note,
-        operator=operators.operator,
-        watching=operators.watching,
-        asking=operators.asking,
-        refused=bench_state.refused,
         waiting=len(bench_state.queue),
     )
+
+
+def _attributes(part: object, *names: str) -> dict[str, Any]:
+    return {name: getattr(part, name) for name in names}
 
 
 def _shown(bench_state: BenchState) -> dict[str, Any]:
@@ -285,9 +267,7 @@ def _names(bench_state: BenchState) -> dict[str, Any]:
         return {
             "mode": "replay",
             "scenario": player.name,
-            "law": player.law,
-            "shape": player.shape,
-            "allocation": player.allocation,
+            **_attributes(player, "law", "shape", "allocation"),
         }
     return {
         "mode": "fault" if driver.reason is not None else driver.mode,

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import contextlib
-import json
 import shlex
 import sys
 import tempfile
@@ -38,7 +37,7 @@ from spheretwin.models.base.extras import missing
 from spheretwin.models.base.mujoco_library import timers_stopped
 from spheretwin.scenario import reading
 from spheretwin.scenario.fields import families, without_indices
-from spheretwin.scenario.reading import shipped
+from spheretwin.scenario.reading import shipped, value_text
 from spheretwin.scenario.sections import Scenario
 from spheretwin.session import Session
 from spheretwin.trajectories import SHAPES
@@ -83,7 +82,7 @@ def shape_settings(name: str, bench: Bench) -> list[FieldSetting]:
     return [
         FieldSetting(
             field,
-            written(known.get(field, _default(info))),
+            value_text(known.get(field, _default(info)), exact=True),
             _default_text(info),
             _meaning(info),
             _literals(info.annotation),
@@ -91,18 +90,6 @@ def shape_settings(name: str, bench: Bench) -> list[FieldSetting]:
         for field, info in kind.model_fields.items()
         if field not in NO_SHAPE
     ]
-
-
-def written(value: Any) -> str:
-    """Return the text of a value for the command line, with all digits; empty for None."""
-    if isinstance(value, tuple) and not any(isinstance(entry, tuple | dict) for entry in value):
-        return " ".join(map(written, value))
-    if isinstance(value, tuple | dict | list | bool):
-        return json.dumps(value, ensure_ascii=False)
-    if isinstance(value, float):
-        short = f"{value:g}"
-        return short if float(short) == value else repr(value)
-    return "" if value is None else str(value)
 
 
 def read(name: str, text: str) -> Any:
@@ -130,7 +117,9 @@ def read(name: str, text: str) -> Any:
 def _setting(name: str, value: Any, field: FieldInfo) -> FieldSetting:
     choices = families(Scenario).get(without_indices(name)) or _literals(field.annotation)
     limits = _range(name, value, field)
-    return FieldSetting(name, written(value), _default_text(field), _meaning(field), choices, limits)
+    return FieldSetting(
+        name, value_text(value, exact=True), _default_text(field), _meaning(field), choices, limits
+    )
 
 
 def _range(name: str, value: Any, field: FieldInfo) -> tuple[float, float] | None:
@@ -154,7 +143,7 @@ def _default(field: FieldInfo) -> Any:
 
 
 def _default_text(field: FieldInfo) -> str | None:
-    return None if field.is_required() else written(_default(field))
+    return None if field.is_required() else value_text(_default(field), exact=True)
 
 
 SIGNS = {"ge": "≥", "gt": ">", "le": "≤", "lt": "<"}

@@ -358,15 +358,15 @@ def described_fields(scenario: Scenario) -> list[tuple[str, Any, FieldInfo]]:
 _DESCRIBED = dict(every_field(Scenario))
 
 
-def value_text(value: Any) -> str:
-    """Return a value as it is written after a flag; an empty text for none."""
-    if isinstance(value, tuple):
-        nested = any(isinstance(entry, tuple) for entry in value)
-        return json.dumps(value) if nested else " ".join(map(value_text, value))
-    if isinstance(value, dict | list | bool):
+def value_text(value: Any, *, exact: bool = False) -> str:
+    """Return a value as it is written after a flag, with six digits unless it is `exact`; empty for none."""
+    if isinstance(value, tuple) and not any(isinstance(entry, tuple | dict) for entry in value):
+        return " ".join(value_text(entry, exact=exact) for entry in value)
+    if isinstance(value, tuple | dict | list | bool):
         return json.dumps(value, ensure_ascii=False)
     if isinstance(value, float):
-        return f"{value:g}"
+        short = f"{value:g}"
+        return repr(value) if exact and float(short) != value else short
     return "" if value is None else str(value)
 
 

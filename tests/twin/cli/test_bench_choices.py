@@ -6,9 +6,9 @@ import pytest
 
 from spheretwin import scenario as scenarios
 from spheretwin.bench import Bench
-from spheretwin.cli.bench import read, settings_of, shape_settings, written
+from spheretwin.cli.bench import read, settings_of, shape_settings
 from spheretwin.models.base.errors import InputError
-from spheretwin.scenario.reading import described_fields, shipped
+from spheretwin.scenario.reading import described_fields, shipped, value_text
 from tests.control.test_user_law import FILE
 
 
@@ -35,7 +35,7 @@ def test_the_gains_are_those_of_the_law_that_is_in_force():
 
 
 def test_a_name_of_any_alphabet_is_shown_as_it_is():
-    assert written(({"file": "Wärme.csv"},)) == '[{"file": "Wärme.csv"}]'
+    assert value_text(({"file": "Wärme.csv"},)) == '[{"file": "Wärme.csv"}]'
 
 
 def test_text_is_read_as_by_the_command_line():
