@@ -1,8 +1,10 @@
 """Content of what the verbs print: help, tables, JSON, pages, and messages about what is refused."""
 
+import argparse
 import functools
 import json
 import re
+from pathlib import Path
 from unittest.mock import patch
 
 import numpy as np
@@ -41,9 +43,19 @@ def several(calls):
     return "\n\n".join(stated(*call.split()) if isinstance(call, str) else stated(*call) for call in calls)
 
 
+PARTS = [
+    "magnetics curve",
+    "magnetics field",
+    "magnetics check",
+    "magnetics map",
+    "log check",
+    "export fmu",
+    "export c",
+]
+
 HELP = [
-    "--help", *(f"{verb} --help" for verb in cli.VERBS), "magnetics curve --help", "magnetics check --help",
-    "magnetics map --help", "log check --help", "simulate tilt --help run",
+    "--help", *(f"{verb} --help" for verb in cli.VERBS), *(f"{part} --help" for part in PARTS),
+    "simulate tilt --help run",
     "simulate hold --help controller.governor", "bench --help watchdog", "simulate hold --help fault",
     "simulate --help trajectory --controller.law pid", "simulate hold --help controler",
 ]  # fmt: skip
@@ -241,7 +253,46 @@ def magnetics():
     )
 
 
+def read_texts(action, parser):
+    """How an option reads texts: a word, those that are no finite number, and the ends of its range."""
+
+    def outcome(text):
+        try:
+            value = parser._get_value(action, text)
+        except argparse.ArgumentError as error:
+            return error.message
+        return f"{text}: a path" if isinstance(value, Path) else f"{text}: {value!r}"
+
+    expected = outcome("x").partition(", received")[0]
+    ends = [float(end) for end in re.findall(r"\d+(?:\.\d+)?", expected)]
+    near = [f"{end + step:.15g}" for end in ends for step in (-1, 0, 1)]
+    return map(
+        outcome, ["x", *(["nan", "inf", "²", "-1", "0", "0.5", *near] if "expected" in expected else [])]
+    )
+
+
+def options():
+    """Every option: kind, number of values, default, valid values, and how it reads texts."""
+    lines = []
+    for verb in cli.VERBS:
+        for title, parser in cli.parsers_of(verb).items():
+            lines.append(f"## {title}")
+            for action in parser._actions:
+                default = parser.get_default(action.dest)
+                if isinstance(default, str):
+                    default = parser._get_value(action, default)
+                name = ", ".join(action.option_strings) or action.metavar
+                kind = type(action).__name__.strip("_")
+                lines.append(f"{name} ({action.dest}): {kind}, {action.nargs}, {default}, {action.required}")
+                if action.choices:
+                    lines.append(f"    {', '.join(map(str, action.choices))}")
+                elif action.nargs != 0:
+                    lines += [f"    {text}" for text in read_texts(action, parser)]
+    return "\n".join(lines)
+
+
 CASES = {
+    "command_options": options,
     "command_help": lambda: several(HELP), "command_explain": lambda: several(EXPLAIN),
     "command_runs": runs, "command_reviews": reviews, "command_sweeps": sweeps,
     "command_tunings": tunings, "command_reproductions": reproductions,
