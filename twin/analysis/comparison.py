@@ -24,6 +24,7 @@ from spheretwin.models.telemetry.table import Table
 from spheretwin.scenario.sections import ResolvedScenario
 from spheretwin.viz.comparison.runs import ComparedRun, EarlyEnd, Spectrum, leaders
 from spheretwin.viz.pages import markdown
+from spheretwin.viz.pages.markdown import Drawing, Page, Section
 from spheretwin.viz.quantities import Quantity, QuantityRows, compared_quantities
 from spheretwin.viz.terminal.reviews import differences as table_rows
 
@@ -163,14 +164,14 @@ def _early_end(run: Reviewed, events: Sequence[Event]) -> EarlyEnd | None:
     return EarlyEnd(float(run.table["t_s"][-1]), status.replace("_", " "), events[-1][2])
 
 
-def _difference_table(runs: Sequence[Reviewed]) -> list[str]:
-    """Return the fields in which scenarios differ as lines of a Markdown table, a column for each run."""
+def _differences(runs: Sequence[Reviewed]) -> markdown.Table | str:
+    """Return the fields in which scenarios differ as a table, a column for each run."""
     rows = scenario_differences([run.record.scenario for run in runs])
     if not rows:
-        return ["The scenarios of the runs are equal."]
+        return "The scenarios of the runs are equal."
     head = ["field", *(f"run {place}" for place in range(1, len(runs) + 1))]
     cells = [[_plain(cell) for cell in (name, *values)] for name, values in rows]
-    return markdown.Table("", head, cells, len(head)).lines()
+    return markdown.Table("", head, cells, len(head))
 
 
 def _rows(run: Reviewed, table: Table) -> QuantityRows:
@@ -211,13 +212,12 @@ def _runs_text(runs: Sequence[Reviewed], drawn_runs: Sequence[ComparedRun]) -> s
         end = run.early_end
         text = f"**{end.status} at {end.t_s:.3f} s**: {end.reason}" if end else "completed"
         lines.append(f"- {_plain(label)}, {text}")
-    lines += ["", "## Differences of the scenarios", "", *_difference_table(runs), ""]
+    lines += ["", *Section("Differences of the scenarios", [_differences(runs)]).lines()]
     lines.append("The thin grey line is the reference. A cross marks the end of a run that is not complete.")
     return "\n".join(lines)
 
 
 if TYPE_CHECKING:
-    from spheretwin.viz.pages.markdown import Drawing
     from spheretwin.viz.recording.part import RecordingSubject
 
 PAGE = "review.html"
@@ -271,21 +271,23 @@ def write_figures(
         drawings = _drawings(drawn_runs, leading, quantities, spectra, conditions)
         saved = markdown.save_drawings(into, drawings, figure_format)
         over_time = interactive.over_time(drawn_runs, leading, quantities)
-    below = _below(runs, drawn_runs, figures)
-    above = [
-        _above(title, drawn_runs, interactive.points_per_line(drawn_runs, leading, quantities)),
-        "",
-        *markdown.contents([*(f"## {heading}" for heading in interactive.TITLES.values()), below]),
-    ]
-    names = " ".join(shlex.quote(run.path.name) for run in runs)
-    content = interactive.page(
-        title,
-        drawn_runs,
-        over_time,
-        interactive.error_spectra(drawn_runs, spectra),
-        "\n".join(above),
-        "\n".join([below, "", *markdown.foot(f"spheretwin review {names} --figures DIR")]),
+        spectral = interactive.error_spectra(drawn_runs, spectra)
+    is_thin = any(
+        len(run.table) > interactive.points_per_line(drawn_runs, leading, quantities) for run in drawn_runs
     )
+    sections = [
+        Section("Signals over time", [interactive.place(interactive.OVER_TIME)]),
+        Section("Spectra of the tracking errors", [interactive.place(interactive.SPECTRA)]),
+        Section(
+            "Metrics", ["Differences are from run 1." if len(runs) > 1 else "", _metrics(drawn_runs, figures)]
+        ),
+    ]
+    if len(runs) > 1:
+        sections.append(Section("Differences of the scenarios", [_differences(runs)]))
+    lead = f"{USE}{THIN if is_thin else ''}\n\n{interactive.place(interactive.RUNS)}"
+    command = f"spheretwin review {' '.join(shlex.quote(run.path.name) for run in runs)} --figures DIR"
+    text = Page("review", _plain(title), lead, sections, command).text()
+    content = interactive.page(title, text, drawn_runs, over_time, spectral)
     page = markdown.save_text(into / PAGE, content)
     _remove(earlier.difference(saved))
     return page
@@ -328,7 +330,6 @@ def _drawings(
 ) -> Iterator[Drawing]:
     from spheretwin.viz.figures.comparison import currents, events_figure, over_time
     from spheretwin.viz.figures.comparison import spectra as of_errors
-    from spheretwin.viz.pages.markdown import Drawing
 
     def named(title: str) -> str:
         return f"{title}: {conditions}" if conditions else title
@@ -352,29 +353,18 @@ def _spectra(run: Reviewed) -> list[Spectrum]:
     ]  # fmt: skip
 
 
-def _above(title: str, runs: Sequence[ComparedRun], most: int) -> str:
-    thin = any(len(run.table) > most for run in runs)
-    lines = [
-        f"# {_plain(title)}",
-        "",
-        "Drag to zoom, double-click to reset the view; every plot shows the values at the cursor. The"
-        " buttons switch runs. The dashed dark line is the reference.",
-    ]
-    if thin:
-        lines.append(
-            "Long runs are drawn by the lowest and highest value of every few ticks, a band, and their mean."
-        )
-    return "\n".join(lines)
+USE = (
+    "Drag to zoom, double-click to reset the view; every plot shows the values at the cursor. The"
+    " buttons switch runs. The dashed dark line is the reference."
+)
+THIN = " Long runs are drawn by the lowest and highest value of every few ticks, a band, and their mean."
 
 
-def _below(runs: Sequence[Reviewed], drawn: Sequence[ComparedRun], figures: Sequence[dict[str, Any]]) -> str:
+def _metrics(drawn: Sequence[ComparedRun], figures: Sequence[dict[str, Any]]) -> markdown.Table:
     head = ["angles in mrad (degrees)", *(_plain(run.label) for run in drawn)]
-    rows = [[cell.replace("\n", "; ") for cell in row] for row in table_rows(figures, BAND_rad)]
-    note = ["Differences are from run 1.", ""] if len(runs) > 1 else []
-    lines = ["## Metrics", "", *note, *markdown.Table("", head, rows).lines(), ""]
-    if len(runs) > 1:
-        lines += ["## Differences of the scenarios", "", *_difference_table(runs)]
-    return "\n".join(lines)
+    return markdown.Table(
+        "", head, [[cell.replace("\n", "; ") for cell in row] for row in table_rows(figures, BAND_rad)]
+    )
 
 
 def _plain(text: str) -> str:

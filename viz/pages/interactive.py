@@ -19,6 +19,7 @@ from spheretwin.viz.comparison.runs import ComparedRun, Spectrum
 from spheretwin.viz.figures import comparison
 from spheretwin.viz.figures.style import DASHES
 from spheretwin.viz.pages import markdown
+from spheretwin.viz.pages.markdown import BLOCK
 from spheretwin.viz.quantities import Array, Quantity
 from spheretwin.viz.theme import run_colours
 
@@ -28,38 +29,34 @@ POLICY = (
     " font-src data:; form-action 'none'; base-uri 'none'"
 )
 
-TITLES = {"over-time": "Signals over time", "spectra": "Spectra of the tracking errors"}
-"""Heading of each figure."""
+OVER_TIME, SPECTRA, RUNS = "over-time", "spectra", "runs"
+"""Names of the figures and of the switches of the runs."""
+
+
+def place(name: str) -> str:
+    """Return the Markdown at whose place a page has a figure, or the switches."""
+    return f"![{name}]({BLOCK}{name})"
 
 
 def page(
-    title: str,
-    runs: Sequence[ComparedRun],
-    over_time: plotly.Figure,
-    spectra: plotly.Figure,
-    above: str,
-    below: str,
+    title: str, text: str, runs: Sequence[ComparedRun], over_time: plotly.Figure, spectra: plotly.Figure
 ) -> str:
     """Whole page.
 
     Parameters
     ----------
     title : str
+    text : str
+        Markdown with the places of figures and switches.
     runs : sequence of ComparedRun
     over_time, spectra : Figure
-    above, below : str
-        Markdown above and below the figures.
     """
-    figures = {"over-time": over_time, "spectra": spectra}
+    figures = {OVER_TIME: over_time, SPECTRA: spectra}
+    blocks = {f"{BLOCK}{name}": f'<div class="plot" id="{name}"></div>\n' for name in figures}
+    switches = f'<div class="runs" role="group" aria-label="runs">{_switches(runs)}</div>\n'
+    blocks[f"{BLOCK}{RUNS}"] = switches
     content = ", ".join(f'"{name}": {figure.to_json()}' for name, figure in figures.items())
-    body = [
-        markdown.rendered(above),
-        f'<div class="runs" role="group" aria-label="runs">{_switches(runs)}</div>',
-        *(
-            markdown.rendered(f"## {TITLES[name]}") + f'<div class="plot" id="{name}"></div>'
-            for name in figures
-        ),
-        markdown.rendered(below),
+    scripts = [
         f"<script>{get_plotlyjs()}</script>",
         # No text of a user's ends the script.
         f"<script>const figures = {{{content}}};".replace("<", "\\u003c").replace("\\u003c", "<", 1),
@@ -67,7 +64,7 @@ def page(
     ]
     style = markdown.shipped_text("interactive.css")
     head = f'<meta http-equiv="Content-Security-Policy" content="{POLICY}">\n<style>\n{style}</style>'
-    return markdown.whole(title, "\n".join(body), head)
+    return markdown.page(title, text, blocks.__getitem__, head, "\n".join(scripts))
 
 
 def _switches(runs: Sequence[ComparedRun]) -> str:

@@ -14,7 +14,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 from markdown_it import MarkdownIt
-from markdown_it.token import Token
 
 from spheretwin.models.base.checks import Check, broken
 from spheretwin.models.base.extras import missing
@@ -25,7 +24,16 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-def page(title: str, markdown: str, figures: Path | None = None) -> str:
+def shipped_text(name: str) -> str:
+    """Contents of a style or a script of this folder."""
+    return Path(__file__).with_name(name).read_text(encoding="utf-8")
+
+
+Inset = Callable[[str], str]
+"""Return the HTML of a figure by its file or name."""
+
+
+def page(title: str, markdown: str, inset: Inset | None = None, head: str = "", end: str = "") -> str:
     """Whole page; its figures have a white ground in the dark theme too, wide content scrolls in its box.
 
     Parameters
@@ -34,40 +42,10 @@ def page(title: str, markdown: str, figures: Path | None = None) -> str:
         As it is, without markup.
     markdown : str
         CommonMark with tables; tags in it are shown, not obeyed.
-    figures : Path, optional
-        Folder of its figures, which are embedded in the page; it refers to their files unless given.
-    """
-    return whole(title, rendered(markdown, figures))
-
-
-def shipped_text(name: str) -> str:
-    """Contents of a style or a script of this folder."""
-    return Path(__file__).with_name(name).read_text(encoding="utf-8")
-
-
-def rendered(markdown: str, figures: Path | None = None) -> str:
-    """Return the HTML of Markdown; parameters as in `page`."""
-    reader = MarkdownIt("commonmark", {"html": False}).enable("table")
-    reader.add_render_rule("table_open", _constant('<div class="wide" tabindex="0">\n<table>\n'))
-    reader.add_render_rule("table_close", _constant("</table>\n</div>\n"))
-    tokens = reader.parse(markdown)
-    headings = [i for i, token in enumerate(tokens) if token.type == "heading_open" and token.tag != "h1"]
-    for i, anchor in zip(headings, anchors(tokens[i + 1].content for i in headings), strict=True):
-        tokens[i].attrs["id"] = anchor
-    if figures:
-        reader.add_render_rule("image", lambda _, images, place, *__: _svg(figures, images[place]))
-    return str(reader.renderer.render(tokens, reader.options, {}))
-
-
-def whole(title: str, body: str, head: str = "") -> str:
-    """A page of what it shows.
-
-    Parameters
-    ----------
-    title : str
-        As it is, without markup.
-    body, head : str
-        HTML.
+    inset : callable, optional
+        Figures in the page; it refers to their files unless given.
+    head, end : str
+        HTML at the end of the head and of the page.
     """
     return "\n".join(
         [
@@ -82,12 +60,33 @@ def whole(title: str, body: str, head: str = "") -> str:
             "</head>",
             "<body>",
             "<main>",
-            f"{body}</main>",
+            f"{_rendered(markdown, inset)}{end}</main>",
             "</body>",
             "</html>",
             "",
         ]
     )
+
+
+def _rendered(markdown: str, inset: Inset | None) -> str:
+    reader = MarkdownIt("commonmark", {"html": False}).enable("table")
+    reader.add_render_rule("table_open", _constant('<div class="wide" tabindex="0">\n<table>\n'))
+    reader.add_render_rule("table_close", _constant("</table>\n</div>\n"))
+    tokens = reader.parse(markdown)
+    headings = [i for i, token in enumerate(tokens) if token.type == "heading_open" and token.tag != "h1"]
+    for i, anchor in zip(headings, anchors(tokens[i + 1].content for i in headings), strict=True):
+        tokens[i].attrs["id"] = anchor
+    if inset:
+        reader.add_render_rule("image", lambda _, images, place, *__: inset(str(images[place].attrs["src"])))
+    for before, content, after in zip(tokens, tokens[1:], tokens[2:], strict=False):
+        # A block is in no paragraph.
+        if content.type == "inline" and re.fullmatch(rf"!\[[^]]*\]\({BLOCK}[^)]*\)", content.content):
+            before.hidden = after.hidden = True
+    return str(reader.renderer.render(tokens, reader.options, {}))
+
+
+BLOCK = "block:"
+"""Before the name of an inset that is a block."""
 
 
 def anchors(titles: Iterable[str]) -> list[str]:
@@ -101,9 +100,8 @@ def anchors(titles: Iterable[str]) -> list[str]:
     return names
 
 
-def _svg(folder: Path, image: Token) -> str:
+def _svg(path: Path) -> str:
     """Inline SVG of a figure; its identifiers begin with the file's name, as a page has several."""
-    path = folder / str(image.attrs["src"])
     content = path.read_text(encoding="utf-8")
     content = re.sub(r'(\bid="|href="#|url\(#)', rf"\g<1>{path.stem}-", content[content.index("<svg") :])
     return content.replace("<svg", '<svg role="img"', 1)
@@ -225,14 +223,18 @@ class Page(NamedTuple):
         save_drawings(
             folder, (drawing for section in self.sections for drawing in section.drawings()), figure_format
         )
-        lines = [line for section in self.sections for line in section.lines()]
-        text = "\n".join(
-            [f"# {self.title}", "", self.lead, "", *contents(lines), *lines, *foot(self.command)]
-        )
+        text, svg = self.text(), lambda file: _svg(folder / file)
         return [
             save_text(folder / f"{self.name}.md", text),
-            save_text(folder / f"{self.name}.html", page(self.title, text, folder)),
+            save_text(folder / f"{self.name}.html", page(self.title, text, svg)),
         ]
+
+    def text(self) -> str:
+        """Return the page in Markdown."""
+        lines = [line for section in self.sections for line in section.lines()]
+        return "\n".join(
+            [f"# {self.title}", "", self.lead, "", *contents(lines), *lines, *foot(self.command)]
+        )
 
 
 def figures_section(drawings: Iterable[Drawing]) -> list[Section]:
