@@ -70,18 +70,16 @@ class Kick(DisturbanceTerm):
     "telemetry column": Addition(
         "",
         """
-@part_of_its_caller
-def write_largest(row, plant):
+@channel(
+    lambda scenario: True, single("largest_current_A", "A", "largest group current at the end of the tick")
+)
+def largest(row, plant):
     row[0] = 0.0
     for j in range(plant.current.shape[0]):
         row[0] = max(row[0], abs(plant.current[j]))
-
-
-LARGEST_SIGNALS = (Signal("largest_current_A", "A", 1, "largest group current at the end of the tick"),)
-LARGEST = Channel(lambda groups: LARGEST_SIGNALS, lambda scenario: True, write_largest)
 """,
         "twin/channels.py",
-        ("    DRIVE,\n", "    DRIVE,\n    LARGEST,\n"),
+        ("    drive,\n", "    drive,\n    largest,\n"),
     ),
     "physics engine": Addition(
         "twin/plant/stiff.py",
