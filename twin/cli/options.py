@@ -11,7 +11,6 @@ from pathlib import Path
 from textwrap import dedent
 from typing import Any, NamedTuple, NoReturn
 
-from spheretwin.models.actuator import MJCF_PATH
 from spheretwin.models.base.errors import InputError, did_you_mean, shown
 
 FIGURE_FORMATS = ("svg", "pdf", "png", "pdf-one-column", "pdf-two-columns")
@@ -158,6 +157,10 @@ class Parser(argparse.ArgumentParser):
         self.description = _description(verb)
         self._add_options(verb.options, verb.readers)
         self._add_options(verb.unlisted, verb.readers, listed=False)
+        if "--mjcf" in self.expected:
+            from spheretwin.models.actuator import MJCF_PATH  # MuJoCo is slow to import
+
+            self.set_defaults(mjcf=MJCF_PATH)
         self.set_defaults(run=verb.run, parser=self, has_fields=verb.has_fields)
         if verb.has_fields:
             needed = verb.usage or self.expected[0]
@@ -166,7 +169,7 @@ class Parser(argparse.ArgumentParser):
             self.add_argument("-h", "--help", nargs="?", const="", metavar="SECTION", help=text)
 
     def _add_options(self, text: str, readers: dict[str, Any], *, listed: bool = True) -> None:
-        readers = {"figure_format": FIGURE_FORMATS, "mjcf": {"type": Path, "default": MJCF_PATH}} | readers
+        readers = {"figure_format": FIGURE_FORMATS} | readers
         common = {re.split("[ =]", spec)[0]: (spec, meaning) for spec, meaning in _entries(COMMON)}
         for spec, meaning in _entries(text):
             spec, standard = common.get(spec, (spec, ""))
