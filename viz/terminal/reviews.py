@@ -12,7 +12,7 @@ from rich.markup import escape
 from spheretwin.models.telemetry.signals import ANGLES
 from spheretwin.models.telemetry.status import named
 from spheretwin.viz.terminal import tables
-from spheretwin.viz.terminal.runs import COLOURS, ERRORS, angle, print_rows, settled_label
+from spheretwin.viz.terminal.runs import NONE, Metric, angle, metrics, print_metrics, print_rows
 from spheretwin.viz.terminal.tables import percent, three_digits
 
 FACTS = ("scenario", "law", "modelling_error", "load", "hardware", "seed", "status", "reason", "simulated_s")
@@ -20,9 +20,6 @@ RESULTS = ("status", "reason", "simulated_s")
 """Facts that are results of a run; the others are fields of its scenario."""
 
 MOST_EVENTS = 12
-
-NONE = "–"
-"""Cell without a value."""
 
 
 class NominalError(NamedTuple):
@@ -47,32 +44,6 @@ class SignalTolerance(NamedTuple):
     """Excess over the tolerance at that time, in the unit of the signal; 0 within it."""
 
 
-class _FigureRow(NamedTuple):
-    """A figure of every run."""
-
-    label: str
-    key: str
-    unit: str
-    each_axis: bool = False
-    signed: bool = False
-    """True if values of either sign occur: a value near zero is then no scale for a percentage."""
-
-
-def _figure_rows(band_rad: float) -> tuple[_FigureRow, ...]:
-    return (
-        *(_FigureRow(label, key, "rad", True) for label, key in ERRORS.items()),
-        _FigureRow("overshoot", "overshoot_rad", "rad", True),
-        _FigureRow(settled_label(band_rad), "settling_time_s", "s", True),
-        _FigureRow("largest current", "max_abs_current_A", "A"),
-        _FigureRow("share of ticks at the limit", "saturated_fraction", "1"),
-        _FigureRow("rms torque", "rms_torque_Nm", "N·m"),
-        _FigureRow("variation of the commands", "current_variation_A_s", "A/s"),
-        _FigureRow("copper loss", "copper_loss_J", "J"),
-        _FigureRow("work on the rotor", "mechanical_work_J", "J", signed=True),
-        _FigureRow("energy", "energy_J", "J"),
-    )
-
-
 def print_run_report(run: dict[str, Any], nominal_errors: Sequence[NominalError], band_rad: float) -> None:
     """Print the report of one run.
 
@@ -88,21 +59,15 @@ def print_run_report(run: dict[str, Any], nominal_errors: Sequence[NominalError]
     console = tables.terminal_console()
     ending = run["status"] or "not closed"
     title = f"{run['scenario']} under {run['law']}: {ending} at {run['simulated_s']:.3f} s"
-    table = tables.new_table(title, "tracking error, mrad (degrees)", *ANGLES)
-    if run["status"]:
-        table.title_style = COLOURS[named(run["status"]).level]
-    rows = _figure_rows(band_rad)
-    for row in rows:
-        if row.each_axis:
-            table.add_row(row.label, *(_figure(value, row.unit) for value in run[row.key] or ()))
-    for place in range(max(len(run["error_peaks"][axis]) for axis in ANGLES)):
-        peaks = (run["error_peaks"][axis][place : place + 1] for axis in ANGLES)
-        label = f"{('strongest', 'second', 'third')[place]} oscillation"
-        table.add_row(label, *(_peak(*peak) if peak else NONE for peak in peaks))
-    tables.print_table(table)
-    for row in rows:
-        if not row.each_axis:
-            console.print(f"{row.label} {_figure(run[row.key], row.unit)}")
+    peaks = [
+        [peaks[place] if place < len(peaks) else None for peaks in run["error_peaks"].values()]
+        for place in range(max(map(len, run["error_peaks"].values())))
+    ]
+    more = [
+        (f"{name} oscillation", *(_peak(peak) if peak else NONE for peak in of_axes))
+        for name, of_axes in zip(("strongest", "second", "third"), peaks, strict=False)
+    ]
+    print_metrics(title, named(run["status"]).level if run["status"] else None, run, band_rad, more)
     facts = [f"{name} {run[name]}" for name in FACTS[2:6]]
     console.print(escape(", ".join(facts) + (f", {run['reason']}" if run["reason"] else "")), soft_wrap=True)
     for event in run["events"][:MOST_EVENTS]:
@@ -112,7 +77,7 @@ def print_run_report(run: dict[str, Any], nominal_errors: Sequence[NominalError]
     _print_nominal_errors([Path(run["path"]).name], [nominal_errors])
 
 
-def _peak(peak: dict[str, float]) -> str:
+def _peak(peak: Mapping[str, float]) -> str:
     return f"{three_digits(peak['frequency_Hz'])} Hz: {angle(peak['amplitude_rad'])}"
 
 
@@ -204,10 +169,10 @@ def differences(runs: Sequence[dict[str, Any]], band_rad: float) -> Iterator[lis
     """Yield facts and figures, one cell for each run; the others with their difference from the first."""
     for name in FACTS:
         yield [name, *(NONE if run[name] is None else f"{run[name]}" for run in runs)]
-    for row in _figure_rows(band_rad):
+    for row in metrics(band_rad):
         for place, axis in enumerate(ANGLES) if row.each_axis else ((None, ""),):
             values = [_entry(run[row.key], place) for run in runs]
-            cells = [_figure(values[0], row.unit)]
+            cells = [row.text(values[0])]
             cells += [_with_difference(values[0], value, row) for value in values[1:]]
             yield [f"{row.label} {axis}".strip(), *cells]
 
@@ -216,26 +181,18 @@ def _entry(value: Any, place: int | None) -> float | None:
     return value if place is None or value is None else value[place]
 
 
-def _figure(value: float | None, unit: str) -> str:
-    if value is None:
-        return NONE
-    if unit == "rad":
-        return angle(value)
-    return percent(value) if unit == "1" else f"{three_digits(value)} {unit}"
-
-
 LARGEST_PERCENT = 1000
 """A larger change is written as a factor."""
 
 
-def _with_difference(first: float | None, value: float | None, row: _FigureRow) -> str:
+def _with_difference(first: float | None, value: float | None, row: Metric) -> str:
     """Return a figure, and below it the difference from the first, absolute and relative."""
     if first is None or value is None:
-        return _figure(value, row.unit)
+        return row.text(value)
     if (difference := value - first) == 0:
         return "the same"
     relative = _relative(first, value, signed=row.signed)
-    return f"{_figure(value, row.unit)}\n{_change(difference, row.unit)}{relative}"
+    return f"{row.text(value)}\n{_change(difference, row.unit)}{relative}"
 
 
 def _change(difference: float, unit: str) -> str:

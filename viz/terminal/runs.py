@@ -8,7 +8,7 @@ import shutil
 import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from rich.markup import escape
 
@@ -17,11 +17,49 @@ from spheretwin.models.telemetry.status import Level, Status, named
 from spheretwin.viz.terminal import tables
 from spheretwin.viz.terminal.tables import percent, three_digits
 
-ERRORS = {
-    "largest": "max_abs_error_rad",
-    "rms": "rms_error_rad",
-    "rms, second half": "tail_rms_error_rad",
-}
+NONE = "–"
+"""Cell without a value."""
+
+
+class Metric(NamedTuple):
+    """Metric of a run in reports."""
+
+    label: str
+    key: str
+    unit: str
+    each_axis: bool = False
+    signed: bool = False
+    """True if values of either sign occur: a value near zero is then no scale for a percentage."""
+    none: str = NONE
+    """Text without a value."""
+
+    def text(self, value: float | None) -> str:
+        """Return a value with its unit."""
+        if value is None:
+            return self.none
+        if self.unit == "rad":
+            return angle(value)
+        return percent(value) if self.unit == "1" else f"{three_digits(value)} {self.unit}"
+
+
+def metrics(band_rad: float) -> tuple[Metric, ...]:
+    """Return the metrics of reports, those of each axis first; with a settling band, rad."""
+    settled = f"settled to ±{1e3 * band_rad:g} mrad after"
+    return (
+        Metric("largest", "max_abs_error_rad", "rad", each_axis=True),
+        Metric("rms", "rms_error_rad", "rad", each_axis=True),
+        Metric("rms, second half", "tail_rms_error_rad", "rad", each_axis=True),
+        Metric("overshoot", "overshoot_rad", "rad", each_axis=True),
+        Metric(settled, "settling_time_s", "s", each_axis=True, none="never"),
+        Metric("largest current", "max_abs_current_A", "A"),
+        Metric("share of ticks at the limit", "saturated_fraction", "1"),
+        Metric("rms torque", "rms_torque_Nm", "N·m"),
+        Metric("variation of the commands", "current_variation_A_s", "A/s"),
+        Metric("copper loss", "copper_loss_J", "J"),
+        Metric("work on the rotor", "mechanical_work_J", "J", signed=True),
+        Metric("energy", "energy_J", "J"),
+    )
+
 
 COLOURS = {Level.INFO: "italic", Level.WARN: "bold yellow", Level.ERROR: "bold red"}
 
@@ -58,26 +96,7 @@ def print_run(
     scenario = summary["scenario"]
     ending = _ending(status, planned_s, summary["simulated_s"], why)
     title = f"{scenario['name']} under {law}, {scenario['hardware']} hardware: {ending}"
-    errors = tables.new_table(title, "tracking error, mrad (degrees)", *ANGLES)
-    errors.title_style = COLOURS[status.level]
-    for label, key in ERRORS.items():
-        errors.add_row(label, *(angle(value) for value in summary[key] or ()))
-    settled = summary["settling_time_s"] or ()
-    errors.add_row(
-        settled_label(band_rad), *("never" if t is None else f"{three_digits(t)} s" for t in settled)
-    )
-    tables.print_table(errors)
-    if summary["max_abs_current_A"] is not None:
-        console.print(
-            f"largest current {summary['max_abs_current_A']:.2f} A,"
-            f" the limit cut the torque at {percent(summary['saturated_fraction'])} of the ticks"
-        )
-    if summary["rms_torque_Nm"] is not None:
-        console.print(
-            f"rms torque {summary['rms_torque_Nm']:.4f} N·m, copper {summary['copper_loss_J']:.2f} J"
-        )
-    if summary["current_variation_A_s"] is not None:
-        console.print(f"commands vary by {summary['current_variation_A_s']:.1f} A/s a group")
+    print_metrics(title, status.level, summary, band_rad)
     for fault in faults:
         console.print(escape(f"fault {fault}"), soft_wrap=True)
     for name in own:
@@ -93,9 +112,40 @@ def print_run(
         console.print(f"[yellow]warning[/yellow]  {escape(warning)}", soft_wrap=True)
 
 
-def settled_label(band_rad: float) -> str:
-    """Return the label of the settling time, with its band."""
-    return f"settled to ±{1e3 * band_rad:g} mrad after"
+def print_metrics(
+    title: str,
+    level: Level | None,
+    run: Mapping[str, Any],
+    band_rad: float,
+    more: Sequence[Sequence[str]] = (),
+) -> None:
+    """Print the metrics of a run: a table of those of each axis, with more rows, then a line for each other.
+
+    Parameters
+    ----------
+    title : str
+    level : Level, optional
+        Level of the status of the run.
+    run : mapping
+        Values by key; metrics without one are left out.
+    band_rad : float
+        Settling band, rad.
+    more : sequence of sequence of str
+        Further rows of the table.
+    """
+    table = tables.new_table(title, "tracking error, mrad (degrees)", *ANGLES)
+    if level:
+        table.title_style = COLOURS[level]
+    known = [metric for metric in metrics(band_rad) if metric.key in run]
+    for metric in known:
+        if metric.each_axis:
+            table.add_row(metric.label, *map(metric.text, run[metric.key] or ()))
+    for row in more:
+        table.add_row(*row)
+    tables.print_table(table)
+    for metric in known:
+        if not metric.each_axis and run[metric.key] is not None:
+            tables.terminal_console().print(f"{metric.label} {metric.text(run[metric.key])}")
 
 
 def _ending(status: Status, planned_s: float, simulated_s: float, why: str | None) -> str:
