@@ -8,6 +8,7 @@ from pathlib import Path
 from spheretwin.cli.common import print_json, print_message
 from spheretwin.cli.log_options import LOGS, changes_of, check_given, read_logs, scenario_of
 from spheretwin.cli.options import from_zero, number, verb, whole
+from spheretwin.machine import report
 from spheretwin.machine.excitation import DesignSettings, design
 from spheretwin.machine.identification import Identified, IdentifySettings, identify
 from spheretwin.machine.parameters import KINDS
@@ -16,7 +17,7 @@ from spheretwin.models.base.errors import InputError
 from spheretwin.models.base.files import check_writable
 from spheretwin.models.telemetry.table import Table
 from spheretwin.scenario.writing import as_toml
-from spheretwin.viz.pages.markdown import save_text
+from spheretwin.viz.pages.markdown import prepare, save_text
 from spheretwin.viz.terminal import runs
 from spheretwin.viz.terminal.progress import counted, tracked
 
@@ -36,6 +37,9 @@ DEFAULT = ("torque_scale", "plant.coulomb_Nm")
     --window S           length of the windows (default: 0.2 s), or of a designed experiment
         (default: 4 s)
     --out FILE.toml      write the twin, if it is accepted; or the designed scenario
+    --suggest            rank the parameters that are not identified by how much they would improve the
+        held-out windows
+    --report FILE.html   write a page about data, parameters, residuals and suggestions
     --json
     """,
     has_fields=True,
@@ -49,26 +53,39 @@ def run(options: argparse.Namespace) -> bool:
     Exit code 1 if the data do not determine the parameters or the result is not better.
     """
     check_given(options)
-    for path, suffix in ((options.out, ".toml"), (options.currents, ".csv")):
+    for path, suffix in ((options.out, ".toml"), (options.currents, ".csv"), (options.report, ".html")):
         if path:
             check_writable(path, suffix)
     if options.design:
+        if options.report or options.suggest:
+            raise InputError("command line: expected --report and --suggest with logs, received --design")
         return _design(options)
     if options.candidates or options.currents:
         raise InputError("command line: expected --candidates and --currents with --design")
     logs, changes = read_logs(options), changes_of(options)
-    settings = IdentifySettings(**({"window_s": options.window} if options.window else {}))
+    if options.report:
+        prepare(options.report.parent)
+    settings = IdentifySettings(
+        suggest=options.suggest or bool(options.report),
+        **({"window_s": options.window} if options.window else {}),
+    )
     names = options.parameter or list(DEFAULT)
-    with counted("identify", "evaluations") as report:
-        result = identify(logs, scenario_of(options), names, changes, settings, report)
+    with counted("identify", "evaluations") as count:
+        result = identify(logs, scenario_of(options), names, changes, settings, count)
     if options.json:
         print_json({**_figures(result), "logs": {log.name: log.digest for log in logs}})
     else:
         _print(result)
+    written = []
+    if options.report:
+        command = f"spheretwin identify {' '.join(map(str, options.logs))}"
+        report.write(options.report, result, logs, scenario_of(options), changes, command)
+        written.append(options.report)
     if result.accepted and options.out:
         write_twin(options.out, result, scenario_of(options), changes, logs)
-        if not options.json:
-            runs.print_written([options.out])
+        written.append(options.out)
+    if not options.json:
+        runs.print_written(written)
     if result.nothing_to_correct:
         print_message("identify: nothing to correct: the values of the scenario are those of the logs")
     for reason in result.reasons:
@@ -136,7 +153,7 @@ def _figures(result: Identified) -> dict[str, object]:
         "accepted": result.accepted,
         "nothing_to_correct": result.nothing_to_correct,
         "parameters": {
-            name: {"value": one.value, "interval": list(one.interval), "unit": one.unit}
+            name: {"value": one.value, "interval": one.interval, "unit": one.unit, "widening": one.widening}
             for name, one in result.parameters.items()
         },
         "refused": [{"parameters": list(one.parameters), "why": one.why} for one in result.refused],
@@ -146,16 +163,13 @@ def _figures(result: Identified) -> dict[str, object]:
             "held_out": result.held_out.chi2 if result.held_out else None,
         },
         "improvement": result.improvement,
+        "suggestions": result.suggestions,
     }
 
 
 def _print(result: Identified) -> None:
     if result.parameters:
-        rows = [
-            [name, f"{one.value:.5g}", f"{one.interval[0]:.5g}", f"{one.interval[1]:.5g}", one.unit]
-            for name, one in result.parameters.items()
-        ]
-        runs.print_rows("identified", ["parameter", "value", "from", "to (95 %)", "unit"], rows, 1)
+        runs.print_rows(*report.parameter_table(result))
     for line in result.correlations:
         print(line)
     if result.held_out and result.held_out_before:
@@ -164,3 +178,5 @@ def _print(result: Identified) -> None:
             f"held-out windows: mean square over that of the noise {before.chi2:.3f} before, {after.chi2:.3f}"
             f" after; error {result.improvement:.1%} smaller"
         )
+    if result.suggestions:
+        runs.print_rows(*report.suggestion_table(result.suggestions[: report.MOST_ROWS]))

@@ -7,13 +7,11 @@ import argparse
 from spheretwin.cli.common import print_json, print_message
 from spheretwin.cli.log_options import LOG, ONE, changes_of, check_given, read_logs, scenario_of
 from spheretwin.cli.options import verb
-from spheretwin.machine.residuals import CHI2, QUANTITIES
-from spheretwin.machine.state_estimation import chi2_text
+from spheretwin.machine.report import bin_table, fit_table, structure_table
+from spheretwin.machine.residuals import CHI2
 from spheretwin.machine.twin_file import read_uncertainty
 from spheretwin.machine.validation import Validation, validate
 from spheretwin.viz.terminal import runs
-
-MOST_LINES = 5
 
 
 @verb(f"{LOG}    --json", has_fields=True, **ONE)
@@ -59,27 +57,7 @@ def _why(result: Validation) -> str:
 
 
 def _print(result: Validation) -> None:
-    fit = result.fit
-    rows = [[name, chi2_text(value)] for name, value in {"all": fit.chi2, **fit.hinge_chi2}.items()]
-    runs.print_rows("residuals", ["hinge", "mean square over that of the noise"], rows, 1)
+    runs.print_rows(*fit_table({"mean square over that of the noise": result.fit}))
     if result.structure:
-        rows = [
-            [one.what, f"{one.size:+.3g}", one.unit, f"{one.deviations:+.1f}"]
-            for one in result.structure[:MOST_LINES]
-        ]
-        head = ["a change alone of", "explains", "unit", "standard deviations from 0"]
-        runs.print_rows("what the residuals show", head, rows, 1)
-    worst = sorted(fit.bins, key=lambda one: -abs(one.mean_rad) * one.rows**0.5 / one.rms_rad)[:MOST_LINES]
-    rows = [
-        [
-            one.hinge,
-            QUANTITIES[one.by],
-            f"{one.low:.3g} to {one.high:.3g}",
-            str(one.rows),
-            f"{1e3 * one.mean_rad:+.3f}",
-            f"{1e3 * one.rms_rad:.3f}",
-        ]
-        for one in worst
-    ]
-    head = ["hinge", "by", "range", "rows", "mean residual mrad", "rms mrad"]
-    runs.print_rows("largest mean residuals", head, rows, 2)
+        runs.print_rows(*structure_table(result.structure))
+    runs.print_rows(*bin_table(result.fit))

@@ -12,6 +12,7 @@ from pydantic import Field
 from scipy.optimize import least_squares
 from scipy.stats import chi2
 
+from spheretwin.machine.discrepancy import Suggestion, components, suggestions, widening
 from spheretwin.machine.intervals import Cost, Uncertainty, interval
 from spheretwin.machine.log import Log
 from spheretwin.machine.parameters import Machine, Parameter, priors, selected, short_names
@@ -46,6 +47,9 @@ class IdentifySettings(SettingsModel):
     chi2_limit: Annotated[float, Field(gt=0, lt=1)] = Field(
         0.1, description="largest difference of the held-out mean square from 1, in the noise of the sensors"
     )
+    suggest: bool = Field(
+        False, description="whether parameters that are not varied are ranked by what they would improve"
+    )
 
 
 class Estimate(NamedTuple):
@@ -55,6 +59,8 @@ class Estimate(NamedTuple):
     interval: tuple[float, float]
     """95 %."""
     unit: str
+    widening: float = 1.0
+    """Width of the interval over that which noise alone gives: what the model may lack widens it."""
 
 
 class Refusal(NamedTuple):
@@ -84,6 +90,8 @@ class Identified(NamedTuple):
     """Fields of a scenario with the found values."""
     nothing_to_correct: bool = False
     """True if the values of the scenario do not differ from those found: the twin has these all the same."""
+    suggestions: tuple[Suggestion, ...] = ()
+    """Parameters that are not varied and would improve the held-out windows; empty unless requested."""
 
     @property
     def uncertainty(self) -> Uncertainty | None:
@@ -183,11 +191,11 @@ class Problem:
         self.settings = settings = settings or IdentifySettings()
         logs = [align_rows(log) for log in logs]
         machines = [Machine(scenario, {**changes, **log.conditions}) for log in logs]
-        self._machines, self.machine = machines, machines[0]
+        self.machines, self.machine = machines, machines[0]
         self.requested = selected(names, self.machine.model.actuator)
         if not self.requested:
             raise InputError("identification: expected at least one parameter, received none")
-        prior = {}
+        prior: dict[Parameter, float] = {}
         if settings.nuisance:
             for machine, log in zip(machines, logs, strict=True):
                 prior |= priors(machine, log)
@@ -215,7 +223,7 @@ class Problem:
         """
         kinds = {one.kind.name for one in self.requested}
         is_payload_known = "plant.payload_kg" not in kinds and any(
-            machine.model.scenario.plant.payload_kg for machine in self._machines
+            machine.model.scenario.plant.payload_kg for machine in self.machines
         )
         if is_payload_known or not kinds.issuperset({"torque_scale", "plant.modelling_error"}):
             return ()
@@ -289,6 +297,9 @@ class Problem:
         before = fit_of(self.held_out.parts(self.initial, slopes=False), self.held_out)
         after = fit_of(self.held_out.parts(values, slopes=False), self.held_out)
         improvement = 1 - np.sqrt(after.chi2 / before.chi2)
+        lacking = components(self, values)
+        wider = widening(lacking, covariance)
+        curvature, covariance = covariance, covariance * np.outer(wider, wider)
         is_right = self._is_right(after, values, covariance)
         reasons = [] if is_right else self._reasons(after, improvement)
         cost = Cost(self._cost, self.normal, values, self._cost(values), self.least)
@@ -298,8 +309,9 @@ class Problem:
             parameters={
                 self.parameters[i].name: Estimate(
                     float(values[i]),
-                    interval(cost, covariance, i),
+                    interval(cost, curvature, i, float(wider[i])),
                     self.parameters[i].kind.unit,
+                    float(wider[i]),
                 )
                 for i in range(len(self.requested))
             },
@@ -313,6 +325,7 @@ class Problem:
             covariance=covariance[: len(self.requested), : len(self.requested)],
             fields=fields,
             nothing_to_correct=is_right and not improvement >= self.settings.least_improvement,
+            suggestions=suggestions(self, values, lacking) if self.settings.suggest else (),
         )
 
     def _is_right(self, after: Fit, values: Array, covariance: Array) -> bool:

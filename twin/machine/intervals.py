@@ -47,7 +47,7 @@ class Cost(NamedTuple):
     """Lower bounds."""
 
 
-def interval(cost: Cost, covariance: Array, place: int) -> tuple[float, float]:
+def interval(cost: Cost, covariance: Array, place: int, wider: float = 1.0) -> tuple[float, float]:
     """Return the 95 % interval of one parameter.
 
     Parameters
@@ -57,20 +57,23 @@ def interval(cost: Cost, covariance: Array, place: int) -> tuple[float, float]:
         Inverse of the information at the best values.
     place : int
         Number of the parameter.
+    wider : float
+        Width over that which noise alone gives.
     """
-    low, high = (_end(cost, covariance, place, sign) for sign in (-1.0, 1.0))
+    half = Z95 * wider
+    low, high = (_end(cost, covariance, place, half, sign) for sign in (-1.0, 1.0))
     return float(max(low, cost.least[place])), float(high)
 
 
-def _end(cost: Cost, covariance: Array, place: int, sign: float) -> float:
-    """Return one end: where the cost, minimised over the other parameters, has risen by half of Z95²."""
+def _end(cost: Cost, covariance: Array, place: int, half: float, sign: float) -> float:
+    """Return one end: where the cost, minimised over the other parameters, has risen by half of half²."""
     deviation = np.sqrt(covariance[place, place])
     # Along it the other parameters stay at their best, as far as the cost is quadratic.
     direction = sign * covariance[:, place] / deviation
-    end = cost.best + Z95 * direction
+    end = cost.best + half * direction
     if np.any(end < cost.least):
         return float(end[place])
-    rise = 0.5 * Z95**2
+    rise = 0.5 * half**2
     if abs(cost.at(end) - cost.lowest - rise) <= _DIFFERENT * rise:
         return float(end[place])
 
@@ -84,7 +87,7 @@ def _end(cost: Cost, covariance: Array, place: int, sign: float) -> float:
     from scipy.optimize import brentq  # slow to import, and a run needs no interval
 
     try:
-        distance = brentq(excess, 0.1, _FARTHEST * Z95, xtol=0.02, maxiter=12)
+        distance = brentq(excess, 0.1, _FARTHEST * half, xtol=0.02, maxiter=12)
     except (ValueError, RuntimeError):  # no end there: the curvature is all that is known
-        distance = Z95
+        distance = half
     return float(cost.best[place] + distance * direction[place])

@@ -63,10 +63,10 @@ def write_twin(
         "[fields]",
         *(f"{_text(name)} = {_text(value)}" for name, value in {**changes, **result.fields}.items()),
         "",
-        "# 95 % intervals.",
+        "# 95 % intervals, and their widths over those that noise alone gives.",
         *(
             f"[parameters.{_text(name)}]\nvalue = {one.value!r}\ninterval = {_text(list(one.interval))}\n"
-            f"unit = {_text(one.unit)}\n"
+            f"unit = {_text(one.unit)}\nwidening = {one.widening!r}\n"
             for name, one in result.parameters.items()
         ),
         "# Rows in the order of the parameters.",

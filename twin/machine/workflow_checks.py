@@ -157,7 +157,7 @@ def rms_error(result: Workflow, judged: Judged, name: str) -> Array:
 
 def _distance(result: Workflow, name: str) -> float:
     """Return the distance of a found value from the true one over half of its interval."""
-    value, (low, high), _ = result.identified.parameters[name]
+    value, (low, high), *_ = result.identified.parameters[name]
     return 2 * abs(value - result.true[name]) / (high - low)
 
 

@@ -10,8 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spheretwin.machine.parameters import KINDS
-from spheretwin.machine.residuals import Bin
-from spheretwin.machine.state_estimation import HINGE_NAMES
+from spheretwin.machine.report import LABELS, log_table, residual_drawing, structure_table
 from spheretwin.machine.watching import WatchSettings
 from spheretwin.machine.workflow import CHANGED_s, Watched, Workflow
 from spheretwin.machine.workflow_checks import TRUE_COLUMNS, checks_of, rms_error, settled_errors
@@ -25,8 +24,6 @@ NAME = "twin"
 TITLE = "Digital twin of a hidden machine"
 
 CALIBRATED_s = WatchSettings().calibration_s
-
-LABELS = ("before identification", "after identification")
 
 
 def figures(result: Workflow) -> dict[str, Any]:
@@ -70,10 +67,17 @@ def write(folder: Path, result: Workflow, command: str, figure_format: str = "sv
     )
     sections = [
         Section("1. Design", [DESIGN_TEXT, _design_rows(result)]),
-        Section("2. Logs", [LOGS_TEXT, _log_rows(result)]),
+        Section("2. Logs", [LOGS_TEXT, log_table([one.log for one in result.logs], result.verdicts)]),
         Section("3. Identification", [_identification_text(result), _parameter_rows(result)]),
         Section("4. Shadow", [SHADOW_TEXT, _shadow_rows(result), shadow]),
-        Section("5. Validation", [_validation_text(result), _structure_rows(result), residuals]),
+        Section(
+            "5. Validation",
+            [
+                _validation_text(result),
+                structure_table(result.before.validation.structure)._replace(title=""),
+                residuals,
+            ],
+        ),
         Section("6. Watch", [WATCH_TEXT, _watch_rows(result), sums]),
         markdown.checks_section(checks),
     ]
@@ -101,8 +105,7 @@ WATCH_TEXT = (
 )
 
 WORDS = (
-    "parameter", "log", "accepted", "findings", "hinge", "a change alone of", "unit", "change", "named as",
-    "further alarms",
+    "parameter", "hinge", "unit", "change", "named as", "further alarms",
 )  # fmt: skip
 """Headings of columns of words; the others are numbers."""
 
@@ -128,22 +131,6 @@ def _design_rows(result: Workflow) -> Table:
                 f"{design.narrower[name]:.2f}",
             )
             for name, value in design.deviations.items()
-        ),
-    )
-
-
-def _log_rows(result: Workflow) -> Table:
-    return _table(
-        ("log", "length, s", "rows", "accepted", "findings"),
-        (
-            (
-                played.log.name,
-                f"{played.log.t_s[-1] - played.log.t_s[0]:.3g}",
-                str(len(played.log)),
-                "yes" if verdict.accepted else "**no**",
-                "; ".join(f"{one.name} ({one.severity}): {one.where}" for one in verdict.findings) or "none",
-            )
-            for played, verdict in zip(result.logs, result.verdicts, strict=True)
         ),
     )
 
@@ -196,16 +183,6 @@ def _validation_text(result: Workflow) -> str:
     )
 
 
-def _structure_rows(result: Workflow) -> Table:
-    return _table(
-        ("a change alone of", "explains", "unit", "standard deviations from 0"),
-        (
-            (one.what, f"{one.size:+.3g}", one.unit, f"{one.deviations:+.1f}")
-            for one in result.before.validation.structure[:5]
-        ),
-    )
-
-
 def _watch_rows(result: Workflow) -> Table:
     head = ("change", "named as", "true size", "size", "unit", "after, s", "confidence", "further alarms")
     return _table(head, map(_watch_row, result.watched))
@@ -239,14 +216,13 @@ def _drawings(result: Workflow) -> list[Drawing]:
 
     times = result.logs[-1].log.t_s
     columns: dict[str, dict[str, twin.ErrorTrace]] = {"angle, mrad": {}, "rate, mrad/s": {}}
-    residuals: dict[str, dict[str, twin.ResidualBins]] = {hinge: {} for hinge in ANGLES}
     for label, judged in zip(LABELS, (result.before, result.after), strict=True):
         for quantity, name in zip(columns, TRUE_COLUMNS, strict=True):
             error, half = settled_errors(result, judged, name)
             columns[quantity][label] = twin.ErrorTrace(times[-len(error) :], 1e3 * error, 1e3 * half)
-        for hinge, name in zip(ANGLES, HINGE_NAMES, strict=True):
-            bins = [one for one in judged.validation.fit.bins if (one.hinge, one.by) == (name, "rate_rad_s")]
-            residuals[hinge][label] = _bins(bins)
+    fits = {
+        label: one.validation.fit for label, one in zip(LABELS, (result.before, result.after), strict=True)
+    }
     panels = {
         one.change.label if one.change else "no change": twin.Sums(
             one.t_s[one.t_s > CALIBRATED_s],
@@ -265,11 +241,7 @@ def _drawings(result: Workflow) -> list[Drawing]:
             " bands.",
             twin.errors(columns, ANGLES, "Shadow: errors against the truth"),
         ),
-        Drawing(
-            "twin_residuals.svg",
-            "Mean residuals of the validation by the rate of each hinge, before and after identification.",
-            twin.residuals(residuals, "rate, rad/s", "mean residual, mrad", "Validation: residuals"),
-        ),
+        residual_drawing("twin_residuals.svg", fits, "rate_rad_s", "Validation: residuals"),
         Drawing(
             "twin_watch.svg",
             "Logarithm of the evidence of each change over time, linear up to the threshold and logarithmic"
@@ -278,10 +250,3 @@ def _drawings(result: Workflow) -> list[Drawing]:
             twin.sums(panels, threshold, "Watch: evidence of changes"),
         ),
     ]
-
-
-def _bins(bins: list[Bin]) -> Any:
-    from spheretwin.viz.figures import twin
-
-    middle = np.array([0.5 * (one.low + one.high) for one in bins])
-    return twin.ResidualBins(middle, 1e3 * np.array([one.mean_rad for one in bins]))

@@ -67,15 +67,22 @@ def test_identify_refuses_and_writes_nothing(log, tmp_path):
     assert not twin.exists()
 
 
-def test_a_data_sheet_that_is_right_gives_a_covariance(log, tmp_path):
-    twin = tmp_path / "twin.toml"
-    words = ["--parameter", "plant.coulomb_Nm", "--out", twin, "--json"]
+def test_a_data_sheet_that_is_right_gives_a_covariance_and_a_page(log, tmp_path):
+    twin, page = tmp_path / "twin.toml", tmp_path / "page.html"
+    words = ["--parameter", "plant.coulomb_Nm", "--out", twin, "--report", page, "--json"]
     result = call("identify", log, *MACHINE, *words)
     assert (result.code, result.json["accepted"], result.json["nothing_to_correct"]) == (0, True, True)
     assert "nothing to correct" in result.err
     uncertainty = read_uncertainty(twin)
-    low, high = result.json["parameters"]["plant.coulomb_Nm.0"]["interval"]
+    value, (low, high), _, wider = result.json["parameters"]["plant.coulomb_Nm.0"].values()
+    assert wider < 1.5
     assert 4 * uncertainty.covariance[0, 0] ** 0.5 == pytest.approx(high - low, rel=0.1)
+    text = page.read_text(encoding="utf-8")
+    for title in ("Data", "Excitation", "Parameters", "Residuals", "Refused", "What the model may lack"):
+        assert f">{title}</h2>" in text
+    assert text.count("<svg") == 3
+    assert f'<td>plant.coulomb_Nm.0</td>\n<td style="text-align:right">{value:.5g}</td>' in text
+    assert "each alone, the log determines" in text
 
 
 def test_each_log_has_a_map_and_a_payload(tmp_path):

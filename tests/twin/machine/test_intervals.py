@@ -27,6 +27,8 @@ def test_a_quadratic_cost_has_the_interval_of_its_curvature():
         half = Z95 * np.sqrt(covariance[place, place])
         expected = cost.best[place] - half, cost.best[place] + half
         assert interval(cost, covariance, place) == pytest.approx(expected)
+        low, high = interval(cost, covariance, place, wider=3.0)
+        assert (low + 2 * half, high - 2 * half) == pytest.approx(expected)
 
 
 def test_a_bound_ends_an_interval():

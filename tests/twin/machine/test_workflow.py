@@ -89,7 +89,7 @@ def test_the_command_writes_the_page_and_fails_with_a_check(result, tmp_path, mo
     assert "validation" in err
     figures = json.loads(out)
     assert set(figures) == {"checks", "parameters", "refused", "chi2", "watch", "wall_s", "versions"}
-    assert figures["chi2"]["after"] == result.before.validation.chi2
+    assert figures["chi2"]["after"] == result.before.validation.fit.chi2
     assert figures["watch"][1]["alarms"][0]["what"] == "torque_scale"
     assert "Created by `spheretwin reproduce twin`" in (folder / "twin.md").read_text(encoding="utf-8")
 

@@ -1,0 +1,225 @@
+"""Tables and figures of identification and validation, and the page of an identification."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import combinations
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import numpy as np
+
+from spheretwin import scenario as scenarios
+from spheretwin.machine.discrepancy import Suggestion
+from spheretwin.machine.identification import Identified, identifiability
+from spheretwin.machine.log import Log
+from spheretwin.machine.residuals import QUANTITIES, Fit
+from spheretwin.machine.state_estimation import HINGE_NAMES, chi2_text
+from spheretwin.machine.validation import Structure
+from spheretwin.machine.verdict import Verdict, check
+from spheretwin.models.telemetry.signals import ANGLES
+from spheretwin.viz.pages.markdown import Drawing, Page, Section, Table, save_text
+
+MOST_ROWS = 5
+"""Suggestions, changes and bins that the terminal shows."""
+
+LABELS = ("before identification", "after identification")
+
+# Correlation from which two parameters are a sentence.
+_CORRELATED = 0.3
+
+
+def parameter_table(result: Identified) -> Table:
+    """Return the identified values with their intervals."""
+    rows = [
+        (name, *(f"{value:.5g}" for value in (one.value, *one.interval)), one.unit, f"{one.widening:.2f}")
+        for name, one in result.parameters.items()
+    ]
+    head = ("parameter", "value", "from", "to (95 %)", "unit", "widening")
+    return Table("identified", head, rows, 1, ("unit",))
+
+
+def suggestion_table(suggestions: Sequence[Suggestion]) -> Table:
+    """Return what would improve the held-out windows."""
+    rows = [
+        (one.what, f"{one.gain:+.1f}", f"{one.chi2:.3f}", one.member, f"{one.departure:+.3g}", one.unit)
+        for one in suggestions
+    ]
+    head = ("identify also", "log likelihood", "mean square", "largest departure", "of", "unit")
+    return Table("what would improve the held-out windows", head, rows, 1, (head[3], "unit"))
+
+
+def structure_table(structure: Sequence[Structure]) -> Table:
+    """Return the clearest changes that the residuals show."""
+    rows = [
+        (one.what, f"{one.size:+.3g}", one.unit, f"{one.deviations:+.1f}") for one in structure[:MOST_ROWS]
+    ]
+    head = ("a change alone of", "explains", "unit", "standard deviations from 0")
+    return Table("what the residuals show", head, rows, 1, ("unit",))
+
+
+def fit_table(fits: Mapping[str, Fit]) -> Table:
+    """Return the mean squares of the residuals of each hinge, a column for each label."""
+    rows = [("all", *(chi2_text(fit.chi2) for fit in fits.values()))]
+    rows += [(name, *(chi2_text(fit.hinge_chi2[name]) for fit in fits.values())) for name in HINGE_NAMES]
+    return Table("residuals", ("hinge", *fits), rows)
+
+
+def bin_table(fit: Fit) -> Table:
+    """Return the clearest mean residuals."""
+    clearest = sorted(fit.bins, key=lambda one: -abs(one.mean_rad) * one.rows**0.5 / one.rms_rad)
+    rows = [
+        (
+            one.hinge,
+            QUANTITIES[one.by],
+            f"{one.low:.3g} to {one.high:.3g}",
+            str(one.rows),
+            f"{1e3 * one.mean_rad:+.3f}",
+            f"{1e3 * one.rms_rad:.3f}",
+        )
+        for one in clearest[:MOST_ROWS]
+    ]
+    head = ("hinge", "by", "range", "rows", "mean residual mrad", "rms mrad")
+    return Table("largest mean residuals", head, rows, 2)
+
+
+def log_table(logs: Sequence[Log], verdicts: Sequence[Verdict]) -> Table:
+    """Return length, rows and findings of logs."""
+    rows = [
+        (
+            log.name,
+            f"{log.t_s[-1] - log.t_s[0]:.3g}",
+            str(len(log)),
+            "yes" if verdict.accepted else "**no**",
+            "; ".join(f"{one.name} ({one.severity}): {one.where}" for one in verdict.findings) or "none",
+        )
+        for log, verdict in zip(logs, verdicts, strict=True)
+    ]
+    return Table("", ("log", "length, s", "rows", "accepted", "findings"), rows, 1, ("accepted", "findings"))
+
+
+def residual_drawing(file: str, fits: Mapping[str, Fit], by: str, title: str) -> Drawing:
+    """Return the figure of the mean residuals of each hinge by one of `QUANTITIES`."""
+    from spheretwin.viz.figures import twin  # Matplotlib is optional
+
+    panels: dict[str, dict[str, twin.ResidualBins]] = {}
+    for hinge, name in zip(ANGLES, HINGE_NAMES, strict=True):
+        panels[hinge] = {}
+        for label, fit in fits.items():
+            bins = [one for one in fit.bins if (one.hinge, one.by) == (name, by)]
+            middle = np.array([0.5 * (one.low + one.high) for one in bins])
+            panels[hinge][label] = twin.ResidualBins(middle, 1e3 * np.array([one.mean_rad for one in bins]))
+    quantity = QUANTITIES[by]
+    caption = f"{title}: mean over ranges of {quantity.partition(',')[0]}, {' and '.join(fits)}."
+    return Drawing(file, caption, twin.residuals(panels, quantity, "mean residual, mrad", title))
+
+
+def write(
+    path: Path,
+    result: Identified,
+    logs: Sequence[Log],
+    scenario: str,
+    changes: Mapping[str, Any],
+    command: str,
+) -> None:
+    """Write the page of an identification, one file of HTML; arguments as in `write_twin`.
+
+    Raises
+    ------
+    InputError
+        The file cannot be written.
+    """
+    verdict = "accepted" if result.accepted else "not accepted"
+    if result.nothing_to_correct:
+        verdict += "; the values of the scenario are those of the logs"
+    lead = f"Identification of {scenario} from {len(logs)} logs: **{verdict}**."
+    loaded = scenarios.load(scenario, dict(changes))
+    sections = [
+        Section("Data", [log_table(logs, [check(log, loaded) for log in logs])]),
+        Section("Excitation", [_motion_table(logs), *_determined(logs, scenario, changes)]),
+        Section("Parameters", [parameter_table(result)._replace(title=""), *_sentences(result)]),
+        Section("Residuals", _residuals(result)),
+        Section("Refused", [f"- {line}" for line in _refused(result)] or ["Nothing."]),
+        Section("What the model may lack", _lacking(result)),
+    ]
+    with TemporaryDirectory() as folder:
+        _, html = Page("report", "Identification", lead, sections, command).write(Path(folder))
+        save_text(path, html.read_text(encoding="utf-8"))
+
+
+WIDTH_TEXT = (
+    "Intervals of 95 %. Widening: width over that which the noise of the sensors alone gives. Above 1,"
+    " parameters that were not identified show departures in the residuals, which move the values."
+)
+
+
+def _motion_table(logs: Sequence[Log]) -> Table:
+    head = ("log", *(f"{hinge}, °" for hinge in ANGLES), "largest current, A", "rms current, A", "conditions")
+    rows = []
+    for log in logs:
+        degrees, current_A = np.degrees(log.angle_rad), np.nan_to_num(log.current_A)
+        rows.append(
+            (
+                log.name,
+                *(f"{np.nanmin(angle):.1f} to {np.nanmax(angle):.1f}" for angle in degrees.T),
+                f"{np.max(np.abs(current_A)):.2f}",
+                f"{np.sqrt(np.mean(current_A**2)):.2f}",
+                ", ".join(f"{name} = {value}" for name, value in log.conditions.items()) or "none",
+            )
+        )
+    return Table("", head, rows, 1, ("conditions",))
+
+
+def _determined(logs: Sequence[Log], scenario: str, changes: Mapping[str, Any]) -> Iterator[str]:
+    for log in logs:
+        lines = identifiability(log, scenario, {**changes, **log.conditions})
+        yield "\n".join([f"{log.name}:", "", *(f"- {line}." for line in lines)])
+
+
+def _sentences(result: Identified) -> Iterator[str]:
+    """Yield sentences on the widths of the intervals, and on errors that go together, the closest first."""
+    if result.covariance is None:
+        yield "Nothing was identified."
+        return
+    yield WIDTH_TEXT
+    names, deviation = list(result.parameters), np.sqrt(np.diag(result.covariance))
+    correlation = result.covariance / np.outer(deviation, deviation)
+    pairs = sorted(combinations(range(len(names)), 2), key=lambda pair: -abs(correlation[pair]))
+    lines = [
+        f"- If {names[i]} is too large, so is {names[j]}: correlation {correlation[i, j]:+.2f}."
+        if correlation[i, j] > 0
+        else f"- If {names[i]} is too large, {names[j]} is too small: correlation {correlation[i, j]:+.2f}."
+        for i, j in pairs
+        if abs(correlation[i, j]) > _CORRELATED
+    ]
+    yield "\n".join(lines) or f"No two errors have a correlation above {_CORRELATED:g}."
+
+
+def _residuals(result: Identified) -> list[str | Table | Drawing | Section]:
+    if result.held_out is None or result.held_out_before is None:
+        return ["Nothing was identified."]
+    fits = dict(zip(LABELS, (result.held_out_before, result.held_out), strict=True))
+    text = (
+        "Held-out windows: mean square of the residuals over that of the noise, 1 if the model lacks nothing."
+    )
+    drawings = [
+        residual_drawing(f"residuals_{by}.svg", fits, by, "Residuals in held-out windows")
+        for by in QUANTITIES
+    ]
+    return [text, fit_table(fits)._replace(title=""), *drawings]
+
+
+def _refused(result: Identified) -> list[str]:
+    reasons = [reason for reason in result.reasons if reason not in {one.why for one in result.refused}]
+    return [*(f"{', '.join(one.parameters)}: {one.why}." for one in result.refused), *reasons]
+
+
+def _lacking(result: Identified) -> list[str | Table | Drawing | Section]:
+    if not result.suggestions:
+        return ["No parameter that was not identified would improve the held-out windows."]
+    text = (
+        "Each kind of parameter that was not identified, with its most likely departures from the scenario in"
+        " the training windows: rise of the log likelihood of the held-out windows, and their mean square."
+    )
+    return [text, suggestion_table(result.suggestions)._replace(title="")]
