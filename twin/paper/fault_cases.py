@@ -15,9 +15,12 @@ from spheretwin import scenario as scenarios
 from spheretwin.faults.targets import TARGETS
 from spheretwin.models import actuator
 from spheretwin.models.telemetry.status import Status
-from spheretwin.paper.experiment import Case
+from spheretwin.paper.experiment import Case, Outcome, Outcomes
+from spheretwin.paper.experiment_file import CaseRuns, ExperimentFile
 from spheretwin.scenario.hardware import PROTOTYPE_DRIVE, PROTOTYPE_SENSORS
 from spheretwin.scenario.sections import Scenario
+
+FILE = ExperimentFile("faults")
 
 COUNT_rad = tau / PROTOTYPE_SENSORS["sensors.encoder.counts"]
 SUPPLY_V = PROTOTYPE_DRIVE["drive.supply_V"]
@@ -155,12 +158,42 @@ SAMPLE = 100
 # Every status but that of diverged numbers.
 EXPECTED = (Status.COMPLETED, Status.LEFT_WORKSPACE, Status.FAILSAFE)
 
-HEALTHY = Case("healthy", SCENARIO, BASE, {"kind": "healthy", "groups": [], "way": None})
-HEALTHY_ELECTRONICS = Case(
-    "healthy electronics", SCENARIO, ELECTRONICS, {"kind": "healthy", "groups": [], "way": None}
-)
+
+def _healthy_case(name: str, fields: Mapping[str, Any]) -> Case:
+    details: dict[str, Any] = {"kind": "healthy", "groups": [], "way": None}
+    return Case(name, SCENARIO, fields, details, columns=details)
 
 
+HEALTHY = _healthy_case("healthy", BASE)
+HEALTHY_ELECTRONICS = _healthy_case("healthy electronics", ELECTRONICS)
+
+
+class FaultRuns:
+    """Cases that were run, by their columns: kind, groups, way, failure, law."""
+
+    def __init__(self, outcomes: Outcomes) -> None:
+        self._by_kind: dict[str, list[CaseRuns]] = {}
+        for case in cases():
+            if runs := outcomes.runs(case):
+                self._by_kind.setdefault(case.columns["kind"], []).append(CaseRuns(case, runs))
+
+    def of(self, *kinds: str, **columns: Any) -> list[CaseRuns]:
+        """Return the cases of some kinds, kind by kind, with some columns."""
+        every = (item for kind in kinds for item in self._by_kind.get(kind, ()))
+        return [item for item in every if columns.items() <= item.case.columns.items()]
+
+    def runs(self, *kinds: str, **columns: Any) -> list[Outcome]:
+        """Return the runs of the cases `of` some kinds with some columns."""
+        return [run for item in self.of(*kinds, **columns) for run in item.runs]
+
+
+FEW = ("single", "pair")
+COILS = (*FEW, "drawn")
+"""Kinds of one or two open groups, and of any number."""
+KINDS = ("healthy", *COILS, "part", "short", "latency", "MuJoCo")
+
+
+@cache
 def cases() -> list[Case]:
     """Healthy cases, then one of each kind in turn, in all its ways."""
     kinds = [
@@ -193,6 +226,7 @@ def of_latency(groups: Groups, law: str) -> Case:
         name=f"{case.name}, {law}, latency",
         fields={**case.fields, "controller.law": law},
         details={**case.details, "kind": "latency"},
+        columns={**case.columns, "kind": "latency", "law": law},
         seeds=SEEDS,
     )
 
@@ -204,6 +238,7 @@ def on_other_engine(groups: Groups, way: Way) -> Case:
         name=f"{case.name}, MuJoCo",
         fields={**case.fields, **OTHER_ENGINE},
         details={**case.details, "kind": "MuJoCo"},
+        columns={**case.columns, "kind": "MuJoCo"},
         single_run=True,
     )
 
@@ -225,6 +260,7 @@ def of_part(failure: Failure, way: Way) -> Case:
             "mode": failure.mode,
             "value": failure.value,
         },
+        columns={"kind": "part", "way": way.name, "failure": failure.name},
         expected_statuses=EXPECTED,
         seeded_fields=lambda seed: _starts(1, start_s(failure.name, seed)),
     )
@@ -267,6 +303,7 @@ def _of_coils(groups: Groups, way: Way, mode: str, kind: str) -> Case:
         scenario=SCENARIO,
         fields={**BASE, **way.fields, **_planned(faults)},
         details={"kind": kind, "groups": list(groups), "way": way.name},
+        columns={"kind": kind, "groups": groups, "way": way.name},
         single_run=kind == "drawn",
         expected_statuses=EXPECTED,
         seeded_fields=lambda seed: _starts(len(groups), start_s(_named(groups), seed)),

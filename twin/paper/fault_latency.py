@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from itertools import pairwise
 from math import inf
 from typing import NamedTuple
@@ -10,35 +11,15 @@ from typing import NamedTuple
 import numpy as np
 
 from spheretwin.paper import fault_cases as cases
-from spheretwin.paper import fault_sections
-from spheretwin.paper.experiment import Outcome, Outcomes, ResultTable, Section
+from spheretwin.paper.experiment import Outcome, Section
+from spheretwin.paper.experiment_file import table
+from spheretwin.paper.fault_cases import FEW, FILE, FaultRuns
 from spheretwin.paper.fault_outcomes import tracks
-from spheretwin.paper.fault_sections import percent, runs_by_set
+from spheretwin.paper.fault_sections import percent
 from spheretwin.paper.laws import BY_LAW
+from spheretwin.paper.page import NONE
 from spheretwin.study.statistics import quantile_text, share_interval
-
-METHOD = (
-    "*Latency* is the time from the start of a fault to the first tick at which the allocation excludes the"
-    " group. Faults that are not detected before the run ends count as infinite in the quantiles. The"
-    " *driven ticks* of an open group are the control ticks after the fault at which its commanded current"
-    " is above the threshold of the detector. At all other ticks the group is idle: an open group within the"
-    " threshold cannot be distinguished from a healthy one. The latency is therefore the time until enough"
-    " driven ticks have passed.\n\n"
-    "Quantiles have their 95 % interval in brackets. The latency depends on the law, which commands the"
-    " currents: every group opens at many starts under each of two. Faults of several groups, which share"
-    " their start, count as one draw.\n\n"
-    "The *cost* of the delay is the error after the fault (as above) minus that of the run with a reported"
-    " fault of the same groups, seed and start."
-)
-HEAD = (
-    "groups", "faults", "latency, ms: median", "90 %", "95 %", "99 %", "longest detected", "not detected",
-    "driven ticks: median", "longest", "not detected: most",
-)  # fmt: skip
-COST = (
-    "slowest latency, ms", "runs", "cost, mrad: median", "95 %", "99 %", "largest of these",
-    "healthy error, mrad: median", "track",
-)  # fmt: skip
-QUANTILES = (0.5, 0.9, 0.95, 0.99)
+from spheretwin.viz.pages.markdown import Drawing
 
 EDGES_ms = (0.0, 6.5, 20.5, 100.5, inf)
 """Between intervals of latency, halfway between control ticks."""
@@ -55,42 +36,46 @@ class Detection(NamedTuple):
     driven_ticks: int
 
 
-def section(outcomes: Outcomes) -> Section:
+Pairs = Sequence[tuple[Outcome, Outcome]]
+"""Runs of the same faults, detected and reported."""
+
+
+def section(faults: FaultRuns) -> Section:
     """Distribution of the latency, its reason, and its cost."""
-    by_kind = {kind: detections for kind, detections in _detections(outcomes).items() if detections}
-    rows = [_row(kind, detections) for kind, detections in by_kind.items()]
-    pairs = _pairs(outcomes)
-    costs = [row for first, end in _intervals() if (row := _cost_row(pairs, first, end))]
-    title = "Detection latency of failed groups"
-    cost_title = "One or two open groups: cost of the delay, by the latency of the slower group"
-    curves = {kind: [one.latency_s for one in detections] for kind, detections in by_kind.items()}
-    return Section(
-        "Detection latency",
-        f"{METHOD}{_why(by_kind)}{_verdict(pairs)}",
-        [ResultTable(title, HEAD, rows), ResultTable(cost_title, COST, costs)],
-        [lambda: fault_sections.latencies(curves)] if curves else [],
-    )
+    by_kind = {kind: detections for kind, detections in _detections(faults).items() if detections}
+    pairs = _pairs(faults)
+    costs = [(_named(*interval), _within(pairs, *interval)) for interval in _intervals()]
+    tables = [
+        table("Detection latency of failed groups", by_kind.items(), LATENCY),
+        table(
+            "One or two open groups: cost of the delay, by the latency of the slower group",
+            [cost for cost in costs if cost[1]],
+            COST,
+        ),
+    ]
+    drawings = [lambda: _draw(by_kind)] if by_kind else []
+    return FILE.section("latency", tables, drawings, f"{_why(by_kind)}{_verdict(pairs)}")
 
 
-def _detections(outcomes: Outcomes) -> dict[str, list[Detection]]:
+def _detections(faults: FaultRuns) -> dict[str, list[Detection]]:
     """Detections by the kind of fault."""
-    singles, label = cases.singles(), {law: BY_LAW[law].label for law in cases.LATENCY_LAWS}
-    kinds = {
-        f"one open, {label[law]}": [cases.of_latency(groups, law) for groups in singles] for law in label
-    }
-    several = {"two open": cases.pairs(), "three to nine open": cases.random_groups()}
-    kinds |= {
-        kind: [cases.of_groups(groups, cases.DETECTING) for groups in sets] for kind, sets in several.items()
-    }
-    kinds["one shorted"] = [cases.shorted(groups, cases.DETECTING) for groups in singles]
+    kinds = {f"one open, {BY_LAW[law].label}": faults.runs("latency", law=law) for law in cases.LATENCY_LAWS}
+    several = {"two open": "pair", "three to nine open": "drawn", "one shorted": "short"}
+    kinds |= {name: faults.runs(kind, way=cases.DETECTING.name) for name, kind in several.items()}
     return {
-        kind: [
-            detection
-            for number, run in enumerate(run for case in of_kind for run in outcomes.runs(case))
-            for detection in _of_run(run, number)
-        ]
-        for kind, of_kind in kinds.items()
+        name: [detection for number, run in enumerate(runs) for detection in _of_run(run, number)]
+        for name, runs in kinds.items()
     }
+
+
+def _draw(by_kind: Mapping[str, Sequence[Detection]]) -> Drawing:
+    from spheretwin.viz.figures import faults as figures
+
+    curves = {kind: [one.latency_s for one in detections] for kind, detections in by_kind.items()}
+    figure = figures.remaining(
+        curves, "time since the fault, s", "faults not detected yet, %", "Detection latency"
+    )
+    return FILE.drawing("latency", figure)
 
 
 def _of_run(run: Outcome, number: int = 0) -> list[Detection]:
@@ -100,22 +85,50 @@ def _of_run(run: Outcome, number: int = 0) -> list[Detection]:
     ]
 
 
-def _row(kind: str, detections: Sequence[Detection]) -> tuple[str, ...]:
-    latencies_ms = [1e3 * one.latency_s for one in detections]
-    detected, missed = _split(detections)
-    # A shorted group is observed by the current that its back-EMF drives as well.
-    ticks = ["–"] * 3
-    if "open" in kind and detected:
-        driven = [one.driven_ticks for one in detected]
-        ticks[:2] = f"{np.median(driven):.0f}", str(max(driven))
-    if "open" in kind and missed:
-        ticks[2] = str(max(one.driven_ticks for one in missed))
-    runs = len({one.run for one in detections})
-    return (
-        kind, str(len(detections)), *(quantile_text(latencies_ms, _ms, share, runs) for share in QUANTILES),
-        _ms(1e3 * max((one.latency_s for one in detected), default=inf)),
-        _share(len(missed), len(detections), runs), *ticks,
-    )  # fmt: skip
+Kind = tuple[str, Sequence[Detection]]
+"""Kind of fault with its detections."""
+
+
+def _quantile(share: float, kind: Kind) -> str:
+    latencies_ms = [1e3 * one.latency_s for one in kind[1]]
+    return quantile_text(latencies_ms, _ms, share, _draws(kind))
+
+
+def _draws(kind: Kind) -> int:
+    return len({one.run for one in kind[1]})
+
+
+def _longest(kind: Kind) -> str:
+    return _ms(1e3 * max((one.latency_s for one in _split(kind[1])[0]), default=inf))
+
+
+def _missed(kind: Kind) -> str:
+    return _share(len(_split(kind[1])[1]), len(kind[1]), _draws(kind))
+
+
+def _ticks(missed: bool, text: Callable[[Sequence[int]], str], kind: Kind) -> str:
+    """Driven ticks; of open groups alone, as a shorted one is observed by the current of its back-EMF too."""
+    ticks = [one.driven_ticks for one in _split(kind[1])[missed]]
+    return text(ticks) if "open" in kind[0] and ticks else NONE
+
+
+def _most(ticks: Sequence[int]) -> str:
+    return str(max(ticks))
+
+
+LATENCY: dict[str, Callable[[Kind], str]] = {
+    "groups": lambda kind: kind[0],
+    "faults": lambda kind: str(len(kind[1])),
+    "latency, ms: median": partial(_quantile, 0.5),
+    "90 %": partial(_quantile, 0.9),
+    "95 %": partial(_quantile, 0.95),
+    "99 %": partial(_quantile, 0.99),
+    "longest detected": _longest,
+    "not detected": _missed,
+    "driven ticks: median": partial(_ticks, False, lambda ticks: f"{np.median(ticks):.0f}"),
+    "longest": partial(_ticks, False, _most),
+    "not detected: most": partial(_ticks, True, _most),
+}
 
 
 def _share(cases: int, count: int, draws: int) -> str:
@@ -152,16 +165,13 @@ def _why(by_kind: Mapping[str, Sequence[Detection]]) -> str:
     )
 
 
-def _pairs(outcomes: Outcomes) -> list[tuple[Outcome, Outcome]]:
+def _pairs(faults: FaultRuns) -> Pairs:
     """Completed runs with one or two open groups, detected and reported, with the same seed and start."""
-    detecting, reported = (
-        runs_by_set(outcomes, [*cases.singles(), *cases.pairs()], way)
-        for way in (cases.DETECTING, cases.REPORTED)
-    )
+    reported = {item["groups"]: item.runs for item in faults.of(*FEW, way=cases.REPORTED.name)}
     return [
         pair
-        for groups, runs in detecting.items()
-        for pair in zip(runs, reported.get(groups, ()), strict=False)
+        for item in faults.of(*FEW, way=cases.DETECTING.name)
+        for pair in zip(item.runs, reported.get(item["groups"], ()), strict=False)
         if all(run.is_complete for run in pair)
     ]
 
@@ -169,20 +179,6 @@ def _pairs(outcomes: Outcomes) -> list[tuple[Outcome, Outcome]]:
 def _intervals() -> list[tuple[float, float]]:
     """Intervals of the latency in ms, then not detected, then all."""
     return [*pairwise(EDGES_ms), (inf, inf), (0.0, inf)]
-
-
-def _cost_row(pairs: Sequence[tuple[Outcome, Outcome]], first: float, end: float) -> tuple[str, ...] | None:
-    chosen = [pair for pair in pairs if _within(1e3 * _slowest_s(pair[0]), first, end)]
-    if not chosen:
-        return None
-    costs = [1e3 * cost_rad(*pair) for pair in chosen]
-    healthy = np.median([1e3 * detecting.data.healthy_rad for detecting, _ in chosen])
-    return (
-        _named(first, end), str(len(chosen)),
-        *(quantile_text(costs, "{:.3f}".format, share) for share in (0.5, 0.95, 0.99)),
-        f"{max(costs):.3f}", f"{healthy:.1f}",
-        percent([tracks(detecting) for detecting, _ in chosen]),
-    )  # fmt: skip
 
 
 def cost_rad(detecting: Outcome, reported: Outcome) -> float:
@@ -194,10 +190,44 @@ def _slowest_s(run: Outcome) -> float:
     return max(one.latency_s for one in _of_run(run))
 
 
-def _within(latency_ms: float, first: float, end: float) -> bool:
+def _within(pairs: Pairs, first: float, end: float) -> Pairs:
+    """Pairs whose slowest latency, in ms, is in an interval."""
     if (first, end) == (0.0, inf):
-        return True
-    return latency_ms == inf if first == inf else first <= latency_ms < end
+        return pairs
+    latencies = [1e3 * _slowest_s(pair[0]) for pair in pairs]
+    return [
+        pair
+        for pair, latency_ms in zip(pairs, latencies, strict=True)
+        if (latency_ms == inf if first == inf else first <= latency_ms < end)
+    ]
+
+
+def _costs(pairs: Pairs) -> list[float]:
+    return [1e3 * cost_rad(*pair) for pair in pairs]
+
+
+Interval = tuple[str, Pairs]
+"""Interval of the latency with its pairs."""
+
+
+def _cost(share: float, interval: Interval) -> str:
+    return quantile_text(_costs(interval[1]), "{:.3f}".format, share)
+
+
+def _healthy(interval: Interval) -> str:
+    return f"{np.median([1e3 * detecting.data.healthy_rad for detecting, _ in interval[1]]):.1f}"
+
+
+COST: dict[str, Callable[[Interval], str]] = {
+    "slowest latency, ms": lambda interval: interval[0],
+    "runs": lambda interval: str(len(interval[1])),
+    "cost, mrad: median": partial(_cost, 0.5),
+    "95 %": partial(_cost, 0.95),
+    "99 %": partial(_cost, 0.99),
+    "largest of these": lambda interval: f"{max(_costs(interval[1])):.3f}",
+    "healthy error, mrad: median": _healthy,
+    "track": lambda interval: percent([tracks(detecting) for detecting, _ in interval[1]]),
+}
 
 
 def _named(first: float, end: float) -> str:
@@ -208,10 +238,10 @@ def _named(first: float, end: float) -> str:
     return f"up to {end:.0f}" if first == 0.0 else f"above {first:.0f}, up to {end:.0f}"
 
 
-def _verdict(pairs: Sequence[tuple[Outcome, Outcome]]) -> str:
+def _verdict(pairs: Pairs) -> str:
     if not pairs:
         return ""
-    costs = [1e3 * cost_rad(*pair) for pair in pairs]
+    costs = _costs(pairs)
     free = sum(cost <= 0 for cost in costs)
     return (
         f" With one or two groups open the delay costs {np.median(costs):.3f} mrad as the median and"

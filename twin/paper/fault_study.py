@@ -2,39 +2,34 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 
 from spheretwin.paper import fault_cases as cases
-from spheretwin.paper import fault_latency, fault_sections
-from spheretwin.paper.experiment import Experiment, Finding, Outcome, Outcomes, ResultTable, Section
-from spheretwin.paper.fault_outcomes import reduce, row_fields, tracks
-from spheretwin.paper.fault_sections import RunsBySet, few, runs_by_set
+from spheretwin.paper import fault_latency
+from spheretwin.paper.experiment import Finding, Outcome, Outcomes, Section
+from spheretwin.paper.experiment_file import CaseRuns, table
+from spheretwin.paper.fault_cases import COILS, FEW, FILE, FaultRuns
+from spheretwin.paper.fault_outcomes import TWICE, reduce, row_fields, tracks
+from spheretwin.paper.fault_sections import ERROR, groups_section, parts_section
+from spheretwin.paper.page import NONE
+from spheretwin.viz.pages.markdown import Drawing
 
-METHOD = (
-    "These quantities are computed along the path of the healthy run, every 10 ms after the fault, and the"
-    " tables contain their least values: the *rank* and least singular value of the torque matrix without"
-    " the open groups; the *torque left over the torque needed*, which is the largest torque of any currents"
-    " within the limit in the direction of the torque of the healthy run, over that torque, and the same for"
-    " least-norm currents; and, for faults that are not reported, the *delivered share* of a torque that is"
-    " commanded of all groups, in the worst direction (the least eigenvalue of G_left G_leftᵀ (G Gᵀ)⁻¹)."
-)
-CAUSES_HEAD = (
-    "way", "figure", "sets", "do not track", "track: least", "do not: largest", "threshold", "correct side",
-)  # fmt: skip
-SMALL = (
-    "open groups", "way", "seeds that do not track", "status of the worst", "error ratio",
-    "rank", "least singular value, N·m/A", "torque left / needed", "by least norm",
-)  # fmt: skip
+FIGURES = {
+    "torque": "torque left / needed",
+    "least_norm": "the same by least norm",
+    "least_share": "delivered share",
+}
 JUDGED = (
-    (cases.REPORTED, ("torque", "torque left / needed")),
-    (cases.REPORTED, ("least_norm", "the same by least norm")),
-    (cases.DETECTING, ("torque", "torque left / needed")),
-    (cases.DETECTING, ("least_norm", "the same by least norm")),
-    (cases.BOUNDED, ("torque", "torque left / needed")),
-    (cases.UNREPORTED, ("least_share", "delivered share")),
+    (cases.REPORTED, "torque"),
+    (cases.REPORTED, "least_norm"),
+    (cases.DETECTING, "torque"),
+    (cases.DETECTING, "least_norm"),
+    (cases.BOUNDED, "torque"),
+    (cases.UNREPORTED, "least_share"),
 )
 """Figures that may separate the runs of a way that track from the others."""
 
@@ -50,30 +45,67 @@ class Split(NamedTuple):
     """Share of the runs on the right side of the threshold."""
 
 
-def causes_section(outcomes: Outcomes) -> Section:
+def causes_section(faults: FaultRuns) -> Section:
     """Separation of the sets that track by rank and torque, and the smallest sets that do not track."""
-    by_way = {way.name: runs_by_set(outcomes, cases.sets(), way) for way in cases.OF_GROUPS}
-    figures = [(way, *figure) for way, figure in JUDGED if by_way[way.name]]
-    rows = [_causes_row(by_way[way.name], way, name, label) for way, name, label in figures]
-    reported = (cases.REPORTED, cases.BOUNDED)
-    small = [row for way in reported for row in _smallest(by_way[way.name], way)]
-    points = {way.name: _points(by_way[way.name]) for way in reported if by_way[way.name]}
-    return Section(
-        "Why some sets do not track",
-        f"{METHOD}{_ranks(by_way)}{''.join(_causes_verdict(by_way[way.name], way) for way in reported)}",
-        [
-            ResultTable(
-                "How well one figure tells the sets that track, each with the first seed",
-                CAUSES_HEAD,
-                rows,
-                2,
-            ),
-            ResultTable(
-                f"The smallest sets that do not track, at most {LISTED} of each way", SMALL, small, 4
-            ),
-        ],
-        [lambda: fault_sections.torque_left(points)] if points else [],
+    causes = [cause for way, figure in JUDGED if (cause := _cause(faults, way, figure)).sets]
+    by_way = {
+        way.name: items
+        for way in (cases.REPORTED, cases.BOUNDED)
+        if (items := faults.of(*COILS, way=way.name))
+    }
+    small = [item for items in by_way.values() for item in smallest(items)]
+    tables = [
+        table("How well one figure tells the sets that track, each with the first seed", causes, CAUSES, 2),
+        table(f"The smallest sets that do not track, at most {LISTED} of each way", small, SMALL, 4),
+    ]
+    drawings = [lambda: _draw(by_way)] if by_way else []
+    verdicts = "".join(_causes_verdict(items, way) for way, items in by_way.items())
+    return FILE.section("causes", tables, drawings, f"{_ranks(faults)}{verdicts}")
+
+
+class Cause(NamedTuple):
+    """Values of a figure in the sets of a way, each with the first seed."""
+
+    way: str
+    figure: str
+    good: Sequence[float]
+    """Of the sets that track."""
+    bad: Sequence[float]
+
+    @property
+    def sets(self) -> int:
+        """Number of the sets."""
+        return len(self.good) + len(self.bad)
+
+
+def _cause(faults: FaultRuns, way: cases.Way, figure: str) -> Cause:
+    runs = [item.runs[0] for item in faults.of(*COILS, way=way.name)]
+    return Cause(way.name, FIGURES[figure], *_by_tracking(runs, figure))
+
+
+def _by_tracking(runs: Sequence[Outcome], figure: str) -> tuple[list[float], list[float]]:
+    """Return a figure of the runs that track, and of those that do not."""
+    good, bad = (
+        [getattr(run.data.remaining, figure) for run in runs if tracks(run) is tracking]
+        for tracking in (True, False)
     )
+    return good, bad
+
+
+def _split_text(text: Callable[[Split], str], cause: Cause) -> str:
+    return text(split(cause.good, cause.bad)) if cause.good and cause.bad else NONE
+
+
+CAUSES: dict[str, Callable[[Cause], str]] = {
+    "way": lambda cause: cause.way,
+    "figure": lambda cause: cause.figure,
+    "sets": lambda cause: str(cause.sets),
+    "do not track": lambda cause: str(len(cause.bad)),
+    "track: least": lambda cause: f"{min(cause.good):.3f}" if cause.good else NONE,
+    "do not: largest": lambda cause: f"{max(cause.bad):.3f}" if cause.bad else NONE,
+    "threshold": partial(_split_text, lambda best: f"{best.at:.3f}"),
+    "correct side": partial(_split_text, lambda best: f"{100 * best.rightly:.1f} %"),
+}
 
 
 def split(good: Sequence[float], bad: Sequence[float]) -> Split:
@@ -90,35 +122,11 @@ def split(good: Sequence[float], bad: Sequence[float]) -> Split:
     return Split(float(neighbours.mean()), float(rightly[best] / len(values)))
 
 
-def _causes_row(by_set: RunsBySet, way: cases.Way, figure: str, label: str) -> tuple[str, ...]:
-    good, bad = _by_tracking({groups: runs[:1] for groups, runs in by_set.items()}, figure)
-    best = split(good, bad)
-    return (
-        way.name, label, str(len(good) + len(bad)), str(len(bad)),
-        f"{min(good):.3f}" if good else "–", f"{max(bad):.3f}" if bad else "–",
-        f"{best.at:.3f}" if good and bad else "–", f"{100 * best.rightly:.1f} %" if good and bad else "–",
-    )  # fmt: skip
-
-
-def _by_tracking(by_set: RunsBySet, figure: str) -> tuple[list[float], list[float]]:
-    """Return a figure of the runs that track, and of those that do not."""
-    good: list[float] = []
-    bad: list[float] = []
-    for runs in by_set.values():
-        for run in runs:
-            (good if tracks(run) else bad).append(getattr(run.data.remaining, figure))
-    return good, bad
-
-
-def _ranks(by_way: dict[str, RunsBySet]) -> str:
+def _ranks(faults: FaultRuns) -> str:
     """Count the sets that lose a direction."""
-    lost = {
-        groups
-        for by_set in by_way.values()
-        for groups, runs in by_set.items()
-        if any(run.data.remaining.rank < 3 for run in runs)
-    }
-    every = {groups for by_set in by_way.values() for groups in by_set}
+    items = faults.of(*COILS)
+    every = {item["groups"] for item in items}
+    lost = {item["groups"] for item in items if any(run.data.remaining.rank < 3 for run in item.runs)}
     if not every:
         return ""
     if not lost:
@@ -126,67 +134,107 @@ def _ranks(by_way: dict[str, RunsBySet]) -> str:
     return f"\n\n{len(lost)} of {len(every)} sets lose a direction on the path."
 
 
-def _causes_verdict(by_set: RunsBySet, way: cases.Way) -> str:
+def _causes_verdict(items: Sequence[CaseRuns], way: str) -> str:
     """Count the runs that track with at least and with less than the needed torque."""
-    good, bad = _by_tracking(by_set, "torque")
+    good, bad = _by_tracking([run for item in items for run in item.runs], "torque")
     if not good:
         return ""
     enough = [value >= 1 for value in good].count(True)
     enough_bad = [value >= 1 for value in bad].count(True)
     less, less_bad = len(good) - enough, len(bad) - enough_bad
     return (
-        f" {way.name.capitalize()}: {enough} of {enough + enough_bad} runs with at least the needed torque"
+        f" {way.capitalize()}: {enough} of {enough + enough_bad} runs with at least the needed torque"
         f" track, and {less} of {less + less_bad} runs with less."
     )
 
 
-def _smallest(by_set: RunsBySet, way: cases.Way) -> list[tuple[str, ...]]:
-    failing = [(groups, runs) for groups, runs in by_set.items() if not all(map(tracks, runs))]
-    failing.sort(key=lambda one: (len(one[0]), min(run.data.remaining.torque for run in one[1]), one[0]))
-    return [_listed(groups, runs, way) for groups, runs in failing[:LISTED]]
+def smallest(items: Sequence[CaseRuns]) -> list[CaseRuns]:
+    """Return the sets with the fewest groups that do not track, the one with the least torque first."""
+    failing = [item for item in items if not all(map(tracks, item.runs))]
+    least = {item.case.name: min(run.data.remaining.torque for run in item.runs) for item in failing}
+    failing.sort(key=lambda item: (len(item["groups"]), least[item.case.name], item["groups"]))
+    return failing[:LISTED]
 
 
-def _listed(groups: cases.Groups, runs: Sequence[Outcome], way: cases.Way) -> tuple[str, ...]:
-    bad = [run for run in runs if not tracks(run)]
-    worst = max(bad, key=lambda run: run.data.ratio)
-    left = worst.data.remaining
-    return (
-        " ".join(map(str, groups)), way.name, f"{len(bad)} of {len(runs)}", str(worst.status),
-        f"{worst.data.ratio:.2f}", str(left.rank), f"{left.singular_value_Nm_per_A:.4f}",
-        f"{left.torque:.2f}", f"{left.least_norm:.2f}",
-    )  # fmt: skip
+def _worst(text: Callable[[Outcome], str]) -> Callable[[CaseRuns], str]:
+    def cell(item: CaseRuns) -> str:
+        bad = [run for run in item.runs if not tracks(run)]
+        return text(max(bad, key=lambda run: run.data.ratio))
+
+    return cell
 
 
-def _points(by_set: RunsBySet) -> list[tuple[float, float, int]]:
-    """Torque left, error over the healthy one, and number of open groups, of each run."""
-    return [
-        (run.data.remaining.torque, run.data.ratio, len(groups))
-        for groups, runs in by_set.items()
-        for run in runs
-    ]
+SMALL: dict[str, Callable[[CaseRuns], str]] = {
+    "open groups": lambda item: " ".join(map(str, item["groups"])),
+    "way": lambda item: item["way"],
+    "seeds that do not track": lambda item: f"{[*map(tracks, item.runs)].count(False)} of {len(item.runs)}",
+    "status of the worst": _worst(lambda run: str(run.status)),
+    "error ratio": _worst(lambda run: f"{run.data.ratio:.2f}"),
+    "rank": _worst(lambda run: str(run.data.remaining.rank)),
+    "least singular value, N·m/A": _worst(lambda run: f"{run.data.remaining.singular_value_Nm_per_A:.4f}"),
+    "torque left / needed": _worst(lambda run: f"{run.data.remaining.torque:.2f}"),
+    "by least norm": _worst(lambda run: f"{run.data.remaining.least_norm:.2f}"),
+}
+
+
+def _draw(by_way: Mapping[str, Sequence[CaseRuns]]) -> Drawing:
+    from spheretwin.viz.figures import faults as figures
+
+    points = {
+        way: [
+            (run.data.remaining.torque, run.data.ratio, len(item["groups"]))
+            for item in items
+            for run in item.runs
+        ]
+        for way, items in by_way.items()
+    }
+    figure = figures.clouds(
+        points,
+        ("torque left / torque needed, least along the path", ERROR, "open groups"),
+        (1.0, TWICE),
+        "What is left decides",
+    )
+    return FILE.drawing("causes", figure, times=TWICE)
 
 
 BOUND_rad = 1e-9
 """Largest errors of the two engines differ by no more in runs that track: 10,000 steps round otherwise, and a
 closed loop holds the difference small."""
 
-ENGINES_HEAD = (
-    "way", "sets", "same status", "same tracking", "difference if they track, rad", "if they complete, rad",
-)  # fmt: skip
+
+class EnginePairs(NamedTuple):
+    """Runs of a way on both engines, with the first seed."""
+
+    way: str
+    pairs: Sequence[tuple[Outcome, Outcome]]
+
+    def same(self, value: Callable[[Outcome], object]) -> str:
+        """Count the pairs of which a value is the same."""
+        return str([value(one) == value(other) for one, other in self.pairs].count(True))
+
+    def largest(self, condition: Callable[[Outcome], bool]) -> str:
+        """Largest difference of the pairs of which both runs meet a condition."""
+        pairs = [pair for pair in self.pairs if all(map(condition, pair))]
+        return f"{max(difference_rad(*pair) for pair in pairs):.1e}" if pairs else NONE
 
 
-def engines_section(outcomes: Outcomes) -> Section:
+ENGINES: dict[str, Callable[[EnginePairs], str]] = {
+    "way": lambda both: both.way,
+    "sets": lambda both: str(len(both.pairs)),
+    "same status": lambda both: both.same(lambda run: run.status),
+    "same tracking": lambda both: both.same(tracks),
+    "difference if they track, rad": lambda both: both.largest(tracks),
+    "if they complete, rad": lambda both: both.largest(lambda run: run.is_complete),
+}
+
+
+def engines_section(faults: FaultRuns) -> Section:
     """Differences between the engines."""
-    rows = [row for way in cases.OF_GROUPS if (row := _engines_row(outcomes, way))]
-    text = (
-        f"The study runs on the Lagrangian engine, the faster one. One of {cases.SAMPLE} sets also runs on"
-        " MuJoCo, with the first seed. Runs that track must have largest errors that differ by at most"
-        f" {BOUND_rad:g} rad; other runs must end with the same status."
-    )
-    title = "Largest error of each hinge on the two engines"
-    return Section(
-        "The other engine", text + _engines_verdict(outcomes), [ResultTable(title, ENGINES_HEAD, rows)]
-    )
+    every = [both for way in cases.OF_GROUPS if (both := engine_pairs(faults, way)).pairs]
+    agreed = [agree(*pair) for both in every for pair in both.pairs]
+    more = f" {agreed.count(True)} of {len(agreed)} agree." if agreed else ""
+    engines = table("Largest error of each hinge on the two engines", every, ENGINES)
+    return FILE.section("engines", [engines], more=more, sample=cases.SAMPLE, bound_rad=BOUND_rad)
 
 
 def agree(one: Outcome, other: Outcome) -> bool:
@@ -201,66 +249,36 @@ def difference_rad(one: Outcome, other: Outcome) -> float:
     return float(max(whole, abs(one.data.after_rad - other.data.after_rad)))
 
 
-def engine_pairs(outcomes: Outcomes, way: cases.Way) -> list[tuple[Outcome, Outcome]]:
-    """Runs of the sample on both engines, with the first seed."""
-    pairs = [
-        (outcomes.runs(cases.of_groups(groups, way)), outcomes.runs(cases.on_other_engine(groups, way)))
-        for groups in cases.sample()
-    ]
-    return [(one[0], other[0]) for one, other in pairs if one and other]
-
-
-def _engines_verdict(outcomes: Outcomes) -> str:
-    both = [pair for way in cases.OF_GROUPS for pair in engine_pairs(outcomes, way)]
-    if not both:
-        return ""
-    return f" {sum(agree(*pair) for pair in both)} of {len(both)} agree."
-
-
-def _engines_row(outcomes: Outcomes, way: cases.Way) -> tuple[str, ...] | None:
-    both = engine_pairs(outcomes, way)
-    if not both:
-        return None
-    alike = [one.status == other.status for one, other in both]
-    tracked = [tracks(one) == tracks(other) for one, other in both]
-    whole = [pair for pair in both if all(run.is_complete for run in pair)]
-    close = [pair for pair in both if all(map(tracks, pair))]
-    apart = [
-        f"{max(difference_rad(*pair) for pair in pairs):.1e}" if pairs else "–" for pairs in (close, whole)
-    ]
-    return way.name, str(len(both)), str(sum(alike)), str(sum(tracked)), *apart
+def engine_pairs(faults: FaultRuns, way: cases.Way) -> EnginePairs:
+    """Return the runs of the sample on both engines."""
+    others = {item["groups"]: item.runs[0] for item in faults.of("MuJoCo", way=way.name)}
+    items = [item for item in faults.of(*COILS, way=way.name) if item["groups"] in others]
+    return EnginePairs(way.name, [(item.runs[0], others[item["groups"]]) for item in items])
 
 
 def sections(outcomes: Outcomes) -> list[Section]:
     """Open groups, detection, why some sets do not track, all other parts, and the other engine."""
+    faults = FaultRuns(outcomes)
     return [
-        fault_sections.groups_section(outcomes),
-        fault_latency.section(outcomes),
-        causes_section(outcomes),
-        fault_sections.parts_section(outcomes),
-        engines_section(outcomes),
+        groups_section(faults),
+        fault_latency.section(faults),
+        causes_section(faults),
+        parts_section(faults),
+        engines_section(faults),
     ]
 
 
 def findings(outcomes: Outcomes) -> list[Finding]:
     """Number of the runs with one or two open groups that track, by way."""
-    texts = []
-    for way in cases.OF_GROUPS:
-        runs = few(outcomes, way)
-        if runs:
-            texts.append(f"{way.name} {[tracks(run) for run in runs].count(True)} of {len(runs)}")
+    faults = FaultRuns(outcomes)
+    by_way = {way.name: faults.runs(*FEW, way=way.name) for way in cases.OF_GROUPS}
+    texts = [
+        f"{way} {[*map(tracks, runs)].count(True)} of {len(runs)}" for way, runs in by_way.items() if runs
+    ]
     text = f"runs that track with one or two groups open: {', '.join(texts)}"
     return [Finding(None, text)] if texts else []
 
 
-EXPERIMENT = Experiment(
-    name="faults",
-    title="Parts that fail during the run",
-    summary="The nutation (59) under AFSM with m = 0.2 and L = 1. At a random time coil groups open, or a"
-    " sensor, the supply or the controller fails. The detection latency is measured under AFSM-ESO too.",
-    cases=cases.cases,
-    sections=sections,
-    reduce=reduce,
-    row_fields=row_fields,
-    findings=findings,
+EXPERIMENT = FILE.experiment(
+    cases=cases.cases, sections=sections, reduce=reduce, row_fields=row_fields, findings=findings
 )

@@ -13,7 +13,16 @@ from spheretwin.control.supervision.watchdog import Reason
 from spheretwin.models.telemetry.status import Status
 from spheretwin.paper import fault_cases, fault_latency, fault_sections, fault_study
 from spheretwin.paper.experiment import Outcome, Outcomes
-from spheretwin.paper.fault_cases import DETECTING, OF_GROUPS, OF_PARTS, REPORTED, of_groups, of_part
+from spheretwin.paper.experiment_file import CaseRuns
+from spheretwin.paper.fault_cases import (
+    DETECTING,
+    OF_GROUPS,
+    OF_PARTS,
+    REPORTED,
+    FaultRuns,
+    of_groups,
+    of_part,
+)
 from spheretwin.paper.fault_outcomes import FaultData, RemainingTorque, reason, reduce, row_fields, tracks
 from spheretwin.paper.page import rows
 from spheretwin.paper.runner import make_plan, run_plan, scenario_of, unexpected_ends
@@ -65,7 +74,9 @@ def outcome(ratio, status=Status.COMPLETED, **more_of_it):
 
 def test_the_error_without_a_failure_is_the_median_of_its_seeds():
     runs = [outcome(ratio) for ratio in (1.0, 2.0, 9.0)]
-    text = fault_sections.parts_section(Outcomes({fault_cases.HEALTHY_ELECTRONICS.name: runs})).text
+    text = fault_sections.parts_section(
+        FaultRuns(Outcomes({fault_cases.HEALTHY_ELECTRONICS.name: runs}))
+    ).text
     assert f"{np.degrees(0.02):.2f}°" in text
     assert f"{np.degrees(0.09):.2f}°" not in text
 
@@ -164,7 +175,7 @@ def test_latency_is_a_distribution_in_which_the_undetected_count():
     names = [of_groups((0,), way).name for way in (DETECTING, REPORTED)]
     latency = fault_cases.of_latency((0,), "afsm_eso").name
     outcomes = {names[0]: runs, names[1]: [undetected] * len(runs), latency: runs}
-    section = fault_latency.section(Outcomes(outcomes))
+    section = fault_latency.section(FaultRuns(Outcomes(outcomes)))
     (row,) = section.tables[0].rows
     # P(82 to 96 of 100 draws are below the quantile of 90 %) = 0.98; 88 to 99 for 95 %.
     assert row == (
@@ -192,7 +203,7 @@ def test_groups_that_fail_at_once_are_one_draw():
         for time_s in latencies
     ]
     pair, single = (
-        fault_latency.section(Outcomes({name: runs})).tables[0].rows[0]
+        fault_latency.section(FaultRuns(Outcomes({name: runs}))).tables[0].rows[0]
         for name, runs in (
             (of_groups(PAIR, DETECTING).name, several[:50]),
             (fault_cases.of_latency((0,), "afsm").name, several[50:]),
@@ -214,7 +225,7 @@ def test_too_little_torque_or_the_watchdog_is_the_reason(study):
 
 
 def test_map_of_pairs_has_pairs_below_and_single_groups_on_the_diagonal(study):
-    ratios = fault_sections.ratios(study[1], fault_cases.UNREPORTED)
+    ratios = fault_sections.ratios(FaultRuns(study[1]), fault_cases.UNREPORTED)
     assert np.argwhere(np.isfinite(ratios)).tolist() == [[0, 0], [1, 0]]
     assert ratios[1, 0] == row(study, of_groups(PAIR, fault_cases.UNREPORTED))["error_ratio"]
 
@@ -255,11 +266,10 @@ def test_shares_are_not_rounded_up_to_all():
 def test_the_ten_smallest_sets_that_do_not_track_are_listed():
     shares = {"torque": 0.5, "least_norm": 0.4, "least_share": 0.3}
     remaining = RemainingTorque(**shares, singular_value_Nm_per_A=0.1, rank=3)
-    sets = {tuple(range(size)): [outcome(100.0, remaining=remaining)] for size in range(14, 1, -1)}
-    listed = fault_study._smallest(sets | {(0,): [outcome(1.0, remaining=remaining)]}, REPORTED)
-    assert len(listed) == fault_study.LISTED == 10
-    assert listed[0] == fault_study._listed((0, 1), sets[0, 1], REPORTED)
-    assert listed[-1] == fault_study._listed(tuple(range(11)), sets[tuple(range(11))], REPORTED)
+    runs = {tuple(range(size)): [outcome(100.0, remaining=remaining)] for size in range(14, 1, -1)}
+    runs |= {(0,): [outcome(1.0, remaining=remaining)]}
+    listed = fault_study.smallest([CaseRuns(of_groups(groups, REPORTED), runs[groups]) for groups in runs])
+    assert [item["groups"] for item in listed] == [tuple(range(size)) for size in range(2, 12)]
 
 
 PAGE = Path(__file__).parents[3] / "docs" / "explanation" / "faults.md"
