@@ -94,15 +94,11 @@ def largest(row, plant):
     "metric": Addition(
         "twin/metrics/effort.py",
         '''
-class Load(NamedTuple):
-    total: Array
-
-
 @rounding_each
-def _add_load(rows, first, columns, state):
+def _add_load(rows, first, columns, total):
     for i in range(rows.shape[0]):
         for j in range(3):
-            state.total[j] += rows[i, columns[0] + j]
+            total[j] += rows[i, columns[0] + j]
 
 
 class MeanLoad(Metric):
@@ -111,13 +107,13 @@ class MeanLoad(Metric):
     reads = ("disturbance_Nm",)
     add = staticmethod(_add_load)
 
-    def __init__(self, planned):
-        super().__init__(planned)
-        self.state = Load(np.zeros(3))
+    def start(self, planned):
+        """Return the sums."""
+        return np.zeros(3)
 
-    def value(self):
-        """[3] in N·m; None without a row."""
-        return (self.state.total / self._rows).tolist() if self._rows else None
+    def result(self):
+        """Return [3] in N·m."""
+        return (self.state / self._rows).tolist()
 ''',
         "twin/metrics/__init__.py",
         (

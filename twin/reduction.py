@@ -10,10 +10,9 @@ from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
-from typing import Any, ClassVar, NamedTuple
+from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from spheretwin.models.actuator import Actuator
 from spheretwin.models.base.compiled import for_types_of, part_of_its_caller, rounding_each
@@ -47,15 +46,6 @@ class PlannedRun:
         return self.scenario.controller.period_s
 
 
-Array = NDArray[np.float64]
-
-
-class Largest(NamedTuple):
-    """Largest values so far; minus infinity before the first row."""
-
-    values: Array
-
-
 class Metric(ABC):
     """Metric of a run; the result is bit-identical for any chunks.
 
@@ -66,7 +56,7 @@ class Metric(ABC):
 
     Attributes
     ----------
-    state : named tuple
+    state : array or named tuple
         Numbers that `add` reads and changes.
     """
 
@@ -80,10 +70,18 @@ class Metric(ABC):
     """``add(rows, first, columns, state)``: compiled, processes the rows (n, width) of one chunk, the first
     of which is that of a tick of the run."""
 
+    least_rows: ClassVar[int] = 1
+    """Rows below which the metric has no value."""
+
     state: Any
 
     def __init__(self, planned: PlannedRun) -> None:
         self.planned, self._rows = planned, 0
+        self.state = self.start(planned)
+
+    @abstractmethod
+    def start(self, planned: PlannedRun) -> Any:
+        """Return the state before the first row."""
 
     def write(self, rows: Table) -> None:
         """Process the rows of one chunk, at least one."""
@@ -94,9 +92,13 @@ class Metric(ABC):
         first, self._rows = self._rows, self._rows + rows
         return first
 
-    @abstractmethod
     def value(self) -> Any:
         """Return the value of the metric in JSON types; None if there are too few rows."""
+        return self.result() if self._rows >= self.least_rows else None
+
+    @abstractmethod
+    def result(self) -> Any:
+        """Return the value of at least `least_rows` rows."""
 
     def warnings(self) -> list[str]:
         """Return warnings that concern the validity of the figures, one line each."""

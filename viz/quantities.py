@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from spheretwin.models.actuator import Actuator
 from spheretwin.models.coil_group import of_each_group
+from spheretwin.models.kinematics import generalised_torque
+from spheretwin.models.lagrangian import coriolis_rows, inertia_entries
+from spheretwin.models.symbolic import on_symbols, turns_by
 from spheretwin.models.telemetry.signals import ANGLES
 from spheretwin.models.telemetry.table import Table
 from spheretwin.viz import theme
@@ -28,6 +31,9 @@ class QuantityRows(NamedTuple):
     current_limit_A: float
 
 
+Values = Callable[[QuantityRows], Array]
+
+
 class Quantity(NamedTuple):
     """Quantity derived from telemetry, for recordings or for a comparison of runs."""
 
@@ -35,7 +41,7 @@ class Quantity(NamedTuple):
     """Ends in its unit."""
     unit: str
     title: str
-    values: Callable[[QuantityRows], Array]
+    values: Values
     """One row for each row of the chunk: (n, size)."""
     floor: float
     """Half of the least range of its plot: smaller values must not look large."""
@@ -47,7 +53,7 @@ class Quantity(NamedTuple):
     """Signals that it needs besides those of every run."""
     group: str = ""
     """Group of compared quantities that are drawn in one row."""
-    desired: Callable[[QuantityRows], Array] | None = None
+    desired: Values | None = None
     """Reference of a compared quantity, (n,)."""
     limits: tuple[float, float] | None = None
     """Limits of the axis of a compared quantity; those of the values unless given."""
@@ -68,12 +74,7 @@ class Quantity(NamedTuple):
 
 
 def by_axis(
-    name: str,
-    unit: str,
-    title: str,
-    values: Callable[[QuantityRows], Array],
-    floor: float,
-    needs: tuple[str, ...] = (),
+    name: str, unit: str, title: str, values: Values, floor: float, needs: tuple[str, ...] = ()
 ) -> Quantity:
     """Quantity with an entry for each hinge, in the colours of the axes."""
     return Quantity(name, unit, title, values, floor, ANGLES, theme.AXIS_COLOURS, needs)
@@ -92,6 +93,10 @@ def copper_loss(rows: QuantityRows) -> Array:
 COPPER_LOSS = Quantity("copper_loss_total_W", "W", "heat of all coils", copper_loss, floor=0.5)
 
 
+_turns = turns_by(np.cos, np.sin)
+_inertia_entries, _coriolis_rows = on_symbols(inertia_entries), on_symbols(coriolis_rows)
+
+
 def coupling_torque(rows: QuantityRows) -> Array:
     """Return the part of ``M qddot + C qdot`` that is not an axis's own inertia, (n, 3) in N·m.
 
@@ -100,36 +105,12 @@ def coupling_torque(rows: QuantityRows) -> Array:
     q, rate, t_s = rows.table["q_rad"], rows.table["qdot_rad_s"], rows.table["t_s"]
     step_s = np.diff(t_s, prepend=rows.before["t_s"])
     change = np.diff(rate, axis=0, prepend=rows.before["qdot_rad_s"])
-    acceleration = change / np.where(step_s > 0, step_s, 1.0)[:, None]  # 0 at the first tick of a run
-    return _inertial(q, acceleration, rows.actuator.inertia) + _coriolis(q, rate, rows.actuator.inertia)
-
-
-def _inertial(q: Array, acceleration: Array, inertia: Array) -> Array:
-    """Entries off the diagonal of M, times the accelerations."""
-    J1, J2, J3 = inertia
-    alpha_beta = (J1 - J2) * np.cos(q[:, 1]) * np.cos(q[:, 2]) * np.sin(q[:, 2])
-    alpha_gamma = J3 * np.sin(q[:, 1])
-    a, b, g = acceleration.T
-    return np.stack([alpha_beta * b + alpha_gamma * g, alpha_beta * a, alpha_gamma * a], axis=1)
-
-
-def _coriolis(q: Array, rate: Array, inertia: Array) -> Array:
-    """Coriolis and centrifugal torques ``C qdot``: each product of rates once."""
-    J1, J2, J3 = inertia
-    cb, sb, cg, sg = np.cos(q[:, 1]), np.sin(q[:, 1]), np.cos(q[:, 2]), np.sin(q[:, 2])
-    a, b, g = rate.T
-    D = J1 - J2
-    double_angle = D * cb * (cg**2 - sg**2)
-    tilt = (J3 - J1 * cg**2 - J2 * sg**2) * sb * cb
-    turn = D * sg * cg
-    return np.stack(
-        [
-            2 * tilt * a * b - 2 * turn * cb**2 * a * g - turn * sb * b**2 + (double_angle + J3 * cb) * b * g,
-            -tilt * a**2 + (double_angle - J3 * cb) * a * g + 2 * turn * b * g,
-            turn * cb**2 * a**2 + (J3 * cb - double_angle) * a * b - turn * b**2,
-        ],
-        axis=1,
-    )
+    a, b, g = (change / np.where(step_s > 0, step_s, 1.0)[:, None]).T  # 0 at the first tick of a run
+    at, inertia = _turns(q.T), rows.actuator.inertia
+    M, C = _inertia_entries(at, inertia), _coriolis_rows(at, rate.T, inertia)
+    inertial = (M.alpha_beta * b + M.alpha_gamma * g, M.alpha_beta * a, M.alpha_gamma * a)
+    coriolis = (sum(entry * of for entry, of in zip(row, rate.T, strict=True)) for row in C)
+    return np.stack([*map(np.add, inertial, coriolis)], axis=1)
 
 
 COUPLING = by_axis(
@@ -143,28 +124,22 @@ COUPLING = by_axis(
 
 def delivered_torque(rows: QuantityRows) -> Array:
     """Generalised torque ``E^T torque_S`` at the pose of the tick, (n, 3) in N·m."""
-    return on_the_hinges(rows.table["q_rad"], rows.table["torque_Nm"])
+    on_hinges: list[Any] = [None] * 3
+    _generalised_torque(rows.table["q_rad"].T, rows.table["torque_Nm"].T, on_hinges)
+    return np.stack(on_hinges, axis=1)
 
 
-def on_the_hinges(q: Array, torque_S: Array) -> Array:
-    """Generalised torque of torques of the stator frame (n, 3) in N·m, at hinge angles (n, 3) in rad."""
-    x, y, z = torque_S.T
-    ca, sa = np.cos(q[:, 0]), np.sin(q[:, 0])
-    cb, sb = np.cos(q[:, 1]), np.sin(q[:, 1])
-    return np.stack([x, ca * y + sa * z, sb * x + cb * (ca * z - sa * y)], axis=1)
-
-
+_generalised_torque = on_symbols(generalised_torque, turns=_turns)
 DELIVERED = by_axis(
     "torque_delivered_Nm", "N·m", "generalised torque of the coils", delivered_torque, floor=0.02
 )
-
-
-def tracking_error(rows: QuantityRows) -> Array:
-    """Error (28), (n, 3) in mrad."""
-    return 1e3 * rows.table["error_rad"]
-
-
-ERROR = by_axis("error_mrad", "mrad", "tracking error q - q_ref (28)", tracking_error, floor=0.1)
+ERROR = by_axis(
+    "error_mrad",
+    "mrad",
+    "tracking error q - q_ref (28)",
+    lambda rows: 1e3 * rows.table["error_rad"],
+    floor=0.1,
+)
 
 
 def error_angle(rows: QuantityRows) -> Array:
@@ -189,16 +164,11 @@ def angle_between(q: Array, desired: Array) -> Array:
 ERROR_ANGLE = Quantity("error_angle_deg", "°", "angle between the rotor and its reference", error_angle, 0.01)
 
 
-def estimated_rate(rows: QuantityRows) -> Array:
-    """Estimated minus true rates, (n, 3) in rad/s."""
-    return rows.table["qdot_estimated_rad_s"] - rows.table["qdot_rad_s"]
-
-
 ESTIMATED_RATE = by_axis(
     "rate_error_rad_s",
     "rad/s",
     "estimated minus true rates",
-    estimated_rate,
+    lambda rows: rows.table["qdot_estimated_rad_s"] - rows.table["qdot_rad_s"],
     0.01,
     needs=("qdot_estimated_rad_s",),
 )
@@ -225,16 +195,11 @@ MARGIN = Quantity(
 )
 
 
-def measured_angle(rows: QuantityRows) -> Array:
-    """Measured minus true angles, (n, 3) in mrad."""
-    return 1e3 * (rows.table["q_measured_rad"] - rows.table["q_rad"])
-
-
 MEASURED_ANGLE = by_axis(
     "measurement_error_mrad",
     "mrad",
     "measured minus true angles",
-    measured_angle,
+    lambda rows: 1e3 * (rows.table["q_measured_rad"] - rows.table["q_rad"]),
     0.1,
     needs=("q_measured_rad",),
 )
@@ -280,9 +245,6 @@ def compared_quantities(tables: Sequence[Table]) -> list[Quantity]:
         for quantity in COMPARED_QUANTITIES
         if all(set(quantity.needs) <= available for available in names)
     ]
-
-
-Values = Callable[[QuantityRows], Array]
 
 
 def _entry(values: Values, axis: int) -> Values:

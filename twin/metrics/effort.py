@@ -8,9 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spheretwin.control.applied_torque import lag_step
+from spheretwin.metrics.tracking import add_largest
 from spheretwin.models.base.compiled import rounding_each
 from spheretwin.models.coil_group import of_each_group
-from spheretwin.reduction import Largest, Metric, PlannedRun
+from spheretwin.reduction import Metric, PlannedRun
 
 Array = NDArray[np.float64]
 
@@ -62,42 +63,31 @@ class CopperLoss(Metric):
     reads = ("copper_loss_W", "current_A", "current_command_A")
     add = staticmethod(_add_copper_loss)
 
-    def __init__(self, planned: PlannedRun) -> None:
-        super().__init__(planned)
+    def start(self, planned: PlannedRun) -> CopperState:
+        """Return shares of the lag, and no loss."""
         section, groups = planned.scenario.drive, len(planned.actuator.groups)
         lag_s, period_s = of_each_group(section.lag_s, groups), planned.period_s
         spans = (lag_s, planned.scenario.plant.step_s), (lag_s, period_s), (0.5 * lag_s, period_s)
         step, tick, tick_squared = (lag_step(span_s, lag)[1] for lag, span_s in spans)
         squares, logged_W = np.zeros((2, groups))
-        follows = not section.converts
-        self.state = CopperState(
-            step, tick, tick_squared, float(section.current_limit_A), follows, squares, logged_W
-        )
+        limit_A, follows = float(section.current_limit_A), not section.converts
+        return CopperState(step, tick, tick_squared, limit_A, follows, squares, logged_W)
 
-    def value(self) -> float | None:
-        """Return the loss in J; None without a row."""
-        if not self._rows:
-            return None
+    def result(self) -> float:
+        """Return the loss in J."""
         resistance_ohm = self.planned.scenario.drive.resistance_ohm
         heat_W = np.sum(np.multiply(resistance_ohm, self.state.squares)) + np.sum(self.state.logged_W)
         return float(heat_W * self.planned.period_s)
 
 
-class VariationState(NamedTuple):
-    """State of `CurrentVariation`."""
-
-    variation: Array  # (n,) A
-    last: Array  # (n,) A, of the last tick
-
-
 @rounding_each
-def _add_variation(rows: Array, first: int, columns: tuple[int, ...], state: VariationState) -> None:
+def _add_variation(rows: Array, first: int, columns: tuple[int, ...], state: Array) -> None:
     (command,) = columns
     for i in range(rows.shape[0]):
-        for j in range(state.last.shape[0]):
+        for j in range(state.shape[1]):
             if first + i > 0:
-                state.variation[j] += abs(rows[i, command + j] - state.last[j])
-            state.last[j] = rows[i, command + j]
+                state[0, j] += abs(rows[i, command + j] - state[1, j])
+            state[1, j] = rows[i, command + j]
 
 
 class CurrentVariation(Metric):
@@ -108,58 +98,40 @@ class CurrentVariation(Metric):
     complete variation, and the lag of the coils does not smooth it.
     """
 
-    state: VariationState
     reads = ("current_command_A",)
     add = staticmethod(_add_variation)
+    least_rows = 2
 
-    def __init__(self, planned: PlannedRun) -> None:
-        super().__init__(planned)
-        groups = len(planned.actuator.groups)
-        self.state = VariationState(np.zeros(groups), np.zeros(groups))
+    def start(self, planned: PlannedRun) -> Array:
+        """Return the variation and the last command of each group, (2, n) in A."""
+        return np.zeros((2, len(planned.actuator.groups)))
 
-    def value(self) -> float | None:
-        """Return the variation in A/s; None with fewer than two rows."""
-        if self._rows < 2:
-            return None
-        return float(self.state.variation.mean() / ((self._rows - 1) * self.planned.period_s))
-
-
-@rounding_each
-def _add_currents(rows: Array, first: int, columns: tuple[int, ...], state: Largest) -> None:
-    (current,) = columns
-    for i in range(rows.shape[0]):
-        for j in range(state.values.shape[0]):
-            state.values[j] = max(state.values[j], abs(rows[i, current + j]))
+    def result(self) -> float:
+        """Return the variation in A/s."""
+        return float(self.state[0].mean() / ((self._rows - 1) * self.planned.period_s))
 
 
 class MaxAbsCurrent(Metric):
     """Largest ``|current_A|`` of any group, A: of means over the physics step that begins at each tick."""
 
-    state: Largest
     reads = ("current_A",)
-    add = staticmethod(_add_currents)
+    add = staticmethod(add_largest)
 
-    def __init__(self, planned: PlannedRun) -> None:
-        super().__init__(planned)
-        self.state = Largest(np.full(len(planned.actuator.groups), -np.inf))
+    def start(self, planned: PlannedRun) -> Array:
+        """Return the largest magnitudes (n,), minus infinity before the first row."""
+        return np.full(len(planned.actuator.groups), -np.inf)
 
-    def value(self) -> float | None:
-        """Return the current in A; None without a row."""
-        return float(self.state.values.max()) if self._rows else None
-
-
-class SumOfSquares(NamedTuple):
-    """Sum of the squares of three columns."""
-
-    values: Array  # (3,)
+    def result(self) -> float:
+        """Return the current in A."""
+        return float(self.state.max())
 
 
 @rounding_each
-def _add_torque(rows: Array, first: int, columns: tuple[int, ...], state: SumOfSquares) -> None:
+def _add_torque(rows: Array, first: int, columns: tuple[int, ...], squares: Array) -> None:
     (torque,) = columns
     for i in range(rows.shape[0]):
         for j in range(3):
-            state.values[j] += rows[i, torque + j] * rows[i, torque + j]
+            squares[j] += rows[i, torque + j] * rows[i, torque + j]
 
 
 class RmsTorque(Metric):
@@ -169,55 +141,47 @@ class RmsTorque(Metric):
     at each tick.
     """
 
-    state: SumOfSquares
     reads = ("torque_Nm",)
     add = staticmethod(_add_torque)
 
-    def __init__(self, planned: PlannedRun) -> None:
-        super().__init__(planned)
-        self.state = SumOfSquares(np.zeros(3))
+    def start(self, planned: PlannedRun) -> Array:
+        """Return the sums of squares (3,)."""
+        return np.zeros(3)
 
-    def value(self) -> float | None:
-        """Return the torque in N·m; None without a row."""
-        return float(np.sqrt(self.state.values.sum() / self._rows)) if self._rows else None
+    def result(self) -> float:
+        """Return the torque in N·m."""
+        return float(np.sqrt(self.state.sum() / self._rows))
 
 
 SATURATED_SHARE = 0.05
 
 
-class Shares(NamedTuple):
-    """State of `SaturatedFraction`."""
-
-    ticks: NDArray[np.int64]  # (2,) with reduced torque, with a torque matrix of less than rank 3
-
-
 @rounding_each
-def _add_shares(rows: Array, first: int, columns: tuple[int, ...], state: Shares) -> None:
+def _add_shares(rows: Array, first: int, columns: tuple[int, ...], ticks: NDArray[np.int64]) -> None:
     (scale,) = columns
     for i in range(rows.shape[0]):
-        state.ticks[0] += 0.0 < rows[i, scale] < 1.0
-        state.ticks[1] += rows[i, scale] == 0.0
+        ticks[0] += 0.0 < rows[i, scale] < 1.0
+        ticks[1] += rows[i, scale] == 0.0
 
 
 class SaturatedFraction(Metric):
     """Share of the ticks at which the current limit reduced the commanded torque, 0 to 1."""
 
-    state: Shares
     reads = ("allocation_scale",)
     add = staticmethod(_add_shares)
 
-    def __init__(self, planned: PlannedRun) -> None:
-        super().__init__(planned)
-        self.state = Shares(np.zeros(2, dtype=np.int64))
+    def start(self, planned: PlannedRun) -> NDArray[np.int64]:
+        """Return the ticks with reduced torque, and with a torque matrix of less than rank 3."""
+        return np.zeros(2, dtype=np.int64)
 
-    def value(self) -> float | None:
-        """Return the share, 0 to 1; None without a row."""
-        return int(self.state.ticks[0]) / self._rows if self._rows else None
+    def result(self) -> float:
+        """Return the share, 0 to 1."""
+        return int(self.state[0]) / self._rows
 
     def warnings(self) -> list[str]:
         """Return warnings if the limit, or a torque matrix without full rank, determines the figures."""
         warnings = []
-        if rank_lost := int(self.state.ticks[1]):
+        if rank_lost := int(self.state[1]):
             warnings.append(
                 "the torque matrix of the groups in use has less than rank 3 at"
                 f" {rank_lost} of {self._rows} ticks: no currents are commanded there"
@@ -232,31 +196,30 @@ class SaturatedFraction(Metric):
 
 
 @rounding_each
-def _add_temperature(rows: Array, first: int, columns: tuple[int, ...], state: Largest) -> None:
+def _add_temperature(rows: Array, first: int, columns: tuple[int, ...], largest: Array) -> None:
     (temperature,) = columns
     if temperature >= 0:
         for i in range(rows.shape[0]):
-            state.values[0] = max(state.values[0], rows[i, temperature])
+            largest[0] = max(largest[0], rows[i, temperature])
 
 
 class RotorTemperature(Metric):
     """Largest temperature of the magnets, °C, which only decides about a warning."""
 
-    state: Largest
     reads = ("rotor_temperature_degC",)
     add = staticmethod(_add_temperature)
 
-    def __init__(self, planned: PlannedRun) -> None:
-        super().__init__(planned)
-        self.state = Largest(np.full(1, -np.inf))
+    def start(self, planned: PlannedRun) -> Array:
+        """Return the temperature (1,), minus infinity before the first one."""
+        return np.full(1, -np.inf)
 
-    def value(self) -> float | None:
+    def result(self) -> float | None:
         """Return the temperature in °C; None without one."""
-        return float(self.state.values[0]) if self.state.values[0] > -np.inf else None
+        return float(self.state[0]) if self.state[0] > -np.inf else None
 
     def warnings(self) -> list[str]:
         """Return a warning if magnets may have been demagnetised, which the model does not contain."""
-        largest, knee_degC = self.state.values[0], self.planned.scenario.plant.thermal.knee_degC
+        largest, knee_degC = self.state[0], self.planned.scenario.plant.thermal.knee_degC
         if not largest > knee_degC:
             return []
         return [

@@ -9,34 +9,34 @@ from numpy.typing import NDArray
 
 from spheretwin.models.base.compiled import rounding_each
 from spheretwin.models.telemetry.signals import ANGLES
-from spheretwin.reduction import Largest, Metric, PlannedRun
+from spheretwin.reduction import Metric, PlannedRun
 
 Array = NDArray[np.float64]
 
 
 @rounding_each
-def _add_error(rows: Array, first: int, columns: tuple[int, ...], state: Largest) -> None:
-    (error,) = columns
+def add_largest(rows: Array, first: int, columns: tuple[int, ...], largest: Array) -> None:
+    """Update the largest magnitudes (n,) of a signal."""
+    (signal,) = columns
     for i in range(rows.shape[0]):
-        for j in range(3):
-            state.values[j] = max(state.values[j], abs(rows[i, error + j]))
+        for j in range(largest.shape[0]):
+            largest[j] = max(largest[j], abs(rows[i, signal + j]))
 
 
 class MaxAbsError(Metric):
     """Largest ``|error_rad|`` of each hinge over the whole run, its start included, [3] in rad."""
 
     labels = ANGLES
-    state: Largest
     reads = ("error_rad",)
-    add = staticmethod(_add_error)
+    add = staticmethod(add_largest)
 
-    def __init__(self, planned: PlannedRun) -> None:
-        super().__init__(planned)
-        self.state = Largest(np.full(3, -np.inf))
+    def start(self, planned: PlannedRun) -> Array:
+        """Return the largest magnitudes (3,), minus infinity before the first row."""
+        return np.full(3, -np.inf)
 
-    def value(self) -> list[float] | None:
-        """Return [3] in rad; None without a row."""
-        return self.state.values.tolist() if self._rows else None
+    def result(self) -> list[float]:
+        """Return [3] in rad."""
+        return self.state.tolist()
 
 
 PIECE_TICKS = 256
@@ -69,9 +69,9 @@ class RmsError(Metric):
     reads = ("error_rad",)
     add = staticmethod(_add_pieces)
 
-    def __init__(self, planned: PlannedRun) -> None:
-        super().__init__(planned)
-        self.state = Pieces(planned.ticks // 2 % PIECE_TICKS, np.zeros((1, 3)))
+    def start(self, planned: PlannedRun) -> Pieces:
+        """Return the first piece."""
+        return Pieces(planned.ticks // 2 % PIECE_TICKS, np.zeros((1, 3)))
 
     def begin(self, rows: int) -> int:
         """Prepare the state for a chunk of some rows; return the tick of its first row."""
@@ -80,14 +80,12 @@ class RmsError(Metric):
             self.state = self.state._replace(sums=np.concatenate([self.state.sums, np.zeros((missing, 3))]))
         return first
 
-    def value(self) -> list[float] | None:
-        """Return [3] in rad; None without a row."""
+    def result(self) -> list[float]:
+        """Return [3] in rad."""
         return self._rms(0)
 
-    def _rms(self, piece: int) -> list[float] | None:
-        """Return the root mean square from the first tick of a piece on; None without a row."""
-        if not self._rows:
-            return None
+    def _rms(self, piece: int) -> list[float]:
+        """Return the root mean square from the first tick of a piece on."""
         begins = max(0, (piece - 1) * PIECE_TICKS + self.state.offset)
         return np.sqrt(self.state.sums[piece:].sum(axis=0) / (self._rows - begins)).tolist()
 
@@ -96,23 +94,29 @@ class RmsError(Metric):
         return (tick - self.state.offset) // PIECE_TICKS + 1
 
 
+class TailRmsError(RmsError):
+    """Root mean square of ``error_rad`` of each hinge over the second half of the run, [3] in rad.
+
+    The second half begins at exactly half of the planned ticks, and in a run that ended early within 256
+    ticks before its half.
+    """
+
+    def result(self) -> list[float]:
+        """Return [3] in rad."""
+        return self._rms(self._piece(self._rows // 2))
+
+
 BAND_rad = 0.01
 """Settling band of every hinge: the usual 5 % of 0.2 rad, the amplitude of the shipped motions."""
 
 
-class LastOutside(NamedTuple):
-    """State of `SettlingTime`."""
-
-    tick: NDArray[np.int64]  # (3,) last one outside the band; -1 for none
-
-
 @rounding_each
-def _add_outside(rows: Array, first: int, columns: tuple[int, ...], state: LastOutside) -> None:
+def _add_outside(rows: Array, first: int, columns: tuple[int, ...], last: NDArray[np.int64]) -> None:
     (error,) = columns
     for i in range(rows.shape[0]):
         for j in range(3):
             if abs(rows[i, error + j]) > BAND_rad:
-                state.tick[j] = first + i
+                last[j] = first + i
 
 
 class SettlingTime(Metric):
@@ -123,38 +127,28 @@ class SettlingTime(Metric):
     """
 
     labels = ANGLES
-    state: LastOutside
     reads = ("error_rad",)
     add = staticmethod(_add_outside)
 
-    def __init__(self, planned: PlannedRun) -> None:
-        super().__init__(planned)
-        self.state = LastOutside(np.full(3, -1))
+    def start(self, planned: PlannedRun) -> NDArray[np.int64]:
+        """Return the last tick of each hinge outside the band (3,); -1 for none."""
+        return np.full(3, -1)
 
-    def value(self) -> list[float | None] | None:
-        """Return [3] in s; None without a row."""
-        if not self._rows:
-            return None
-        settled = (self.state.tick + 1).tolist()
+    def result(self) -> list[float | None]:
+        """Return [3] in s."""
+        settled = (self.state + 1).tolist()
         return [tick * self.planned.period_s if tick < self._rows else None for tick in settled]
 
 
-class Crossing(NamedTuple):
-    """State of `Overshoot`."""
-
-    start: Array  # (3,) rad, error at the first tick
-    largest: Array  # (3,) rad
-
-
 @rounding_each
-def _add_crossing(rows: Array, first: int, columns: tuple[int, ...], state: Crossing) -> None:
+def _add_crossing(rows: Array, first: int, columns: tuple[int, ...], state: Array) -> None:
     (error,) = columns
     for i in range(rows.shape[0]):
         for j in range(3):
             if first + i == 0:
-                state.start[j] = rows[i, error + j]
-            beyond = -rows[i, error + j] if state.start[j] > 0.0 else rows[i, error + j]
-            state.largest[j] = max(state.largest[j], beyond)
+                state[0, j] = rows[i, error + j]
+            beyond = -rows[i, error + j] if state[0, j] > 0.0 else rows[i, error + j]
+            state[1, j] = max(state[1, j], beyond)
 
 
 class Overshoot(Metric):
@@ -165,31 +159,15 @@ class Overshoot(Metric):
     """
 
     labels = ANGLES
-    state: Crossing
     reads = ("error_rad",)
     add = staticmethod(_add_crossing)
 
-    def __init__(self, planned: PlannedRun) -> None:
-        super().__init__(planned)
-        self.state = Crossing(np.zeros(3), np.zeros(3))
+    def start(self, planned: PlannedRun) -> Array:
+        """Return the error at the first tick and the largest one beyond the reference, (2, 3) in rad."""
+        return np.zeros((2, 3))
 
-    def value(self) -> list[float | None] | None:
-        """Return [3] in rad; None without a row."""
-        if not self._rows:
-            return None
-        steps = np.abs(self.state.start) > BAND_rad
-        return [
-            float(largest) if step else None for largest, step in zip(self.state.largest, steps, strict=True)
-        ]
-
-
-class TailRmsError(RmsError):
-    """Root mean square of ``error_rad`` of each hinge over the second half of the run, [3] in rad.
-
-    The second half begins at exactly half of the planned ticks, and in a run that ended early within 256
-    ticks before its half.
-    """
-
-    def value(self) -> list[float] | None:
-        """Return [3] in rad; None without a row."""
-        return self._rms(self._piece(self._rows // 2))
+    def result(self) -> list[float | None]:
+        """Return [3] in rad."""
+        start, largest = self.state
+        steps = np.abs(start) > BAND_rad
+        return [float(beyond) if step else None for beyond, step in zip(largest, steps, strict=True)]
