@@ -29,7 +29,7 @@ def motion_of(designed):
     if not designed:
         return {}
     settings = reproduced.WorkflowSettings().design
-    found = design(reproduced.SCENARIO, reproduced.WANTED, reproduced.NOMINAL, settings)
+    found = design(reproduced.SCENARIO, reproduced.REQUESTED, reproduced.NOMINAL, settings)
     return {"trajectory.shape": "multisine", "trajectory.components": reproduced._components(found)}
 
 
@@ -56,7 +56,7 @@ def watched(seed, motion, duration_s):
         reproduced._play(hidden, payload_kg, LOG_s, 100 * seed + place).log
         for place, payload_kg in enumerate(reproduced.PAYLOADS_kg)
     ]
-    identified = identify(logs, reproduced.SCENARIO, reproduced.WANTED, reproduced.NOMINAL)
+    identified = identify(logs, reproduced.SCENARIO, reproduced.REQUESTED, reproduced.NOMINAL)
     if not identified.accepted:
         raise SystemExit(f"seed {seed}: {identified.reasons}")
     twin = {**reproduced.NOMINAL, **identified.fields}

@@ -119,6 +119,8 @@ class ChangeDiagnosis:
             for over in (False, True)
             if coarse.places(number, over=over).size
         ]
+        shortest_s = PUSH_s[0] + _AT_LIMIT_s
+        named = [explanation for explanation in named if (explanation.lasted_s or shortest_s) >= shortest_s]
         return [*named, self._noise(), self._torque(coarse)]
 
     def _grid(self) -> Iterator[Begin]:
@@ -379,6 +381,8 @@ def _parts(step: Step, cuts_s: Sequence[float]) -> Iterator[tuple[int, Rows]]:
 
 # Replays until the size stays within this share.
 _REPLAYS, _CLOSE = 3, 0.05
+
+_AT_LIMIT_s = 5e-3  # a push as short as possible is a kick, or another torque that varies
 
 _BIN_STEPS = 3  # in which a torque without a name is constant
 

@@ -68,6 +68,12 @@ def test_a_load_has_its_name_and_its_duration(load_Nm, seed, lasts_s):
     assert alarm.lasted_s == (pytest.approx(lasts_s, abs=0.01) if lasts_s else None)
 
 
+def test_a_kick_shorter_than_a_push_is_unexplained():
+    changes = (2.4173, "disturbance.load", 0.6), (2.4323, "disturbance.load", 0.0)
+    alarm, *_ = Watch(SCENARIO, KNOWN).advance(changing_log(3.2, *changes))
+    assert alarm.what == UNNAMED
+
+
 def test_a_change_of_a_parameter_that_is_not_watched_is_unexplained():
     log = changing_log(3.2, (2.417, "disturbance.load", 0.4))
     alarm, *_ = Watch(SCENARIO, KNOWN, ["plant.group_gain", "plant.coulomb_Nm"]).advance(log)
