@@ -86,12 +86,12 @@ def overview():
 
 def margins_of_laws():
     steps = np.array([[0.5, 0.01, 1.0], [1.0, 0.02, 1.0], [8.0, 0.3, 0.0]])
-    panels = [
-        conditions.MarginPanel("load, N·m", {"pd": steps, "afsm": steps * [1.0, 0.5, 1.0]}),
-        conditions.MarginPanel("delay, ms", {"pd": steps * [0.1, 2.0, 1.0], "afsm": steps[:2]}),
-        conditions.MarginPanel("steps from zero", {"pd": steps - [0.5, 0.0, 0.0], "afsm": steps}),
-        conditions.MarginPanel("narrow", {"pd": steps + [5.0, 0.0, 0.0], "afsm": steps + [6.0, 0.0, 0.0]}),
-    ]
+    panels = {
+        "load, N·m": {"pd": steps, "afsm": steps * [1.0, 0.5, 1.0]},
+        "delay, ms": {"pd": steps * [0.1, 2.0, 1.0], "afsm": steps[:2]},
+        "steps from zero": {"pd": steps - [0.5, 0.0, 0.0], "afsm": steps},
+        "narrow": {"pd": steps + [5.0, 0.0, 0.0], "afsm": steps + [6.0, 0.0, 0.0]},
+    }
     return conditions.margins(panels, {"pd": "PD", "afsm": "AFSM"}, 0.05, "largest |error|, mrad", "Margins")
 
 
@@ -101,10 +101,7 @@ def ratios():
         "another": ([0.25, 0.75], [4.0, 5.0, 6.0]),
         "third": ([7.0], [8.0, 2.0]),
     }
-    rows = [
-        conditions.RatioRow(name, {"pd": np.array(pd), "afsm": np.array(afsm)})
-        for name, (pd, afsm) in values.items()
-    ]
+    rows = {name: {"pd": np.array(pd), "afsm": np.array(afsm)} for name, (pd, afsm) in values.items()}
     return conditions.ratios(rows, {"pd": "PD", "afsm": "AFSM"}, "ours over printed", "Ratios")
 
 
@@ -125,18 +122,17 @@ def motion():
 def convergence():
     steps = np.array([1e-3, 2e-3, 4e-3])
     slopes = {
-        "RK4": crosscheck.Slope(steps, 3.0 * steps**4, 4.0),
-        "Euler": crosscheck.Slope(steps[1:], 0.2 * steps[1:], 1.0),
+        "RK4": (steps, 3.0 * steps**4, 4.0),
+        "Euler": (steps[1:], 0.2 * steps[1:], 1.0),
     }
     return crosscheck.convergence(slopes, "Orders")
 
 
 def drifts():
     t_s = np.linspace(0.0, 3.0, 30)
-    of = crosscheck.Bounded
     panels = {
-        "energy, relative": {"2π": of(1e-9 * (1 + t_s), 1e-6), "30": of(2e-9 * (1 + t_s), None)},
-        "momentum": {"2π": of(5e-9 * (2 + t_s), 2e-7), "30": of(-3e-9 * t_s, 3e-7)},
+        "energy, relative": {"2π": (1e-9 * (1 + t_s), 1e-6), "30": (2e-9 * (1 + t_s), None)},
+        "momentum": {"2π": (5e-9 * (2 + t_s), 2e-7), "30": (-3e-9 * t_s, 3e-7)},
     }
     return crosscheck.drifts(t_s, panels, "Drifts")
 
@@ -148,8 +144,8 @@ def closed_loops():
         t_s,
         {"PD": (three, three[:30] + 0.5), "AFSM": (2 * three, 3 * three)},
         {
-            "PD": crosscheck.Bounded(1e-9 * (1 + t_s[:30]), 1e-8),
-            "AFSM": crosscheck.Bounded(2e-9 * (1 + t_s), 1e-7),
+            "PD": (1e-9 * (1 + t_s[:30]), 1e-8),
+            "AFSM": (2e-9 * (1 + t_s), 1e-7),
         },
         ("one", "other"),
         "Loops",

@@ -113,10 +113,7 @@ def draw_closed_loop(evidence: Evidence) -> Drawing:
     pairs = evidence.of(trajectories.ClosedLoop).pairs
     longest = max(pairs.values(), key=lambda pair: len(pair.mujoco))
     errors = {law: (pair.mujoco["error_rad"], pair.lagrangian["error_rad"]) for law, pair in pairs.items()}
-    apart = {
-        law: crosscheck.Bounded(pair.difference_rad, trajectories.TRACE_BOUND_rad)
-        for law, pair in pairs.items()
-    }
+    apart = {law: (pair.difference_rad, trajectories.TRACE_BOUND_rad) for law, pair in pairs.items()}
     titles = {law: f"{law}, load {2 if law == 'AFSM' else 0.5:g}" for law in pairs}
     figure = crosscheck.closed_loops(
         longest.mujoco["t_s"],
@@ -135,8 +132,7 @@ def draw_convergence(evidence: Evidence) -> Drawing:
     from spheretwin.viz.figures import crosscheck
 
     measured = evidence.of(trajectories.Trajectories).convergence
-    slopes = {name: crosscheck.Slope(*slope) for name, slope in measured.items()}
-    figure = crosscheck.convergence(slopes, "Order of convergence against DOP853")
+    figure = crosscheck.convergence(measured, "Order of convergence against DOP853")
     return Drawing("convergence.svg", "Largest error over 5 s at five steps, with the fitted slopes.", figure)
 
 
@@ -172,9 +168,7 @@ def draw_torque_free(evidence: Evidence) -> Drawing:
         "attitude": "attitude, rad",
     }
     panels = {
-        axis[quantity]: {
-            f"{spin} rad/s": crosscheck.Bounded(drift.values, drift.bound) for spin, drift in by_spin.items()
-        }
+        axis[quantity]: {f"{spin} rad/s": (drift.values, drift.bound) for spin, drift in by_spin.items()}
         for quantity, by_spin in rotor.drifts.items()
     }
     title = f"Torque-free rotor over {identities.DURATION_s:g} s, by spin rate"

@@ -103,13 +103,13 @@ def residual_drawing(file: str, fits: Mapping[str, Fit], by: str, title: str) ->
     """Return the figure of the mean residuals of each hinge by one of `QUANTITIES`."""
     from spheretwin.viz.figures import twin  # Matplotlib is optional
 
-    panels: dict[str, dict[str, twin.ResidualBins]] = {}
+    panels: dict[str, dict[str, Any]] = {}
     for hinge, name in zip(ANGLES, HINGE_NAMES, strict=True):
         panels[hinge] = {}
         for label, fit in fits.items():
             bins = [one for one in fit.bins if (one.hinge, one.by) == (name, by)]
             middle = np.array([0.5 * (one.low + one.high) for one in bins])
-            panels[hinge][label] = twin.ResidualBins(middle, 1e3 * np.array([one.mean_rad for one in bins]))
+            panels[hinge][label] = middle, 1e3 * np.array([one.mean_rad for one in bins])
     quantity = QUANTITIES[by]
     caption = f"{title}: mean over ranges of {quantity.partition(',')[0]}, {' and '.join(fits)}."
     return Drawing(file, caption, twin.residuals(panels, quantity, "mean residual, mrad", title))

@@ -138,13 +138,12 @@ def _of_afsm(best: ReadingResult) -> str:
 def _draw(results: Sequence[ReadingResult]) -> Drawing:
     from spheretwin.viz.figures import conditions as figures
 
-    rows = [
-        figures.RatioRow(
-            f"{result.label}\nscore {result.score:.2f}",
-            {law.law: result.ratios[:, i].ravel() for i, law in enumerate(PAPER_LAWS)},
-        )
+    rows = {
+        f"{result.label}\nscore {result.score:.2f}": {
+            law.law: result.ratios[:, i].ravel() for i, law in enumerate(PAPER_LAWS)
+        }
         for result in results
-    ]
+    }
     labels = {law.law: law.label for law in PAPER_LAWS}
     title = f"Readings of (41) against the {results[0].ratios.size} printed errors"
     figure = figures.ratios(rows, labels, "largest |error| over the printed one", title)

@@ -173,7 +173,7 @@ def _bode(by_law: dict[str, tuple[responses.Response, responses.Response]]) -> D
 
     frequency_Hz = np.array(responses.LINES_Hz, np.float64)
     figure = figures.bode(
-        {law: figures.LoopResponse(frequency_Hz, *both) for law, both in by_law.items()},
+        {law: (frequency_Hz, *both) for law, both in by_law.items()},
         {law: BY_LAW[law].label for law in by_law},
         "Loop of alpha, opened at the torque of the law",
     )
@@ -294,19 +294,16 @@ def _ends(tested: Tested, law: str) -> Callable[[str], str]:
 def _draw(tested: Tested) -> Drawing:
     from spheretwin.viz.figures import conditions as figures
 
-    panels = [
-        figures.MarginPanel(
-            ", ".join(filter(None, (quantity, UNITS[quantity]))),
-            {
-                law: np.array(
-                    [(item["step"], item.runs[0].tail_rms_error.max(), holds(item.runs[0])) for item in steps]
-                )
-                for law, steps in by_law.items()
-                if steps
-            },
-        )
+    panels = {
+        ", ".join(filter(None, (quantity, UNITS[quantity]))): {
+            law: np.array(
+                [(item["step"], item.runs[0].tail_rms_error.max(), holds(item.runs[0])) for item in steps]
+            )
+            for law, steps in by_law.items()
+            if steps
+        }
         for quantity, by_law in tested.items()
-    ]
+    }
     labels = {law.law: law.label for law in LAWS}
     figure = figures.margins(
         panels, labels, HOLDS_rad, "RMS error of the worst hinge, second half, mrad", "Margins"

@@ -27,6 +27,8 @@ from spheretwin.viz.figures.style import (
 
 Array = NDArray[np.float64]
 
+ByLaw = Mapping[str, Array]
+
 MARGIN = 1.25
 SHIFT = 0.035
 """Shift between the laws, as a share of the steps of x: their ranges do not overlap."""
@@ -112,21 +114,19 @@ WIDE = 9.0
 """Ratio of largest to smallest step from which on a scale is logarithmic."""
 
 
-class MarginPanel(NamedTuple):
-    """Panel of one condition that is varied."""
-
-    name: str
-    by_law: Mapping[str, Array]  # (n, 3) step, error in rad, 1 if the law holds
-
-
 def margins(
-    panels: Sequence[MarginPanel], labels: Mapping[str, str], bound_rad: float, quantity: str, title: str
+    panels: Mapping[str, ByLaw],
+    labels: Mapping[str, str],
+    bound_rad: float,
+    quantity: str,
+    title: str,
 ) -> Figure:
     """Draw them on one scale of errors.
 
     Parameters
     ----------
-    panels : sequence of MarginPanel
+    panels : mapping of condition to mapping of law to (n, 3) array
+        Step, error in rad, 1 if the law holds.
     labels : mapping of law to label
     bound_rad : float, rad
         Bound below which a law holds.
@@ -138,8 +138,8 @@ def margins(
     looks = styles(list(labels))
     for spare in grid.flat[len(panels) :]:
         spare.set_visible(False)
-    for axes, panel in zip(grid.flat, panels, strict=False):
-        for law, values in panel.by_law.items():
+    for axes, (name, by_law) in zip(grid.flat, panels.items(), strict=False):
+        for law, values in by_law.items():
             step, error_mrad, within_bound = values[:, 0], 1e3 * values[:, 1], values[:, 2] > 0
             style = looks[law]
             axes.plot(step, error_mrad, linewidth=1.4, **style.line())
@@ -148,12 +148,12 @@ def margins(
                           markerfacecolor=inside, markersize=6)  # fmt: skip
         axes.axhline(1e3 * bound_rad, color=INK, linestyle="--", linewidth=1)
         axes.set_yscale("log")
-        steps = np.concatenate([values[:, 0] for values in panel.by_law.values()])
+        steps = np.concatenate([values[:, 0] for values in by_law.values()])
         if steps.min() > 0 and steps.max() > WIDE * steps.min():
             axes.set_xscale("log")
             axes.xaxis.set_major_formatter("{x:g}")
         axes.yaxis.set_major_formatter("{x:g}")
-        axes.set_xlabel(panel.name)
+        axes.set_xlabel(name)
         faint_grid(axes)
     figure.supylabel(quantity, fontsize="medium")
     first = grid[0, 0]
@@ -166,34 +166,27 @@ def margins(
 ROW_in = 0.5
 
 
-class RatioRow(NamedTuple):
-    """One reading of the paper."""
-
-    label: str
-    by_law: Mapping[str, Array]  # (n,) ratios of each law
-
-
-def ratios(rows: Sequence[RatioRow], labels: Mapping[str, str], quantity: str, title: str) -> Figure:
+def ratios(rows: Mapping[str, ByLaw], labels: Mapping[str, str], quantity: str, title: str) -> Figure:
     """Draw them on a logarithmic axis, the laws of a row below each other.
 
     Parameters
     ----------
-    rows : sequence of RatioRow
+    rows : mapping of reading to mapping of law to (n,) ratios
     labels : mapping of law to label
     quantity, title : str
     """
     figure, ((axes,),) = sheet(1.5 + ROW_in * len(rows), title=title)
     looks = styles(list(labels))
-    for y, row in enumerate(rows):
-        for place, (law, values) in enumerate(row.by_law.items()):
+    for y, by_law in enumerate(rows.values()):
+        for place, (law, values) in enumerate(by_law.items()):
             style = looks[law]
-            at = y + 0.22 * (place - (len(row.by_law) - 1) / 2)
+            at = y + 0.22 * (place - (len(by_law) - 1) / 2)
             axes.plot([values.min(), values.max()], [at, at], color=style.colour, linewidth=1.2)
             axes.plot(values, np.full(len(values), at), style.marker, color=style.colour, markersize=5,
                       alpha=0.8, label=labels[law] if y == 0 else None)  # fmt: skip
     axes.axvline(1.0, color=INK, linewidth=1.2, linestyle="--", label="the paper")
     axes.set_xscale("log")
-    axes.set_yticks(range(len(rows)), [row.label for row in rows])
+    axes.set_yticks(range(len(rows)), list(rows))
     axes.set_ylim(len(rows) - 0.5, -0.5)
     axes.set_xlabel(quantity)
     axes.xaxis.set_major_formatter("{x:g}")

@@ -6,7 +6,6 @@ Every series is named, every axis has its unit, and a bound is a dashed line wit
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -22,19 +21,8 @@ LEAST_SHARE = 1e-14  # of a bound: less is drawn as this much
 NOTHING = 1e-18  # what a difference of exactly zero is drawn as, on a logarithmic axis
 
 
-class Slope(NamedTuple):
-    """Errors of a method at several steps, and its order."""
-
-    steps_s: Array
-    errors: Array
-    order: float
-
-
-class Bounded(NamedTuple):
-    """A series that should stay below a bound; None for one without."""
-
-    values: Array
-    bound: float | None
+Bounded = tuple[Array, float | None]
+"""Series that should stay below a bound, and the bound; None for one without."""
 
 
 def margins(values: Mapping[str, float], title: str) -> Figure:
@@ -129,26 +117,26 @@ def motion(t_s: Array, q_rad: Array, difference_rad: Array, bound_rad: float, ti
     return figure
 
 
-def convergence(slopes: Mapping[str, Slope], title: str) -> Figure:
+def convergence(slopes: Mapping[str, tuple[Array, Array, float]], title: str) -> Figure:
     """Error against step, both logarithmic, with the fitted power of the step as a dashed line.
 
     Parameters
     ----------
-    slopes : mapping of method to Slope
+    slopes : mapping of method to its steps in s, errors, and order
     title : str
     """
     figure, ((axes,),) = sheet(4.6, title=title)
-    for colour, marker, size, (name, slope) in zip(
+    for colour, marker, size, (name, (steps_s, errors, order)) in zip(
         SERIES, "osDx^", (8, 9, 5, 6, 6), slopes.items(), strict=False
     ):
-        factor = np.exp(np.mean(np.log(slope.errors / slope.steps_s**slope.order)))
-        ends = np.array([slope.steps_s.min(), slope.steps_s.max()])
+        factor = np.exp(np.mean(np.log(errors / steps_s**order)))
+        ends = np.array([steps_s.min(), steps_s.max()])
         hollow = "none" if marker in "os" else colour
-        axes.plot(slope.steps_s * 1e3, slope.errors, marker, color=colour, markersize=size,
-                  markerfacecolor=hollow, label=f"{name}: order {slope.order:.2f}")  # fmt: skip
-        axes.plot(ends * 1e3, factor * ends**slope.order, "--", color=colour, linewidth=1)
+        axes.plot(steps_s * 1e3, errors, marker, color=colour, markersize=size,
+                  markerfacecolor=hollow, label=f"{name}: order {order:.2f}")  # fmt: skip
+        axes.plot(ends * 1e3, factor * ends**order, "--", color=colour, linewidth=1)
     axes.set(xscale="log", yscale="log")
-    steps_ms = 1e3 * np.unique(np.concatenate([slope.steps_s for slope in slopes.values()]))
+    steps_ms = 1e3 * np.unique(np.concatenate([steps_s for steps_s, *_ in slopes.values()]))
     axes.set_xticks(steps_ms, [f"{step:g}" for step in steps_ms])
     axes.minorticks_off()
     axes.set_xlabel("step, ms")
@@ -167,9 +155,9 @@ def drifts(t_s: Array, panels: Mapping[str, Mapping[str, Bounded]], title: str) 
     """
     figure, grid = sheet(2.1 * len(panels), len(panels), title=title, sharex=True)
     for axes, (quantity, series) in zip(grid[:, 0], panels.items(), strict=True):
-        for colour, (name, drift) in zip(SERIES, series.items(), strict=False):
-            axes.plot(t_s, _positive(drift.values), color=colour, linewidth=1, label=name)
-            _draw_bound(axes, drift.bound, "", colour)
+        for colour, (name, (values, bound)) in zip(SERIES, series.items(), strict=False):
+            axes.plot(t_s, _positive(values), color=colour, linewidth=1, label=name)
+            _draw_bound(axes, bound, "", colour)
         axes.set_yscale("log")
         _finish(axes, quantity)
     axes.set_xlabel("time, s")
@@ -202,10 +190,10 @@ def closed_loops(
             top.plot(t_s[: len(pair[0])], pair[0][:, axis], color=colour, label=f"{name}, {sources[0]}")
             top.plot(t_s[: len(pair[1])], pair[1][:, axis], color=INK, linewidth=0.9, linestyle=(0, (4, 6)),
                      label=sources[1] if axis == 2 else None)  # fmt: skip
-        values = _positive(apart[law].values)
+        values = _positive(apart[law][0])
         bottom.plot(t_s[: len(values)], values, color=SERIES[0], linewidth=1, label="worst hinge")
         bottom.set_yscale("log")
-        _draw_bound(bottom, apart[law].bound, "rad")
+        _draw_bound(bottom, apart[law][1], "rad")
         name_axes(top, law, y="tracking error, rad")
         name_axes(bottom, "", "time, s", "|difference|, rad")
         faint_grid(top)

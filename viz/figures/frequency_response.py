@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import NamedTuple
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -14,34 +13,28 @@ from spheretwin.viz.figures.style import INK, faint_grid, legend_below, sheet, s
 
 Array = NDArray[np.float64]
 Response = NDArray[np.complex128]
+Loop = tuple[Array, Response, Response]
+"""Frequencies in Hz, measured and linear response of the opened loop."""
 
 
 SMALLEST = 1e-5
 """Gain below which a response is a zero that rounding fills; it is not drawn."""
 
 
-class LoopResponse(NamedTuple):
-    """Response of the opened loop of a law."""
-
-    frequency_Hz: Array  # (k,)
-    measured: Response  # (k,)
-    linear: Response  # (k,)
-
-
-def bode(by_law: Mapping[str, LoopResponse], labels: Mapping[str, str], title: str) -> Figure:
+def bode(by_law: Mapping[str, Loop], labels: Mapping[str, str], title: str) -> Figure:
     """Draw gains and phases; markers: measured, lines: linear.
 
     Parameters
     ----------
-    by_law : mapping of law to LoopResponse
+    by_law : mapping of law to Loop
     labels : mapping of law to label
     title : str
     """
     figure, ((upper,), (lower,)) = sheet(5.6, 2, title=title, sharex=True)
     looks = styles(list(by_law))
-    for law, response in by_law.items():
-        style, f, label = looks[law], response.frequency_Hz, labels[law]
-        linear, measured = _curves(response.linear), _curves(response.measured)
+    for law, (f, *both) in by_law.items():
+        style, label = looks[law], labels[law]
+        measured, linear = map(_curves, both)
         for axes, line, points in zip((upper, lower), linear, measured, strict=True):
             axes.plot(f, line, linewidth=1.4, label=label if axes is upper else None, **style.line())
             axes.plot(f, points, style.marker, color=style.colour, markersize=4.5)

@@ -28,13 +28,6 @@ class ErrorTrace(NamedTuple):
     half_width: Array  # (n, hinges), of the band
 
 
-class ResidualBins(NamedTuple):
-    """Mean residuals of one hinge by a quantity."""
-
-    middle: Array
-    mean: Array
-
-
 class Sums(NamedTuple):
     """Logarithms of the evidence of changes over the windows of a log."""
 
@@ -74,19 +67,19 @@ def errors(columns: Mapping[str, Mapping[str, ErrorTrace]], hinges: Sequence[str
     return figure
 
 
-def residuals(panels: Mapping[str, Mapping[str, ResidualBins]], x: str, y: str, title: str) -> Figure:
+def residuals(panels: Mapping[str, Mapping[str, tuple[Array, Array]]], x: str, y: str, title: str) -> Figure:
     """Draw mean residuals by a quantity: a panel a hinge, a colour a model.
 
     Parameters
     ----------
-    panels : mapping of hinge to mapping of label to ResidualBins
+    panels : mapping of hinge to mapping of label to middles of bins and means
         At most two labels.
     x, y, title : str
     """
     figure, (row,) = sheet(3.2, 1, len(panels), title, sharey=True)
     for panel, (name, by_label) in zip(row, panels.items(), strict=True):
-        for (label, bins), colour, marker in zip(by_label.items(), COLOURS, "os", strict=False):
-            panel.plot(bins.middle, bins.mean, color=colour, marker=marker, markersize=4, label=label)
+        for (label, (middle, mean)), colour, marker in zip(by_label.items(), COLOURS, "os", strict=False):
+            panel.plot(middle, mean, color=colour, marker=marker, markersize=4, label=label)
         panel.axhline(0.0, color=INK, linewidth=0.8)
         plain(panel, "")
         panel.set_xlabel(f"{name}: {x}", fontsize="small")

@@ -63,11 +63,11 @@ def print_run_report(run: dict[str, Any], nominal_errors: Sequence[NominalError]
         [peaks[place] if place < len(peaks) else None for peaks in run["error_peaks"].values()]
         for place in range(max(map(len, run["error_peaks"].values())))
     ]
-    more = [
+    oscillations = [
         (f"{name} oscillation", *(_peak(peak) if peak else NONE for peak in of_axes))
         for name, of_axes in zip(("strongest", "second", "third"), peaks, strict=False)
     ]
-    print_metrics(title, named(run["status"]).level if run["status"] else None, run, band_rad, more)
+    print_metrics(title, named(run["status"]).level if run["status"] else None, run, band_rad, oscillations)
     facts = [f"{name} {run[name]}" for name in FACTS[2:6]]
     console.print(escape(", ".join(facts) + (f", {run['reason']}" if run["reason"] else "")), soft_wrap=True)
     for event in run["events"][:MOST_EVENTS]:
