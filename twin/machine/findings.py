@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 
 from spheretwin.machine.diagnosis import FEWEST_WINDOWS, MOST_UNEXPLAINED, Diagnosis
 from spheretwin.machine.log import COMMANDED, LARGEST, Log
+from spheretwin.machine.model import Model
 from spheretwin.machine.torque_balance import TorqueBalance
 from spheretwin.models.base.errors import InputError, did_you_mean
 from spheretwin.models.telemetry.joint_states import ANGLE_NAMES
-from spheretwin.plant import Parameters
 
 Array = NDArray[np.float64]
 
@@ -51,23 +51,12 @@ class Stated(NamedTuple):
     advice: str
 
 
-class Machine(NamedTuple):
-    """Statements of the scenario about the logged machine."""
-
-    parameters: Parameters
-    """Plant, without what is drawn from a seed."""
-    hinge_range_rad: Array
-    current_limit_A: float
-    period_s: float
-    delay_s: float
-
-
 @dataclass(frozen=True)
 class Evidence:
-    """A log, its machine, and what several findings need of both."""
+    """A log, the model of its machine, and what several findings need of both."""
 
     log: Log
-    machine: Machine
+    model: Model
 
     @cached_property
     def angle_s(self) -> Array:
@@ -102,8 +91,8 @@ class Evidence:
             return None
         gaps = [gap for t_s in (angles[0], currents[0]) for gap in _gaps(t_s)]
         zero_order_hold = self.log.currents == COMMANDED
-        balance = TorqueBalance(*angles, *currents, zero_order_hold, self.machine.parameters, gaps)
-        return Diagnosis(balance, self.machine.delay_s if zero_order_hold else 0.0)
+        balance = TorqueBalance(*angles, *currents, zero_order_hold, self.model.parameters, gaps)
+        return Diagnosis(balance, self.model.delay_s if zero_order_hold else 0.0)
 
 
 def _complete(t_s: Array, values: Array) -> NDArray[np.bool_]:
@@ -139,7 +128,7 @@ def _time_unit(evidence: Evidence) -> Iterator[Stated]:
 
 
 def _rate(evidence: Evidence) -> Iterator[Stated]:
-    rate_Hz, control_Hz = 1 / evidence.period_s, 1 / evidence.machine.period_s
+    rate_Hz, control_Hz = 1 / evidence.period_s, 1 / evidence.model.scenario.controller.period_s
     if SLOWEST_CLOCK_Hz < rate_Hz < LOWEST_RATE_Hz:
         advice = f"record at the control rate, {control_Hz:g} Hz; {LOWEST_RATE_Hz:g} Hz are the least"
         yield Stated(ERROR, f"t_s: {rate_Hz:.4g} Hz", advice)
@@ -206,7 +195,7 @@ def _missing_values(evidence: Evidence) -> Iterator[Stated]:
 
 
 def _angle_unit(evidence: Evidence) -> Iterator[Stated]:
-    low, high = evidence.machine.hinge_range_rad.T
+    low, high = np.transpose(evidence.model.actuator.hinge_range_rad)
     largest = np.nanmax(
         np.abs(np.where(np.isfinite(evidence.log.angle_rad), evidence.log.angle_rad, 0)), axis=0
     )
@@ -222,14 +211,14 @@ def _angle_unit(evidence: Evidence) -> Iterator[Stated]:
 
 
 def _current_unit(evidence: Evidence) -> Iterator[Stated]:
-    limit_A, largest = evidence.machine.current_limit_A, _largest_current(evidence)
+    limit_A, largest = evidence.model.scenario.drive.current_limit_A, _largest_current(evidence)
     if largest > BEYOND_LIMIT * limit_A or _best_is(evidence, "current_factor"):
         where = f"currents: up to {largest:.4g} A, limit {limit_A:g} A"
         yield Stated(ERROR, where, "set currents.unit to mA, or currents.scale")
 
 
 def _saturation(evidence: Evidence) -> Iterator[Stated]:
-    limit_A, largest = evidence.machine.current_limit_A, _largest_current(evidence)
+    limit_A, largest = evidence.model.scenario.drive.current_limit_A, _largest_current(evidence)
     sizes = np.max(np.abs(np.nan_to_num(evidence.log.current_A)), axis=1)
     share = float(np.mean(sizes >= AT_LIMIT * limit_A))
     if OVER_LIMIT * limit_A < largest <= BEYOND_LIMIT * limit_A and evidence.log.currents == COMMANDED:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from itertools import count
+from itertools import combinations, count
 from typing import Annotated, Any, NamedTuple
 
 import numpy as np
@@ -298,25 +298,26 @@ class Problem:
         after = fit_of(self.held_out.parts(values, slopes=False), self.held_out)
         improvement = 1 - np.sqrt(after.chi2 / before.chi2)
         lacking = components(self, values)
-        wider = widening(lacking, covariance)
-        curvature, covariance = covariance, covariance * np.outer(wider, wider)
+        widened = widening(lacking, covariance)
+        curvature, covariance = covariance, covariance * np.outer(widened, widened)
         is_right = self._is_right(after, values, covariance)
         reasons = [] if is_right else self._reasons(after, improvement)
         cost = Cost(self._cost, self.normal, values, self._cost(values), self.least)
         fields = self.machine.fields(self.requested, values[: len(self.requested)].tolist())
+        estimates = {
+            one.name: Estimate(
+                float(values[i]),
+                interval(cost, curvature, i, float(widened[i])),
+                one.kind.unit,
+                float(widened[i]),
+            )
+            for i, one in enumerate(self.requested)
+        }
         return Identified(
             accepted=not reasons,
-            parameters={
-                self.parameters[i].name: Estimate(
-                    float(values[i]),
-                    interval(cost, curvature, i, float(wider[i])),
-                    self.parameters[i].kind.unit,
-                    float(wider[i]),
-                )
-                for i in range(len(self.requested))
-            },
+            parameters=estimates,
             refused=(),
-            correlations=tuple(_correlations(covariance, self.requested)),
+            correlations=tuple(correlation_sentences([*estimates], covariance, _CORRELATED)),
             train=fit_of(train, self.train),
             held_out=after,
             held_out_before=before,
@@ -416,18 +417,27 @@ def _why(names: Sequence[str]) -> str:
     )
 
 
-# Above it, the interval of a parameter is more than three times as wide as with the other one known.
-_CORRELATED = 0.95
+def correlation_sentences(names: Sequence[str], covariance: Array, least: float) -> list[str]:
+    """Return sentences on parameters whose errors go together, the closest first.
 
-
-def _correlations(covariance: Array, requested: Sequence[Parameter]) -> list[str]:
-    count = len(requested)
-    deviation = np.sqrt(np.diag(covariance))[:count]
-    correlation = covariance[:count, :count] / np.outer(deviation, deviation)
+    Parameters
+    ----------
+    names : sequence of str
+    covariance : (p, p) array
+        Those of the names first.
+    least : float
+        Correlation from which a pair is named. Above 0.95, the interval of a parameter is more than three
+        times as wide as with the other one known.
+    """
+    deviation = np.sqrt(np.diag(covariance))
+    correlation = covariance / np.outer(deviation, deviation)
+    pairs = sorted(combinations(range(len(names)), 2), key=lambda pair: -abs(correlation[pair]))
     return [
-        f"{requested[i].name} and {requested[j].name} are hardly distinguished in these data"
-        f" (correlation {correlation[i, j]:+.3f})"
-        for i in range(count)
-        for j in range(i)
-        if abs(correlation[i, j]) > _CORRELATED
+        f"{names[i]} and {names[j]} are {'hardly' if abs(correlation[i, j]) > _CORRELATED else 'not well'}"
+        f" distinguished in these data (correlation {correlation[i, j]:+.3f})"
+        for i, j in pairs
+        if abs(correlation[i, j]) > least
     ]
+
+
+_CORRELATED = 0.95

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from itertools import combinations
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -12,7 +11,7 @@ import numpy as np
 
 from spheretwin import scenario as scenarios
 from spheretwin.machine.discrepancy import Suggestion
-from spheretwin.machine.identification import Identified, identifiability
+from spheretwin.machine.identification import Identified, correlation_sentences, identifiability
 from spheretwin.machine.log import Log
 from spheretwin.machine.residuals import QUANTITIES, Fit
 from spheretwin.machine.state_estimation import HINGE_NAMES, chi2_text
@@ -30,13 +29,19 @@ LABELS = ("before identification", "after identification")
 _CORRELATED = 0.3
 
 
-def parameter_table(result: Identified) -> Table:
-    """Return the identified values with their intervals."""
+def parameter_table(result: Identified, **others: Mapping[str, float]) -> Table:
+    """Return the identified values with their intervals, after others by name."""
     rows = [
-        (name, *(f"{value:.5g}" for value in (one.value, *one.interval)), one.unit, f"{one.widening:.2f}")
+        (
+            name,
+            *(f"{value:.5g}" for value in (*(by_name[name] for by_name in others.values()), one.value)),
+            *(f"{end:.5g}" for end in one.interval),
+            one.unit,
+            f"{one.widening:.2f}",
+        )
         for name, one in result.parameters.items()
     ]
-    head = ("parameter", "value", "from", "to (95 %)", "unit", "widening")
+    head = ("parameter", *others, "found", "from", "to (95 %)", "unit", "widening")
     return Table("identified", head, rows, 1, ("unit",))
 
 
@@ -138,7 +143,7 @@ def write(
     sections = [
         Section("Data", [log_table(logs, [check(log, loaded) for log in logs])]),
         Section("Excitation", [_motion_table(logs), *_determined(logs, scenario, changes)]),
-        Section("Parameters", [parameter_table(result)._replace(title=""), *_sentences(result)]),
+        Section("Parameters", [parameter_table(result), *_sentences(result)]),
         Section("Residuals", _residuals(result)),
         Section("Refused", [f"- {line}" for line in _refused(result)] or ["Nothing."]),
         Section("What the model may lack", _lacking(result)),
@@ -183,17 +188,10 @@ def _sentences(result: Identified) -> Iterator[str]:
         yield "Nothing was identified."
         return
     yield WIDTH_TEXT
-    names, deviation = list(result.parameters), np.sqrt(np.diag(result.covariance))
-    correlation = result.covariance / np.outer(deviation, deviation)
-    pairs = sorted(combinations(range(len(names)), 2), key=lambda pair: -abs(correlation[pair]))
-    lines = [
-        f"- If {names[i]} is too large, so is {names[j]}: correlation {correlation[i, j]:+.2f}."
-        if correlation[i, j] > 0
-        else f"- If {names[i]} is too large, {names[j]} is too small: correlation {correlation[i, j]:+.2f}."
-        for i, j in pairs
-        if abs(correlation[i, j]) > _CORRELATED
-    ]
-    yield "\n".join(lines) or f"No two errors have a correlation above {_CORRELATED:g}."
+    lines = correlation_sentences(list(result.parameters), result.covariance, _CORRELATED)
+    yield (
+        "\n".join(f"- {line}." for line in lines) or f"No two errors correlate by more than {_CORRELATED:g}."
+    )
 
 
 def _residuals(result: Identified) -> list[str | Table | Drawing | Section]:
@@ -207,7 +205,7 @@ def _residuals(result: Identified) -> list[str | Table | Drawing | Section]:
         residual_drawing(f"residuals_{by}.svg", fits, by, "Residuals in held-out windows")
         for by in QUANTITIES
     ]
-    return [text, fit_table(fits)._replace(title=""), *drawings]
+    return [text, fit_table(fits), *drawings]
 
 
 def _refused(result: Identified) -> list[str]:
@@ -222,4 +220,4 @@ def _lacking(result: Identified) -> list[str | Table | Drawing | Section]:
         "Each kind of parameter that was not identified, with its most likely departures from the scenario in"
         " the training windows: rise of the log likelihood of the held-out windows, and their mean square."
     )
-    return [text, suggestion_table(result.suggestions)._replace(title="")]
+    return [text, suggestion_table(result.suggestions)]

@@ -44,8 +44,6 @@ class Fit(NamedTuple):
     """Mean square of the residuals in the noise of the sensors."""
     hinge_chi2: dict[str, float]
     """NaN for a hinge that is not informative: free starts explain whatever its sensor reports."""
-    rms_rad: Array
-    """(3,) root mean square of the residuals of each angle."""
     bins: tuple[Bin, ...]
 
 
@@ -68,7 +66,6 @@ def fit_of(parts: Sequence[Part], shooting: Shooting) -> Fit:
     return Fit(
         sum(part.squares for part in parts) / sum(part.used for part in parts),
         dict(zip(HINGE_NAMES, map(float, hinge_chi2), strict=True)),
-        np.sqrt(np.nanmean(residual_rad**2, axis=0)),
         tuple(
             one
             for hinge, name in enumerate(HINGE_NAMES)

@@ -9,17 +9,12 @@ from typing import Any
 import numpy as np
 
 from spheretwin import scenario as scenarios
-from spheretwin.active_config import initial_config
-from spheretwin.machine.findings import ERROR, FINDINGS, Evidence, Finding, Machine
+from spheretwin.machine.findings import ERROR, FINDINGS, Evidence, Finding
 from spheretwin.machine.log import Log
+from spheretwin.machine.model import Model, model_of
 from spheretwin.models.base.errors import InputError
-from spheretwin.plant_model import parameters_of
 from spheretwin.scenario.changes import with_change
-from spheretwin.scenario.plant_sections import PlantSection
 from spheretwin.scenario.sections import Scenario
-
-# What a seed draws belongs to another machine; elements with states are not in the torque balance.
-LEFT_OUT = ("stiction", "cable", "poles", "coils", "mass", "thermal")
 
 
 @dataclass(frozen=True)
@@ -83,7 +78,7 @@ def check(log: Log, scenario: Scenario | str | PathLike[str] = "hold") -> Verdic
     InputError
         The scenario or a condition is not valid, or the log has another number of groups.
     """
-    evidence = Evidence(log, machine_of(log, scenario))
+    evidence = Evidence(log, model_of_log(log, scenario))
     findings = [
         Finding(name, *stated) for name, function in FINDINGS.items() for stated in function(evidence)
     ]
@@ -91,8 +86,8 @@ def check(log: Log, scenario: Scenario | str | PathLike[str] = "hold") -> Verdic
     return Verdict(tuple(findings), len(log), rate_Hz, log.accepted)
 
 
-def machine_of(log: Log, scenario: Scenario | str | PathLike[str]) -> Machine:
-    """Return what a scenario, under the conditions of a log, states of its machine.
+def model_of_log(log: Log, scenario: Scenario | str | PathLike[str]) -> Model:
+    """Return the model of a scenario under the conditions of a log.
 
     Raises
     ------
@@ -102,18 +97,7 @@ def machine_of(log: Log, scenario: Scenario | str | PathLike[str]) -> Machine:
     chosen = scenario if isinstance(scenario, Scenario) else scenarios.load(fspath(scenario))
     for name, value in log.conditions.items():
         chosen = with_change(chosen, name, value, f"with the conditions of {log.name}")
-    ideal = PlantSection()
-    plant = chosen.plant.model_copy(update={name: getattr(ideal, name) for name in LEFT_OUT})
-    config = initial_config(chosen.model_copy(update={"plant": plant}), None, None)
-    resolved, actuator = config.scenario, config.files.actuator
-    if (groups := log.current_A.shape[1]) != len(actuator.groups):
-        raise InputError(
-            f"log {log.name}: expected currents of {len(actuator.groups)} groups, received {groups}"
-        )
-    return Machine(
-        parameters_of(resolved, config.files),
-        np.array(actuator.hinge_range_rad),
-        resolved.drive.current_limit_A,
-        resolved.controller.period_s,
-        resolved.drive.delay_s,
-    )
+    model = model_of(chosen)
+    if (groups := log.current_A.shape[1]) != model.groups:
+        raise InputError(f"log {log.name}: expected currents of {model.groups} groups, received {groups}")
+    return model

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spheretwin.machine.parameters import KINDS
-from spheretwin.machine.report import LABELS, log_table, residual_drawing, structure_table
+from spheretwin.machine.report import LABELS, log_table, parameter_table, residual_drawing, structure_table
 from spheretwin.machine.watching import WatchSettings
 from spheretwin.machine.workflow import CHANGED_s, Watched, Workflow
 from spheretwin.machine.workflow_checks import TRUE_COLUMNS, checks_of, rms_error, settled_errors
@@ -68,13 +68,19 @@ def write(folder: Path, result: Workflow, command: str, figure_format: str = "sv
     sections = [
         Section("1. Design", [DESIGN_TEXT, _design_rows(result)]),
         Section("2. Logs", [LOGS_TEXT, log_table([one.log for one in result.logs], result.verdicts)]),
-        Section("3. Identification", [_identification_text(result), _parameter_rows(result)]),
+        Section(
+            "3. Identification",
+            [
+                _identification_text(result),
+                parameter_table(result.identified, nominal=result.nominal, true=result.true),
+            ],
+        ),
         Section("4. Shadow", [SHADOW_TEXT, _shadow_rows(result), shadow]),
         Section(
             "5. Validation",
             [
                 _validation_text(result),
-                structure_table(result.before.validation.structure)._replace(title=""),
+                structure_table(result.before.validation.structure),
                 residuals,
             ],
         ),
@@ -142,20 +148,6 @@ def _identification_text(result: Workflow) -> str:
         lines.append(f"From both logs: the error of held-out windows is {identified.improvement:.0%} smaller")
     lines += [*identified.correlations, *(f"Not accepted: {why}" for why in identified.reasons)]
     return "\n\n".join(f"{line}." for line in lines)
-
-
-def _parameter_rows(result: Workflow) -> Table:
-    numbers = {
-        name: (result.nominal[name], result.true[name], one.value, *one.interval)
-        for name, one in result.identified.parameters.items()
-    }
-    return _table(
-        ("parameter", "nominal", "true", "found", "from", "to (95 %)", "unit"),
-        (
-            (name, *(f"{value:.5g}" for value in numbers[name]), one.unit)
-            for name, one in result.identified.parameters.items()
-        ),
-    )
 
 
 def _shadow_rows(result: Workflow) -> Table:

@@ -13,7 +13,7 @@ from spheretwin.machine.twin_file import UNSIGNED, read_twin, read_uncertainty, 
 from spheretwin.models.base.errors import InputError
 
 FIELDS = {"plant.coulomb_Nm": [0.003, 0.003, 0.004], "plant.modelling_error": 0.1}
-FIT = Fit(1.0, {}, np.ones(3), ())
+FIT = Fit(1.0, {}, ())
 RESULT = Identified(
     accepted=True,
     parameters={"torque_scale": Estimate(0.97, (0.96, 0.98), "1")},

@@ -11,7 +11,7 @@ import spheretwin as st
 from spheretwin import machine
 from spheretwin.machine.diagnosis import AXES, FEWEST_WINDOWS
 from spheretwin.machine.findings import FINDINGS, Evidence, check_names
-from spheretwin.machine.verdict import machine_of
+from spheretwin.machine.verdict import model_of_log
 from spheretwin.models.base.errors import InputError
 from tests.twin.machine.logs import MULTISINE, log_of, multisine, relabelled, run
 
@@ -29,7 +29,7 @@ def errors(log, scenario="hold", severity="error"):
 
 def stated(name, log):
     """Severities and places of one finding, without the others, some of which need the torque balance."""
-    result = FINDINGS[name](Evidence(log, machine_of(log, "hold")))
+    result = FINDINGS[name](Evidence(log, model_of_log(log, "hold")))
     return [(severity, where) for severity, where, _ in result]
 
 
@@ -164,7 +164,7 @@ def without(rows):
 
 def test_gaps_are_found_and_nothing_is_computed_across_them():
     logs = (multisine(), without(np.s_[600:800]))
-    whole, parts = (Evidence(log, machine_of(log, "hold")).diagnosis.unexplained for log in logs)
+    whole, parts = (Evidence(log, model_of_log(log, "hold")).diagnosis.unexplained for log in logs)
     assert parts < 2 * whole  # 700 times if the angles are interpolated
     assert list(errors(without(np.s_[600:800]))) == ["gaps"]
 
@@ -283,7 +283,7 @@ def test_conditions_belong_to_the_machine():
     with pytest.raises(InputError, match="with the conditions of log"):
         machine.check(replace(multisine(), conditions={"plant.payload": 0.1}), "hold")
     log = replace(multisine(), conditions={"drive.current_limit_A": 5.5})
-    assert machine_of(log, "hold").current_limit_A == 5.5
+    assert model_of_log(log, "hold").scenario.drive.current_limit_A == 5.5
 
 
 def test_names_of_findings_and_groups_are_checked(log):

@@ -65,7 +65,7 @@ def test_the_page_has_the_numbers_of_the_results(result, tmp_path):
     text = paths[0].read_text(encoding="utf-8")
     rows = [line.strip("| ").split(" | ") for line in text.splitlines() if line.startswith("| ")]
     for name, outcome in result.identified.parameters.items():
-        (row,) = [row for row in rows if row[0] == name and row[-1] == outcome.unit and len(row) == 7]
+        (row,) = [row for row in rows if row[0] == name and row[-2] == outcome.unit and len(row) == 8]
         numbers = [result.nominal[name], result.true[name], outcome.value, *outcome.interval]
         # Five digits are printed.
         assert [float(cell) for cell in row[1:6]] == pytest.approx(numbers, rel=1e-4)
