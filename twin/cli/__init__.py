@@ -71,6 +71,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             succeeded = True
         else:
             _check_flags(given, options)
+            options.parser.check(options)
             with import_module("spheretwin.viz.terminal.compilation").announced():
                 succeeded = options.run(options)
         sys.stdout.flush()

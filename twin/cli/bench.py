@@ -197,6 +197,7 @@ LARGEST_PORT = 65_535
     hold_after=number("a time from 0 s on", from_zero),
     folder={"type": Path, "default": Path()},
     usage="[SCENARIO]",
+    needs={"--arm": "--machine"},
     unlisted=LINK + FRAME,
     **LIMITS,
 )
@@ -241,8 +242,6 @@ def _machine(
 ) -> Iterator[Session | None]:
     """Connect to the machine of the command line, and yield a session with it as the plant; None without."""
     if options.machine is None:
-        if options.arm:
-            raise InputError("command line: expected --arm with --machine, received it alone")
         yield None
         return
     if options.machine == STANDARD_STREAMS:

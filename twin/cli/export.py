@@ -45,7 +45,6 @@ def run_fmu(options: argparse.Namespace) -> bool:
     from spheretwin.export.fmu import write_fmu
     from spheretwin.export.plant_code import plant_code
 
-    _check_scenario(options)
     path = options.out or Path(f"{Path(options.scenario).stem}.fmu")
     if path.suffix != ".fmu":
         raise InputError(f"export: expected --out FILE.fmu, received {path}")
@@ -90,7 +89,6 @@ def run_c(options: argparse.Namespace) -> bool:
     from spheretwin.export.controller_code import controller_code
     from spheretwin.export.plant_code import plant_code
 
-    _check_scenario(options)
     chosen, changes = [options.part] if options.part else BOTH, changes_of(options)
     plant = plant_code(options.scenario, changes, options.inputs) if "plant" in chosen else None
     controller = controller_code(options.scenario, changes) if "controller" in chosen else None
@@ -104,11 +102,6 @@ def run_c(options: argparse.Namespace) -> bool:
     else:
         runs.print_written([folder])
     return True
-
-
-def _check_scenario(options: argparse.Namespace) -> None:
-    if not options.scenario:
-        raise InputError("command line: expected SCENARIO, received none")
 
 
 PARTS = {"fmu": run_fmu, "c": run_c}

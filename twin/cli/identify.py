@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 
 from spheretwin.cli.common import print_json, print_message
-from spheretwin.cli.log_options import LOGS, changes_of, check_given, read_logs, scenario_of
+from spheretwin.cli.log_options import LOGS, changes_of, read_logs, scenario_of
 from spheretwin.cli.options import from_zero, number, verb, whole
 from spheretwin.machine import report
 from spheretwin.machine.excitation import DesignSettings, design
@@ -43,6 +43,8 @@ DEFAULT = ("torque_scale", "plant.coulomb_Nm")
     --json
     """,
     has_fields=True,
+    needs={"--candidates": "--design", "--currents": "--design"},
+    excludes={"--design": "--report --suggest"},
     logs=Path,
     payload=number("a number of kg, at least 0", from_zero),
     candidates=whole(10_000, first=2),
@@ -52,16 +54,11 @@ def run(options: argparse.Namespace) -> bool:
 
     Exit code 1 if the data do not determine the parameters or the result is not better.
     """
-    check_given(options)
     for path, suffix in ((options.out, ".toml"), (options.currents, ".csv"), (options.report, ".html")):
         if path:
             check_writable(path, suffix)
     if options.design:
-        if options.report or options.suggest:
-            raise InputError("command line: expected --report and --suggest with logs, received --design")
         return _design(options)
-    if options.candidates or options.currents:
-        raise InputError("command line: expected --candidates and --currents with --design")
     logs, changes = read_logs(options), changes_of(options)
     if options.report:
         prepare(options.report.parent)

@@ -62,18 +62,6 @@ def scenario_of(options: argparse.Namespace) -> str:
     return options.scenario or "hold"
 
 
-def check_given(options: argparse.Namespace) -> None:
-    """Refuse a verb without a log; help does not need one.
-
-    Raises
-    ------
-    InputError
-        No log.
-    """
-    if not options.logs:
-        raise InputError("command line: expected LOG, received none")
-
-
 def file_log(options: argparse.Namespace) -> Log | None:
     """Return the log of a file, which a check has accepted; None if a stream is named.
 

@@ -108,12 +108,7 @@ def read_scenario(options: argparse.Namespace, address: str) -> Scenario:
     InputError
         Scenario or address is missing, or a file cannot be written.
     """
-    if options.scenario is None:
-        raise InputError(f"command line: expected a scenario ({', '.join(shipped())}), received none")
-    value = getattr(options, address)
-    if value is None:
-        raise InputError(f"command line: expected --{address} ADDRESS, received none")
-    if value == STANDARD_STREAMS and options.json:
+    if getattr(options, address) == STANDARD_STREAMS and options.json:
         raise InputError("command line: expected --json without the address -, which uses stdout for frames")
     log = getattr(options, "log", None)
     if log:

@@ -118,18 +118,19 @@ def run_map(options: argparse.Namespace) -> bool:
     return _report(options, "map", verdict._asdict(), verdict.checks, tables, text, written)
 
 
-@verb(f"""{MODEL}
+@verb(
+    f"""{MODEL}
     --out FILE.csv  write the curve here, not to stdout
     --csv FILE.csv  check this {CURVE}
-    """)
+    """,
+    excludes={"--csv": "--out"},
+)
 def run_curve(options: argparse.Namespace) -> bool:
     """Compute the torque curve of a pole and a coil, or check another curve.
 
     The curve f_t(φ) follows from the geometry of the model file, with magpylib; finite-element or
     measured data are compared with it.
     """
-    if options.csv and options.out:
-        raise InputError("command line: expected --out or --csv, received both")
     if options.csv:
         return _judge(options)
     if options.out:

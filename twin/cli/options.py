@@ -6,7 +6,7 @@ import argparse
 import inspect
 import math
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from textwrap import dedent
 from typing import Any, NamedTuple, NoReturn
@@ -82,6 +82,9 @@ READERS: dict[str, Any] = {
 """Functions that read the values of placeholders, unless a verb states another one."""
 
 
+_NONE: Mapping[str, str] = {}
+
+
 class Verb(NamedTuple):
     """Verb, or a part of one, with its options."""
 
@@ -92,11 +95,20 @@ class Verb(NamedTuple):
     """Whether any field of a scenario is a flag."""
     usage: str
     unlisted: str
+    needs: dict[str, str]
+    excludes: dict[str, str]
     readers: dict[str, Any]
 
 
 def verb(
-    options: str, *, has_fields: bool = False, usage: str = "", unlisted: str = "", **readers: Any
+    options: str,
+    *,
+    has_fields: bool = False,
+    usage: str = "",
+    unlisted: str = "",
+    needs: Mapping[str, str] = _NONE,
+    excludes: Mapping[str, str] = _NONE,
+    **readers: Any,
 ) -> Callable[[Callable[[argparse.Namespace], bool]], Verb]:
     """Return a decorator that makes a function a verb.
 
@@ -112,14 +124,16 @@ def verb(
     has_fields : bool
         Whether any field of a scenario is a flag.
     usage : str
-        Required arguments; default: the positional ones.
+        Required arguments; default: the first one, unless argparse checks that.
     unlisted : str
         Further arguments, which the help does not list.
+    needs, excludes : mapping, optional
+        By option: others of which it needs one, or that it excludes, as ``{"--draws": "--twin"}``.
     **readers : callable, sequence or dict
         By name: the function that reads a value, its valid values, or settings for argparse. By default,
         placeholders of files and folders are paths, and those without a reader texts.
     """
-    return lambda run: Verb(run, options, has_fields, usage, unlisted, readers)
+    return lambda run: Verb(run, options, has_fields, usage, unlisted, {**needs}, {**excludes}, readers)
 
 
 class _Formatter(argparse.HelpFormatter):
@@ -143,6 +157,7 @@ class Parser(argparse.ArgumentParser):
 
     def __init__(self, **settings: Any) -> None:
         self.expected: list[str] = []
+        self._required = ""
         super().__init__(**settings, allow_abbrev=False, formatter_class=_Formatter)
 
     def define(self, verb: Verb | dict[str, Verb]) -> None:
@@ -162,9 +177,10 @@ class Parser(argparse.ArgumentParser):
 
             self.set_defaults(mjcf=MJCF_PATH)
         self.set_defaults(run=verb.run, parser=self, has_fields=verb.has_fields)
+        self._verb = verb
         if verb.has_fields:
-            needed = verb.usage or self.expected[0]
-            self.usage = f"{self.prog} {needed} [options] [--section.field VALUE ...]"
+            self._required = verb.usage or self.expected[0]
+            self.usage = f"{self.prog} {self._required} [options] [--section.field VALUE ...]"
             text = "show this help, or the fields of a section, or all"
             self.add_argument("-h", "--help", nargs="?", const="", metavar="SECTION", help=text)
 
@@ -204,6 +220,32 @@ class Parser(argparse.ArgumentParser):
             settings.setdefault("nargs", ("*" if optional else "+") if many else "?")
         self.expected.append(names or placeholder)
         self.add_argument(name, **settings)
+
+    def check(self, options: argparse.Namespace) -> None:
+        """Check that required arguments are given, and that options fit each other.
+
+        Raises
+        ------
+        InputError
+            They are not, or do not.
+        """
+        actions = {next(iter(action.option_strings), action.metavar): action for action in self._actions}
+        given = {
+            name
+            for name, action in actions.items()
+            if getattr(options, action.dest, None) not in (None, False, [])
+        }
+        for name, action in actions.items():
+            if name in self._required.split() and name not in given:
+                placeholder = f" {action.metavar}" if action.option_strings else ""
+                raise InputError(f"command line: expected {name}{placeholder} ({action.help}), received none")
+        for name, others in self._verb.needs.items():
+            if name in given and given.isdisjoint(others.split()):
+                needed = " or ".join(others.split())
+                raise InputError(f"command line: expected {name} with {needed}, received it alone")
+        for name, others in self._verb.excludes.items():
+            if name in given and (both := sorted(given.intersection(others.split()))):
+                raise InputError(f"command line: expected {name} without {' and '.join(both)}, received both")
 
     def parts(self) -> dict[str, Parser]:
         """Return the parsers of the parts of a verb by their names; empty if it has none."""

@@ -14,7 +14,6 @@ from spheretwin.cli.log_options import (
     STREAM,
     STREAMED,
     blocks,
-    check_given,
     file_log,
     known_fields,
     live_view,
@@ -56,7 +55,6 @@ def run(options: argparse.Namespace) -> bool:
     The estimator is an extended Kalman filter on the plant of a scenario. Exit code 1 if model and log
     are not consistent.
     """
-    check_given(options)
     outputs.check(options.record, options.telemetry)
     settings = ShadowSettings(offset_walk_rad=1e-5 if options.offsets else None)
     shift = None

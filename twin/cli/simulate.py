@@ -54,6 +54,8 @@ from spheretwin.viz.terminal.progress import Progress
     --json
     """,
     has_fields=True,
+    usage="[SCENARIO]",
+    needs={"--view": "--record --live", "--live-window": "--live"},
     view=VIEW_NAMES,
 )
 def run(options: argparse.Namespace) -> bool:
@@ -65,14 +67,6 @@ def run(options: argparse.Namespace) -> bool:
     if _is_bare(options, rest):
         runs.print_scenarios({name: scenarios.load(name).description for name in shipped()})
     plan = _planned(options, rest)
-    if options.view and not (options.record or options.live):
-        raise InputError(
-            f"command line: expected --view with --record or --live, received {options.view} alone"
-        )
-    if options.live_window is not None and not options.live:
-        raise InputError(
-            f"command line: expected --live-window with --live, received {options.live_window:g} alone"
-        )
     own = load_metrics(options.metric)
     exported = export.check_paths(options.export_log, options.export_truth)
     outputs.check(options.record, options.telemetry, exported)

@@ -61,6 +61,8 @@ GO_ON = "sweep: finished rows are stored; the same command continues from there"
     --json             print the result as JSON, alone on stdout
     """,
     threads=whole(MOST_THREADS),
+    needs={"--draws": "--twin", "--trials": "--optimise"},
+    excludes={"--row": "--out --threads --limit", "--optimise": "--row --limit"},
     engine=tuple(ENGINES),
     draws=whole(100_000),
 )
@@ -73,15 +75,9 @@ def run(options: argparse.Namespace) -> bool:
     study = load(options.study)
     if options.twin:
         study = _over_twin(study, options.twin, options.draws or DRAWS)
-    elif options.draws:
-        raise InputError("command line: expected --draws with --twin, received it alone")
     if options.optimise:
         return _optimised(study, options)
-    if options.trials:
-        raise InputError("command line: expected --trials with --optimise, received it alone")
     if options.row:
-        if options.out or options.threads or options.limit:
-            raise InputError("command line: expected --row without --out, --threads or --limit")
         return _one(study, options.row, options.json)
     with _tracked(study.name, "rows") as tracking:
         outcome = run_study(
@@ -174,8 +170,6 @@ def _is_complete(done: int, of: int, what: str) -> bool:
 
 def _optimised(study: Study, options: argparse.Namespace) -> bool:
     """Tune gains; return True if all requested trials are finished."""
-    if options.row or options.limit:
-        raise InputError("command line: expected --optimise without --row and --limit")
     objectives = section_of(study).objective
     folder = options.out or Path(f"{study.name}_study")
     with _tracked(study.name, "trials") as tracking:

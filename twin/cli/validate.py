@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 
 from spheretwin.cli.common import print_json, print_message
-from spheretwin.cli.log_options import LOG, ONE, changes_of, check_given, read_logs, scenario_of
+from spheretwin.cli.log_options import LOG, ONE, changes_of, read_logs, scenario_of
 from spheretwin.cli.options import verb
 from spheretwin.machine.report import bin_table, fit_table, structure_table
 from spheretwin.machine.residuals import CHI2
@@ -21,7 +21,6 @@ def run(options: argparse.Namespace) -> bool:
     It prints residuals by hinge, pose and rate, and what would explain those that noise does not. Exit
     code 1 if the twin is not accepted.
     """
-    check_given(options)
     (log,) = read_logs(options)
     uncertainty = read_uncertainty(options.twin) if options.twin else None
     result = validate(log, scenario_of(options), changes_of(options), uncertainty=uncertainty)

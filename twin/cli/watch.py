@@ -11,7 +11,6 @@ from spheretwin.cli.log_options import (
     STREAM,
     STREAMED,
     blocks,
-    check_given,
     file_log,
     known_fields,
     live_view,
@@ -43,7 +42,6 @@ def run(options: argparse.Namespace) -> bool:
 
     Exit code 1 if there was one.
     """
-    check_given(options)
     settings = WatchSettings(false_alarms_per_hour=options.false_alarms)
     scenario, log = scenario_of(options), file_log(options)
     known = known_fields(options, log)
