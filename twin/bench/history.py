@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from spheretwin.models.telemetry.signals import Signal, common_signals, width
 from spheretwin.models.telemetry.table import Table
+from spheretwin.viz.bench.protocols import Bins
 
 Array = NDArray[np.float64]
 
@@ -49,17 +50,6 @@ class Bin(NamedTuple):
     high: Array
     variation_A: float
     """Σ|Δi| of the commanded currents, mean over the groups."""
-
-
-class Bins(NamedTuple):
-    """Some bins of a history, as arrays by signal, oldest first."""
-
-    run: int
-    """Number of the history: another one is another run."""
-    numbers: list[int]
-    rows: dict[str, Array]
-    low: dict[str, Array]
-    high: dict[str, Array]
 
 
 class History:

@@ -75,10 +75,10 @@ def settings_of(fields: list[tuple[str, Any, FieldInfo]]) -> list[FieldSetting]:
 
 def shape_settings(name: str, bench: Bench) -> list[FieldSetting]:
     """Return the fields of a shape: present values for the active shape, defaults for another."""
-    kind, present = SHAPES.get(name), bench.trajectory
+    kind, present = SHAPES.get(name), bench.trajectory.model_dump()
     if kind is None:
         return []
-    known = present.model_dump() if present.shape == name else {}
+    known = present if present["shape"] == name else {}
     return [
         FieldSetting(
             field,

@@ -229,7 +229,7 @@ class Parser(argparse.ArgumentParser):
         InputError
             They are not, or do not.
         """
-        actions = {next(iter(action.option_strings), action.metavar): action for action in self._actions}
+        actions = {next(iter(action.option_strings), f"{action.metavar}"): action for action in self._actions}
         given = {
             name
             for name, action in actions.items()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,28 +22,16 @@ class TicketProtocol(Protocol):
     refused: str | None
 
 
-class BinsProtocol(Protocol):
-    """Bins of rows as arrays by signal, oldest first."""
+class Bins(NamedTuple):
+    """Some bins of a history of rows, as arrays by signal, oldest first."""
 
-    @property
-    def run(self) -> int:
-        """Number of the run."""
-
-    @property
-    def numbers(self) -> list[int]:
-        """Numbers of the bins."""
-
-    @property
-    def rows(self) -> dict[str, NDArray[np.float64]]:
-        """First row of each."""
-
-    @property
-    def low(self) -> dict[str, NDArray[np.float64]]:
-        """Least values."""
-
-    @property
-    def high(self) -> dict[str, NDArray[np.float64]]:
-        """Greatest values."""
+    run: int
+    """Number of the history: another one is another run."""
+    numbers: list[int]
+    rows: dict[str, NDArray[np.float64]]
+    """First row of each."""
+    low: dict[str, NDArray[np.float64]]
+    high: dict[str, NDArray[np.float64]]
 
 
 class BenchProtocol(Protocol):
@@ -62,7 +50,7 @@ class BenchProtocol(Protocol):
     def state(self) -> Any:
         """The latest picture."""
 
-    def bins(self, after: int = -1) -> BinsProtocol:
+    def bins(self, after: int = -1) -> Bins:
         """Rows of the last minute in bins with a number above `after`."""
 
     def captured(self) -> dict[str, NDArray[np.float64]]:

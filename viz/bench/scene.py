@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 from spheretwin.models.actuator import Actuator
 from spheretwin.viz import theme
 from spheretwin.viz.bench.actuator import actuator_solids, quaternions_along
-from spheretwin.viz.bench.protocols import BinsProtocol
+from spheretwin.viz.bench.protocols import Bins
 from spheretwin.viz.scene.solids import Surface
 
 LIGHT = 1.6
@@ -184,7 +184,7 @@ class Scene:
             self._ghost.wxyz = desired.as_quat(scalar_first=True)
             self.handle.position = desired.as_matrix() @ self._actuator.shaft_tip_m
 
-    def trail(self, bins: BinsProtocol) -> None:
+    def trail(self, bins: Bins) -> None:
         """Extend the path of the tip by the first rows of bins; start again with another run."""
         if bins.run != self._trail_run:
             self._trail_run, self.trail_after = bins.run, -1
