@@ -11,6 +11,7 @@ from spheretwin.cli.common import interruptible, print_message, warn
 from spheretwin.cli.machine import OUTPUTS, read_scenario, rehearse_run, run_session
 from spheretwin.cli.options import from_zero, number, verb
 from spheretwin.machine.files import conditions_of
+from spheretwin.machine.link.admission import read_key
 from spheretwin.machine.link.controller_scenario import left_out
 from spheretwin.machine.link.limits import Limits
 from spheretwin.machine.link.log_file import LogFile
@@ -116,6 +117,7 @@ def open_link(
         _settings(options),
         limits,
         frame=options.frame,
+        key=read_key(options.key),
         report=None if options.arm else print_message,
         stop_requested=stop_requested,
         **more,

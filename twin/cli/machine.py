@@ -13,6 +13,7 @@ from spheretwin import scenario as scenarios
 from spheretwin.cli.common import interruptible, print_json, print_message
 from spheretwin.cli.options import verb
 from spheretwin.machine.link import frame_format
+from spheretwin.machine.link.admission import LEAST_KEY_BYTES, read_key
 from spheretwin.machine.link.channel import Channel
 from spheretwin.machine.link.frame_format import DEFAULT_FRAME
 from spheretwin.machine.link.machine_link import Link
@@ -39,7 +40,8 @@ STANDARD_STREAMS = "-"
 
 FRAME = f"""
     --frame NAME={DEFAULT_FRAME}  frames: {", ".join(frame_format.shipped())}, or a .toml file;
-        {DEFAULT_FRAME} unless given"""
+        {DEFAULT_FRAME} unless given
+    --key FILE       authenticate the frames by the key in a file, of at least {LEAST_KEY_BYTES} bytes"""
 
 OUTPUTS = f"""{FRAME}
     --record
@@ -74,7 +76,9 @@ def run(options: argparse.Namespace) -> bool:
         transport = open_transport(options.listen, listening=True)
         try:
             groups = len(Session(scenario).actuator.groups)
-            channel = Channel(transport, frames.measurement, frames.command, groups)
+            transport.announce = print_message
+            key = read_key(options.key)
+            channel = Channel(transport, frames.measurement, frames.command, groups, key=key)
             server = MachineServer(
                 channel,
                 f"a controller at {options.listen}",
@@ -83,6 +87,7 @@ def run(options: argparse.Namespace) -> bool:
                 real_time=options.real_time,
                 timeout_s=1e-3 * options.timeout_ms,
                 idle_s=options.idle_s,
+                authenticated=bool(key),
                 stop_requested=stop_requested,
             )
             with Session(scenario, external=server.to_stand_in()) as rehearsal:

@@ -183,6 +183,8 @@ def print_link(link: Mapping[str, Any]) -> None:
     console = tables.terminal_console()
     counts = ", ".join(f"{count} {name}" for name, count in link["frames"].items() if count)
     console.print(f"frames received: {counts or 'none'}", soft_wrap=True)
+    for sender, count in link.get("refused_senders", {}).items():
+        console.print(f"refused: {count} datagrams or more of {sender}", soft_wrap=True)
     for name in ("latency", "turnaround", "jitter"):
         times = link.get(name, {})
         if times.get("max_ms") is not None:

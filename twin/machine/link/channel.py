@@ -6,10 +6,12 @@ from collections.abc import Callable, Mapping
 from dataclasses import asdict
 from typing import Any
 
+from spheretwin.machine.link.admission import Admission
 from spheretwin.machine.link.codec import Codec, Values
 from spheretwin.machine.link.decoder import Counts, Decoder
-from spheretwin.machine.link.frame_format import FrameFormat
+from spheretwin.machine.link.frame_format import Flags, FrameFormat
 from spheretwin.machine.link.transports import StandIn, Transport
+from spheretwin.models.base.errors import InputError
 
 SHOWN_FRAMES = 3
 """Frames of each direction that a channel reports."""
@@ -29,6 +31,8 @@ class Channel:
         Coil groups of the machine.
     report : callable, optional
         Receives a line for each of the first frames.
+    key : bytes
+        Authenticates the frames; no bytes for none.
 
     Attributes
     ----------
@@ -48,11 +52,14 @@ class Channel:
         receives: FrameFormat,
         groups: int,
         report: Callable[[str], None] | None = None,
+        key: bytes = b"",
     ) -> None:
+        if key and not (sends.has("session") and receives.has("session")):
+            raise InputError("link: expected frames with the field session to authenticate, received others")
         self.transport, self.groups = transport, groups
-        self._formats = sends, receives
-        self._encoder = Codec(sends, groups)
-        self._decoder = Decoder(Codec(receives, groups), datagrams=transport.datagrams)
+        self._formats, self._key = (sends, receives), key
+        self._encoder = Codec(sends, groups, key)
+        self._decoder = Decoder(Codec(receives, groups, key), datagrams=transport.datagrams)
         self._report = report
         self.has_echo = receives.has("echo")
         self.modulus = min(sends.modulus("sequence"), receives.modulus("echo"))
@@ -67,13 +74,17 @@ class Channel:
             Returns the values of the reply to those of a frame, and of the peer's first frame to none.
         """
         sends, receives = self._formats
-        sent, replies = Codec(sends, self.groups), Codec(receives, self.groups)
+        sent, replies = (Codec(frame, self.groups, self._key) for frame in self._formats)
 
         def reply(content: bytes) -> bytes:
             return replies.encode(values(sent.decode(content) or {}))
 
         peer = StandIn(reply)
-        return Channel(peer, sends, receives, self.groups), peer
+        return Channel(peer, sends, receives, self.groups, key=self._key), peer
+
+    def admit_by(self, admission: Callable[[Values], Admission]) -> None:
+        """Use the frames that belong to a session alone."""
+        self._decoder.admission = admission
 
     @property
     def counts(self) -> Counts:
@@ -82,7 +93,7 @@ class Channel:
 
     def figures(self) -> dict[str, int]:
         """Return the counts by name, with the datagrams of other senders."""
-        return {**asdict(self.counts), "foreign": self.transport.foreign}
+        return {**asdict(self.counts), "foreign": sum(self.transport.refused.values())}
 
     def send(self, values: Mapping[str, Any]) -> bytes:
         """Send a frame; return its bytes."""
@@ -97,8 +108,10 @@ class Channel:
         if not content:
             return []
         frames = self._decoder.feed(content)
-        if frames:
-            self.transport.accept()
+        if not frames:
+            self.transport.refuse()
+        else:
+            self.transport.accept(is_peer=not frames[-1].get("flags", 0) & Flags.HELLO)
             self._show("received", content, frames[-1])
         return frames
 

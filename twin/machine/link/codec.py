@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hmac
 import json
 import math
 import struct
@@ -19,10 +20,10 @@ Values = dict[str, Any]
 """Values of a frame in SI units by field: an int for integers, a float for one number, else an array."""
 
 CRC_START, CRC_BYTES = 0xFFFF, 2
+HMAC_BYTES = 16
+"""Of HMAC-SHA256, the first ones: RFC 2104 allows half of the digest."""
 LARGEST_FRAME = 65536
 """Bytes; a longer line is no frame."""
-
-_JSON_CRC = b',"crc16":'
 
 
 def crc16(content: bytes) -> int:
@@ -88,6 +89,8 @@ class Codec:
     frame : FrameFormat
     groups : int
         Coil groups of the machine.
+    key : bytes
+        With one, an HMAC authenticates each frame, in place of its checksum.
 
     Attributes
     ----------
@@ -95,8 +98,8 @@ class Codec:
         Bytes of a binary frame.
     """
 
-    def __init__(self, frame: FrameFormat, groups: int) -> None:
-        self.frame = frame
+    def __init__(self, frame: FrameFormat, groups: int, key: bytes = b"") -> None:
+        self.frame, self._key = frame, key
         self._fields = [_Field(field, groups) for field in frame.field]
         order = "<" if frame.byte_order == "little" else ">"
         codes = (
@@ -105,10 +108,10 @@ class Codec:
         )
         self._struct = struct.Struct(order + "".join(codes))
         self._crc = struct.Struct(f"{order}H")
+        self._json_check = b',"hmac":' if key else b',"crc16":'
         self.start, self._end = bytes(frame.start), bytes(frame.end)
-        self._has_crc = frame.checksum == "crc16"
-        crc_size = CRC_BYTES if self._has_crc else 0
-        self.size = len(self.start) + self._struct.size + crc_size + len(self._end)
+        self._check_size = HMAC_BYTES if key else CRC_BYTES if frame.checksum == "crc16" else 0
+        self.size = len(self.start) + self._struct.size + self._check_size + len(self._end)
 
     def encode(self, values: Mapping[str, Any]) -> bytes:
         """Return the frame of values in SI units; a field not given is missing.
@@ -119,9 +122,7 @@ class Codec:
         if self.frame.encoding == "json":
             return self._encode_line(numbers)
         content = self.start + self._struct.pack(*(number for field in numbers for number in field))
-        if self._has_crc:
-            content += self._crc.pack(crc16(content))
-        return content + self._end
+        return content + self._check(content) + self._end
 
     def decode(self, content: bytes) -> Values | None:
         """Return the values of exactly one frame; None for any other bytes."""
@@ -129,16 +130,24 @@ class Codec:
             return self._decode_line(content)
         if len(content) != self.size or not content.startswith(self.start) or not content.endswith(self._end):
             return None
-        last = self.size - len(self._end)
-        if self._has_crc:
-            last -= CRC_BYTES
-            if self._crc.unpack_from(content, last)[0] != crc16(content[:last]):
-                return None
+        last = self.size - len(self._end) - self._check_size
+        if not hmac.compare_digest(content[last : last + self._check_size], self._check(content[:last])):
+            return None
         numbers, first, values = self._struct.unpack_from(content, len(self.start)), 0, {}
         for field in self._fields:
             values[field.name] = field.value(numbers[first : first + field.count])
             first += field.count
         return values
+
+    def _check(self, content: bytes) -> bytes:
+        """Return HMAC or checksum of the bytes of a frame before it; no bytes if it has none."""
+        if self._key:
+            return hmac.digest(self._key, content, "sha256")[:HMAC_BYTES]
+        return self._crc.pack(crc16(content)) if self._check_size else b""
+
+    def _check_text(self, text: bytes) -> bytes:
+        """Return HMAC or checksum of the text of a line before it."""
+        return b'"%s"' % self._check(text).hex().encode() if self._key else str(crc16(text)).encode()
 
     def _encode_line(self, numbers: list[list[Any]]) -> bytes:
         entries = {}
@@ -146,16 +155,16 @@ class Codec:
             plain = [number if math.isfinite(number) else None for number in raw]  # JSON has no NaN
             entries[field.name] = plain if field.count > 1 else plain[0]
         text = json.dumps(entries, separators=(",", ":")).encode()
-        if self._has_crc:
+        if self._check_size:
             text = text[:-1]
-            text += _JSON_CRC + f"{crc16(text)}}}".encode()
+            text += self._json_check + self._check_text(text) + b"}"
         return text + b"\n"
 
     def _decode_line(self, line: bytes) -> Values | None:
         line = line.strip()
-        if self._has_crc:
-            content, mark, number = line.rpartition(_JSON_CRC)
-            if not mark or number.rstrip(b"}").strip() != str(crc16(content)).encode():
+        if self._check_size:
+            content, mark, check = line.rpartition(self._json_check)
+            if not mark or not hmac.compare_digest(check.rstrip(b"}").strip(), self._check_text(content)):
                 return None
         try:
             entries = json.loads(line)

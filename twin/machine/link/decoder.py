@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections import OrderedDict
+from collections.abc import Callable
 from dataclasses import dataclass
 
+from spheretwin.machine.link.admission import Admission
 from spheretwin.machine.link.codec import LARGEST_FRAME, Codec, Values
-from spheretwin.machine.link.frame_format import Flags
 
 REMEMBERED = 1024
 """Missing frames that are recognised if they arrive later."""
@@ -28,6 +29,8 @@ class Counts:
         Frames that arrived after a newer one; they are not used.
     corrupt : int
         Runs of bytes that are no frame.
+    refused : int
+        Frames that do not belong to the session.
     late : int
         Control ticks without a new frame.
     """
@@ -37,6 +40,7 @@ class Counts:
     duplicated: int = 0
     reordered: int = 0
     corrupt: int = 0
+    refused: int = 0
     late: int = 0
 
 
@@ -54,11 +58,14 @@ class Decoder:
     Attributes
     ----------
     counts : Counts
+    admission : callable
+        Returns the place of a frame in the session; by default, each is in order.
     """
 
     def __init__(self, codec: Codec, *, datagrams: bool) -> None:
         self._codec, self._datagrams = codec, datagrams
         self.counts = Counts()
+        self.admission: Callable[[Values], Admission] = lambda _: Admission.IN_ORDER
         self._sequence = SequenceCheck(self.counts, codec.frame.modulus("sequence"))
         self._rest = bytearray()
         self._skipping = False
@@ -75,7 +82,14 @@ class Decoder:
         return [frame for frame in frames if self._is_new(frame)]
 
     def _is_new(self, frame: Values) -> bool:
-        if frame.get("flags", 0) & Flags.HELLO:  # a sender that starts counts from any number
+        place = self.admission(frame)
+        if place == Admission.REFUSED:
+            self.counts.refused += 1
+            return False
+        if place == Admission.REQUEST:
+            self.counts.accepted += 1
+            return True
+        if place == Admission.FIRST:
             self._sequence.restart()
         return self._sequence.is_new(frame.get("sequence"))
 

@@ -50,6 +50,7 @@ QUANTITIES = {
     "sequence": Quantity(_COUNT, 1, True),
     "echo": Quantity(_COUNT, 1, True),
     "flags": Quantity(_COUNT, 1, True),
+    "session": Quantity(_COUNT, 1, True),
     "time": Quantity({"s": 1.0, "ms": 1e-3, "us": 1e-6}, 1),
     "angle": Quantity(_ANGLE, 3),
     "rate": Quantity(_RATE, 3),
@@ -57,7 +58,8 @@ QUANTITIES = {
     "temperature": Quantity({"degC": 1.0}, 1),
     "unused": Quantity(_COUNT, 1),
 }
-"""Fields by name. `echo` is the sequence number of the last command that the machine received."""
+"""Fields by name. `echo` is the sequence number of the last command that the machine received, `session` the
+number that `admission` describes."""
 
 
 if TYPE_CHECKING:

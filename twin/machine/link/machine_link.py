@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import secrets
 import time
 from collections.abc import Callable
 from copy import deepcopy
@@ -14,6 +15,7 @@ from pydantic import ConfigDict, Field
 from spheretwin.control.supervision.watchdog import Reason
 from spheretwin.external import Measurement
 from spheretwin.machine.link import frame_format
+from spheretwin.machine.link.admission import ControllerAdmission
 from spheretwin.machine.link.channel import Channel
 from spheretwin.machine.link.codec import Values
 from spheretwin.machine.link.controller_scenario import check_measurement, controller_scenario
@@ -141,7 +143,9 @@ class Link:
         self._settings, self._limits, self._heat, self._period_s = settings, limits, heat, period_s
         self._shadow, self._plausibility = shadow, plausibility
         self._stop_requested, self._now = stop_requested, now
-        self._sequence = 0
+        self._sequence = secrets.randbelow(channel.modulus)  # an old answer is not that to a request
+        self._admission = ControllerAdmission()
+        channel.admit_by(self._admission)
         self._sent_s: dict[int, float] = {}
         self._newest: Values | None = None
         self._arrival_s = self._answered_s = 0.0
@@ -160,6 +164,7 @@ class Link:
         *,
         frame: str = DEFAULT_FRAME,
         report: Callable[[str], None] | None = None,
+        key: bytes = b"",
         **options: Any,
     ) -> Link:
         """Open a link to the machine at an address.
@@ -179,6 +184,8 @@ class Link:
             Shipped name or TOML file of the frames.
         report : callable, optional
             Receives a line for each of the first frames.
+        key : bytes
+            Authenticates the frames; no bytes for none.
         **options
             `shadow`, `stop_requested` and `now`.
 
@@ -204,7 +211,7 @@ class Link:
             highest_degC = min(limits.temperature_degC, float(np.min(stated_degC)))
             limits = limits.model_copy(update={"temperature_degC": highest_degC})
         period_s = resolved.controller.period_s
-        channel = Channel(open_transport(address), frames.command, frames.measurement, groups, report)
+        channel = Channel(open_transport(address), frames.command, frames.measurement, groups, report, key)
         heat = CoilHeat(resolved.drive, limits, period_s)
         options["plausibility"] = Plausibility.of(scenario, resolved, limits)
         return cls(channel, f"a machine at {address}", settings, limits, heat, period_s, **options)
@@ -247,7 +254,8 @@ class Link:
         }
 
         def measure(command: Values) -> Values:
-            return {"sequence": command.get("sequence"), "echo": command.get("sequence"), **still}
+            number = command.get("sequence")
+            return {"sequence": number, "echo": number, "session": command.get("session"), **still}
 
         channel, peer = self.channel.stand_in(measure)
         link = Link(
@@ -377,7 +385,17 @@ class Link:
         self._sequence = (self._sequence + 1) % self.channel.modulus
         self._sent_s[self._sequence] = self._now()
         self._sent_s.pop((self._sequence - SENT_TIMES) % self.channel.modulus, None)
-        self._values = {"sequence": self._sequence, "flags": flags, "time": t_s, "current": current_A}
+        session = self._admission.session
+        if flags & Flags.HELLO:
+            self._admission.request(self._sequence)
+            session = self._admission.key
+        self._values = {
+            "sequence": self._sequence,
+            "session": session,
+            "flags": flags,
+            "time": t_s,
+            "current": current_A,
+        }
         if current_A is None:
             self._values["current"] = np.zeros(self.channel.groups)
         self.channel.send(self._values)

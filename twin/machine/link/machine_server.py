@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spheretwin.external import Measurement
+from spheretwin.machine.link.admission import MachineAdmission
 from spheretwin.machine.link.channel import Channel
 from spheretwin.machine.link.codec import Values
 from spheretwin.machine.link.frame_format import Flags
@@ -47,6 +48,8 @@ class MachineServer:
         Age of a command at which the currents are removed, in real time.
     idle_s : float
         Time without commands after which the run ends.
+    authenticated : bool
+        Commands without a session are refused.
     stop_requested : callable
         True ends the run.
     now : callable
@@ -71,6 +74,7 @@ class MachineServer:
         real_time: bool = False,
         timeout_s: float = 0.02,
         idle_s: float = 60.0,
+        authenticated: bool = False,
         stop_requested: Callable[[], bool] = lambda: False,
         now: Callable[[], float] = time.monotonic,
     ) -> None:
@@ -83,6 +87,8 @@ class MachineServer:
             stop_requested,
             now,
         )
+        self._admission = MachineAdmission(now, authenticated=authenticated)
+        channel.admit_by(self._admission)
         self._pending: deque[Values] = deque()
         self._sequence = 0
         self._echo: int | None = None
@@ -111,6 +117,7 @@ class MachineServer:
         self._reply = {
             "sequence": self._sequence,
             "echo": self._echo,
+            "session": self._admission.session,
             "flags": self._flags,
             "time": t_s,
             "angle": measurement.angle_rad,
@@ -130,6 +137,7 @@ class MachineServer:
             **self._reply,
             "sequence": self._sequence,
             "echo": self._echo,
+            "session": self._admission.session,
             "flags": flags,
             "time": t_s,
             "angle": angle_rad,
@@ -139,7 +147,13 @@ class MachineServer:
     def figures(self) -> dict[str, Any]:
         """Return counts of frames and distributions of times."""
         jitter = {"jitter": self.jitter.figures()} if self.real_time else {}
-        return {"frames": self.channel.figures(), "turnaround": self.turnaround.figures(), **jitter}
+        refused = {"refused_senders": dict(self.channel.transport.refused)}
+        return {
+            "frames": self.channel.figures(),
+            **refused,
+            "turnaround": self.turnaround.figures(),
+            **jitter,
+        }
 
     def _send_reply(self) -> None:
         self.channel.send(self._reply)
@@ -160,7 +174,7 @@ class MachineServer:
                 return None
             self._echo = frame.get("sequence")
             if frame.get("flags", 0) & Flags.HELLO:
-                self._reply = {**self._reply, "echo": self._echo}
+                self._reply = {**self._reply, "echo": self._echo, "session": self._admission.answer_to(frame)}
                 self._send_reply()
                 self._sent_s = None  # the controller may be starting
                 continue

@@ -7,6 +7,8 @@ import os
 import select
 import socket
 import sys
+import time
+from collections import Counter
 from collections.abc import Callable
 from typing import Any, Protocol
 from urllib.parse import urlsplit
@@ -19,6 +21,12 @@ LARGEST_READ = 65536
 BAUD = 115200
 WRITE_s = 1.0
 
+MOST_NAMES = 16
+"""Senders whose datagrams are counted by name."""
+
+LOOK_s, MOST_LOOKS = 0.1, 32
+"""Time between two looks at the datagrams of others, and datagrams of a look."""
+
 EXPECTED = "udp://HOST:PORT, serial:DEVICE@BAUD, or - for standard input and output"
 
 
@@ -29,14 +37,17 @@ class Transport(Protocol):
     ----------
     datagrams : bool
         True if each received text has complete frames.
-    foreign : int
-        Datagrams of other senders than the peer; they are dropped.
+    refused : Counter
+        Datagrams of other senders than the peer, by sender; they are dropped.
+    announce : callable
+        Receives a line for the peer and for each refused sender.
     is_closed : bool
         True if the peer has closed the connection.
     """
 
     datagrams: bool
-    foreign: int
+    refused: Counter[str]
+    announce: Callable[[str], None]
     is_closed: bool
 
     def send(self, content: bytes) -> None:
@@ -45,15 +56,18 @@ class Transport(Protocol):
     def receive(self, timeout_s: float) -> bytes:
         """Return the received bytes, after at most a time; empty if there are none."""
 
-    def accept(self) -> None:
-        """Take the sender of the last received bytes as the peer: from now on no other one is heard."""
+    def accept(self, *, is_peer: bool = True) -> None:
+        """Answer the sender of the last received bytes; as the peer, it is the only one that is heard."""
+
+    def refuse(self) -> None:
+        """Count the sender of the last received bytes as refused, unless it is the peer."""
 
     def close(self) -> None:
         """Close the connection."""
 
 
 class Udp:
-    """Datagrams; a listening end takes the sender of its first valid frame as the peer.
+    """Datagrams; a listening end takes the sender of the first frame of a session as the peer.
 
     Parameters
     ----------
@@ -65,8 +79,12 @@ class Udp:
     datagrams, is_closed = True, False
 
     def __init__(self, host: str, port: int, *, listening: bool) -> None:
-        self.foreign = 0
+        self.refused: Counter[str] = Counter()
+        self.announce: Callable[[str], None] = lambda _: None
         self._peer: Any = None
+        self._candidate: Any = None
+        self._others: socket.socket | None = None
+        self._look_s = 0.0
         self._sender: Any = None
         self._listening = listening
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
@@ -92,31 +110,87 @@ class Udp:
         with contextlib.suppress(OSError):
             if not self._listening:
                 self._socket.send(content)
-            elif self._peer:
-                self._socket.sendto(content, self._peer)
+            elif self._peer or self._candidate:
+                self._socket.sendto(content, self._peer or self._candidate)
 
     def receive(self, timeout_s: float) -> bytes:
         """Return a datagram of the peer, or of anyone before there is a peer."""
+        if self._others and time.monotonic() >= self._look_s:
+            self._look_at_others()
         if not _is_readable(self._socket, timeout_s):
             return b""
         try:
-            content, sender = self._socket.recvfrom(LARGEST_READ)
+            content, self._sender = self._socket.recvfrom(LARGEST_READ)
         except OSError:  # the peer does not listen yet
             return b""
-        if self._peer and sender != self._peer:
-            self.foreign += 1
+        if self._peer and self._sender != self._peer:
+            self.refuse()
             return b""
-        self._sender = sender
         return content
 
-    def accept(self) -> None:
-        """Take the last sender as the peer."""
-        if self._listening and not self._peer:
+    def accept(self, *, is_peer: bool = True) -> None:
+        """Answer the last sender; take it as the peer unless it has only made a request."""
+        if not self._listening or self._peer:
+            return
+        self._candidate = self._sender
+        if is_peer:
             self._peer = self._sender
+            self.announce(f"the peer is {_name(self._peer)}")
+            self._separate_others()
+
+    def refuse(self) -> None:
+        """Count the last datagram as one of a refused sender, and report it if it is the first of it."""
+        if self._sender == self._peer or not (self._listening and self._sender):
+            return
+        name = _name(self._sender)
+        if name not in self.refused and len(self.refused) >= MOST_NAMES:
+            name = "others"
+        if not self.refused[name]:
+            self.announce(f"refused: {name}")
+        self.refused[name] += 1
 
     def close(self) -> None:
         """Close the socket."""
         self._socket.close()
+        if self._others:
+            self._others.close()
+
+    def _separate_others(self) -> None:
+        """Give the peer a socket of its own: the system sorts the datagrams, and others fill no queue of it.
+
+        Without the option, as on Windows, one socket receives all, and datagrams of others take time.
+        """
+        if not hasattr(socket, "SO_REUSEPORT"):
+            return
+        own = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        try:
+            for end in (self._socket, own):
+                end.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEPORT, 1)
+            own.bind(self._socket.getsockname())
+            own.connect(self._peer)
+        except OSError:
+            own.close()
+            return
+        finally:  # no other program shares the port
+            self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEPORT, 0)
+        own.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEPORT, 0)
+        self._socket, self._others = own, self._socket
+
+    def _look_at_others(self) -> None:
+        """Count some datagrams of others; what their queue cannot hold is lost without a count."""
+        self._look_s = time.monotonic() + LOOK_s
+        peer_sender = self._sender
+        for _ in range(MOST_LOOKS):
+            if not (self._others and _is_readable(self._others, 0.0)):
+                break
+            with contextlib.suppress(OSError):
+                _, self._sender = self._others.recvfrom(1)
+                self.refuse()
+        self._sender = peer_sender
+
+
+def _name(sender: Any) -> str:
+    return f"{sender[0]}:{sender[1]}"
 
 
 class Stream:
@@ -130,9 +204,11 @@ class Stream:
         Closes them.
     """
 
-    datagrams, foreign = False, 0
+    datagrams = False
 
     def __init__(self, source: int, sink: int, close: Callable[[], object] = lambda: None) -> None:
+        self.refused: Counter[str] = Counter()
+        self.announce: Callable[[str], None] = lambda _: None
         self._source, self._sink, self._close = source, sink, close
         self.is_closed = False
 
@@ -164,7 +240,10 @@ class Stream:
         self.is_closed = not content
         return content
 
-    def accept(self) -> None:
+    def accept(self, *, is_peer: bool = True) -> None:
+        """Do nothing: there is only one peer."""
+
+    def refuse(self) -> None:
         """Do nothing: there is only one peer."""
 
     def close(self) -> None:
@@ -181,9 +260,11 @@ class StandIn:
         Returns the reply to sent bytes, and the first frame of the peer to no bytes.
     """
 
-    datagrams, foreign, is_closed = True, 0, False
+    datagrams, is_closed = True, False
 
     def __init__(self, reply: Callable[[bytes], bytes]) -> None:
+        self.refused: Counter[str] = Counter()
+        self.announce: Callable[[str], None] = lambda _: None
         self._reply, self._waiting, self._now_s = reply, reply(b""), 0.0
 
     def now(self) -> float:
@@ -201,7 +282,10 @@ class StandIn:
             self._now_s += timeout_s + 1e-9  # rounding must not leave a rest to wait for
         return content
 
-    def accept(self) -> None:
+    def accept(self, *, is_peer: bool = True) -> None:
+        """Do nothing: there is only one peer."""
+
+    def refuse(self) -> None:
         """Do nothing: there is only one peer."""
 
     def close(self) -> None:

@@ -1,6 +1,7 @@
 """Transports without a network or a clock, and the pieces of a link in tests."""
 
 import queue
+from collections import Counter
 
 import numpy as np
 
@@ -17,9 +18,13 @@ OWN, LIMITS = frame_format.load("spheretwin"), Limits(current_A=8.0)
 class Transport:
     """What the connections of tests have in common."""
 
-    datagrams, foreign, is_closed = True, 0, False
+    datagrams, is_closed = True, False
+    refused = Counter()  # noqa: RUF012 (nothing is refused)
 
-    def accept(self):
+    def accept(self, *, is_peer=True):
+        pass
+
+    def refuse(self):
         pass
 
     def close(self):

@@ -7,9 +7,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from spheretwin.machine.link import frame_format
+from spheretwin.machine.link.admission import Admission
 from spheretwin.machine.link.codec import Codec
 from spheretwin.machine.link.decoder import Counts, Decoder, SequenceCheck
-from spheretwin.machine.link.frame_format import Flags
 from tests.twin.machine.link.lines import COMMAND, GROUPS, MEASUREMENT, command, measurement
 
 
@@ -53,11 +53,12 @@ def test_every_frame_is_counted_once_in_any_order(order, again):
     assert tally.duplicated == len(again)
 
 
-def test_a_sender_that_starts_again_is_heard():
+def test_the_admission_of_a_frame_restarts_the_sequence_or_refuses_it():
     decoder = Decoder(COMMAND, datagrams=True)
-    for sequence, flags in ((1000, 1), (1, Flags.HELLO), (2, 1)):
-        assert len(decoder.feed(command(sequence, flags=flags))) == 1
-    assert decoder.counts == counts(accepted=3)
+    places = iter((Admission.IN_ORDER, Admission.REQUEST, Admission.FIRST, Admission.REFUSED))
+    decoder.admission = lambda frame: next(places)
+    assert [len(decoder.feed(command(sequence))) for sequence in (1000, 1, 1, 2)] == [1, 1, 1, 0]
+    assert decoder.counts == counts(accepted=3, refused=1)
 
 
 JSON = Codec(frame_format.load("spheretwin_json").measurement, GROUPS)

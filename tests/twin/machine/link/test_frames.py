@@ -25,7 +25,7 @@ def test_the_checksum_is_that_of_the_catalogue():
 @pytest.mark.parametrize("name", ["spheretwin", "spheretwin_json"])
 @given(angle=st.tuples(numbers, numbers, numbers), sequence=st.integers(0, 2**32 - 1), current=numbers)
 def test_own_frames_carry_every_bit(name, angle, sequence, current):
-    values = {"sequence": sequence, "echo": 3, "flags": 5, "time": 0.1, "angle": angle,
+    values = {"sequence": sequence, "echo": 3, "session": sequence, "flags": 5, "time": 0.1, "angle": angle,
               "rate": (np.nan,) * 3, "current": np.full(GROUPS, current), "temperature": 21.5}  # fmt: skip
     back = CODECS[name].decode(CODECS[name].encode(values).rstrip(b"\n") if "json" in name else
                                CODECS[name].encode(values))  # fmt: skip

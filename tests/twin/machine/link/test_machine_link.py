@@ -91,8 +91,8 @@ def test_without_arming_nothing_rises_and_frames_are_shown(machine):
     reasons(link, 20)
     assert link.authority == 0.0
     assert all(command["flags"] == 0 for command in machine.commands)
-    assert sum(line.startswith("sent 162 bytes a5 c3") for line in shown) == 3
-    assert sum(line.startswith("received 222 bytes a5 5a") for line in shown) == 3
+    assert sum(line.startswith("sent 166 bytes a5 c3") for line in shown) == 3
+    assert sum(line.startswith("received 226 bytes a5 5a") for line in shown) == 3
     assert "angle [0 0 0]" in shown[1]
 
 
@@ -237,7 +237,8 @@ def test_a_bad_line_changes_the_counts_and_not_the_measurement(machine):
     assert angles == [1, 1, 3, 3, 4, 4, 4, 6]
     # Lost: 9 before the first one (the first measurement was number 1), and number 5.
     assert link.figures()["frames"] == {
-        "accepted": 5, "lost": 10, "duplicated": 1, "reordered": 1, "corrupt": 2, "late": 4, "foreign": 0,
+        "accepted": 5, "lost": 10, "duplicated": 1, "reordered": 1, "corrupt": 2, "refused": 0, "late": 4,
+        "foreign": 0,
     }  # fmt: skip
 
 

@@ -1,6 +1,7 @@
 """Transports: addresses, UDP with strangers, serial lines on a pseudo-terminal, pipes."""
 
 import contextlib
+import math
 import os
 import socket
 import subprocess
@@ -8,7 +9,7 @@ import sys
 
 import pytest
 
-from spheretwin.machine.link.transports import Stream, Udp, open_transport
+from spheretwin.machine.link.transports import MOST_LOOKS, MOST_NAMES, Stream, Udp, open_transport
 from spheretwin.models.base.errors import SpheretwinError
 from tests.requirements import needs_pseudo_terminal
 from tests.waiting import UNLIMITED_S
@@ -30,7 +31,10 @@ def test_it_listens_at_the_loopback_unless_an_address_is_given(listener):
     assert listener._socket.getsockname()[0] == "127.0.0.1"
 
 
+@pytest.mark.skipif(not hasattr(socket, "SO_REUSEPORT"), reason="one socket receives all there")
 def test_a_stranger_is_not_heard_after_the_peer(listener, sender):
+    lines = []
+    listener.announce = lines.append
     with contextlib.closing(open_transport(f"udp://:{listener.port}")) as stranger:
         stranger.send(b"a stranger whose frame was not valid")
         assert listener.receive(UNLIMITED_S)
@@ -38,13 +42,52 @@ def test_a_stranger_is_not_heard_after_the_peer(listener, sender):
         assert listener.receive(UNLIMITED_S) == b"the peer"
         listener.send(b"to nobody")
         listener.accept()
-        stranger.send(b"currents")
-        assert listener.receive(UNLIMITED_S) == b""
-        assert listener.foreign == 1
+        listener._look_s = math.inf
+        for _ in range(1000):  # a flood fills no queue of the peer, and costs no call
+            stranger.send(b"currents")
+        sender.send(b"the next one")
+        assert listener.receive(UNLIMITED_S) == b"the next one"
+        listener._look_s = 0.0
+        assert listener.receive(0.0) == b""
+        assert listener.refused == {f"127.0.0.1:{stranger.port}": MOST_LOOKS}
+        assert lines == [f"the peer is 127.0.0.1:{sender.port}", f"refused: 127.0.0.1:{stranger.port}"]
         listener.send(b"answer")
         assert sender.receive(UNLIMITED_S) == b"answer"
         assert sender.receive(0.0) == b""
         assert stranger.receive(0.0) == b""
+
+
+def test_the_port_of_a_peer_is_not_shared(listener, sender):
+    sender.send(b"the peer")
+    assert listener.receive(UNLIMITED_S)
+    listener.accept()
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as other:
+        if hasattr(socket, "SO_REUSEPORT"):
+            other.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEPORT, 1)
+        with pytest.raises(OSError, match="in use"):
+            other.bind(("127.0.0.1", listener.port))
+
+
+def test_a_request_is_answered_and_makes_no_peer(listener, sender):
+    sender.send(b"request")
+    assert listener.receive(UNLIMITED_S)
+    listener.accept(is_peer=False)
+    listener.send(b"answer")
+    assert sender.receive(UNLIMITED_S) == b"answer"
+    with contextlib.closing(open_transport(f"udp://127.0.0.1:{listener.port}")) as other:
+        other.send(b"command")
+        assert listener.receive(UNLIMITED_S) == b"command"
+        listener.accept()
+        listener.send(b"answer")
+        assert other.receive(UNLIMITED_S) == b"answer"
+
+
+def test_many_refused_senders_are_counted_together(listener):
+    for port in range(MOST_NAMES + 5):
+        listener._sender = ("192.0.2.1", port)
+        listener.refuse()
+    assert len(listener.refused) == MOST_NAMES + 1
+    assert listener.refused["others"] == 5
 
 
 def test_nobody_at_the_address_is_silence():

@@ -34,7 +34,7 @@ static const double PI = 3.14159265358979323846;
 static const double PERIOD_S = 1e-3, LIMIT_A = 8.0, BANDWIDTH = 40.0; /* 1/s: a triple pole of the loop */
 static const double INERTIA[3] = {2.22e-3, 2.18e-3, 2.26e-3};         /* kg m^2 */
 
-typedef struct { uint32_t sequence, echo; uint16_t flags; double angle[3]; } Measurement;
+typedef struct { uint32_t sequence, echo, session; uint16_t flags; double angle[3]; } Measurement;
 
 /* Frames: CRC-16/CCITT-FALSE over all bytes before the checksum. */
 
@@ -48,7 +48,8 @@ static uint16_t crc16(const unsigned char *bytes, size_t count)
     return crc;
 }
 
-static size_t encode(unsigned char *out, uint32_t sequence, uint16_t flags, double t, const double *current)
+static size_t encode(unsigned char *out, uint32_t sequence, uint32_t session, uint16_t flags, double t,
+                     const double *current)
 {
     size_t n = 0;
     out[n++] = 0xA5, out[n++] = 0xC3;
@@ -56,6 +57,7 @@ static size_t encode(unsigned char *out, uint32_t sequence, uint16_t flags, doub
     memcpy(out + n, &flags, 2), n += 2;
     memcpy(out + n, &t, 8), n += 8;
     memcpy(out + n, current, 8 * GROUPS), n += 8 * GROUPS;
+    memcpy(out + n, &session, 4), n += 4;
     uint16_t crc = crc16(out, n);
     memcpy(out + n, &crc, 2);
     return n + 2;
@@ -63,14 +65,14 @@ static size_t encode(unsigned char *out, uint32_t sequence, uint16_t flags, doub
 
 static int decode(const unsigned char *in, size_t count, Measurement *m)
 {
-    /* start 2, sequence 4, echo 4, flags 2, time 8, angles 24, rates 24, currents, temperature 8, crc 2 */
-    const size_t size = 2 + 4 + 4 + 2 + 8 + 24 + 24 + 8 * GROUPS + 8 + 2;
+    /* start 2, sequence 4, echo 4, flags 2, time 8, angles 24, rates 24, currents, temperature 8, session 4, crc 2 */
+    const size_t size = 2 + 4 + 4 + 2 + 8 + 24 + 24 + 8 * GROUPS + 8 + 4 + 2;
     uint16_t crc;
     if (count != size || in[0] != 0xA5 || in[1] != 0x5A) return 0;
     memcpy(&crc, in + size - 2, 2);
     if (crc != crc16(in, size - 2)) return 0;
     memcpy(&m->sequence, in + 2, 4), memcpy(&m->echo, in + 6, 4), memcpy(&m->flags, in + 10, 2);
-    memcpy(m->angle, in + 20, 24);
+    memcpy(m->angle, in + 20, 24), memcpy(&m->session, in + size - 6, 4);
     return isfinite(m->angle[0]) && isfinite(m->angle[1]) && isfinite(m->angle[2]);
 }
 
@@ -214,7 +216,9 @@ int main(int count, char **arguments)
     Measurement m = {0};
     for (long tick = 0; tick <= ticks; tick++) {
         double t = PERIOD_S * (double)tick;
-        size_t size = encode(command, ++sequence, flags, t, current);
+        /* A request has a number of ours; the answer has that of the session. */
+        uint32_t session = flags == HELLO ? (uint32_t)time(NULL) | 1 : m.session;
+        size_t size = encode(command, ++sequence, session, flags, t, current);
         int attempts = 0;
         do {
             send(udp, command, size, 0);
@@ -236,7 +240,7 @@ int main(int count, char **arguments)
         control(t, m.angle, current);
     }
     memset(current, 0, sizeof current);
-    size_t size = encode(command, ++sequence, END, 0, current);
+    size_t size = encode(command, ++sequence, m.session, END, 0, current);
     for (int i = 0; i < 3; i++) send(udp, command, size, 0);
     printf("largest error in the second half: %.3f mrad\n", 1e3 * largest);
     close(udp);
