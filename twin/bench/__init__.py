@@ -24,7 +24,6 @@ from spheretwin.bench.command_queue import (
 from spheretwin.bench.commands import documentation, find_command
 from spheretwin.bench.cycle import CommandProcessor, Cycle, Thread
 from spheretwin.bench.folder import Folder
-from spheretwin.bench.history import Bins
 from spheretwin.bench.operators import Operators
 from spheretwin.bench.status import BenchStatus
 from spheretwin.models.actuator import Actuator
@@ -34,6 +33,7 @@ from spheretwin.scenario.sections import Scenario
 from spheretwin.scenario.writing import as_command, as_toml
 from spheretwin.session import Session
 from spheretwin.trajectories.trajectory import Shape
+from spheretwin.viz.bench.protocols import Bins
 
 # Period at which `until` looks at the status.
 POLL_s = 0.005

@@ -9,6 +9,7 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Callable
+from concurrent.futures import Future, wait
 from typing import Any
 
 from spheretwin.models.base.errors import InputError, exception_text
@@ -33,20 +34,16 @@ class Preparation:
     """
 
     def __init__(self, name: str, work: Callable[[], Any], limit_s: float | None = None) -> None:
-        self._name, self._work = name, work
-        self._limit_s = LIMIT_s if limit_s is None else limit_s
+        self._name, self._limit_s = name, LIMIT_s if limit_s is None else limit_s
         self._due_s = time.monotonic() + self._limit_s
-        self._lock, self._ended = threading.Lock(), threading.Event()
-        self._outcome: Any = None
-        self._error: Exception | None = None
-        self._abandoned = False
-        self._thread = threading.Thread(target=self._run, name=f"prepare {name}", daemon=True)
+        self._future: Future[Any] = Future()
+        self._thread = threading.Thread(target=self._run, args=(work,), name=f"prepare {name}", daemon=True)
         self._thread.start()
 
     @property
     def done(self) -> bool:
         """True if it has ended, or is too late."""
-        return self._ended.is_set() or time.monotonic() >= self._due_s
+        return self._future.done() or time.monotonic() >= self._due_s
 
     def result(self) -> Any:
         """Wait for the result, at most until the limit.
@@ -56,44 +53,31 @@ class Preparation:
         InputError
             It is too late.
         """
-        self._ended.wait(max(0.0, self._due_s - time.monotonic()))
-        with self._lock:
-            self._abandoned = not self._ended.is_set()
-        if self._abandoned:
-            raise InputError(
-                f"bench: expected {self._name} to be prepared within {self._limit_s:g} s, received nothing"
-            )
-        if self._error is not None:
-            raise self._error
-        return self._outcome
+        wait([self._future], max(0.0, self._due_s - time.monotonic()))
+        if self._future.done():
+            return self._future.result()
+        self._future.add_done_callback(_close)
+        raise InputError(
+            f"bench: expected {self._name} to be prepared within {self._limit_s:g} s, received nothing"
+        )
 
     def abandon(self) -> None:
         """Wait for its end for a moment; close a result that comes later."""
-        self._thread.join(END_s)
-        with self._lock:
-            self._abandoned = True
-            if self._ended.is_set():
-                _close(self._outcome)
+        wait([self._future], END_s)
+        self._future.add_done_callback(_close)
 
-    def _run(self) -> None:
-        outcome: Any = None
-        error: Exception | None = None
+    def _run(self, work: Callable[[], Any]) -> None:
         try:
-            outcome = self._work()
-        except Exception as raised:
-            error = raised
-        except BaseException as raised:  # code of the user may raise what would end the loop's thread
-            error = InputError(
-                f"bench: expected {self._name} to be prepared, received {exception_text(raised)}"
-            )
-        with self._lock:
-            self._outcome, self._error = outcome, error
-            self._ended.set()
-            if self._abandoned:
-                _close(outcome)
+            self._future.set_result(work())
+        except Exception as error:
+            self._future.set_exception(error)
+        except BaseException as error:  # code of the user may raise what would end the loop's thread
+            reason = f"bench: expected {self._name} to be prepared, received {exception_text(error)}"
+            self._future.set_exception(InputError(reason))
 
 
-def _close(outcome: Any) -> None:
+def _close(future: Future[Any]) -> None:
     """Close files that no command will use."""
-    if close := getattr(outcome, "close", None):
+    close = None if future.exception() else getattr(future.result(), "close", None)
+    if close:
         close()

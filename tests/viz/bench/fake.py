@@ -6,12 +6,11 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from spheretwin.bench.history import Bins
 from spheretwin.models import actuator as actuators
 from spheretwin.models.base.errors import InputError
 from spheretwin.viz.bench import server
 from spheretwin.viz.bench.page import Page
-from spheretwin.viz.bench.protocols import Choices, FieldSetting
+from spheretwin.viz.bench.protocols import Bins, Choices, FieldSetting
 
 GROUPS = 18
 
