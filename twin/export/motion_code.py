@@ -14,7 +14,6 @@ from typing import Any
 
 from spheretwin.export.c_text import header
 from spheretwin.models import joint_chain, kinematics, lagrangian
-from spheretwin.models.kinematics import Turns
 from spheretwin.models.lagrangian import InertiaEntries
 from spheretwin.models.symbolic import on_symbols, turns_by
 
@@ -100,12 +99,14 @@ def _called(function: str, *arguments: Any) -> Term:
     return Term(function, arguments)
 
 
+_turns = turns_by(lambda angle: _called("COSINE", angle), lambda angle: _called("SINE", angle))
+
+
 def _traced(function: Callable[..., Any]) -> Callable[..., Any]:
     """Return a function of the model on terms."""
-    turns = turns_by(lambda angle: _called("COSINE", angle), lambda angle: _called("SINE", angle))
     return on_symbols(
         function,
-        turns=turns,
+        turns=_turns,
         asin=lambda x: _called("ARC_SINE", x),
         atan2=lambda y, x: _called("ARC_TANGENT", y, x),
     )
@@ -122,13 +123,8 @@ def _filled(function: Callable[..., Any], *arguments: Any, results: int = 1) -> 
     return vectors if results > 1 else vectors[0]
 
 
-def _members(pointer: str, kind: Any) -> Any:
-    """Return a tuple of a kind with the members of a structure."""
-    return kind(*(Term(f"{pointer}->{name}") for name in kind._fields))
-
-
 Q, V, TORQUE, J = _vector("q"), _vector("v"), _vector("torque"), _vector("J", is_real=True)
-AT, MASS_MATRIX = _members("at", Turns), _members("M", InertiaEntries)
+MASS_MATRIX = InertiaEntries._make(Term(f"M->{name}") for name in InertiaEntries._fields)
 
 
 def _entries(name: str, vector: Iterable[Any]) -> Outputs:
@@ -143,18 +139,9 @@ def _inertia(M: InertiaEntries) -> Outputs:
     return {f"M->{name}": entry for name, entry in zip(M._fields, M, strict=True)}
 
 
-def _common(is_general: bool) -> list[str]:
-    return [
-        _function(
-            "rotation", "const T q[3], T R[3][3]", "R_SR",
-            _rows("R", _traced(kinematics.rotation_rows)(Q)),
-        ),
-        _function(
-            "solve_inertia", "const NAME(inertia) *M, const T torque[3], T x[3]",
-            "Solution x of M x = torque; M may be the sum of an inertia matrix and a diagonal one",
-            _entries("x", _traced(lagrangian.solve_inertia)(MASS_MATRIX, TORQUE, is_general)),
-        ),
-    ]  # fmt: skip
+def _rotation() -> str:
+    rows = _traced(kinematics.rotation_rows)(Q)
+    return _function("rotation", "const T q[3], T R[3][3]", "R_SR", _rows("R", rows))
 
 
 def plant_motion(joint: Any) -> str:
@@ -176,7 +163,12 @@ def plant_motion(joint: Any) -> str:
         on_hinges = _filled(kinematics.generalised_torque, Q, torque_S)
     acceleration = _traced(joint_chain.acceleration_at)(joint, inertia, weight, Q, V, TORQUE)
     functions = [
-        *_common(is_general),
+        _rotation(),
+        _function(
+            "solve_inertia", "const NAME(inertia) *M, const T torque[3], T x[3]",
+            "Solution x of M x = torque; M may be the sum of an inertia matrix and a diagonal one",
+            _entries("x", _traced(lagrangian.solve_inertia)(MASS_MATRIX, TORQUE, is_general)),
+        ),
         _function(
             "mass_matrix", "const st_parameters *p, const T q[3], NAME(inertia) *M",
             "Inertia matrix at a pose, kg m^2", _inertia(_traced(joint_chain.inertia_at)(joint, inertia, Q)),
@@ -207,17 +199,28 @@ def plant_motion(joint: Any) -> str:
 
 def controller_motion() -> str:
     """Return the header of the motion of a nominal model."""
-    torque_q, torque_S = _vector("torque_q"), _vector("torque_S")
+    torque_q, torque_S, rates = _vector("torque_q"), _vector("torque_S"), _vector("acceleration")
+    at = _turns(Q)
+    acceleration = _traced(lagrangian.acceleration_entries)(at, V, TORQUE, J, 0.0)
+    M, C = _traced(lagrangian.inertia_entries)(at, J), _traced(lagrangian.coriolis_rows)(at, V, J)
+    a, b, c = rates
+    inertial = (
+        M.alpha * a + M.alpha_beta * b + M.alpha_gamma * c,
+        M.alpha_beta * a + M.beta * b,
+        M.alpha_gamma * a + M.gamma * c,
+    )
+    torque = [of + row[0] * V[0] + row[1] * V[1] + row[2] * V[2] for of, row in zip(inertial, C, strict=True)]
+    motion = "const ST_NUMBER J[3], const T q[3], const T v[3], const T "
     functions = [
-        *_common(False),
+        _rotation(),
         _function(
-            "inertia_of", "const NAME(turns) *at, const ST_NUMBER J[3], NAME(inertia) *M",
-            "Inertia matrix about the principal axes, kg m^2",
-            _inertia(_traced(lagrangian.inertia_entries)(AT, J)),
+            "acceleration", f"{motion}torque[3], T acceleration[3]",
+            "Accelerations of the hinges under a torque on them, rad/s^2",
+            _entries("acceleration", acceleration),
         ),
         _function(
-            "coriolis", "const NAME(turns) *at, const T v[3], const ST_NUMBER J[3], T C[3][3]",
-            "Coriolis matrix in Christoffel form", _rows("C", _traced(lagrangian.coriolis_rows)(AT, V, J)),
+            "motion_torque", f"{motion}acceleration[3], T torque[3]",
+            "Torque on the hinges of a motion, N m", _entries("torque", torque),
         ),
         _function(
             "generalised_torque", "const T q[3], const T torque_S[3], T torque_q[3]",

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Cosines and sines of a pose, motion, and torque matrix, for one type of numbers.
+/* Motion and torque matrix, for one type of numbers.
  *
  * The file is included once for each type T. NAME(x) gives the functions names of their own, RE(x) is the
  * real part of a number. A model header defines the sizes and tables with the prefix ST_.
@@ -7,24 +7,8 @@
  */
 
 typedef struct {
-    T ca, sa, cb, sb, cg, sg;
-} NAME(turns); /* cosines and sines of a pose */
-
-typedef struct {
     T alpha, beta, gamma, alpha_beta, alpha_gamma, beta_gamma;
 } NAME(inertia); /* entries of the inertia matrix, kg m^2 */
-
-static inline NAME(turns) NAME(turns_of)(const T q[3])
-{
-    NAME(turns) at;
-    at.ca = COSINE(q[0]);
-    at.sa = SINE(q[0]);
-    at.cb = COSINE(q[1]);
-    at.sb = SINE(q[1]);
-    at.cg = COSINE(q[2]);
-    at.sg = SINE(q[2]);
-    return at;
-}
 
 #include ST_MOTION /* generated */
 

@@ -5,24 +5,17 @@
 static void st_feed_forward(
     st_controller *controller, st_real reference[3][3], st_real applied_torque[3], st_real fed[3])
 {
-    const st_turns at = st_turns_of(reference[0]);
-    const st_real *v = reference[1], *a = reference[2], f = ST_FEED_FORWARD_FRACTION;
-    st_inertia M;
-    st_real C[3][3], inertial[3];
+    const st_real *v = reference[1], f = ST_FEED_FORWARD_FRACTION;
+    st_real inertial[3];
     int i, row;
-    st_inertia_of(&at, ST_FEED_FORWARD_INERTIA, &M);
-    st_coriolis(&at, v, ST_FEED_FORWARD_INERTIA, C);
-    inertial[0] = M.alpha * a[0] + M.alpha_beta * a[1] + M.alpha_gamma * a[2];
-    inertial[1] = M.alpha_beta * a[0] + M.beta * a[1];
-    inertial[2] = M.alpha_gamma * a[0] + M.gamma * a[2];
+    st_motion_torque(ST_FEED_FORWARD_INERTIA, reference[0], v, reference[2], inertial);
     for (i = 0; i < 3; i++) {
         const st_real smoothing = ST_FEED_FORWARD_SMOOTHING;
         const st_real k = ST_FEED_FORWARD_VISCOUS[i]
             + ST_FEED_FORWARD_COULOMB[i] / st_sqrt(v[i] * v[i] + smoothing * smoothing);
-        const st_real coriolis = C[i][0] * v[0] + C[i][1] * v[1] + C[i][2] * v[2];
         applied_torque[i] -= f * controller->fed_forward[ST_FED_FORWARD - 1][i]
             + (1 - f) * controller->fed_forward[ST_FED_FORWARD - 2][i];
-        fed[i] = k * v[i] + ST_FEED_FORWARD_SHARE[i] * (inertial[i] + coriolis);
+        fed[i] = k * v[i] + ST_FEED_FORWARD_SHARE[i] * inertial[i];
         for (row = ST_FED_FORWARD - 1; row > 0; row--) {
             controller->fed_forward[row][i] = controller->fed_forward[row - 1][i];
         }

@@ -14,43 +14,21 @@ enum {
     ST_HISTORY_ROWS = (ST_LAW_STATE - ST_HISTORY) / 3
 };
 
-/* Pose of the nominal model; without coupling that of the upright rotor. */
-static st_turns st_operating_point(const st_real q[3])
-{
-    static const st_real upright[3] = {0, 0, 0};
-    return st_turns_of(ST_LAW_PARAMETERS[ST_COUPLED] != 0 ? q : upright);
-}
+static const st_real st_rest[3] = {0, 0, 0};
 
-static void st_inertial_torque(const st_turns *at, const st_real acceleration[3], st_real torque[3])
+/* Pose or rates for the nominal model; without coupling those of the upright rotor at rest. */
+static const st_real *st_operating(const st_real motion[3])
 {
-    st_inertia M;
-    st_inertia_of(at, ST_LAW_PARAMETERS + ST_INERTIA, &M);
-    torque[0] = M.alpha * acceleration[0] + M.alpha_beta * acceleration[1] + M.alpha_gamma * acceleration[2];
-    torque[1] = M.alpha_beta * acceleration[0] + M.beta * acceleration[1];
-    torque[2] = M.alpha_gamma * acceleration[0] + M.gamma * acceleration[2];
-}
-
-/* Coriolis matrix at a motion; 0 without coupling. */
-static void st_operating_coriolis(const st_turns *at, const st_real v[3], st_real C[3][3])
-{
-    static const st_real rest[3] = {0, 0, 0};
-    st_coriolis(at, ST_LAW_PARAMETERS[ST_COUPLED] != 0 ? v : rest, ST_LAW_PARAMETERS + ST_INERTIA, C);
+    return ST_LAW_PARAMETERS[ST_COUPLED] != 0 ? motion : st_rest;
 }
 
 /* Advance a motion by a time under a constant torque, with the initial acceleration. */
 static void st_advance_motion(st_real q[3], st_real v[3], const st_real torque[3], st_real time_s)
 {
-    const st_turns at = st_operating_point(q);
     const st_real half = time_s * time_s / 2;
-    st_inertia M;
-    st_real C[3][3], net[3], acceleration[3];
+    st_real acceleration[3];
     int i;
-    st_inertia_of(&at, ST_LAW_PARAMETERS + ST_INERTIA, &M);
-    st_operating_coriolis(&at, v, C);
-    for (i = 0; i < 3; i++) {
-        net[i] = torque[i] - C[i][0] * v[0] - C[i][1] * v[1] - C[i][2] * v[2];
-    }
-    st_solve_inertia(&M, net, acceleration);
+    st_acceleration(ST_LAW_PARAMETERS + ST_INERTIA, st_operating(q), st_operating(v), torque, acceleration);
     for (i = 0; i < 3; i++) {
         q[i] = q[i] + time_s * v[i] + half * acceleration[i];
         v[i] = v[i] + time_s * acceleration[i];
@@ -64,7 +42,6 @@ static void st_observe(const st_real measurement[3][3], st_real *state)
     const st_real period = parameters[ST_PERIOD];
     st_real torque[3], innovation[3], unexplained[3], learnt[3];
     st_real *q = state + ST_ANGLE, *v = state + ST_RATE;
-    st_turns at;
     int i;
     if (!(state[ST_STARTED] != 0)) {
         state[ST_STARTED] = 1;
@@ -91,8 +68,7 @@ static void st_observe(const st_real measurement[3][3], st_real *state)
         v[i] = v[i] + of_rate * innovation[i];
         unexplained[i] = of_acceleration * innovation[i];
     }
-    at = st_operating_point(q);
-    st_inertial_torque(&at, unexplained, learnt);
+    st_motion_torque(parameters + ST_INERTIA, st_operating(q), st_rest, unexplained, learnt);
     for (i = 0; i < 3; i++) {
         state[ST_OBSERVED + i] += learnt[i];
     }
@@ -189,8 +165,7 @@ static st_real st_desired_acceleration(
 static void st_law(
     const st_real reference[3][3], const st_real measurement[3][3], st_real *state, st_real torque[3])
 {
-    st_real q[3], v[3], acceleration[3], C[3][3];
-    st_turns at;
+    st_real q[3], v[3], acceleration[3];
     int adapts, i;
     st_observe(measurement, state);
     st_motion_ahead(state, q, v);
@@ -198,11 +173,8 @@ static void st_law(
     for (i = 0; i < 3; i++) {
         acceleration[i] = st_desired_acceleration(i, q[i], v[i], adapts, reference, state);
     }
-    at = st_operating_point(q);
-    st_inertial_torque(&at, acceleration, torque);
-    st_operating_coriolis(&at, v, C);
+    st_motion_torque(ST_LAW_PARAMETERS + ST_INERTIA, st_operating(q), st_operating(v), acceleration, torque);
     for (i = 0; i < 3; i++) {
-        torque[i] = torque[i] + C[i][0] * v[0] + C[i][1] * v[1] + C[i][2] * v[2];
         torque[i] -= state[ST_OBSERVED + i];
     }
     st_store_command(state + ST_HISTORY, ST_HISTORY_ROWS, torque);

@@ -10,60 +10,56 @@
 #include "st_plant_bounds.h" /* generated */
 #include "st_plant_tables.h"
 
+#define RE(x) NAME(real)(x)
+#define SINE NAME(sine)
+#define COSINE NAME(cosine)
+#define ROOT NAME(root)
+#define ARC_SINE NAME(arc_sine)
+#define ARC_TANGENT NAME(arc_tangent)
+
 /* Real numbers. */
 #define T double
 #define NAME(x) st_##x
-#define RE(x) (x)
-#define SINE sin
-#define COSINE cos
-#define ROOT sqrt
-#define ARC_SINE asin
-#define ARC_TANGENT atan2
+#define st_real(x) (x)
+#define st_sine sin
+#define st_cosine cos
+#define st_root sqrt
+#define st_arc_sine asin
+#define st_arc_tangent atan2
 #include "st_equations.h"
 #include "st_rates.h"
 #undef T
 #undef NAME
-#undef RE
-#undef SINE
-#undef COSINE
-#undef ROOT
-#undef ARC_SINE
-#undef ARC_TANGENT
 
 /* Complex numbers: friction needs products; as dual numbers, with a tiny imaginary part, they carry a
  * derivative through the same formulas without a difference of near values. */
 typedef double complex st_complex;
 #define T st_complex
 #define NAME(x) st_##x##_complex
-#define RE(x) creal(x)
-#define SINE st_sine
-#define COSINE st_cosine
-#define ROOT st_root
-#define ARC_SINE st_arc_sine
-#define ARC_TANGENT st_arc_tangent
+#define st_real_complex creal
 static st_complex st_dual(double value, double slope)
 {
     return value + slope * _Complex_I;
 }
-static st_complex st_sine(st_complex x)
+static st_complex st_sine_complex(st_complex x)
 {
     return st_dual(sin(creal(x)), cos(creal(x)) * cimag(x));
 }
-static st_complex st_cosine(st_complex x)
+static st_complex st_cosine_complex(st_complex x)
 {
     return st_dual(cos(creal(x)), -sin(creal(x)) * cimag(x));
 }
-static st_complex st_root(st_complex x)
+static st_complex st_root_complex(st_complex x)
 {
     const double root = sqrt(creal(x));
     return st_dual(root, cimag(x) / (2 * root));
 }
 #if ST_GENERAL_JOINT
-static st_complex st_arc_sine(st_complex x)
+static st_complex st_arc_sine_complex(st_complex x)
 {
     return st_dual(asin(creal(x)), cimag(x) / sqrt(1 - creal(x) * creal(x)));
 }
-static st_complex st_arc_tangent(st_complex y, st_complex x)
+static st_complex st_arc_tangent_complex(st_complex y, st_complex x)
 {
     const double a = creal(x), b = creal(y);
     return st_dual(atan2(b, a), (a * cimag(y) - b * cimag(x)) / (a * a + b * b));
@@ -237,14 +233,6 @@ static st_shares st_relaxed(double duration_s, double time_constant_s)
     return time_constant_s > 0 ? st_relaxation(duration_s / time_constant_s) : settled;
 }
 
-/* M v, N m s. */
-static void st_momentum(const st_inertia *M, const double v[3], double result[3])
-{
-    result[0] = M->alpha * v[0] + M->alpha_beta * v[1] + M->alpha_gamma * v[2];
-    result[1] = M->alpha_beta * v[0] + M->beta * v[1] + M->beta_gamma * v[2];
-    result[2] = M->alpha_gamma * v[0] + M->beta_gamma * v[1] + M->gamma * v[2];
-}
-
 /* Advance the rates by a time under friction alone: (1 + X + X^2/2)^-1 with X = time M^-1 diag(k), where k are
  * the friction factors at the rates in the middle. It neither amplifies nor reverses a motion. */
 static void st_slow_down(const st_parameters *p, double time_s, const double q[3], double v[3])
@@ -256,7 +244,9 @@ static void st_slow_down(const st_parameters *p, double time_s, const double q[3
     st_complex before_complex[3], slowed[3];
     int i;
     st_mass_matrix(p, q, &M);
-    st_momentum(&M, v, before);
+    before[0] = M.alpha * v[0] + M.alpha_beta * v[1] + M.alpha_gamma * v[2];
+    before[1] = M.alpha_beta * v[0] + M.beta * v[1] + M.beta_gamma * v[2];
+    before[2] = M.alpha_gamma * v[0] + M.beta_gamma * v[1] + M.gamma * v[2];
     damped = M;
     damped.alpha += time_s / 2 * st_friction_factor(p, 0, v[0]);
     damped.beta += time_s / 2 * st_friction_factor(p, 1, v[1]);
@@ -265,8 +255,7 @@ static void st_slow_down(const st_parameters *p, double time_s, const double q[3
     damped_complex.alpha = M.alpha + pole * time_s * st_friction_factor(p, 0, middle[0]);
     damped_complex.beta = M.beta + pole * time_s * st_friction_factor(p, 1, middle[1]);
     damped_complex.gamma = M.gamma + pole * time_s * st_friction_factor(p, 2, middle[2]);
-    damped_complex.alpha_beta = M.alpha_beta;
-    damped_complex.alpha_gamma = M.alpha_gamma;
+    damped_complex.alpha_beta = M.alpha_beta, damped_complex.alpha_gamma = M.alpha_gamma;
     damped_complex.beta_gamma = M.beta_gamma;
     for (i = 0; i < 3; i++) {
         before_complex[i] = before[i];
