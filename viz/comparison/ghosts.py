@@ -12,9 +12,9 @@ from rerun.chunk import Chunk
 
 from spheretwin.models.telemetry.table import Table
 from spheretwin.viz import theme
-from spheretwin.viz.recording.part import RecordingPart, RecordingSubject, scalars, strips, time_index
+from spheretwin.viz.recording.part import RecordingPart, RecordingSubject, scalars, time_index
 from spheretwin.viz.recording.recorder import MOST_ROWS
-from spheretwin.viz.recording.scene3d import Frames
+from spheretwin.viz.recording.scene3d import Frames, send_path, style_path
 from spheretwin.viz.scene.entities import body_quaternions, shaft_tip
 from spheretwin.viz.scene.meshes import WORLD
 
@@ -120,31 +120,6 @@ def style_point(recording: rr.RecordingStream, entity: str, label: str, colour: 
 def send_point(recording: rr.RecordingStream, entity: str, t_s: Array, positions: Array) -> None:
     """Send where a point is, (n, 3) in m."""
     recording.send_columns(entity, time_index(t_s), rr.Points3D.columns(positions=positions))
-
-
-def style_path(recording: rr.RecordingStream, entity: str, colour: theme.Colour) -> None:
-    """Log the style of a path that is sent later."""
-    style = rr.LineStrips3D.from_fields(colors=[colour], radii=rr.Radius.ui_points(1.5))
-    recording.log(entity, style, static=True)
-
-
-def send_path(
-    recording: rr.RecordingStream, entity: str, t_s: Array, positions: Array, before: Array
-) -> None:
-    """Send the path of a point as a short segment a row.
-
-    Parameters
-    ----------
-    recording : RecordingStream
-    entity : str
-    t_s : (n,) array, s
-    positions : (n, 3) array, m
-    before : (1, 3) or (0, 3) array, m
-        Its position before, if there is one.
-    """
-    starts = np.concatenate([before if len(before) else positions[:1], positions[:-1]])
-    segments = strips(np.stack([starts, positions], axis=1))
-    recording.send_columns(entity, time_index(t_s), rr.LineStrips3D.columns(strips=segments))
 
 
 ROTOR = f"{WORLD}/rotor"

@@ -20,6 +20,7 @@ from spheretwin.viz.figures.style import (
     law_keys,
     legend_below,
     name_axes,
+    name_rows,
     on_errors,
     sheet,
     styles,
@@ -134,10 +135,8 @@ def margins(
     """
     across = min(3, len(panels))
     down = -(-len(panels) // across)
-    figure, grid = sheet(1.2 + 2.7 * down, down, across, title, 1.2 * WIDTH_in, sharey=True)
+    figure, grid = sheet(1.2 + 2.7 * down, down, across, title, 1.2 * WIDTH_in, len(panels), sharey=True)
     looks = styles(list(labels))
-    for spare in grid.flat[len(panels) :]:
-        spare.set_visible(False)
     for axes, (name, by_law) in zip(grid.flat, panels.items(), strict=False):
         for law, values in by_law.items():
             step, error_mrad, within_bound = values[:, 0], 1e3 * values[:, 1], values[:, 2] > 0
@@ -185,12 +184,8 @@ def ratios(rows: Mapping[str, ByLaw], labels: Mapping[str, str], quantity: str, 
             axes.plot(values, np.full(len(values), at), style.marker, color=style.colour, markersize=5,
                       alpha=0.8, label=labels[law] if y == 0 else None)  # fmt: skip
     axes.axvline(1.0, color=INK, linewidth=1.2, linestyle="--", label="the paper")
-    axes.set_xscale("log")
-    axes.set_yticks(range(len(rows)), list(rows))
-    axes.set_ylim(len(rows) - 0.5, -0.5)
-    axes.set_xlabel(quantity)
+    name_rows(axes, list(rows), quantity)
     axes.xaxis.set_major_formatter("{x:g}")
-    faint_grid(axes, axis="x")
     for y in range(1, len(rows)):
         axes.axhline(y - 0.5, color=FAINT, linewidth=0.4)
     legend_below(figure, [axes])

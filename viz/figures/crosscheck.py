@@ -13,7 +13,17 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from spheretwin.models.telemetry.signals import ANGLES
-from spheretwin.viz.figures.style import AXES, BROKEN, INK, SERIES, faint_grid, legend_below, name_axes, sheet
+from spheretwin.viz.figures.style import (
+    AXES,
+    BROKEN,
+    INK,
+    SERIES,
+    faint_grid,
+    legend_below,
+    name_axes,
+    name_rows,
+    sheet,
+)
 
 Array = NDArray[np.float64]
 
@@ -46,12 +56,8 @@ def margins(values: Mapping[str, float], title: str) -> Figure:
             axes.plot(shares[chosen], rows[chosen], "o", color=colour, markersize=6, label=label)
             axes.hlines(rows[chosen], LEAST_SHARE, shares[chosen], color=colour, linewidth=1, alpha=0.5)
     axes.axvline(1.0, color=INK, linestyle="--", linewidth=1.2, label="bound")
-    axes.set_xscale("log")
+    name_rows(axes, list(values), "value over bound")
     axes.set_xlim(LEAST_SHARE, 10 * max(1.0, *shares))
-    axes.set_yticks(rows, list(values))
-    axes.set_ylim(len(values) - 0.4, -0.6)
-    axes.set_xlabel("value over bound")
-    faint_grid(axes, axis="x")
     legend_below(figure, [axes], 3)
     return figure
 
@@ -84,11 +90,7 @@ def spreads(
     for row, bound in enumerate(bounds.values()):
         axes.plot([bound, bound], [row - 0.36, row + 0.36], color=INK, linewidth=1.6, linestyle="--",
                   label="bound" if row == 0 else None)  # fmt: skip
-    axes.set_xscale("log")
-    axes.set_yticks(range(len(quantities)), quantities)
-    axes.set_ylim(len(quantities) - 0.5, -0.5)
-    axes.set_xlabel("relative difference")
-    faint_grid(axes)
+    name_rows(axes, quantities, "relative difference")
     legend_below(figure, [axes])
     return figure
 

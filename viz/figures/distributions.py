@@ -48,9 +48,7 @@ def distributions(
     title : str
     """
     down, colours = -(-len(figures) // ACROSS), law_colours(list(totals))
-    figure, grid = sheet(1.0 + 2.1 * down, down, ACROSS, title, 1.15 * WIDTH_in, sharey=True)
-    for spare in grid.flat[len(figures) :]:
-        spare.set_visible(False)
+    figure, grid = sheet(1.0 + 2.1 * down, down, ACROSS, title, 1.15 * WIDTH_in, len(figures), sharey=True)
     for axes, (name, by_law) in zip(grid.flat, figures.items(), strict=False):
         for law, values in by_law.items():
             numbers = np.sort(values)
@@ -114,9 +112,7 @@ def scatters(
     across, colours = min(4, len(axes_values)), law_colours(list(figure_values))
     down = -(-len(axes_values) // across)
     width_in = max(2.6 * across, WIDTH_in / 2)
-    figure, grid = sheet(1.1 + 2.2 * down, down, across, title, width_in, sharey=True)
-    for spare in grid.flat[len(axes_values) :]:
-        spare.set_visible(False)
+    figure, grid = sheet(1.1 + 2.2 * down, down, across, title, width_in, len(axes_values), sharey=True)
     for axes, (name, by_law) in zip(grid.flat, axes_values.items(), strict=False):
         for law, x in by_law.items():
             _scatter(axes, x, figure_values[law], colours[law], law)

@@ -133,11 +133,9 @@ def maps(
     lost = any(np.any(panel.lost) for panel in panels.values())
     title = f"{title}\n× not all runs completed" if lost else title
     width_in, height_in = max(WIDTH_in, across * (cells[1] + 0.5) + 1.6), 1.5 + down * (cells[0] + 0.9)
-    figure, grid = sheet(height_in, down, across, title, width_in, sharex=True, sharey=True)
+    figure, grid = sheet(height_in, down, across, title, width_in, count, sharex=True, sharey=True)
     values = np.concatenate([panel.values.ravel() for panel in panels.values()])
     scale = _scale(values)
-    for spare in grid.flat[count:]:
-        spare.set_visible(False)
     for axes, (law, panel) in zip(grid.flat, panels.items(), strict=False):
         image = axes.imshow(panel.values, norm=scale, cmap="viridis", aspect="auto", origin="lower")
         _write_map_cells(axes, panel, scale)

@@ -19,6 +19,7 @@ from spheretwin.viz.figures.style import (
     WIDTH_in,
     faint_grid,
     legend_below,
+    name_rows,
     on_errors,
     sheet,
     styles,
@@ -69,12 +70,9 @@ def lines(groups: Sequence[ErrorGroup], quantity: str, title: str) -> Figure:
             _spread(panel, row + 0.13, line.true_deg, colour, "white")
         if group.paper_deg:
             panel.axvline(group.paper_deg, color=INK, linestyle=":", linewidth=1.4, zorder=1)
-        panel.set_yticks(range(len(group.lines)), [line.label for line in group.lines])
-        panel.set_ylim(len(group.lines) - 0.5, -0.5)
-        panel.set_xscale("log")
+        name_rows(panel, [line.label for line in group.lines])
         panel.xaxis.set_major_formatter("{x:g}")
         panel.xaxis.set_minor_formatter(NullFormatter())
-        faint_grid(panel, 0.3, which="both", axis="x")
         panel.set_title(group.label, fontsize="small", loc="left", color=colour, fontweight="bold")
     panels[-1].set_xlabel(quantity)
     for inside, label in ((INK, "measured"), ("white", "true")):

@@ -175,13 +175,28 @@ def draw_line(
 
 def sheet(
     height_in: float, rows: int = 1, columns: int = 1, title: str = "", width_in: float = WIDTH_in,
-    **options: Any,
+    count: int | None = None, **options: Any,
 ) -> tuple[Figure, NDArray[Any]]:  # fmt: skip
-    """Return a figure with a title and its axes by row and column; options as of `Figure.subplots`."""
+    """Return a figure with a title and its axes by row and column; options as of `Figure.subplots`.
+
+    Axes beyond a count are invisible.
+    """
     figure = Figure(figsize=(width_in, height_in), layout="constrained")
     if title:
         figure.suptitle(title, fontsize="medium")
-    return figure, figure.subplots(rows, columns, squeeze=False, **options)
+    grid: NDArray[Any] = figure.subplots(rows, columns, squeeze=False, **options)
+    for spare in grid.flat[grid.size if count is None else count :]:
+        spare.set_visible(False)
+    return figure, grid
+
+
+def name_rows(axes: Axes, names: Sequence[str], x: str = "") -> None:
+    """Name the rows of a figure from the top, above a logarithmic axis."""
+    axes.set_yticks(range(len(names)), names)
+    axes.set_ylim(len(names) - 0.5, -0.5)
+    axes.set_xscale("log")
+    axes.set_xlabel(x)
+    faint_grid(axes, axis="x")
 
 
 def legend_below(

@@ -30,6 +30,8 @@ from spheretwin.viz.scene.entities import (
 )
 from spheretwin.viz.scene.meshes import FAILURE, FAILURE_TEXT, TORQUES, WORLD
 
+Array = NDArray[np.float64]
+
 LARGEST_rad = 1e6
 """Beyond it a pose is meaningless, and its sine has no correct digits."""
 
@@ -52,7 +54,7 @@ class Frames(FirstRows):
         return first[posed(rows[angles][first])]
 
 
-def posed(q: NDArray[np.float64]) -> NDArray[np.bool_]:
+def posed(q: Array) -> NDArray[np.bool_]:
     """Return True for each pose; the last rows of a run that diverged may have none."""
     small: NDArray[np.bool_] = np.all(np.abs(q) < LARGEST_rad, axis=1)
     return small
@@ -169,11 +171,40 @@ class Torques(RecordingPart):
         return ("gravity",) if self.subject.facts.payload_kg else ()
 
 
-def _gravity(facts: RunFacts) -> NDArray[np.float64]:
+def _gravity(facts: RunFacts) -> Array:
     """Gravity in the stator frame, (3,) in m/s²."""
     if facts.gravity_m_s2 is not None:
         return np.array([0.0, 0.0, -facts.gravity_m_s2])
     return np.array(mjcf.gravity(mjcf.read(facts.mjcf).described.opt))
+
+
+def style_path(recording: rr.RecordingStream, entity: str, colour: theme.Colour, width: float = 1.5) -> None:
+    """Log the style of a path that is sent later."""
+    style = rr.LineStrips3D.from_fields(colors=[colour], radii=rr.Radius.ui_points(width))
+    recording.log(entity, style, static=True)
+
+
+def send_path(
+    recording: rr.RecordingStream,
+    entity: str,
+    t_s: Array,
+    positions: Array,
+    before: Array,
+) -> None:
+    """Send the path of a point as a short segment a row.
+
+    Parameters
+    ----------
+    recording : RecordingStream
+    entity : str
+    t_s : (n,) array, s
+    positions : (n, 3) array, m
+    before : (1, 3) or (0, 3) array, m
+        Its position before, if there is one.
+    """
+    starts = np.concatenate([before if len(before) else positions[:1], positions[:-1]])
+    segments = strips(np.stack([starts, positions], axis=1))
+    recording.send_columns(entity, time_index(t_s), rr.LineStrips3D.columns(strips=segments))
 
 
 class Traces(RecordingPart):
@@ -182,14 +213,12 @@ class Traces(RecordingPart):
     def __init__(self, subject: RecordingSubject) -> None:
         super().__init__(subject)
         self._frames = {trace: Frames(trace.rate_Hz) for trace in TRACES}
-        self._last: dict[TipTrace, NDArray[np.float64]] = {}
+        self._last: dict[TipTrace, Array] = {}
 
     def begin(self, recording: rr.RecordingStream) -> None:
         """Log the style of each trace."""
         for trace in TRACES:
-            width = rr.Radius.ui_points(trace.width)
-            style = rr.LineStrips3D.from_fields(colors=[trace.colour], radii=width)
-            recording.log(trace.entity, style, static=True)
+            style_path(recording, trace.entity, trace.colour, trace.width)
 
     def write(self, recording: rr.RecordingStream, rows: Table) -> None:
         """Record the ticks that fall on a frame."""
@@ -198,12 +227,7 @@ class Traces(RecordingPart):
             if len(new):
                 self._send(recording, trace, rows["t_s"][new], rows[trace.signal][new])
 
-    def _send(
-        self, recording: rr.RecordingStream, trace: TipTrace, t_s: NDArray[np.float64], q: NDArray[np.float64]
-    ) -> None:
+    def _send(self, recording: rr.RecordingStream, trace: TipTrace, t_s: Array, q: Array) -> None:
         tips = shaft_tip(q, self.subject.actuator)
-        before = np.concatenate([self._last.get(trace, tips[:1]), tips[:-1]])
+        send_path(recording, trace.entity, t_s, tips, self._last.get(trace, tips[:1]))
         self._last[trace] = tips[-1:]
-        segments = np.stack([before, tips], axis=1)  # (n, 2, 3)
-        columns = rr.LineStrips3D.columns(strips=strips(segments))
-        recording.send_columns(trace.entity, time_index(t_s), columns)
