@@ -72,7 +72,7 @@ def run(options: argparse.Namespace) -> bool:
     if options.json:
         print_json({**_figures(result), "logs": {log.name: log.digest for log in logs}})
     else:
-        _print(result)
+        _print(result, is_suggesting=options.suggest)
     written = []
     if options.report:
         command = f"spheretwin identify {' '.join(map(str, options.logs))}"
@@ -101,13 +101,7 @@ def _design(options: argparse.Namespace) -> bool:
     given = {"duration_s": options.window, "candidates": options.candidates, "payloads_kg": options.payload}
     settings = DesignSettings(**{name: value for name, value in given.items() if value})
     names = options.parameter or list(DEFAULT)
-    excitation = design(
-        scenario,
-        names,
-        changes_of(options),
-        settings,
-        tracked("design"),
-    )
+    excitation = design(scenario, names, changes_of(options), settings, tracked("design"))
     written = []
     if options.out:
         save_text(options.out, as_toml(excitation.scenario))
@@ -116,20 +110,10 @@ def _design(options: argparse.Namespace) -> bool:
         save_text(options.currents, _currents(excitation.runs[0]))
         written.append(options.currents)
     if options.json:
-        print_json(
-            {
-                "deviations": excitation.deviations,
-                "nutation": excitation.reference,
-                "narrower": excitation.narrower,
-            }
-        )
+        figures = {"deviations": excitation.deviations, "nutation": excitation.reference}
+        print_json({**figures, "narrower": excitation.narrower})
         return True
-    rows = [
-        [name, f"{value:.3g}", f"{excitation.reference[name]:.3g}", f"{excitation.narrower[name]:.2f}"]
-        for name, value in excitation.deviations.items()
-    ]
-    head = ["parameter", "standard deviation", "with the nutation", "times narrower"]
-    runs.print_rows("design", head, rows, 1)
+    runs.print_rows(*report.design_table(excitation))
     runs.print_written(written)
     return True
 
@@ -146,25 +130,20 @@ def _currents(run: Table) -> str:
 
 
 def _figures(result: Identified) -> dict[str, object]:
+    fits = {"train": result.train, "held_out": result.held_out}
     return {
         "accepted": result.accepted,
         "nothing_to_correct": result.nothing_to_correct,
-        "parameters": {
-            name: {"value": one.value, "interval": one.interval, "unit": one.unit, "widening": one.widening}
-            for name, one in result.parameters.items()
-        },
-        "refused": [{"parameters": list(one.parameters), "why": one.why} for one in result.refused],
-        "correlations": list(result.correlations),
-        "chi2": {
-            "train": result.train.chi2 if result.train else None,
-            "held_out": result.held_out.chi2 if result.held_out else None,
-        },
+        "parameters": result.parameters,
+        "refused": result.refused,
+        "correlations": result.correlations,
+        "chi2": {name: fit.chi2 if fit else None for name, fit in fits.items()},
         "improvement": result.improvement,
         "suggestions": result.suggestions,
     }
 
 
-def _print(result: Identified) -> None:
+def _print(result: Identified, *, is_suggesting: bool) -> None:
     if result.parameters:
         runs.print_rows(*report.parameter_table(result))
     for line in result.correlations:
@@ -177,3 +156,5 @@ def _print(result: Identified) -> None:
         )
     if result.suggestions:
         runs.print_rows(*report.suggestion_table(result.suggestions[: report.MOST_ROWS]))
+    elif is_suggesting:
+        print(report.NO_SUGGESTION)

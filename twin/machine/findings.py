@@ -43,12 +43,8 @@ class Finding(NamedTuple):
     advice: str
 
 
-class Stated(NamedTuple):
-    """Severity, place and advice of a finding."""
-
-    severity: str
-    where: str
-    advice: str
+Stated = tuple[str, str, str]
+"""Severity, place and advice of a finding."""
 
 
 @dataclass(frozen=True)
@@ -124,17 +120,17 @@ def _time_unit(evidence: Evidence) -> Iterator[Stated]:
             if LOWEST_RATE_Hz <= factor * rate_Hz <= 1e5
         ]  # fmt: skip
         advice = f"set time.unit to {fits[0]}" if fits else "record at 1000 Hz"
-        yield Stated(ERROR, f"t_s: {rate_Hz:.3g} rows per second", f"{advice}; t_s is in seconds")
+        yield (ERROR, f"t_s: {rate_Hz:.3g} rows per second", f"{advice}; t_s is in seconds")
 
 
 def _rate(evidence: Evidence) -> Iterator[Stated]:
     rate_Hz, control_Hz = 1 / evidence.period_s, 1 / evidence.model.scenario.controller.period_s
     if SLOWEST_CLOCK_Hz < rate_Hz < LOWEST_RATE_Hz:
         advice = f"record at the control rate, {control_Hz:g} Hz; {LOWEST_RATE_Hz:g} Hz are the least"
-        yield Stated(ERROR, f"t_s: {rate_Hz:.4g} Hz", advice)
+        yield (ERROR, f"t_s: {rate_Hz:.4g} Hz", advice)
     elif rate_Hz >= LOWEST_RATE_Hz and rate_Hz < control_Hz * (1 - RATE_TOLERANCE):
         where = f"t_s: {rate_Hz:.4g} Hz, control at {control_Hz:g} Hz"
-        yield Stated(WARNING, where, "record each control tick: the currents between the rows are unknown")
+        yield (WARNING, where, "record each control tick: the currents between the rows are unknown")
 
 
 def _time_order(evidence: Evidence) -> Iterator[Stated]:
@@ -142,13 +138,13 @@ def _time_order(evidence: Evidence) -> Iterator[Stated]:
         back = np.flatnonzero(np.diff(t_s) < 0)
         if len(back):
             where = f"{name}: {len(back)} times, first after {t_s[back[0]]:.6g} s"
-            yield Stated(
+            yield (
                 ERROR,
                 where,
                 "record with one monotonic clock; state time.wrap for a counter that starts again",
             )
     if lost := np.count_nonzero(~np.isfinite(evidence.log.t_s)):
-        yield Stated(ERROR, f"t_s: {lost} rows without a time", "remove these rows")
+        yield (ERROR, f"t_s: {lost} rows without a time", "remove these rows")
 
 
 def _duplicates(evidence: Evidence) -> Iterator[Stated]:
@@ -156,7 +152,7 @@ def _duplicates(evidence: Evidence) -> Iterator[Stated]:
         same = np.flatnonzero(np.diff(t_s) == 0)
         if len(same):
             where = f"{name}: {len(same)} rows, first at {t_s[same[0]]:.6g} s"
-            yield Stated(ERROR, where, "remove rows that repeat a time, or record finer times")
+            yield (ERROR, where, "remove rows that repeat a time, or record finer times")
 
 
 def _gap_rows(evidence: Evidence) -> Iterator[Stated]:
@@ -169,7 +165,7 @@ def _gap_rows(evidence: Evidence) -> Iterator[Stated]:
                 f"{name}: {len(gaps)}, {share:.2g} of the time, longest {lengths[longest]:.3g} s"
                 f" at {gaps[longest][0]:.6g} s"
             )
-            yield Stated(ERROR if is_large else WARNING, where, "record without loss, or cut the log there")
+            yield (ERROR if is_large else WARNING, where, "record without loss, or cut the log there")
 
 
 def _jitter(evidence: Evidence) -> Iterator[Stated]:
@@ -181,7 +177,7 @@ def _jitter(evidence: Evidence) -> Iterator[Stated]:
         if jitter > JITTER:
             severity = ERROR if jitter > LARGE_JITTER else WARNING
             where = f"{name}: intervals scatter by {jitter:.2g} of the period"
-            yield Stated(severity, where, "take the times from the clock that triggers the converters")
+            yield (severity, where, "take the times from the clock that triggers the converters")
 
 
 def _missing_values(evidence: Evidence) -> Iterator[Stated]:
@@ -189,9 +185,9 @@ def _missing_values(evidence: Evidence) -> Iterator[Stated]:
         finite = np.isfinite(values)
         if not np.all(seen := finite.any(axis=0)):
             columns = ", ".join(map(str, np.flatnonzero(~seen)))
-            yield Stated(ERROR, f"{name}: no number in column {columns}", "record every column")
+            yield (ERROR, f"{name}: no number in column {columns}", "record every column")
         elif partial := np.count_nonzero(finite.any(axis=1) & ~finite.all(axis=1)):
-            yield Stated(WARNING, f"{name}: {partial} rows lack some numbers", "these rows are not used")
+            yield (WARNING, f"{name}: {partial} rows lack some numbers", "these rows are not used")
 
 
 def _angle_unit(evidence: Evidence) -> Iterator[Stated]:
@@ -205,16 +201,14 @@ def _angle_unit(evidence: Evidence) -> Iterator[Stated]:
         places = [f"{ANGLE_NAMES[i]} up to {largest[i]:.4g} rad" for i in np.flatnonzero(largest > bound)]
         advice = "set angles.unit to deg" if in_degrees else "set angles.unit, angles.scale and angles.offset"
         where = ", ".join(places) or "angles: in degrees they explain the currents"
-        yield Stated(
-            ERROR, where, f"{advice}; hinges turn by {np.degrees(bound[:2].max()) / BEYOND_RANGE:.4g}°"
-        )
+        yield (ERROR, where, f"{advice}; hinges turn by {np.degrees(bound[:2].max()) / BEYOND_RANGE:.4g}°")
 
 
 def _current_unit(evidence: Evidence) -> Iterator[Stated]:
     limit_A, largest = evidence.model.scenario.drive.current_limit_A, _largest_current(evidence)
     if largest > BEYOND_LIMIT * limit_A or _best_is(evidence, "current_factor"):
         where = f"currents: up to {largest:.4g} A, limit {limit_A:g} A"
-        yield Stated(ERROR, where, "set currents.unit to mA, or currents.scale")
+        yield (ERROR, where, "set currents.unit to mA, or currents.scale")
 
 
 def _saturation(evidence: Evidence) -> Iterator[Stated]:
@@ -223,10 +217,10 @@ def _saturation(evidence: Evidence) -> Iterator[Stated]:
     share = float(np.mean(sizes >= AT_LIMIT * limit_A))
     if OVER_LIMIT * limit_A < largest <= BEYOND_LIMIT * limit_A and evidence.log.currents == COMMANDED:
         where = f"currents: commands up to {largest:.4g} A, limit {limit_A:g} A"
-        yield Stated(ERROR, where, "record measured currents, or command less: the amplifiers limit them")
+        yield (ERROR, where, "record measured currents, or command less: the amplifiers limit them")
     elif share > MOST_AT_LIMIT and largest <= BEYOND_LIMIT * limit_A:
         where = f"currents: at the limit of {limit_A:g} A in {share:.2g} of the rows"
-        yield Stated(WARNING, where, "move slower or by smaller angles")
+        yield (WARNING, where, "move slower or by smaller angles")
 
 
 def _axes(evidence: Evidence) -> Iterator[Stated]:
@@ -241,7 +235,7 @@ def _axes(evidence: Evidence) -> Iterator[Stated]:
         ]
         named = [ANGLE_NAMES[place] for place in order]
         advice = f"set angles.columns to those of {', '.join(named)}, angles.sign to {list(signs)}"
-        yield Stated(ERROR, "; ".join(texts), advice)
+        yield (ERROR, "; ".join(texts), advice)
 
 
 def _groups(evidence: Evidence) -> Iterator[Stated]:
@@ -252,7 +246,7 @@ def _groups(evidence: Evidence) -> Iterator[Stated]:
     if wrong:
         texts = [f"{j} is {'-' if signs[j] < 0 else ''}{order[j]} of the log" for j in wrong]
         advice = f"set currents.columns to the order {order}, currents.sign to {signs}"
-        yield Stated(ERROR, f"group {', '.join(texts)}", advice)
+        yield (ERROR, f"group {', '.join(texts)}", advice)
 
 
 def _clock_offset(evidence: Evidence) -> Iterator[Stated]:
@@ -260,7 +254,7 @@ def _clock_offset(evidence: Evidence) -> Iterator[Stated]:
     if diagnosis and diagnosis.best.offset_s != diagnosis.logged.offset_s:
         late_s = diagnosis.best.offset_s - diagnosis.logged.offset_s
         where = f"currents: {abs(late_s) * 1e3:.1f} ms {'before' if late_s > 0 else 'after'} the angles"
-        yield Stated(ERROR, where, "record both with one clock, or shift the times of one")
+        yield (ERROR, where, "record both with one clock, or shift the times of one")
 
 
 def _excitation(evidence: Evidence) -> Iterator[Stated]:
@@ -269,13 +263,13 @@ def _excitation(evidence: Evidence) -> Iterator[Stated]:
         return
     if diagnosis.spread < FEWEST_WINDOWS:
         where = f"torque in {diagnosis.spread:.0f} independent windows, {FEWEST_WINDOWS} are the least"
-        yield Stated(ERROR, where, "move all axes for some seconds, such as by a multisine of 0.5 to 3 Hz")
+        yield (ERROR, where, "move all axes for some seconds, such as by a multisine of 0.5 to 3 Hz")
     elif diagnosis.decided:
         signs, _ = diagnosis.unverified_axes
         if signs:
             names = ", ".join(ANGLE_NAMES[hinge] for hinge in signs)
             where = f"{names}: too little torque to see a wrong sign"
-            yield Stated(WARNING, where, "move these axes, at 0.5 to 3 Hz and by several degrees")
+            yield (WARNING, where, "move these axes, at 0.5 to 3 Hz and by several degrees")
 
 
 def _unverified(evidence: Evidence) -> Iterator[Stated]:
@@ -287,7 +281,7 @@ def _unverified(evidence: Evidence) -> Iterator[Stated]:
             texts.append(f"sign of groups {', '.join(map(str, groups))}")
         if texts:
             advice = "move the axes at different frequencies, also at larger tilts"
-            yield Stated(WARNING, "; ".join(texts), advice)
+            yield (WARNING, "; ".join(texts), advice)
 
 
 def _torque_balance(evidence: Evidence) -> Iterator[Stated]:
@@ -295,7 +289,7 @@ def _torque_balance(evidence: Evidence) -> Iterator[Stated]:
     if diagnosis and diagnosis.spread >= FEWEST_WINDOWS and not diagnosis.decided:
         where = f"{diagnosis.unexplained:.2g} of the torque is unexplained, {MOST_UNEXPLAINED:g} is the most"
         advice = "check scenario, conditions and columns; record larger motions without external torques"
-        yield Stated(ERROR, where, advice)
+        yield (ERROR, where, advice)
 
 
 def _best_is(evidence: Evidence, factor: str) -> bool:

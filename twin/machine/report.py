@@ -11,6 +11,7 @@ import numpy as np
 
 from spheretwin import scenario as scenarios
 from spheretwin.machine.discrepancy import Suggestion
+from spheretwin.machine.excitation import Design
 from spheretwin.machine.identification import Identified, correlation_sentences, identifiability
 from spheretwin.machine.log import Log
 from spheretwin.machine.residuals import QUANTITIES, Fit
@@ -22,6 +23,8 @@ from spheretwin.viz.pages.markdown import Drawing, Page, Section, Table, save_te
 
 MOST_ROWS = 5
 """Suggestions, changes and bins that the terminal shows."""
+
+NO_SUGGESTION = "no parameter that is not identified would improve the held-out windows"
 
 LABELS = ("before identification", "after identification")
 
@@ -62,6 +65,16 @@ def structure_table(structure: Sequence[Structure]) -> Table:
     ]
     head = ("a change alone of", "explains", "unit", "standard deviations from 0")
     return Table("what the residuals show", head, rows, 1, ("unit",))
+
+
+def design_table(design: Design) -> Table:
+    """Return what a designed motion determines."""
+    rows = [
+        (name, *(f"{one:.3g}" for one in (value, design.reference[name])), f"{design.narrower[name]:.2f}")
+        for name, value in design.deviations.items()
+    ]
+    head = ("parameter", "standard deviation", "with the nutation", "times narrower")
+    return Table("design", head, rows)
 
 
 def fit_table(fits: Mapping[str, Fit]) -> Table:
@@ -215,7 +228,7 @@ def _refused(result: Identified) -> list[str]:
 
 def _lacking(result: Identified) -> list[str | Table | Drawing | Section]:
     if not result.suggestions:
-        return ["No parameter that was not identified would improve the held-out windows."]
+        return [f"{NO_SUGGESTION}."]
     text = (
         "Each kind of parameter that was not identified, with its most likely departures from the scenario in"
         " the training windows: rise of the log likelihood of the held-out windows, and their mean square."

@@ -9,8 +9,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from spheretwin.machine.parameters import KINDS
-from spheretwin.machine.report import LABELS, log_table, parameter_table, residual_drawing, structure_table
+from spheretwin.machine.report import (
+    LABELS,
+    design_table,
+    log_table,
+    parameter_table,
+    residual_drawing,
+    structure_table,
+)
 from spheretwin.machine.watching import WatchSettings
 from spheretwin.machine.workflow import CHANGED_s, Watched, Workflow
 from spheretwin.machine.workflow_checks import TRUE_COLUMNS, checks_of, rms_error, settled_errors
@@ -66,7 +72,7 @@ def write(folder: Path, result: Workflow, command: str, figure_format: str = "sv
         f" logs of it, follows its state, is validated, and watches it. {markdown.verdict(checks)}"
     )
     sections = [
-        Section("1. Design", [DESIGN_TEXT, _design_rows(result)]),
+        Section("1. Design", [DESIGN_TEXT, design_table(result.design)]),
         Section("2. Logs", [LOGS_TEXT, log_table([one.log for one in result.logs], result.verdicts)]),
         Section(
             "3. Identification",
@@ -118,27 +124,6 @@ WORDS = (
 
 def _table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> Table:
     return Table("", head, list(rows), 0, WORDS)
-
-
-def _design_rows(result: Workflow) -> Table:
-    design = result.design
-    units = {
-        name: next(kind.unit for kind in KINDS.values() if name.startswith(kind.name))
-        for name in design.deviations
-    }
-    return _table(
-        ("parameter", "designed", "nutation", "unit", "times narrower"),
-        (
-            (
-                name,
-                f"{value:.2g}",
-                f"{design.reference[name]:.2g}",
-                units[name],
-                f"{design.narrower[name]:.2f}",
-            )
-            for name, value in design.deviations.items()
-        ),
-    )
 
 
 def _identification_text(result: Workflow) -> str:
