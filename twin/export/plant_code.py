@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from types import SimpleNamespace
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from spheretwin import scenario as scenarios
 from spheretwin.active_config import initial_config
@@ -225,104 +226,51 @@ def _per_group(groups: int) -> tuple[str, ...]:
 
 def _parameters(scenario: ResolvedScenario, step: Parameters, inputs: Inputs, groups: int) -> list[Variable]:
     drive, thermal, plant = scenario.drive, scenario.plant.thermal, scenario.plant
-    gain = step.torque_gain / remanence(thermal, drive.ambient_degC)
+    own = SimpleNamespace(
+        torque_gain=step.torque_gain / remanence(thermal, drive.ambient_degC),
+        thermal_period_s=scenario.controller.period_s,
+    )
+    hinges, each, one, any_sign = AXES, _per_group(groups), (), -LARGEST
+    is_ideal, voltages, warms = not step.joint["on"][0], inputs == "voltages", thermal.on
+    # Condition, parts, where its value is, name, unit, meaning; least value.
+    table: list[tuple[Any, ...]] = [
+        (is_ideal, hinges, step, "inertia_kg_m2", "kg.m2", "principal moments, with the payload"),
+        (is_ideal, one, step, "weight_moment_Nm", "N.m", "weight of the payload times height", 0),
+        (True, hinges, step, "coulomb_Nm", "N.m", "Coulomb friction of each hinge", 0),
+        (True, hinges, step, "viscous_Nm_s", "N.m.s", "viscous friction of each hinge", 0),
+        (True, one, step, "friction_smoothing_rad_s", "rad/s",
+         "rate over which Coulomb friction changes sign"),
+        (True, hinges, step, "constant_torque_Nm", "N.m", "constant torque, subtracted", any_sign),
+        (True, hinges, step, "spring_Nm_rad", "N.m/rad", "stiffness about each hinge", 0),
+        (True, each, own, "torque_gain", "1",
+         "torque of each group over nominal, at 20 degC", -FASTEST, FASTEST),
+        (not voltages, one, drive, "current_limit_A", "A", "largest current of the amplifiers", 0),
+        (not voltages, each, drive, "lag_s", "s", "time constant of each current", 0),
+        (True, each, drive, "resistance_ohm", "Ohm", "resistance of each group at 20 degC"),
+        (voltages, each, drive, "inductance_H", "H", "inductance of each group"),
+        (True, each, drive, "resistance_per_K", "1/K", "relative rise of the resistance", 0),
+        (True, each, drive, "heat_capacity_J_K", "J/K", "heat capacity of each winding"),
+        (True, each, drive, "thermal_resistance_K_W", "K/W", "from a winding to the stator", 0),
+        (warms, one, drive, "ambient_degC", "degC", "temperature of the surroundings", COLDEST_DEGC),
+        (warms, one, thermal, "remanence_per_K", "1/K", "relative change of the remanence", any_sign),
+        (warms, one, thermal, "stator_heat_capacity_J_K", "J/K", "of the stator"),
+        (warms, one, thermal, "rotor_heat_capacity_J_K", "J/K", "of the rotor"),
+        (warms, one, thermal, "stator_to_ambient_K_W", "K/W", "from stator to surroundings"),
+        (warms, one, thermal, "air_gap_K_W", "K/W", "from stator to rotor"),
+        (warms, one, thermal, "rotor_to_ambient_K_W", "K/W", "from rotor to surroundings"),
+        (True, one, plant, "step_s", "s", "longest step of the fixed-step method", SHORTEST_STEP_S, 1, True),
+        (True, one, own, "thermal_period_s", "s",
+         "time between updates of the temperatures by the fixed-step method", SHORTEST_STEP_S, FASTEST, True),
+    ]  # fmt: skip
 
-    def each_hinge(name: str, values: Array, unit: str, text: str, least: float = -LARGEST) -> Variable:
-        return Variable(name, _numbers(values), unit, text, AXES, least)
-
-    def each_group(
-        name: str, value: ArrayLike, unit: str, text: str, least: float = SMALLEST, **more: Any
+    def variable(
+        parts: tuple[str, ...], of: Any, name: str, unit: str, text: str, least: float = SMALLEST, *more: Any
     ) -> Variable:
-        values = _numbers(of_each_group(value, groups))
-        return Variable(name, values, unit, text, _per_group(groups), least, **more)
+        value = getattr(of, name)
+        values = np.ravel(of_each_group(value, groups) if parts is each else value)
+        return Variable(name, _numbers(values), unit, text, parts, least, *more)
 
-    def single(
-        name: str, value: float, unit: str, text: str, least: float = SMALLEST, **more: Any
-    ) -> Variable:
-        return Variable(name, (float(value),), unit, text, (), least, **more)
-
-    rows = []
-    if not step.joint["on"][0]:
-        rows += [
-            each_hinge(
-                "inertia_kg_m2", step.inertia_kg_m2, "kg.m2", "principal moments, with the payload", SMALLEST
-            ),
-            single("weight_moment_Nm", step.weight_moment_Nm, "N.m", "weight of the payload times height", 0),
-        ]
-    rows += [
-        each_hinge("coulomb_Nm", step.coulomb_Nm, "N.m", "Coulomb friction of each hinge", 0),
-        each_hinge("viscous_Nm_s", step.viscous_Nm_s, "N.m.s", "viscous friction of each hinge", 0),
-        single(
-            "friction_smoothing_rad_s",
-            step.friction_smoothing_rad_s,
-            "rad/s",
-            "rate over which Coulomb friction changes sign",
-        ),
-        each_hinge("constant_torque_Nm", step.constant_torque_Nm, "N.m", "constant torque, subtracted"),
-        each_hinge("spring_Nm_rad", step.spring_Nm_rad, "N.m/rad", "stiffness about each hinge", 0),
-        each_group(
-            "torque_gain",
-            gain,
-            "1",
-            "torque of each group over nominal, at 20 degC",
-            -FASTEST,
-            largest=FASTEST,
-        ),
-    ]
-    if inputs == "currents":
-        rows += [
-            single("current_limit_A", drive.current_limit_A, "A", "largest current of the amplifiers", 0),
-            each_group("lag_s", drive.lag_s, "s", "time constant of each current", 0),
-        ]
-    rows += [
-        each_group("resistance_ohm", drive.resistance_ohm, "Ohm", "resistance of each group at 20 degC"),
-    ]
-    if inputs == "voltages":
-        rows.append(each_group("inductance_H", drive.inductance_H, "H", "inductance of each group"))
-    rows += [
-        each_group("resistance_per_K", drive.resistance_per_K, "1/K", "relative rise of the resistance", 0),
-        each_group("heat_capacity_J_K", drive.heat_capacity_J_K, "J/K", "heat capacity of each winding"),
-        each_group(
-            "thermal_resistance_K_W", drive.thermal_resistance_K_W, "K/W", "from a winding to the stator", 0
-        ),
-    ]
-    if thermal.on:
-        rows += [
-            single(
-                "ambient_degC", drive.ambient_degC, "degC", "temperature of the surroundings", COLDEST_DEGC
-            ),
-            Variable(
-                "remanence_per_K", (thermal.remanence_per_K,), "1/K", "relative change of the remanence"
-            ),
-            single("stator_heat_capacity_J_K", thermal.stator_heat_capacity_J_K, "J/K", "of the stator"),
-            single("rotor_heat_capacity_J_K", thermal.rotor_heat_capacity_J_K, "J/K", "of the rotor"),
-            single(
-                "stator_to_ambient_K_W", thermal.stator_to_ambient_K_W, "K/W", "from stator to surroundings"
-            ),
-            single("air_gap_K_W", thermal.air_gap_K_W, "K/W", "from stator to rotor"),
-            single("rotor_to_ambient_K_W", thermal.rotor_to_ambient_K_W, "K/W", "from rotor to surroundings"),
-        ]
-    return [
-        *rows,
-        single(
-            "step_s",
-            plant.step_s,
-            "s",
-            "longest step of the fixed-step method",
-            SHORTEST_STEP_S,
-            largest=1,
-            fixed=True,
-        ),
-        single(
-            "thermal_period_s",
-            scenario.controller.period_s,
-            "s",
-            "time between updates of the temperatures by the fixed-step method",
-            SHORTEST_STEP_S,
-            largest=FASTEST,
-            fixed=True,
-        ),
-    ]
+    return [variable(*row) for applies, *row in table if applies]
 
 
 def _states(scenario: ResolvedScenario, groups: int) -> list[Variable]:

@@ -95,7 +95,7 @@ def test_a_stack_s_field_tends_to_that_of_the_body(actuator):
     assert off[2] < 5e-4
 
 
-@pytest.mark.release("sums over all windings for 1 to 3 s; the content design_direct_sums has their values")
+@pytest.mark.release("sums over all windings for 1 to 3 s; a flat pole is compared in less")
 def test_a_pair_s_torque_tends_to_the_current_sheet_s(actuator):
     few, more, many = (pair_errors(actuator, Rule(12, 12, 48, stacked)) for stacked in (6, 12, 24))
     # Steps miss the front by the square of their number, and nothing else is left.

@@ -11,7 +11,7 @@ from spheretwin.models.design import field_check as field_verdict
 from spheretwin.models.torque_curve import TorqueCurve
 from tests.models.design.quadrature import COARSE
 
-pytestmark = pytest.mark.release("sums over windings for 0.7 to 7.5 s; design_direct_sums has their values")
+pytestmark = pytest.mark.release("sums over windings for 0.7 to 7.5 s; test_field_check.py has the sums")
 
 
 @pytest.fixture
