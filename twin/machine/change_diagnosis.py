@@ -15,7 +15,17 @@ from numpy.typing import NDArray
 from scipy.special import logsumexp
 
 from spheretwin.machine.change_filter import ChangeFilter, Estimate, Linearisation, Rows, Step
-from spheretwin.machine.explanations import LOADS, NONLINEAR, UNNAMED, WIDTHS, Candidate, evidence
+from spheretwin.machine.explanations import (
+    BEYOND,
+    LOADS,
+    NONLINEAR,
+    RARE,
+    TOLERATED,
+    UNNAMED,
+    WIDTHS,
+    Candidate,
+    evidence,
+)
 from spheretwin.machine.signatures import Places, Signatures, product
 
 Array = NDArray[np.float64]
@@ -121,7 +131,7 @@ class ChangeDiagnosis:
         ]
         shortest_s = PUSH_s[0] + _AT_LIMIT_s
         named = [explanation for explanation in named if (explanation.lasted_s or shortest_s) >= shortest_s]
-        return [*named, self._noise(), self._torque(coarse)]
+        return [*named, self._noise(), self._torque(coarse), *self._impossible(coarse)]
 
     def _grid(self) -> Iterator[Begin]:
         """Yield each candidate in each step; one of a sensor at each row, another with the step."""
@@ -180,6 +190,22 @@ class ChangeDiagnosis:
         logs = evidence_of_noise(self._squares, self._angles)
         step = int(np.argmax(np.max(logs, axis=0)))
         return self._unnamed(logs, float(self._steps[step].block.t_s[0]))
+
+    def _impossible(self, coarse: Times) -> Iterator[Explanation]:
+        """Yield the explanation by a value that is physically impossible, if one would fit."""
+        count, number = len(coarse.begins), coarse.begins[:, 0]
+        gradient, information = coarse.gradient[:count], coarse.information[:count]
+        size, least, most, log_prior = np.array(
+            [(one.size, one.least, one.most, one.log_prior) for one in self._candidates]
+        ).T[:, number]
+        fitted = gradient / np.maximum(information, 1e-300)
+        below = fitted < (1 + BEYOND) * least - TOLERATED * size
+        beyond = below | (fitted > (1 + BEYOND) * most + TOLERATED * size)
+        if np.any(beyond):
+            logs = evidence(gradient, information, self._candidates, number, bounded=False) + log_prior
+            best = int(np.argmax(np.where(beyond, logs, -np.inf)))
+            total = float(logsumexp(logs[beyond])) - float(np.log(len(self._steps))) + float(np.log(RARE))
+            yield Explanation(total, float(coarse.onset_s[best]))
 
     def _torque(self, coarse: Times) -> Explanation:
         """Return the explanation by a torque on the hinges that varies from some time on."""

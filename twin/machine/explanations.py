@@ -49,6 +49,10 @@ UNLIKELY, RARE = ("delay_s", "sensor_gain_error"), 0.1
 _TOGETHER = ("plant.coulomb_Nm", "plant.viscous_Nm_s", "plant.modelling_torque_Nm")
 
 
+BEYOND = 0.1
+"""Share of a bound by which the estimate of a value within it may exceed it."""
+
+
 class Candidate(NamedTuple):
     """Change that is watched for."""
 
@@ -116,7 +120,12 @@ def candidates_of(
 
 
 def evidence(
-    gradient: Array, information: Array, candidates: Sequence[Candidate], number: NDArray[np.int64]
+    gradient: Array,
+    information: Array,
+    candidates: Sequence[Candidate],
+    number: NDArray[np.int64],
+    *,
+    bounded: bool = True,
 ) -> Array:
     """Return the logarithms of the evidence of changes over no change, (n,).
 
@@ -127,13 +136,16 @@ def evidence(
     candidates : sequence of Candidate
     number : (n,) array of int
         Candidate of each change.
+    bounded : bool
+        False: any value is possible.
     """
     size, least, most = np.array([(one.size, one.least, one.most) for one in candidates]).T[:, number]
     precision = 1 / (WIDTHS[:, None] * size) ** 2
     total = information + precision
     mean, deviation = gradient / total, 1 / np.sqrt(total)
-    within = _log_mass(least, most, mean, deviation) - _log_mass(least, most, 0.0, 1 / np.sqrt(precision))
-    each = 0.5 * gradient**2 / total + 0.5 * np.log(precision / total) + within
+    each = 0.5 * gradient**2 / total + 0.5 * np.log(precision / total)
+    if bounded:
+        each += _log_mass(least, most, mean, deviation) - _log_mass(least, most, 0.0, 1 / np.sqrt(precision))
     return logsumexp(each, axis=0) - np.log(len(WIDTHS))
 
 

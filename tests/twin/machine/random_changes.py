@@ -110,6 +110,12 @@ def _load(alone, push):
     return change
 
 
+def _two_loads(generator, _):
+    torque_Nm = _log_uniform(generator, 3e-3, 4e-2) * np.array([1.0, _sign(generator), 0.0])
+    terms = [{"kind": "constant", "torque_Nm": generator.permutation(torque_Nm).tolist()}]
+    return UNNAMED, 0.0, [(0.0, "disturbance.terms", terms)]
+
+
 def _payload(generator, payload_kg):
     size = _log_uniform(generator, 0.015, 0.08)
     return "plant.payload_kg", size, [(0.0, "plant.payload_kg", payload_kg + size)]
@@ -151,13 +157,15 @@ KINDS = {
     "payload": _payload,
     "noise of a sensor": _sensor,
     "nothing": _nothing,
+    "reversed group": _reversed,
+    "swinging weight": _swing,
 }
 
 HELD_OUT = {
     "viscous friction of one hinge": _viscous(alone=True),
-    "reversed group": _reversed,
-    "swinging weight": _swing,
+    "load on two hinges": _two_loads,
     "spikes of a sensor": _sensor,
+    "gain of a sensor": _sensor,
 }
 
 
@@ -185,6 +193,8 @@ def random_case(seed, kind=None, duration_s=3.9):
     if kind == "spikes of a sensor":
         spikes = after[generator.random(len(after)) < generator.uniform(0.02, 0.2)]
         angle_rad[spikes, generator.integers(2)] += _log_uniform(generator, 3e-3, 3e-2)
+    if kind == "gain of a sensor":
+        angle_rad[after, generator.integers(2)] *= 1 + _sign(generator) * _log_uniform(generator, 0.01, 0.04)
     return Case(kind, name, size, changed_s, known, Log(t_s, current_A, angle_rad, name=f"case {seed}"))
 
 

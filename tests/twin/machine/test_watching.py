@@ -74,6 +74,13 @@ def test_a_kick_shorter_than_a_push_is_unexplained():
     assert alarm.what == UNNAMED
 
 
+def test_a_group_with_the_wrong_sign_is_unexplained():
+    """No gain within its range does that, and another parameter would explain some of it."""
+    gains = [1.0] * 5 + [-1.0] + [1.0] * 12
+    alarm, *_ = Watch(SCENARIO, KNOWN).advance(changing_log(3.2, (2.4261, "plant.group_gain", gains)))
+    assert alarm.what == UNNAMED
+
+
 def test_a_change_of_a_parameter_that_is_not_watched_is_unexplained():
     log = changing_log(3.2, (2.417, "disturbance.load", 0.4))
     alarm, *_ = Watch(SCENARIO, KNOWN, ["plant.group_gain", "plant.coulomb_Nm"]).advance(log)
@@ -134,17 +141,17 @@ def test_the_threshold_is_that_of_the_rate_of_false_alarms():
     assert np.exp(watch.threshold) == pytest.approx(18_000 / 0.5)  # windows of an hour
 
 
-@pytest.mark.release("300 logs, 6 min; the tests above have single changes")
+@pytest.mark.release("265 logs, 6 min; the tests above have single changes")
 def test_the_confidence_is_the_rate_of_right_names():
-    """Of machines that change in one of 12 ways, or not, at random times, sizes, hinges and motions.
+    """Of machines that change in one of 14 ways, or not, at random times, sizes, hinges and motions.
 
-    A fifth of the kinds was not used while the watch was built.
+    Another four kinds were not used while the watch was built.
     """
-    built = [outcome_of(random_case(seed)) for seed in range(260)]
+    built = [outcome_of(random_case(seed)) for seed in range(225)]
     held_out = [outcome_of(random_case(seed, list(HELD_OUT)[seed % 4])) for seed in range(40)]
     assert not any(outcome.early for outcome in built + held_out)
     assert not any(outcome.alarm for outcome in built if outcome.case.kind == "nothing")
-    for outcomes, least in ((built, 150), (held_out, 5)):
+    for outcomes, least in ((built, 130), (held_out, 5)):
         named = [outcome for outcome in outcomes if outcome.is_named]
         right = np.mean([outcome.is_right for outcome in named])
         assert len(named) > least
