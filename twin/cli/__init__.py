@@ -45,6 +45,7 @@ VERBS = {
     "magnetics": "analyse the magnetic model",
     "export": "write plant and controller as an FMU or as C files",
     "log": "check the log of a machine",
+    "link": "measure round trip, jitter and loss of a link to a machine",
     "explain": "print value, unit, distribution and origin of fields",
     "new": "write a template: a law, an actuator or a study",
     "doctor": "print what is installed, and what is missing for which purpose",

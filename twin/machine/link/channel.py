@@ -41,6 +41,8 @@ class Channel:
     groups : int
     has_echo : bool
         True if received frames name the command that they answer.
+    has_flags : bool
+        True if sent frames can be requests.
     modulus : int
         Sequence numbers of the sent frames run from 0 to the one below.
     """
@@ -61,7 +63,7 @@ class Channel:
         self._encoder = Codec(sends, groups, key)
         self._decoder = Decoder(Codec(receives, groups, key), datagrams=transport.datagrams)
         self._report = report
-        self.has_echo = receives.has("echo")
+        self.has_echo, self.has_flags = receives.has("echo"), sends.has("flags")
         self.modulus = min(sends.modulus("sequence"), receives.modulus("echo"))
         self._shown = {"sent": 0, "received": 0}
 

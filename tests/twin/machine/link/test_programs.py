@@ -11,6 +11,10 @@ import pytest
 
 from spheretwin import cli, machine, simulation
 from spheretwin.bench import Bench
+from spheretwin.machine.link import frame_format
+from spheretwin.machine.link.channel import Channel
+from spheretwin.machine.link.frame_format import Flags
+from spheretwin.machine.link.transports import open_transport
 from spheretwin.models.telemetry.table import read_parquet
 from tests.requirements import C_COMPILER, needs_c_compiler, needs_posix
 from tests.twin.passive_cases import STILL
@@ -195,6 +199,25 @@ def test_the_limit_of_the_current_holds(firmware, capsys):
     code, result = driven(firmware, capsys, *ARMED, "--duration", "0.3", "--limit-current-A", "0.5")
     assert code == 0
     assert result["max_abs_current_A"] == 0.5
+
+
+def test_the_link_to_the_firmware_is_measured(firmware, capsys):
+    """The times are those of the computer; the firmware has not moved, and waits for a controller."""
+    with firmware() as port:
+        address, frame = f"udp://:{port}", str(HERE / "firmware.toml")
+        code = cli.main(["link", "test", address, "--frame", frame, "--seconds", "0.1", "--json"])
+        frames = frame_format.load(frame)
+        with contextlib.closing(open_transport(address)) as transport:
+            channel = Channel(transport, frames.command, frames.measurement, 18)
+            channel.send({"sequence": 9999, "flags": Flags.HELLO, "current": np.zeros(18)})
+            while not (found := channel.receive(UNLIMITED_S)):
+                pass
+            channel.send({"sequence": 10000, "flags": Flags.END, "current": np.zeros(18)})
+    rates = json.loads(capsys.readouterr().out)["rates"]
+    assert [(rate["rate_Hz"], rate["sent"]) for rate in rates] == [(1000, 100), (2000, 200), (5000, 500)]
+    assert all(sum(rate["histogram"]) == round(rate["sent"] * (1 - rate["loss"])) for rate in rates)
+    assert code == (0 if rates[0]["suffices"] else 1)
+    assert not any(found[0]["angle"])
 
 
 def test_the_example_of_a_controller_tracks(tmp_path, capsys):
