@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import argparse
 import contextlib
 import json
 import math
@@ -12,18 +13,69 @@ import socket
 import sys
 import threading
 import time
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from spheretwin.models import mjcf
 from spheretwin.models.base.checks import Check, broken
 from spheretwin.models.base.files import OPEN_FILES, PartialFile
+from spheretwin.viz.pages.markdown import Table
+from spheretwin.viz.terminal import runs
+from spheretwin.viz.terminal.tables import print_checks, terminal_console
 
 
 def print_json(figures: Mapping[str, Any]) -> None:
     """Print figures as JSON on stdout: checks as their rows, named tuples by name, null for no number."""
     print(json.dumps(_plain(figures), allow_nan=False), flush=True)
+
+
+def print_result(
+    options: argparse.Namespace,
+    name: str,
+    figures: Mapping[str, Any],
+    tables: Iterable[Table] = (),
+    checks: Sequence[Check] = (),
+    text: str = "",
+    *,
+    title: str = "",
+    written: Sequence[Path] = (),
+) -> bool:
+    """Print the figures as JSON if requested, or tables, text, checks and files; report broken checks.
+
+    Parameters
+    ----------
+    options : Namespace
+        Of the command line.
+    name : str
+        Name of the command, for the message about broken checks.
+    figures : mapping
+        Results for JSON.
+    tables : iterable of Table
+    checks : sequence of Check
+    text : str
+        Between tables and checks.
+    title : str
+        Title of the checks; default: the name.
+    written : sequence of Path
+        Files that were written.
+
+    Returns
+    -------
+    bool
+        True if no bound is broken.
+    """
+    if options.json:
+        print_json(figures)
+    else:
+        for table in tables:
+            runs.print_rows(*table)
+        if text:
+            terminal_console().print(text)
+        if checks:
+            print_checks(title or name, checks, options.verbose)
+        runs.print_written(written)
+    return report_broken(name, checks)
 
 
 def print_message(line: str) -> None:

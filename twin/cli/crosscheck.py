@@ -5,16 +5,14 @@ from __future__ import annotations
 import argparse
 import time
 
-from spheretwin.cli.common import print_json, report_broken, warn_about_model
+from spheretwin.cli.common import print_result, warn_about_model
 from spheretwin.cli.options import verb, whole
 from spheretwin.crosscheck import suite
 from spheretwin.crosscheck.suite import STATES
 from spheretwin.models import actuator as actuators
 from spheretwin.models.telemetry.run_record import versions
 from spheretwin.viz.pages.markdown import prepare
-from spheretwin.viz.terminal import runs
 from spheretwin.viz.terminal.progress import parts
-from spheretwin.viz.terminal.tables import print_checks
 
 MOST_STATES = 1_000_000  # some three minutes and a gigabyte
 
@@ -46,9 +44,6 @@ def run(options: argparse.Namespace) -> bool:
     wall_s = time.perf_counter() - started
     checks = evidence.checks
     written = suite.write(options.out, evidence, options.figure_format) if options.out else []
-    if options.json:
-        print_json({"checks": checks, "wall_s": wall_s, "versions": versions()})
-    else:
-        print_checks(f"crosscheck, {wall_s:.1f} s", checks, options.verbose)
-        runs.print_written(written)
-    return report_broken("crosscheck", checks)
+    figures = {"checks": checks, "wall_s": wall_s, "versions": versions()}
+    title = f"crosscheck, {wall_s:.1f} s"
+    return print_result(options, "crosscheck", figures, (), checks, title=title, written=written)

@@ -5,12 +5,11 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from spheretwin.cli.common import print_json, print_message
+from spheretwin.cli.common import print_message, print_result
 from spheretwin.cli.log_options import changes_of
 from spheretwin.cli.options import verb
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.base.files import check_writable
-from spheretwin.viz.terminal import runs
 
 BOTH = ("plant", "controller")
 
@@ -53,21 +52,16 @@ def run_fmu(options: argparse.Namespace) -> bool:
     written = write_fmu(path, model, options.fmi, options.kind, options.target)
     if not written.binaries:
         print_message("export: no binary: no C compiler for this machine; the sources are inside")
-    if options.json:
-        print_json(
-            {
-                "fmu": str(path),
-                "fmi": options.fmi,
-                "kind": options.kind,
-                "inputs": options.inputs,
-                "identifier": written.identifier,
-                "binaries": written.binaries,
-                "parameters": [name for quantity in model.parameters for name in quantity.names],
-            }
-        )
-    else:
-        runs.print_written([path])
-    return True
+    figures = {
+        "fmu": str(path),
+        "fmi": options.fmi,
+        "kind": options.kind,
+        "inputs": options.inputs,
+        "identifier": written.identifier,
+        "binaries": written.binaries,
+        "parameters": [name for quantity in model.parameters for name in quantity.names],
+    }
+    return print_result(options, "export fmu", figures, written=[path])
 
 
 @verb(
@@ -94,14 +88,10 @@ def run_c(options: argparse.Namespace) -> bool:
     controller = controller_code(options.scenario, changes) if "controller" in chosen else None
     folder = options.out or Path(f"{Path(options.scenario).stem}_c")
     paths = write_c(folder, plant, controller)
-    if options.json:
-        tick = controller._asdict() if controller else {}
-        tick.pop("files", None)
-        names = [path.name for path in paths]
-        print_json({"folder": str(folder), "files": names, "controller": tick or None})
-    else:
-        runs.print_written([folder])
-    return True
+    tick = controller._asdict() if controller else {}
+    tick.pop("files", None)
+    figures = {"folder": str(folder), "files": [path.name for path in paths], "controller": tick or None}
+    return print_result(options, "export c", figures, written=[folder])
 
 
 PARTS = {"fmu": run_fmu, "c": run_c}

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from spheretwin.cli.common import print_json, print_message
+from spheretwin.cli.common import print_json, print_message, print_result
 from spheretwin.cli.log_options import LOGS, changes_of, read_logs, scenario_of
 from spheretwin.cli.options import from_zero, number, verb, whole
 from spheretwin.machine import report
@@ -109,13 +109,9 @@ def _design(options: argparse.Namespace) -> bool:
     if options.currents:
         save_text(options.currents, _currents(excitation.runs[0]))
         written.append(options.currents)
-    if options.json:
-        figures = {"deviations": excitation.deviations, "nutation": excitation.reference}
-        print_json({**figures, "narrower": excitation.narrower})
-        return True
-    runs.print_rows(*report.design_table(excitation))
-    runs.print_written(written)
-    return True
+    figures = {"deviations": excitation.deviations, "nutation": excitation.reference}
+    figures["narrower"] = excitation.narrower
+    return print_result(options, "identify", figures, [report.design_table(excitation)], written=written)
 
 
 def _currents(run: Table) -> str:

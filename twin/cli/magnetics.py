@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from spheretwin.cli.common import print_json, print_message, report_broken, warn, warn_about_model
+from spheretwin.cli.common import print_message, print_result, report_broken, warn, warn_about_model
 from spheretwin.cli.options import number, verb, whole
 from spheretwin.models import actuator as actuators
 from spheretwin.models import torque_curve
@@ -23,9 +23,7 @@ from spheretwin.models.magnet_and_coil import read_magnet_and_coil
 from spheretwin.models.magnetics import SAME, computed_from
 from spheretwin.viz.pages import magnetics
 from spheretwin.viz.pages.markdown import Table, prepare, save_text
-from spheretwin.viz.terminal import runs
 from spheretwin.viz.terminal.progress import tracked
-from spheretwin.viz.terminal.tables import print_checks, terminal_console
 
 CURVE = "torque curve from 0 to 180 degrees, columns phi_deg,torque_Nm_per_A"
 
@@ -82,7 +80,9 @@ def run_check(options: argparse.Namespace) -> bool:
         magnetics.write_check(options.out, verdict, command, options.figure_format) if options.out else []
     )
     tables, text = [magnetics.field_table(verdict)], magnetics.sources_text(verdict)
-    return _report(options, "check", verdict._asdict(), verdict.checks, tables, text, written)
+    return print_result(
+        options, "magnetics check", verdict._asdict(), tables, verdict.checks, text, written=written
+    )
 
 
 @verb(
@@ -115,7 +115,9 @@ def run_map(options: argparse.Namespace) -> bool:
         command = f"spheretwin magnetics map --largest-tilt {options.largest_tilt:g}{need}"
         written = magnetics.write_map(options.out, surveyed, verdict, command, options.figure_format)
     tables, text = magnetics.workspace_tables(verdict), magnetics.MAP_TERMS
-    return _report(options, "map", verdict._asdict(), verdict.checks, tables, text, written)
+    return print_result(
+        options, "magnetics map", verdict._asdict(), tables, verdict.checks, text, written=written
+    )
 
 
 @verb(
@@ -215,7 +217,9 @@ def _judge(options: argparse.Namespace) -> bool:
         "checks": [],  # the user judges the data
         "warnings": judged.warnings,
     }
-    return _report(options, "curve", figures, [], [magnetics.judged_curve_table(options.csv, judged)])
+    return print_result(
+        options, "magnetics curve", figures, [magnetics.judged_curve_table(options.csv, judged)], []
+    )
 
 
 def _is_known(mjcf: Path) -> bool:
@@ -241,30 +245,7 @@ def _report_csv(
     elif not options.json:
         print(csv, end="")
         return report_broken(f"magnetics {part}", checks)
-    return _report(options, part, figures, checks, tables, written=[options.out])
-
-
-def _report(
-    options: argparse.Namespace,
-    part: str,
-    figures: Mapping[str, Any],
-    checks: Sequence[Check],
-    tables: Sequence[Table],
-    text: str = "",
-    written: Sequence[Path] = (),
-) -> bool:
-    """Print the figures as JSON, or tables, checks and files; return True if no bound is broken."""
-    if options.json:
-        print_json(figures)
-    else:
-        for table in tables:
-            runs.print_rows(*table)
-        if text:
-            terminal_console().print(text)
-        if checks:
-            print_checks(f"magnetics {part}", checks, options.verbose)
-        runs.print_written(written)
-    return report_broken(f"magnetics {part}", checks)
+    return print_result(options, f"magnetics {part}", figures, tables, checks, written=[options.out])
 
 
 PARTS = {"curve": run_curve, "field": run_field, "hoop": run_hoop, "check": run_check, "map": run_map}

@@ -6,7 +6,7 @@ import argparse
 import time
 from collections.abc import Sequence
 
-from spheretwin.cli.common import print_json, print_message, report_broken
+from spheretwin.cli.common import print_json, print_message, print_result
 from spheretwin.cli.options import verb, whole
 from spheretwin.models.base.errors import InputError, did_you_mean, shown
 from spheretwin.models.base.mujoco_library import timers_stopped
@@ -19,7 +19,6 @@ from spheretwin.plant.plant_tick import ENGINES
 from spheretwin.viz.pages.markdown import prepare
 from spheretwin.viz.terminal import runs as tables
 from spheretwin.viz.terminal.progress import runs, tracked
-from spheretwin.viz.terminal.tables import print_checks
 from spheretwin.viz.terminal.texts import Verdict, print_verdicts
 
 MOST = 1000
@@ -109,13 +108,9 @@ def _twin(options: argparse.Namespace) -> bool:
     checks = checks_of(result)
     command = f"spheretwin reproduce {TWIN}"
     written = workflow_page.write(options.out, result, command, options.figure_format) if options.out else []
-    if options.json:
-        figures = workflow_page.figures(result)
-        print_json({"checks": checks, **figures, "wall_s": wall_s, "versions": versions()})
-    else:
-        print_checks(f"reproduce {TWIN}, {wall_s:.1f} s", checks, options.verbose)
-        tables.print_written(written)
-    return report_broken(f"reproduce {TWIN}", checks)
+    figures = {"checks": checks, **workflow_page.figures(result), "wall_s": wall_s, "versions": versions()}
+    title = f"reproduce {TWIN}, {wall_s:.1f} s"
+    return print_result(options, f"reproduce {TWIN}", figures, (), checks, title=title, written=written)
 
 
 def _named(names: Sequence[str]) -> list[str]:

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import argparse
 
-from spheretwin.cli.common import print_json, print_message
+from spheretwin.cli.common import print_message, print_result
 from spheretwin.cli.log_options import LOG, ONE, changes_of, read_logs, scenario_of
 from spheretwin.cli.options import verb
 from spheretwin.machine.report import bin_table, fit_table, structure_table
 from spheretwin.machine.residuals import CHI2
 from spheretwin.machine.twin_file import read_uncertainty
 from spheretwin.machine.validation import Validation, validate
-from spheretwin.viz.terminal import runs
 
 
 @verb(f"{LOG}    --json", has_fields=True, **ONE)
@@ -24,19 +23,18 @@ def run(options: argparse.Namespace) -> bool:
     (log,) = read_logs(options)
     uncertainty = read_uncertainty(options.twin) if options.twin else None
     result = validate(log, scenario_of(options), changes_of(options), uncertainty=uncertainty)
-    if options.json:
-        print_json(
-            {
-                "accepted": result.accepted,
-                "log_sha256": log.digest,
-                "accepted_findings": list(log.accepted),
-                "chi2": {"all": result.fit.chi2, **result.fit.hinge_chi2},
-                "structure": result.structure,
-                "bins": result.fit.bins,
-            }
-        )
-    else:
-        _print(result)
+    figures = {
+        "accepted": result.accepted,
+        "log_sha256": log.digest,
+        "accepted_findings": list(log.accepted),
+        "chi2": {"all": result.fit.chi2, **result.fit.hinge_chi2},
+        "structure": result.structure,
+        "bins": result.fit.bins,
+    }
+    tables = [fit_table({"mean square over that of the noise": result.fit}), bin_table(result.fit)]
+    if result.structure:
+        tables.insert(1, structure_table(result.structure))
+    print_result(options, "validate", figures, tables)
     if not result.accepted:
         print_message(f"validate: {_why(result)}")
     return result.accepted
@@ -53,10 +51,3 @@ def _why(result: Validation) -> str:
         f"not accepted: expected a mean square from {CHI2[0]:g} to {CHI2[1]:g} of that of the noise, received"
         f" {result.fit.chi2:.3g}"
     )
-
-
-def _print(result: Validation) -> None:
-    runs.print_rows(*fit_table({"mean square over that of the noise": result.fit}))
-    if result.structure:
-        runs.print_rows(*structure_table(result.structure))
-    runs.print_rows(*bin_table(result.fit))
