@@ -34,7 +34,14 @@ from spheretwin.viz.layout.styles import MIDDLE, THICK, THIN
 from spheretwin.viz.layout.view import SCENARIO
 from spheretwin.viz.quantities import Quantity, compared_quantities
 from spheretwin.viz.recording.currents import CoilCurrents
-from spheretwin.viz.recording.part import RecordingPart, RecordingSubject, drawable, scalars, time_index
+from spheretwin.viz.recording.part import (
+    RecordingPart,
+    RecordingSubject,
+    drawable,
+    log_markdown,
+    scalars,
+    time_index,
+)
 from spheretwin.viz.recording.recorder import PIPE_PATHS, FilePipe
 from spheretwin.viz.recording.scene3d import MovingActuator
 from spheretwin.viz.recording.signals import Signals
@@ -125,8 +132,7 @@ def write(path: Path, runs: Sequence[ComparedRun], subjects: Sequence[RecordingS
     colours = [theme.rgb(colour) for colour in theme.run_colours([run.law for run in runs])]
     with recorded(path, application(view), layout(view)) as recording:
         recording.send_recording_name(f"{len(runs)} runs")
-        text = drawable("\n".join([text, *_outside(quantities, ranges)]))
-        recording.log(RUNS, rr.TextDocument(text, media_type=rr.MediaType.MARKDOWN), static=True)
+        log_markdown(recording, RUNS, "\n".join([text, *_outside(quantities, ranges)]))
         _log_legend(recording, runs, colours)
         for place, (run, subject, colour) in enumerate(zip(runs, subjects, colours, strict=True)):
             of_run = below(recording, run.name)

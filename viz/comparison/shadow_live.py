@@ -18,7 +18,6 @@ from spheretwin.viz.comparison.ghosts import Line, send_lines
 from spheretwin.viz.comparison.shadow_recording import (
     TEXT,
     layout,
-    log_text,
     parts_of_shadow,
     titles_of,
     with_currents,
@@ -28,7 +27,7 @@ from spheretwin.viz.layout.plots import following_axis
 from spheretwin.viz.layout.styles import MIDDLE, THIN
 from spheretwin.viz.layout.view import LIVE_WINDOW_S, application_of
 from spheretwin.viz.recording.live import LiveStream
-from spheretwin.viz.recording.part import RecordingSubject, drawable, time_index
+from spheretwin.viz.recording.part import RecordingSubject, drawable, log_markdown, time_index
 
 Array = NDArray[np.float64]
 
@@ -87,7 +86,7 @@ class ShadowView(LiveStream):
     def send(self) -> None:
         """Send viewers the data and the verdict."""
         if self._text:
-            log_text(self.recording, self._text)
+            log_markdown(self.recording, TEXT, self._text)
         super().send()
 
     def judge(

@@ -23,7 +23,7 @@ from spheretwin.viz.layout.plots import time_axis
 from spheretwin.viz.layout.styles import MIDDLE, THICK, THIN
 from spheretwin.viz.layout.view import application_of
 from spheretwin.viz.recording.currents import CoilCurrents
-from spheretwin.viz.recording.part import RecordingPart, RecordingSubject, drawable
+from spheretwin.viz.recording.part import RecordingPart, RecordingSubject, log_markdown
 from spheretwin.viz.recording.scene3d import MovingActuator
 from spheretwin.viz.scene.entities import FRAME_RATE_Hz, size_of
 from spheretwin.viz.scene.meshes import WORLD
@@ -105,11 +105,6 @@ def with_currents(telemetry: Table, current_A: Array) -> Table:
     return Table((*telemetry.signals, currents), values)
 
 
-def log_text(recording: rr.RecordingStream, text: str) -> None:
-    """Log the verdict, in Markdown."""
-    recording.log(TEXT, rr.TextDocument(drawable(text), media_type=rr.MediaType.MARKDOWN), static=True)
-
-
 def write(path: Path, telemetry: Table, current_A: Array, subject: RecordingSubject, text: str) -> None:
     """Write the recording of a shadow.
 
@@ -141,7 +136,7 @@ def write(path: Path, telemetry: Table, current_A: Array, subject: RecordingSubj
     views = layout(subject, titles, axis, text_view, limits)
     with recorded(path, application, blueprint(views)) as recording:
         recording.send_recording_name("shadow")
-        log_text(recording, text)
+        log_markdown(recording, TEXT, text)
         table = with_currents(telemetry, current_A)
         for part in parts_of_shadow(subject):
             write_part(recording, table, part)

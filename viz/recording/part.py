@@ -153,6 +153,12 @@ def drawable(text: str) -> str:
     return _NOT_IN_FONT.sub(lambda match: ascii(match[0])[1:-1], text)
 
 
+def log_markdown(recording: rr.RecordingStream, entity: str, text: str) -> None:
+    """Log a text in Markdown that replaces an earlier one."""
+    document = rr.TextDocument(drawable(text), media_type=rr.MediaType.MARKDOWN)
+    recording.log(entity, document, static=True)
+
+
 def struct_component(fields: Mapping[str, pa.Array]) -> ArrowComponent:
     """Return values with named fields as a component."""
     return ArrowComponent(pa.StructArray.from_arrays(list(fields.values()), list(fields)))

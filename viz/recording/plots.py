@@ -37,7 +37,7 @@ from spheretwin.viz.quantities import ERROR_ANGLE, QuantityRows, quantities_of
 from spheretwin.viz.recording.part import (
     RecordingPart,
     RecordingSubject,
-    drawable,
+    log_markdown,
     scalars,
     struct_component,
     time_index,
@@ -144,7 +144,7 @@ class PlotData(RecordingPart):
             names = [quantity.name for quantity in self._columns.quantities]
             _log_styles(recording, DERIVED, {name: self._columns.styles[name].lines() for name in names})
         if self.subject.live:
-            log_summary(recording, self._summary.running())
+            log_markdown(recording, SUMMARY, self._summary.running())
 
     def write(self, recording: rr.RecordingStream, rows: Table) -> None:
         """Record the derived quantities of the rows of a chunk, or what bins they have completed."""
@@ -171,7 +171,7 @@ class PlotData(RecordingPart):
         if binned and binned.last_s[-1] > binned.t_s[-1] and self.subject.view.decimated:
             end = CompletedBins(*(column[-1:] for column in binned))
             self._send_envelope(recording, end._replace(t_s=end.last_s))
-        log_summary(recording, self._summary.ended(status))
+        log_markdown(recording, SUMMARY, self._summary.ended(status))
         ended_s = None if status in _AS_PLANNED else self._summary.last_s
         if ended_s is not None:
             log_end(recording, ended_s)
@@ -183,7 +183,7 @@ class PlotData(RecordingPart):
         if self._opened or self.subject.live or monotonic() - self._begun_s < OPENED_AFTER_s:
             return
         self._opened = True
-        log_summary(recording, self._summary.running())
+        log_markdown(recording, SUMMARY, self._summary.running())
         recording.send_blueprint(opening_layout(self.subject.view))
 
     def _record(self, recording: rr.RecordingStream, binned: CompletedBins | None) -> None:
@@ -264,11 +264,6 @@ def _log_styles(recording: rr.RecordingStream, entity: str, styles: Mapping[str,
     structs = struct_component({name: as_struct(style) for name, style in styles.items()})
     batch = rr.DescribedComponentBatch(structs, rr.ComponentDescriptor(component(STYLES, 0)))
     recording.log(entity, [batch], static=True)
-
-
-def log_summary(recording: rr.RecordingStream, text: str) -> None:
-    """Log the headline."""
-    recording.log(SUMMARY, rr.TextDocument(drawable(text), media_type=rr.MediaType.MARKDOWN), static=True)
 
 
 PHASE_PLANE_RATE_Hz = 200.0

@@ -27,11 +27,20 @@ from spheretwin.models.telemetry.table import Table
 from spheretwin.viz.decimation import TimeBins
 from spheretwin.viz.layout.extents import ExtentTracker
 from spheretwin.viz.layout.layout import layout
-from spheretwin.viz.layout.view import DERIVED, ENVELOPE, TIMELINE, VALUES, View, application, component
+from spheretwin.viz.layout.view import (
+    DERIVED,
+    ENVELOPE,
+    SUMMARY,
+    TIMELINE,
+    VALUES,
+    View,
+    application,
+    component,
+)
 from spheretwin.viz.quantities import angle_between
 from spheretwin.viz.recording.contents import Contents
-from spheretwin.viz.recording.part import total
-from spheretwin.viz.recording.plots import ENVELOPE_RATE_Hz, Marks, PlottedColumns, log_end, log_summary
+from spheretwin.viz.recording.part import log_markdown, total
+from spheretwin.viz.recording.plots import ENVELOPE_RATE_Hz, Marks, PlottedColumns, log_end
 from spheretwin.viz.recording.signals import RATE
 from spheretwin.viz.recording.summary import Summary
 from spheretwin.viz.rerun_internals import check_readable, whole_messages
@@ -214,7 +223,7 @@ class RecoveredPlots:
         error_deg = np.degrees(angle_between(table["q_rad"], table["q_ref_rad"]))
         summary = Summary(_run_facts(facts))
         summary.add(table, error_deg)
-        log_summary(recording, summary.cut_off())
+        log_markdown(recording, SUMMARY, summary.cut_off())
         log_end(recording, summary.last_s)
         recording.send_blueprint(layout(view, tracker.extents(summary.last_s)))
 

@@ -23,6 +23,7 @@ from spheretwin.viz.recording.part import (
     RecordingSubject,
     RowSet,
     drawable,
+    log_markdown,
     no_vectors,
     range_checksum,
     struct_component,
@@ -75,8 +76,7 @@ class ScenarioText(RecordingPart):
         """Log text and facts."""
         facts = self.subject.facts
         recording.send_recording_name(drawable(f"{facts.name}, {facts.law}"))
-        text = rr.TextDocument(drawable(_as_markdown(facts)), media_type=rr.MediaType.MARKDOWN)
-        recording.log(SCENARIO, text, static=True)
+        log_markdown(recording, SCENARIO, _as_markdown(facts))
         recording.log(SCENARIO, facts_as_json(facts, self.subject.rate_Hz), static=True)
 
 
