@@ -39,7 +39,8 @@ def test_data_files_come_along(names):
     for name in (
         "models/actuator.xml", "models/scene.xml", "models/torque_curve.csv", "models/README.md",
         "models/assets/coil.obj", "models/py.typed", "scenario/shipped/nutation.toml",
-        "plant/mujoco_rotor.py", "cli/simulate.py", "paper/rivals_ideal.json", "py.typed",
+        "plant/mujoco_rotor.py", "cli/simulate.py", "paper/rivals_ideal.json", "paper/figure8.toml",
+        "py.typed",
         "viz/pages/page.css", "viz/pages/interactive.js", "viz/bench/page_head.html",
     ):  # fmt: skip
         assert f"spheretwin/{name}" in names

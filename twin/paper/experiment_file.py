@@ -21,6 +21,7 @@ from spheretwin.paper.experiment import (
     Section,
 )
 from spheretwin.paper.laws import COMPARED_LAWS, printed_rad
+from spheretwin.study.statistics import quantile_text
 from spheretwin.viz.pages.markdown import Drawing
 
 if TYPE_CHECKING:
@@ -160,6 +161,21 @@ def table(
     """Table with a row for each item, each cell a function of it."""
     rows = [tuple(cell(item) for cell in columns.values()) for item in items]
     return ResultTable(title, tuple(columns), rows, texts)
+
+
+def quantiles(
+    head: str, values: Callable[[T], Sequence[float]], text: Callable[[float], str], *shares: float
+) -> dict[str, Callable[[T], str]]:
+    """Cells of quantiles of the values of an item, the median first, each with its interval."""
+    return {
+        head if share == 0.5 else f"{100 * share:g} %": _quantile(values, text, share) for share in shares
+    }
+
+
+def _quantile(
+    values: Callable[[T], Sequence[float]], text: Callable[[float], str], share: float
+) -> Callable[[T], str]:
+    return lambda item: quantile_text(values(item), text, share)
 
 
 def column(name: str, text: str = "{}") -> Callable[[CaseRuns], str]:

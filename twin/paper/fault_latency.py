@@ -12,7 +12,7 @@ import numpy as np
 
 from spheretwin.paper import fault_cases as cases
 from spheretwin.paper.experiment import Outcome, Section
-from spheretwin.paper.experiment_file import table
+from spheretwin.paper.experiment_file import quantiles, table
 from spheretwin.paper.fault_cases import FEW, FILE, FaultRuns
 from spheretwin.paper.fault_outcomes import tracks
 from spheretwin.paper.fault_sections import percent
@@ -210,10 +210,6 @@ Interval = tuple[str, Pairs]
 """Interval of the latency with its pairs."""
 
 
-def _cost(share: float, interval: Interval) -> str:
-    return quantile_text(_costs(interval[1]), "{:.3f}".format, share)
-
-
 def _healthy(interval: Interval) -> str:
     return f"{np.median([1e3 * detecting.data.healthy_rad for detecting, _ in interval[1]]):.1f}"
 
@@ -221,9 +217,7 @@ def _healthy(interval: Interval) -> str:
 COST: dict[str, Callable[[Interval], str]] = {
     "slowest latency, ms": lambda interval: interval[0],
     "runs": lambda interval: str(len(interval[1])),
-    "cost, mrad: median": partial(_cost, 0.5),
-    "95 %": partial(_cost, 0.95),
-    "99 %": partial(_cost, 0.99),
+    **quantiles("cost, mrad: median", lambda one: _costs(one[1]), "{:.3f}".format, 0.5, 0.95, 0.99),
     "largest of these": lambda interval: f"{max(_costs(interval[1])):.3f}",
     "healthy error, mrad: median": _healthy,
     "track": lambda interval: percent([tracks(detecting) for detecting, _ in interval[1]]),

@@ -242,28 +242,33 @@ def row_fields(case: Case, outcomes: Sequence[Outcome]) -> Mapping[str, Any]:
     data: list[FaultData] = [outcome.data for outcome in outcomes]
     remaining = [run.remaining for run in data if run.remaining is not None]
     reasons = [why for outcome in outcomes if (why := reason(outcome))]
+    ratios = [run.ratio for run in data]
     return {
         "tracks": [tracks(outcome) for outcome in outcomes].count(True),
         "reason": reasons[0] if reasons else None,
         "start_s": [run.start_s for run in data],
         "error_after_fault_rad": [_plain(run.after_rad) for run in data],
         "healthy_error_after_fault_rad": [_plain(run.healthy_rad) for run in data],
-        "error_ratio": _plain(np.median([run.ratio for run in data])),
-        "error_ratio_range": [
-            _plain(min(run.ratio for run in data)),
-            _plain(max(run.ratio for run in data)),
-        ],
+        "error_ratio": _plain(np.median(ratios)),
+        "error_ratio_range": [_plain(min(ratios)), _plain(max(ratios))],
         "ended_s": float(np.median([run.ended_s for run in data])),
         "time_to_detection_s": [list(run.latencies_s) for run in data],
         "wrongly_found": sum(run.false_detections for run in data),
-        "torque_left_over_needed": min((least.torque for least in remaining), default=None),
-        "least_norm_torque_over_needed": min((least.least_norm for least in remaining), default=None),
-        "share_that_comes_untold": min((least.least_share for least in remaining), default=None),
-        "least_singular_value_Nm_per_A": min(
-            (least.singular_value_Nm_per_A for least in remaining), default=None
-        ),
-        "rank": min((least.rank for least in remaining), default=None),
+        **{
+            name: min((getattr(least, figure) for least in remaining), default=None)
+            for name, figure in LEAST.items()
+        },
     }
+
+
+LEAST = {
+    "torque_left_over_needed": "torque",
+    "least_norm_torque_over_needed": "least_norm",
+    "share_that_comes_untold": "least_share",
+    "least_singular_value_Nm_per_A": "singular_value_Nm_per_A",
+    "rank": "rank",
+}
+"""Smallest values of the JSON, by fields of `RemainingTorque`."""
 
 
 def _detected_s(table: Table) -> dict[int, float]:

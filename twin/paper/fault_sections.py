@@ -12,11 +12,10 @@ from spheretwin.control.supervision.watchdog import Reason
 from spheretwin.models.telemetry.status import Status
 from spheretwin.paper import fault_cases as cases
 from spheretwin.paper.experiment import Array, Outcome, Section
-from spheretwin.paper.experiment_file import table
+from spheretwin.paper.experiment_file import quantiles, table
 from spheretwin.paper.fault_cases import COILS, FEW, FILE, FaultRuns
 from spheretwin.paper.fault_outcomes import TWICE, FaultData, tracks
 from spheretwin.paper.page import NONE, statuses_text
-from spheretwin.study.statistics import quantile_text
 from spheretwin.viz.pages.markdown import Drawing
 
 Cells = dict[str, Callable[["Group"], str]]
@@ -134,16 +133,14 @@ class Group(NamedTuple):
     runs: Sequence[Outcome]
 
 
-def _ratio(share: float, group: Group) -> str:
-    return quantile_text([run.data.ratio for run in group.runs], "{:.2f}".format, share)
+def _ratios(group: Group) -> list[float]:
+    return [run.data.ratio for run in group.runs]
 
 
 TRACKING: Cells = {
     "track": lambda group: percent([tracks(run) for run in group.runs]),
-    "error ratio: median": partial(_ratio, 0.5),
-    "95 %": partial(_ratio, 0.95),
-    "99 %": partial(_ratio, 0.99),
-    "largest": lambda group: f"{np.max([run.data.ratio for run in group.runs]):.2f}",
+    **quantiles("error ratio: median", _ratios, "{:.2f}".format, 0.5, 0.95, 0.99),
+    "largest": lambda group: f"{np.max(_ratios(group)):.2f}",
 }
 BY_NUMBER: Cells = {
     "open groups": lambda group: group.name,
