@@ -139,7 +139,10 @@ def examine(subject):
     return Units([Check("inertia is small", "largest inertia, kg·m²", 1, value, 1.0, "it fits a hand")])
 """,
         "twin/crosscheck/suite.py",
-        ("\n)\n\n\nclass Evidence", '\n    Part("units", units.examine),\n)\n\n\nclass Evidence'),
+        (
+            "\n)\n\n\nclass CrosscheckResult",
+            '\n    CheckPart("units", units.examine),\n)\n\n\nclass CrosscheckResult',
+        ),
         "from spheretwin.crosscheck import units\n",
     ),
     "figure": Addition(

@@ -83,7 +83,7 @@ from spheretwin import cli
 from spheretwin import scenario as scenarios
 from spheretwin.scenario import reading as flags
 from spheretwin.crosscheck import suite
-from spheretwin.crosscheck.suite import Evidence, Subject
+from spheretwin.crosscheck.suite import CrosscheckResult, Subject
 from spheretwin.models import actuator as actuators
 from spheretwin.viz.recording.recorder import Recorder
 from spheretwin.provenance import facts_of
@@ -152,7 +152,7 @@ with Session(scenario) as session:
     recorder.close()
 
 part = suite.PARTS[-1]
-evidence = Evidence({part.name: part.examine(Subject(actuators.MJCF_PATH, actuators.load(), 10))})
+evidence = CrosscheckResult({part.name: part.examine(Subject(actuators.MJCF_PATH, actuators.load(), 10))})
 suite.FIGURES = suite.FIGURES[-1:]
 suite.write(folder, evidence)
 table = read_parquet(parquet)[0]

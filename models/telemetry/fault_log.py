@@ -84,7 +84,7 @@ def _group_of(part: str) -> int | None:
     return int(number) if number.isdecimal() else None
 
 
-class StateChange(NamedTuple):
+class Transition(NamedTuple):
     """Change of one entry of a column of states."""
 
     tick: int
@@ -101,13 +101,13 @@ class ColumnChanges:
     def __init__(self) -> None:
         self._last: dict[str, NDArray[np.float64]] = {}
 
-    def of(self, rows: Table, name: str) -> list[StateChange]:
+    def of(self, rows: Table, name: str) -> list[Transition]:
         """Return the changes of a column in one chunk, at least one row, in the order of time."""
         values = rows[name].reshape(len(rows), -1)
         last = self._last.get(name, np.zeros(values.shape[1]))
         self._last[name] = values[-1].copy()
         before = np.concatenate([last[None], values[:-1]])
         return [
-            StateChange(int(tick), float(rows["t_s"][tick]), int(entry), int(values[tick, entry]))
+            Transition(int(tick), float(rows["t_s"][tick]), int(entry), int(values[tick, entry]))
             for tick, entry in zip(*np.nonzero(values != before), strict=True)
         ]

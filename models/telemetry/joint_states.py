@@ -78,7 +78,7 @@ def write(path: Path, t_s: Array, topics: Mapping[str, Topic], metadata: Mapping
         writer.add_metadata(METADATA, dict(metadata))
         schema = writer.register_schema(TYPE, "ros2msg", DEFINITION.encode())
         channels = [
-            (writer.register_channel(f"/{name}", ENCODING, schema), Encoder(topic))
+            (writer.register_channel(f"/{name}", ENCODING, schema), MessageEncoder(topic))
             for name, topic in topics.items()
         ]
         for row, stamp in enumerate(stamps):
@@ -93,7 +93,7 @@ def group_names(groups: int) -> list[str]:
     return [str(group) for group in range(groups)]
 
 
-class Encoder:
+class MessageEncoder:
     """Messages of a topic: a stamp, the same names each time, and a row of each field.
 
     Parameters

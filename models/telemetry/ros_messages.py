@@ -18,7 +18,7 @@ _CODES = {
 _FIELD = re.compile(r"(?P<type>[\w/]+)(?:<=\d+)?(?P<array>\[(?:<=)?\d*\])?\s+(?P<name>\w+)(?P<rest>.*)")
 
 
-class _Field(NamedTuple):
+class _MessageField(NamedTuple):
     """Field of a message."""
 
     type: str
@@ -45,7 +45,7 @@ class Definition:
 
     def __init__(self, name: str, text: str) -> None:
         self._root = _plain(name)
-        self._types: dict[str, list[_Field]] = {}
+        self._types: dict[str, list[_MessageField]] = {}
         for number, part in enumerate(re.split(r"^=+$", text, flags=re.MULTILINE)):
             head, *body = part.strip().splitlines() or [""]
             is_root = number == 0
@@ -58,7 +58,7 @@ class Definition:
                 if field.type not in _CODES and field.type != "string":
                     self._fields(field.type)
 
-    def _fields(self, name: str) -> list[_Field]:
+    def _fields(self, name: str) -> list[_MessageField]:
         """Return the fields of a type, whose name may lack its package."""
         last = name.rpartition("/")[2]
         for known, fields in self._types.items():
@@ -78,10 +78,10 @@ class Definition:
             raise ValueError("expected CDR of version 1, received another encoding")
         return self._message(self._types[self._root], _Reader(data))
 
-    def _message(self, fields: Sequence[_Field], reader: _Reader) -> dict[str, Any]:
+    def _message(self, fields: Sequence[_MessageField], reader: _Reader) -> dict[str, Any]:
         return {field.name: self._value(field, reader) for field in fields}
 
-    def _value(self, field: _Field, reader: _Reader) -> Any:
+    def _value(self, field: _MessageField, reader: _Reader) -> Any:
         if field.length is None:
             return self._values(field.type, 1, reader)[0]
         count = reader.numbers("I", 1)[0] if field.length < 0 else field.length
@@ -122,7 +122,7 @@ def _plain(name: str) -> str:
     return name.replace("/msg/", "/")
 
 
-def _field(line: str) -> _Field | None:
+def _field(line: str) -> _MessageField | None:
     """Return the field of a line; None for a comment or a constant."""
     text = line.partition("#")[0].strip()
     match = _FIELD.fullmatch(text)
@@ -132,7 +132,7 @@ def _field(line: str) -> _Field | None:
         raise ValueError(f"expected a field of a message, received {text!r}")
     array = match["array"]
     count = None if array is None else int(array[1:-1]) if array[1:-1].isdigit() else -1
-    return _Field(match["type"], match["name"], count)
+    return _MessageField(match["type"], match["name"], count)
 
 
 def stamp_ns(message: Mapping[str, Any]) -> int | None:

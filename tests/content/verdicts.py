@@ -7,7 +7,7 @@ import numpy as np
 
 from spheretwin.crosscheck.dynamics import QUANTITIES, Dynamics
 from spheretwin.crosscheck.identities import Drift, FreeRotor
-from spheretwin.crosscheck.suite import Evidence
+from spheretwin.crosscheck.suite import CrosscheckResult
 from spheretwin.crosscheck.trajectories import ClosedLoop, Convergence, Pair, Trajectories
 from spheretwin.models import actuator as actuators
 from spheretwin.models.base.checks import Check
@@ -40,7 +40,7 @@ def checks(*names: str) -> list[Check]:
     return made
 
 
-def evidence() -> Evidence:
+def evidence() -> CrosscheckResult:
     """Return findings of each part of the cross-check that has a figure."""
     three = np.stack([T_s, 0.5 - T_s, T_s * T_s], axis=1)
     differences = {
@@ -72,7 +72,7 @@ def evidence() -> Evidence:
         "torque-free rotor": FreeRotor(checks("energy", "momentum"), T_s, drifts),
         "closed loop": ClosedLoop(checks("one", "two", "three", "four"), pairs),
     }
-    return Evidence(findings)
+    return CrosscheckResult(findings)
 
 
 def field_verdict() -> FieldVerdict:

@@ -51,7 +51,7 @@ _NO_RINGS = (
 )
 
 
-class Case(NamedTuple):
+class PlantCase(NamedTuple):
     """A plant to compare."""
 
     name: str
@@ -61,10 +61,10 @@ class Case(NamedTuple):
 
 
 CASES = (
-    Case("nominal", 0.0, 0.0),
-    Case("modelling error 0.2", 0.2, 0.0),
-    Case("payload 0.05 kg", 0.0, 0.05),
-    Case("both", 0.2, 0.05),
+    PlantCase("nominal", 0.0, 0.0),
+    PlantCase("modelling error 0.2", 0.2, 0.0),
+    PlantCase("payload 0.05 kg", 0.0, 0.05),
+    PlantCase("both", 0.2, 0.05),
 )
 
 # A machine of the seed with all mass properties and hinges that the closed forms lack.
@@ -198,7 +198,7 @@ def random_states(count: int) -> States:
     )
 
 
-def ask_mujoco(mjcf: Path, case: Case, states: States) -> Answers:
+def ask_mujoco(mjcf: Path, case: PlantCase, states: States) -> Answers:
     """Answers of MuJoCo, from its public functions."""
     rotor = MujocoRotor(read(mjcf), STEP_S, "RK4", case.modelling_error, case.payload_kg, mass=case.mass)
     model, data, body = rotor.model, rotor.data, rotor.model.body("rotor").id
@@ -219,14 +219,14 @@ def ask_mujoco(mjcf: Path, case: Case, states: States) -> Answers:
     return answers
 
 
-def ask_pinocchio(mjcf: Path, case: Case, states: States) -> Answers:
+def ask_pinocchio(mjcf: Path, case: PlantCase, states: States) -> Answers:
     """Answers of Pinocchio, from the same model file; errors are those of `model_of_file`."""
     model, joint = model_of_file(mjcf, case.modelling_error, case.payload_kg)
     E = np.array([rate_jacobian(q) for q in states.q])
     return _pinocchio_answers(model, joint, states, states.torque_q + _times(_turned(E), states.torque_S))
 
 
-def ask_pinocchio_about_chain(mjcf: Path, case: Case, states: States) -> Answers:
+def ask_pinocchio_about_chain(mjcf: Path, case: PlantCase, states: States) -> Answers:
     """Answers of Pinocchio, from the axes and bodies of the compiled model."""
     model = _compiled(mjcf, case)
     chain, joint = model_of_bodies(model)
@@ -255,9 +255,9 @@ def _pinocchio_answers(model: Any, joint: int, states: States, torque_q: Array) 
 def _differences(
     mjcf: Path,
     actuator: Actuator,
-    case: Case,
+    case: PlantCase,
     states: States,
-    ask: Callable[[Path, Case, States], Answers],
+    ask: Callable[[Path, PlantCase, States], Answers],
     is_general: bool,
 ) -> dict[str, Array]:
     """Relative differences by quantity, one entry a state."""
@@ -278,7 +278,7 @@ def _differences(
     }
 
 
-def _closed_terms(mjcf: Path, actuator: Actuator, case: Case, states: States) -> _Terms:
+def _closed_terms(mjcf: Path, actuator: Actuator, case: PlantCase, states: States) -> _Terms:
     """Return the terms of an ideal joint, in closed form."""
     gravity_m_s2 = -gravity(read(mjcf).described.opt)[2]
     rotor = LagrangianRotor(
@@ -326,7 +326,7 @@ def _chain_row(chain: Any, q: Triple, qdot: Array) -> tuple[Any, ...]:
     return np.array(rotor[:3]).T, axes, symmetric(M), np.array(columns).T, bias, G
 
 
-def _compiled(mjcf: Path, case: Case) -> mujoco.MjModel:
+def _compiled(mjcf: Path, case: PlantCase) -> mujoco.MjModel:
     return true_model(read(mjcf), case.modelling_error, case.payload_kg, None, case.mass)
 
 
@@ -334,7 +334,7 @@ def _general_joint(mjcf: Path, actuator: Actuator, states: States) -> list[Check
     """Compare MuJoCo and Pinocchio with the equations of motion of a general joint."""
     scale = scale_of(actuator)
     mass = MassSection(**{name: scale.field(f"plant.mass.{name}", value) for name, value in MASS})
-    case = Case("general joint", 0.2, 0.05, mass_errors(mass, SEED))
+    case = PlantCase("general joint", 0.2, 0.05, mass_errors(mass, SEED))
     terms = _chain_terms(_compiled(mjcf, case), states)
     qddot_of = {"MuJoCo": ask_mujoco(mjcf, case, states).qddot}
     with suppress(ImportError):

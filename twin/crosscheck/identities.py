@@ -118,7 +118,7 @@ NODDING = np.array([0.08, 0.05, 1.0])  # rates of α and β as shares of the spi
 SPINS_rad_s = {"2π": 2 * np.pi, "30": 30.0}
 
 
-class Motion(NamedTuple):
+class FreeMotion(NamedTuple):
     """A rotor in flight; one row a sample."""
 
     t_s: Array  # (n,)
@@ -185,7 +185,7 @@ def check_free_rotor(mjcf: Path, actuator: Actuator) -> FreeRotor:
     return FreeRotor(checks, t_s, drifts)
 
 
-def fly(mjcf: Path, inertia: Array, spin_rad_s: float) -> Motion:
+def fly(mjcf: Path, inertia: Array, spin_rad_s: float) -> FreeMotion:
     """Motion without torque in MuJoCo.
 
     Parameters
@@ -212,10 +212,10 @@ def fly(mjcf: Path, inertia: Array, spin_rad_s: float) -> Motion:
     for i in range(count + 1):
         R_SR[i], w_SR_R[i] = rotation(q), rotor_rate_jacobian(q) @ qdot
         mujoco.mj_step(rotor.model, rotor.data, nstep=round(SAMPLE_s / STEP_s))
-    return Motion(SAMPLE_s * np.arange(count + 1, dtype=np.float64), R_SR, w_SR_R, inertia)
+    return FreeMotion(SAMPLE_s * np.arange(count + 1, dtype=np.float64), R_SR, w_SR_R, inertia)
 
 
-def euler_attitude(motion: Motion) -> Array:
+def euler_attitude(motion: FreeMotion) -> Array:
     """Attitude of an axisymmetric rotor at each time, exact, from its state at time 0.
 
     With J1 = J2 the third axis turns about the fixed angular momentum H at H/J1, and the rotor turns about
@@ -229,13 +229,13 @@ def euler_attitude(motion: Motion) -> Array:
     return attitude
 
 
-def _momentum_drift(motion: Motion) -> Array:
+def _momentum_drift(motion: FreeMotion) -> Array:
     H = motion.momentum_S
     drift: Array = np.linalg.norm(H - H[0], axis=1) / np.linalg.norm(H[0])
     return drift
 
 
-def _attitude_error(motion: Motion) -> Array:
+def _attitude_error(motion: FreeMotion) -> Array:
     """(n,) angle between the motion and Euler's, rad."""
     apart = euler_attitude(motion).transpose(0, 2, 1) @ motion.R_SR
     # The sine from the antisymmetric part: an arc cosine alone loses half the digits of a small angle.
@@ -245,7 +245,7 @@ def _attitude_error(motion: Motion) -> Array:
     return np.arctan2(sine, cosine)
 
 
-def _nodding_share(motion: Motion) -> float:
+def _nodding_share(motion: FreeMotion) -> float:
     """Rate across the third axis over the whole rate, at the start."""
     w = motion.w_SR_R[0]
     return float(np.hypot(w[0], w[1]) / np.linalg.norm(w))

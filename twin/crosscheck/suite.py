@@ -15,7 +15,7 @@ from spheretwin.models.mjcf import read
 from spheretwin.viz.pages import markdown as pieces
 from spheretwin.viz.pages.markdown import Drawing, Page
 
-F = TypeVar("F", bound="Finding")
+F = TypeVar("F", bound="PartResult")
 
 STATES = 10_000
 """Default number of random states at which the dynamics are compared."""
@@ -30,7 +30,7 @@ class Subject(NamedTuple):
     """Random states at which formulas are compared."""
 
 
-class Finding(Protocol):
+class PartResult(Protocol):
     """Result of a part: its checks, and the data of its figures."""
 
     @property
@@ -39,28 +39,28 @@ class Finding(Protocol):
         ...
 
 
-class Part(NamedTuple):
+class CheckPart(NamedTuple):
     """One row of the suite."""
 
     name: str
-    examine: Callable[[Subject], Finding]
+    examine: Callable[[Subject], PartResult]
 
 
 PARTS = (
-    Part("dynamics", lambda on: dynamics.compare(on.mjcf, on.actuator, on.states)),
-    Part("identities", lambda on: identities.check_identities(on.actuator, on.states)),
-    Part("trajectories", lambda on: trajectories.compare_trajectories(on.mjcf, on.actuator)),
-    Part("torque-free rotor", lambda on: identities.check_free_rotor(on.mjcf, on.actuator)),
-    Part("coil-driven motion", lambda on: coil_driven.compare(on.mjcf, on.actuator)),
-    Part("closed loop", lambda on: trajectories.compare_closed_loop(on.mjcf, on.actuator)),
-    Part("prototype", lambda on: prototype.compare(on.mjcf, on.actuator)),
+    CheckPart("dynamics", lambda on: dynamics.compare(on.mjcf, on.actuator, on.states)),
+    CheckPart("identities", lambda on: identities.check_identities(on.actuator, on.states)),
+    CheckPart("trajectories", lambda on: trajectories.compare_trajectories(on.mjcf, on.actuator)),
+    CheckPart("torque-free rotor", lambda on: identities.check_free_rotor(on.mjcf, on.actuator)),
+    CheckPart("coil-driven motion", lambda on: coil_driven.compare(on.mjcf, on.actuator)),
+    CheckPart("closed loop", lambda on: trajectories.compare_closed_loop(on.mjcf, on.actuator)),
+    CheckPart("prototype", lambda on: prototype.compare(on.mjcf, on.actuator)),
 )
 
 
-class Evidence(NamedTuple):
+class CrosscheckResult(NamedTuple):
     """Findings of every part by its name."""
 
-    findings: Mapping[str, Finding]
+    findings: Mapping[str, PartResult]
 
     @property
     def checks(self) -> list[Check]:
@@ -74,7 +74,7 @@ class Evidence(NamedTuple):
 
 def run(
     mjcf: Path = actuators.MJCF_PATH, states: int = STATES, begun: Callable[[str], None] = lambda part: None
-) -> Evidence:
+) -> CrosscheckResult:
     """Run every check.
 
     Parameters
@@ -99,14 +99,14 @@ def run(
             f"crosscheck {mjcf}: expected rigid bodies on three hinges, which the Lagrangian computes,"
             f" received a model with {', '.join(unknown)}"
         )
-    findings: dict[str, Finding] = {}
+    findings: dict[str, PartResult] = {}
     for part in PARTS:
         begun(part.name)
         findings[part.name] = part.examine(subject)
-    return Evidence(findings)
+    return CrosscheckResult(findings)
 
 
-def draw_closed_loop(evidence: Evidence) -> Drawing:
+def draw_closed_loop(evidence: CrosscheckResult) -> Drawing:
     """The same run on two plants."""
     from spheretwin.viz.figures import crosscheck
 
@@ -127,7 +127,7 @@ def draw_closed_loop(evidence: Evidence) -> Drawing:
     )
 
 
-def draw_convergence(evidence: Evidence) -> Drawing:
+def draw_convergence(evidence: CrosscheckResult) -> Drawing:
     """Orders of convergence."""
     from spheretwin.viz.figures import crosscheck
 
@@ -136,7 +136,7 @@ def draw_convergence(evidence: Evidence) -> Drawing:
     return Drawing("convergence.svg", "Largest error over 5 s at five steps, with the fitted slopes.", figure)
 
 
-def draw_differences(evidence: Evidence) -> Drawing:
+def draw_differences(evidence: CrosscheckResult) -> Drawing:
     """Differences of engines and Lagrangian at random states."""
     from spheretwin.viz.figures import crosscheck
 
@@ -148,7 +148,7 @@ def draw_differences(evidence: Evidence) -> Drawing:
     return Drawing("dynamics.svg", caption, figure)
 
 
-def draw_margins(evidence: Evidence) -> Drawing:
+def draw_margins(evidence: CrosscheckResult) -> Drawing:
     """Value over bound of each check."""
     from spheretwin.viz.figures import crosscheck
 
@@ -157,7 +157,7 @@ def draw_margins(evidence: Evidence) -> Drawing:
     return Drawing("margins.svg", caption, figure)
 
 
-def draw_torque_free(evidence: Evidence) -> Drawing:
+def draw_torque_free(evidence: CrosscheckResult) -> Drawing:
     """Drift of what a torque-free rotor keeps."""
     from spheretwin.viz.figures import crosscheck
 
@@ -177,7 +177,7 @@ def draw_torque_free(evidence: Evidence) -> Drawing:
     return Drawing("torque_free.svg", caption, figure)
 
 
-def draw_trajectory(evidence: Evidence) -> Drawing:
+def draw_trajectory(evidence: CrosscheckResult) -> Drawing:
     """A motion by given torques, and how far engine and reference part."""
     from spheretwin.viz.figures import crosscheck
 
@@ -194,7 +194,7 @@ def draw_trajectory(evidence: Evidence) -> Drawing:
     )
 
 
-FIGURES: tuple[Callable[[Evidence], Drawing], ...] = (
+FIGURES: tuple[Callable[[CrosscheckResult], Drawing], ...] = (
     draw_margins,
     draw_differences,
     draw_trajectory,
@@ -207,14 +207,14 @@ FIGURES: tuple[Callable[[Evidence], Drawing], ...] = (
 NAME = "crosscheck"
 
 
-def write(folder: Path, evidence: Evidence, figure_format: str = "svg") -> list[Path]:
+def write(folder: Path, evidence: CrosscheckResult, figure_format: str = "svg") -> list[Path]:
     """Write the page and its figures into a folder; return both forms of the page.
 
     Parameters
     ----------
     folder : Path
         Exists.
-    evidence : Evidence
+    evidence : CrosscheckResult
         Result of the suite.
     figure_format : str
         Format of the figures in addition to SVG.

@@ -48,7 +48,7 @@ LARGEST_ERROR_rad, MOST_HALVINGS = 0.04, 5
 OWN = "our own RK4"
 
 
-class Pieces(NamedTuple):
+class HeldTorques(NamedTuple):
     """Torques held one after another, from a given start."""
 
     start: Array  # (6,) rad and rad/s
@@ -106,12 +106,12 @@ def compare_trajectories(mjcf: Path, actuator: Actuator) -> Trajectories:
     )
 
 
-def nutation_pieces(motion: Equations) -> Pieces:
+def nutation_pieces(motion: Equations) -> HeldTorques:
     """Torques that follow the nutation (59): those of (1) at the middle of each piece."""
     nutation, count = Nutation(), round(DURATION_s / HOLD_s)
     desired = nutation.sample(HOLD_s * (np.arange(count, dtype=np.float64) + 0.5))
     torque = [motion.torque(q, qdot, qddot) for q, qdot, qddot in desired]
-    return Pieces(nutation.sample(np.zeros(1))[0, :2].ravel(), np.array(torque))
+    return HeldTorques(nutation.sample(np.zeros(1))[0, :2].ravel(), np.array(torque))
 
 
 def solve(what: str, *problem: Any, **options: Any) -> Any:
@@ -128,7 +128,7 @@ def solve(what: str, *problem: Any, **options: Any) -> Any:
     return solution
 
 
-def integrate(pieces: Pieces, motion: Equations) -> Array:
+def integrate(pieces: HeldTorques, motion: Equations) -> Array:
     """States at the ends of the pieces by DOP853, of order eight, on the Lagrangian.
 
     Its tolerance is near rounding, so that its error is far below any bound here.
@@ -150,7 +150,7 @@ def integrate(pieces: Pieces, motion: Equations) -> Array:
     return np.array(states)
 
 
-def by_mujoco(mjcf: Path, pieces: Pieces, integrator: str, step_s: float) -> Array:
+def by_mujoco(mjcf: Path, pieces: HeldTorques, integrator: str, step_s: float) -> Array:
     """States at the ends of the pieces by MuJoCo."""
     rotor = MujocoRotor(read(mjcf), step_s, integrator, 0.0, 0.0, gravity_m_s2=0.0)
     rotor.start(pieces.start[:3], pieces.start[3:])
@@ -162,7 +162,7 @@ def by_mujoco(mjcf: Path, pieces: Pieces, integrator: str, step_s: float) -> Arr
     return np.array(states)
 
 
-def by_own_steps(actuator: Actuator, motion: Equations, pieces: Pieces, step_s: float) -> Array:
+def by_own_steps(actuator: Actuator, motion: Equations, pieces: HeldTorques, step_s: float) -> Array:
     """States at the ends of the pieces by the Lagrangian plant."""
     plant = LagrangianRotor(actuator, step_s, joint=motion.joint).start(pieces.start[:3], pieces.start[3:])
     states = [pieces.start]

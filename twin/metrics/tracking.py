@@ -42,7 +42,7 @@ class MaxAbsError(Metric):
 PIECE_TICKS = 256
 
 
-class Pieces(NamedTuple):
+class PieceSums(NamedTuple):
     """Sums of squares over pieces of 256 ticks, one of which begins at half of the planned ticks.
 
     They give the value of the second half without the rows, and grow by a kilobyte for 10,000 ticks.
@@ -53,7 +53,7 @@ class Pieces(NamedTuple):
 
 
 @rounding_each
-def _add_pieces(rows: Array, first: int, columns: tuple[int, ...], state: Pieces) -> None:
+def _add_pieces(rows: Array, first: int, columns: tuple[int, ...], state: PieceSums) -> None:
     (error,) = columns
     for i in range(rows.shape[0]):
         piece = (first + i - state.offset) // PIECE_TICKS + 1
@@ -65,13 +65,13 @@ class RmsError(Metric):
     """Root mean square of ``error_rad`` of each hinge over the whole run, [3] in rad."""
 
     labels = ANGLES
-    state: Pieces
+    state: PieceSums
     reads = ("error_rad",)
     add = staticmethod(_add_pieces)
 
-    def start(self, planned: PlannedRun) -> Pieces:
+    def start(self, planned: PlannedRun) -> PieceSums:
         """Return the first piece."""
-        return Pieces(planned.ticks // 2 % PIECE_TICKS, np.zeros((1, 3)))
+        return PieceSums(planned.ticks // 2 % PIECE_TICKS, np.zeros((1, 3)))
 
     def begin(self, rows: int) -> int:
         """Prepare the state for a chunk of some rows; return the tick of its first row."""

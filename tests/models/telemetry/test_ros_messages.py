@@ -8,7 +8,7 @@ import pytest
 from mcap.writer import Writer
 
 from spheretwin.models.telemetry import joint_states, ros_messages
-from spheretwin.models.telemetry.joint_states import DEFINITION, TYPE, Encoder, Topic
+from spheretwin.models.telemetry.joint_states import DEFINITION, TYPE, MessageEncoder, Topic
 from spheretwin.models.telemetry.ros_messages import Definition
 
 ARRAY = """# Data of any layout
@@ -73,7 +73,7 @@ def test_a_definition_that_is_none_is_refused(text):
 
 
 def test_a_file_has_the_numbers_of_all_topics_or_of_those_that_are_needed(tmp_path):
-    state = Encoder(Topic(["a", "b"], {"position": np.array([[1.0, 2.0]])}))
+    state = MessageEncoder(Topic(["a", "b"], {"position": np.array([[1.0, 2.0]])}))
     with (path := tmp_path / "bag.mcap").open("wb") as file:
         writer = Writer(file)
         writer.start()

@@ -7,7 +7,7 @@ from mcap.reader import make_reader
 from mcap.writer import Writer
 
 from spheretwin.models.telemetry import joint_states
-from spheretwin.models.telemetry.joint_states import ANGLE_NAMES, Encoder, Topic
+from spheretwin.models.telemetry.joint_states import ANGLE_NAMES, MessageEncoder, Topic
 
 START_s = 1764253053
 START = datetime.fromtimestamp(START_s, UTC)
@@ -67,8 +67,11 @@ def simulink(log, path):
 def ros_bag(log, path):
     """Two topics, whose messages were stamped 0.2 ms apart."""
     topics = {
-        "/joint_states": (0, Encoder(Topic(ANGLE_NAMES, {"position": log.angle_rad}))),
-        "/coils": (200_000, Encoder(Topic([f"coil_{1 + j}" for j in GROUPS], {"effort": log.current_A}))),
+        "/joint_states": (0, MessageEncoder(Topic(ANGLE_NAMES, {"position": log.angle_rad}))),
+        "/coils": (
+            200_000,
+            MessageEncoder(Topic([f"coil_{1 + j}" for j in GROUPS], {"effort": log.current_A})),
+        ),
     }
     with path.open("wb") as file:
         writer = Writer(file)

@@ -154,7 +154,7 @@ def test_topics_with_times_of_their_own_are_read_at_those_of_the_angles(tmp_path
         for row in range(2):
             for place, (name, topic) in enumerate(topics.items()):
                 stamp_ns = 1000 * (2 * row + place)
-                message = joint_states.Encoder(topic).message(row, stamp_ns)
+                message = joint_states.MessageEncoder(topic).message(row, stamp_ns)
                 writer.add_message(channels[name], stamp_ns, message, stamp_ns)
         writer.finish()
     states = joint_states.read(path)
