@@ -125,7 +125,9 @@ def test_a_long_front_is_printed_at_even_places(capsys, monkeypatch, trials, sho
     front = [{"trial": place, "command": f"command {place}"} for place in range(trials)]
     printed = []
     monkeypatch.setattr(
-        sweep.tuning_page, "chosen", lambda of_law: ([], [trial["trial"] for trial in of_law["best"]])
+        sweep.tuning_page,
+        "chosen",
+        lambda of_law, title: (title, [], [trial["trial"] for trial in of_law["best"]], 1),
     )
     monkeypatch.setattr(sweep.tuning_page, "counted", lambda of_law: f"{len(of_law['best'])} counted")
     monkeypatch.setattr(sweep.runs, "print_rows", lambda *table: printed.append(table))
