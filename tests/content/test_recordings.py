@@ -9,7 +9,8 @@ from spheretwin.models.telemetry.signals import width
 from spheretwin.models.telemetry.status import Level, Status
 from spheretwin.models.telemetry.table import Table
 from spheretwin.provenance import facts_of
-from spheretwin.viz.comparison import merged_recording, shadow_recording, trajectories
+from spheretwin.viz.comparison import merged_recording, trajectories
+from spheretwin.viz.comparison import shadow as shadow_recording
 from spheretwin.viz.comparison.runs import ComparedRun, EarlyEnd
 from spheretwin.viz.comparison.trajectories import LawTrajectory
 from spheretwin.viz.quantities import QuantityRows

@@ -25,7 +25,7 @@ from spheretwin.scenario import reading
 from spheretwin.scenario.sections import Scenario
 
 if TYPE_CHECKING:
-    from spheretwin.viz.comparison.shadow_live import ShadowView
+    from spheretwin.viz.comparison.shadow import ShadowView
 
 T = TypeVar("T")
 
@@ -110,7 +110,7 @@ def live_view(
         yield None
         return
     from spheretwin.analysis.comparison import subject_of  # Rerun is slow to import
-    from spheretwin.viz.comparison.shadow_live import ShadowView
+    from spheretwin.viz.comparison.shadow import ShadowView
 
     view = ShadowView(subject_of(model.scenario, model.actuator), signals, watched=watched)
     try:

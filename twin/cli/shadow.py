@@ -91,12 +91,12 @@ def run(options: argparse.Namespace) -> bool:
         result.telemetry.write_parquet(options.telemetry, metadata)
     if options.record:
         from spheretwin.analysis.comparison import subject_of  # Rerun is slow to import
-        from spheretwin.viz.comparison import shadow_recording
+        from spheretwin.viz.comparison import shadow as recording
 
         verdict = Verdict(result.chi2, result.consistent).markdown(log)
         text = f"{verdict}\n\nSHA-256 of the numbers of the log: {log.digest}"
         subject = subject_of(model.scenario, model.actuator)
-        shadow_recording.write(options.record, result.telemetry, log.current_A, subject, text)
+        recording.write(options.record, result.telemetry, log.current_A, subject, text)
     if options.json:
         print_json(
             {

@@ -169,7 +169,7 @@ def _response_cells(margins: responses.Margins) -> tuple[str, ...]:
 
 
 def _bode(by_law: dict[str, tuple[responses.Response, responses.Response]]) -> Drawing:
-    from spheretwin.viz.figures import frequency_response as figures
+    from spheretwin.viz.figures import conditions as figures
 
     frequency_Hz = np.array(responses.LINES_Hz, np.float64)
     figure = figures.bode(

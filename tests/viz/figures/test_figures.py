@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from spheretwin.models.base.errors import InputError
-from spheretwin.viz.figures import comparison, faults, fronts, maps, over_time, style
+from spheretwin.viz.figures import comparison, conditions, faults, fronts, maps, over_time, style
 from tests.viz.comparison.compared import RAMP, VALUE, T_s, run_of
 from tests.viz.figures import figure_builders as built
 from tests.viz.figures.figure_builders import OBJECTIVES, TRIALS
@@ -128,3 +128,23 @@ def test_the_same_figure_gives_the_same_bytes(tmp_path, suffix):
 def test_a_figure_that_cannot_be_written_is_bad_input(tmp_path):
     with pytest.raises(InputError, match="writable path"):
         style.save(built.margins(), tmp_path / "missing" / "figure.png")
+
+
+FREQUENCY_Hz = np.array([1.0, 10.0, 100.0, 500.0])
+
+
+def test_lines_and_markers_have_gain_and_phase_and_a_zero_is_left_out():
+    linear = np.array([10.0, 1.0, -0.1j, -0.01])
+    measured = np.array([10.0, 1.0, -0.1j, 1e-12 + 0j])  # no gain at half of the sampling rate
+    figure = conditions.bode({"pid": (FREQUENCY_Hz, measured, linear)}, {"pid": "PID"}, "loop")
+    gain, phase = ([curve.get_ydata() for curve in axes.lines[:2]] for axes in figure.axes)
+    assert gain[0] == pytest.approx([20.0, 0.0, -20.0, -40.0])
+    assert gain[1] == pytest.approx([20.0, 0.0, -20.0, np.nan], nan_ok=True)
+    assert np.diff(phase[0]) == pytest.approx([0.0, -90.0, -90.0])
+    assert np.isnan(phase[1]).tolist() == [False, False, False, True]
+    (legend,) = figure.legends
+    assert [text.get_text() for text in legend.get_texts()] == [
+        "PID",
+        "linear model of the sampled loop",
+        "measured",
+    ]

@@ -9,8 +9,7 @@ from spheretwin.analysis.comparison import subject_of
 from spheretwin.machine import Log
 from spheretwin.machine.model import model_of
 from spheretwin.machine.state_estimation import followed, signals
-from spheretwin.viz.comparison.shadow_live import ALARMS, WINDOWS, ShadowView
-from spheretwin.viz.comparison.shadow_recording import TEXT
+from spheretwin.viz.comparison.shadow import ALARMS, TEXT, WINDOWS, ShadowView
 from spheretwin.viz.recording.live import RECORDING
 from tests.viz.recording.panels import columns, series
 
