@@ -1,4 +1,4 @@
-"""Several runs as one recording."""
+"""Several runs as one recording: all in one actuator, and each quantity of all in one plot."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import json
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 import rerun as rr
@@ -14,24 +15,13 @@ from rerun.components import MarkerShape
 
 from spheretwin.models.base.files import whole_file
 from spheretwin.viz import theme
-from spheretwin.viz.comparison.ghosts import Array, Ghost, Line, Tip, below, send_lines, write_part
-from spheretwin.viz.comparison.layout import (
-    COMPARE,
-    END,
-    LEGEND,
-    MARKS,
-    REFERENCE,
-    RUNS,
-    TIP,
-    ComparisonView,
-    Plot,
-    application,
-    layout,
-)
+from spheretwin.viz.comparison.ghosts import ROTOR, Array, Ghost, Line, Tip, below, send_lines, write_part
 from spheretwin.viz.comparison.runs import ComparedRun, PlotRange, leaders, quantity_range
 from spheretwin.viz.layout.extents import labelled
+from spheretwin.viz.layout.layout import blueprint, eye
+from spheretwin.viz.layout.plots import time_axis, time_range
 from spheretwin.viz.layout.styles import MIDDLE, THICK, THIN
-from spheretwin.viz.layout.view import SCENARIO
+from spheretwin.viz.layout.view import EVENTS, SCENARIO, application_of
 from spheretwin.viz.quantities import Quantity, compared_quantities
 from spheretwin.viz.recording.currents import CoilCurrents
 from spheretwin.viz.recording.part import (
@@ -46,7 +36,124 @@ from spheretwin.viz.recording.recorder import PIPE_PATHS, FilePipe
 from spheretwin.viz.recording.scene3d import MovingActuator
 from spheretwin.viz.recording.signals import Signals
 from spheretwin.viz.recording.status import StateChanges, StateLanes, log_lines
-from spheretwin.viz.scene.entities import size_of
+from spheretwin.viz.scene.entities import TRAIL_S, size_of
+from spheretwin.viz.scene.meshes import WORLD
+
+COMPARE, MARKS, END, TIP = "compare", "marks", "end", "tip"
+"""Parts of the paths of entities, after the name of a run."""
+
+RUNS, LEGEND = "runs", "legend"
+"""Entities of all runs: their description, and their colours with labels."""
+
+REFERENCE = "setpoint"
+"""Before the name of a run: a viewer draws lines in the order of their paths, these above all others."""
+
+LARGE, BESIDE_TEXTS = "whole", "more"
+"""Groups of the plot that is higher than the others, and of plots in tabs with the texts."""
+
+
+class Plot(NamedTuple):
+    """Plot of one quantity of all runs."""
+
+    name: str
+    title: str
+    group: str
+    desired: bool
+    """True if the reference is drawn with it."""
+    limits: tuple[float, float]
+
+
+class ComparisonView(NamedTuple):
+    """Properties of the runs on which the layout depends."""
+
+    runs: tuple[str, ...]
+    """Names."""
+    leaders: tuple[str, ...]
+    """Names of the runs that show the reference."""
+    plots: tuple[Plot, ...]
+    duration_s: float
+    states: tuple[str, ...]
+    """Names of the runs with changes of state."""
+    logs: tuple[str, ...]
+    """Names of the runs with events."""
+    failed: tuple[str, ...]
+    """Names of the runs that are not complete."""
+    size: float
+    """Size of the first run's actuator, which is drawn completely."""
+
+
+def application(view: ComparisonView) -> str:
+    """Return the application id of recordings with one layout: a viewer keeps one layout for each."""
+    return application_of("spheretwin-runs", repr(view))
+
+
+def layout(view: ComparisonView) -> rrb.Blueprint:
+    """Blueprint of a recording of several runs."""
+    groups = dict.fromkeys(plot.group for plot in view.plots if plot.group != BESIDE_TEXTS)
+    rows = [rrb.Horizontal(*_plots(view, group)) for group in groups]
+    texts = rrb.Tabs(
+        rrb.TextDocumentView(origin=f"/{RUNS}", name="runs"),
+        rrb.TextLogView(origin="/", contents=[f"/{run}/{EVENTS}" for run in view.logs], name="events"),
+        *([_states(view)] if view.states else []),
+        *_plots(view, BESIDE_TEXTS),
+    )
+    return blueprint(
+        rrb.Horizontal(
+            rrb.Vertical(_bodies(view), _legend(view), texts, row_shares=[5, 0.5 + 0.6 * len(view.runs), 3]),
+            rrb.Vertical(*rows, row_shares=[4 if group == LARGE else 3 for group in groups]),
+            column_shares=[2, 3],
+            name="compare",
+        )
+    )
+
+
+def _plots(view: ComparisonView, group: str) -> list[rrb.TimeSeriesView]:
+    return [_plot(view, plot) for plot in view.plots if plot.group == group]
+
+
+def _plot(view: ComparisonView, plot: Plot) -> rrb.TimeSeriesView:
+    reference_lines = [f"/{REFERENCE}/{run}/{plot.name}" for run in view.leaders] if plot.desired else []
+    return rrb.TimeSeriesView(
+        origin="/",
+        contents=[
+            *reference_lines,
+            *(f"/{run}/{COMPARE}/{plot.name}" for run in view.runs),
+            *(f"/{run}/{MARKS}/{plot.name}" for run in view.runs),
+            *(f"/{run}/{END}/{plot.name}" for run in view.failed),
+        ],
+        name=plot.title,
+        axis_x=time_axis(view.duration_s),
+        axis_y=rrb.ScalarAxis(range=plot.limits),
+        plot_legend=rrb.PlotLegend(visible=False),
+        interaction=rrb.PlotInteraction(tooltip_mode="All"),
+    )
+
+
+def _bodies(view: ComparisonView) -> rrb.Spatial3DView:
+    first, *ghosts = view.runs
+    tips = [f"/{run}/{TIP}" for run in view.runs] + [f"/{REFERENCE}/{run}/{TIP}" for run in view.leaders]
+    bodies = [f"/{first}/{WORLD}/**", *(f"/{run}/{ROTOR}/**" for run in ghosts)]
+    return rrb.Spatial3DView(
+        origin="/",
+        contents=[*bodies, *(f"{tip}/**" for tip in tips)],
+        name="run 1; the others as ghosts",
+        line_grid=False,
+        eye_controls=eye(view.size),
+        overrides={f"{tip}/path": time_range(TRAIL_S) for tip in tips},
+    )
+
+
+def _legend(view: ComparisonView) -> rrb.Spatial2DView:
+    """View of the colours and labels of the runs: a legend within a plot would cover lines."""
+    bounds = rrb.VisualBounds2D(x_range=[-0.1, 1.1], y_range=[-0.5, len(view.runs) - 0.1])
+    return rrb.Spatial2DView(origin=f"/{LEGEND}", name="runs", visual_bounds=bounds)
+
+
+def _states(view: ComparisonView) -> rrb.StateTimelineView:
+    contents = [f"/{run}/**" for run in view.states]
+    return rrb.StateTimelineView(
+        origin="/", contents=contents, name="states", time_view=time_axis(view.duration_s)
+    )
 
 
 @contextmanager
@@ -122,7 +229,9 @@ def write(path: Path, runs: Sequence[ComparedRun], subjects: Sequence[RecordingS
     view = ComparisonView(
         tuple(run.name for run in runs),
         tuple(runs[place].name for place in leading),
-        tuple(_plot(quantity, of_quantity) for quantity, of_quantity in zip(quantities, ranges, strict=True)),
+        tuple(
+            _plot_of(quantity, of_quantity) for quantity, of_quantity in zip(quantities, ranges, strict=True)
+        ),
         max(float(table["t_s"][-1]) for table in tables),
         tuple(run.name for run in runs if StateChanges().of(run.table)),
         tuple(run.name for run in runs if run.events),
@@ -183,7 +292,7 @@ def _write_reference(
             send_lines(recording, quantity.name, run.table["t_s"], line)
 
 
-def _plot(quantity: Quantity, of_quantity: PlotRange) -> Plot:
+def _plot_of(quantity: Quantity, of_quantity: PlotRange) -> Plot:
     """Return the plot of a quantity; its title states that values are outside of its range."""
     low, high, outside = of_quantity
     limits = quantity.limits or labelled(low, high, quantity.floor, STEPS)

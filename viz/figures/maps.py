@@ -250,8 +250,7 @@ def capability_map(workspace: Workspace, on_grid: Capability, limit_A: float) ->
         f"Worst direction and worst spin at {limit_A:g} A; radius: tilt of the shaft in degrees, angle: its"
     )
     title += " azimuth"
-    polar = {"subplot_kw": {"projection": "polar"}}
-    figure, grid = sheet(1.2 * WIDTH_in, 2, 2, title, 1.25 * WIDTH_in, **polar)
+    figure, grid = sheet(1.2 * WIDTH_in, 2, 2, title, 1.25 * WIDTH_in, subplot_kw={"projection": "polar"})
     least_norm, best, singular_value = (
         _over_spin(workspace, values, np.min)
         for values in (on_grid.least_norm_Nm, on_grid.best_Nm, on_grid.singular_value_Nm_per_A)
