@@ -193,10 +193,11 @@ def shapes_of_modes():
 
 
 def arguments_of_commands():
-    return "\n".join(
-        f"{name}: by {command.by}, {command.arguments.model_json_schema().get('properties')}"
-        for name, command in COMMANDS.items()
-    )
+    lines = []
+    for name, command in COMMANDS.items():
+        fields = command.arguments.model_json_schema().get("properties")
+        lines += [f"{name}: by {command.by}, {fields}", f"    {command.text}"]
+    return "\n".join(lines)
 
 
 def row(setting):

@@ -184,10 +184,7 @@ def _parser(arguments: Sequence[str]) -> Parser:
     parser = Parser(prog="spheretwin", description="Digital twin of a permanent-magnet spherical actuator.")
     parser.add_argument("--version", action="version", version=f"spheretwin {version('spheretwin')}")
     verbs = parser.add_subparsers(metavar="VERB", required=True)
-    # Verbs that run a scenario replace the option --help by their own.
-    parsers = {
-        name: verbs.add_parser(name, help=text, conflict_handler="resolve") for name, text in VERBS.items()
-    }
+    parsers = {name: verbs.add_parser(name, help=text) for name, text in VERBS.items()}
     called = next((argument for argument in arguments if not argument.startswith("-")), None)
     if called in parsers:
         parsers[called].define(_verb(called))
@@ -202,6 +199,6 @@ def _verb(name: str) -> Verb | dict[str, Verb]:
 
 def parsers_of(verb: str) -> dict[str, Parser]:
     """Return the parser of a verb, and those of its parts, by what is typed for each."""
-    parser = Parser(prog=f"spheretwin {verb}", conflict_handler="resolve")
+    parser = Parser(prog=f"spheretwin {verb}")
     parser.define(_verb(verb))
     return {verb: parser, **{f"{verb} {name}": part for name, part in parser.parts().items()}}

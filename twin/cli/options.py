@@ -158,7 +158,13 @@ class Parser(argparse.ArgumentParser):
     def __init__(self, **settings: Any) -> None:
         self.expected: list[str] = []
         self._required = ""
-        super().__init__(**settings, allow_abbrev=False, formatter_class=_Formatter)
+        # Verbs that run a scenario replace the option --help by their own.
+        options: dict[str, Any] = {
+            "allow_abbrev": False,
+            "formatter_class": _Formatter,
+            "conflict_handler": "resolve",
+        }
+        super().__init__(**settings, **options)
 
     def define(self, verb: Verb | dict[str, Verb]) -> None:
         """Define a verb, or its parts by their names."""
@@ -167,7 +173,7 @@ class Parser(argparse.ArgumentParser):
             for name, part in verb.items():
                 summary = _description(part).partition("\n")[0].rstrip(".")
                 summary = summary[:1].lower() + summary[1:]
-                parts.add_parser(name, help=summary, conflict_handler="resolve").define(part)
+                parts.add_parser(name, help=summary).define(part)
             return
         self.description = _description(verb)
         self._add_options(verb.options, verb.readers)
