@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import hashlib
-import json
 import shlex
 import zlib
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import closing, suppress
+from contextlib import closing
 from functools import cache
 from itertools import islice
 from typing import Any, NamedTuple, get_type_hints
@@ -16,31 +14,22 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import TypeAdapter
 
-from spheretwin.models import mjcf
-from spheretwin.models.actuator import MJCF_PATH, TORQUE_CURVE_PATH
-from spheretwin.models.base.cache import cache_folder
-from spheretwin.models.base.errors import InputError, SpheretwinError
-from spheretwin.models.telemetry.run_record import versions
+from spheretwin.models.base.errors import InputError
 from spheretwin.models.telemetry.status import Status
+from spheretwin.paper.earlier_runs import EarlierRuns, key_of
 from spheretwin.paper.experiment import STATUSES, Case, Experiment, Outcome, Outcomes
-from spheretwin.provenance import digest
 from spheretwin.run import Run, UserMetric
-from spheretwin.scenario.reading import named_files
 from spheretwin.scenario.sections import Scenario
 from spheretwin.scenario.writing import command_words
 from spheretwin.study.agreement import Ending, compare
 from spheretwin.study.engines.threads import run_each
 from spheretwin.study.grid import Row
-from spheretwin.study.journal import Journal
 from spheretwin.study.row import Result, Rows
 from spheretwin.study.study import FULL, Study
 
 Array = NDArray[np.float64]
 
 PLANT = "plant.engine"
-
-MOST_RUNS = 1_000_000
-"""Largest number of runs of an experiment that are cached."""
 
 EVERY = 100
 """In addition to the first run of each law, one run in this many runs on MuJoCo too."""
@@ -200,20 +189,6 @@ def _summary(plan: Plan, case: Case) -> CaseSummary:
     return CaseSummary(key_of(scenario), fields)
 
 
-def key_of(scenario: Scenario) -> str:
-    """Digest of everything that a run depends on, except plant, seed and sources."""
-    fields = scenario.model_dump(mode="json", exclude={"seed": True, "plant": {"engine"}})
-    files = {path: digest(dotted, path) for path, dotted in named_files(fields)}
-    content = json.dumps([fields, files, _shipped(), versions()], sort_keys=True)
-    return hashlib.sha256(content.encode()).hexdigest()[:32]
-
-
-@cache
-def _shipped() -> tuple[str | None, ...]:
-    """Digests of the shipped model and torque curve."""
-    return mjcf.contents_digest(MJCF_PATH), digest("plant.torque_curve", str(TORQUE_CURVE_PATH))
-
-
 class PlanResult(NamedTuple):
     """Outcomes of a plan."""
 
@@ -224,53 +199,17 @@ class PlanResult(NamedTuple):
     """Differences of the sample that ran on both plants."""
 
 
-class EarlierRuns:
-    """Results of earlier runs of a plan, in a journal of the cache folder.
-
-    Nothing is kept if there is no such folder, or if another process writes the journal.
-
-    Parameters
-    ----------
-    plan : Plan
-    summaries : mapping
-        `summarise` of the plan.
-    """
-
-    def __init__(self, plan: Plan, summaries: Mapping[str, CaseSummary]) -> None:
-        self._summaries, self._results = summaries, dict[str, Result]()
-        self._journal: Journal | None = None
-        if folder := cache_folder():
-            with suppress(SpheretwinError):
-                self._journal = Journal(folder / f"reproduce_{plan.experiment.name}.jsonl", "", MOST_RUNS)
-                self._results = {key: Result(*rest) for _, (key, *rest) in self._journal.records()}
-
-    def __enter__(self) -> EarlierRuns:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        if self._journal:
-            self._journal.close()
-
-    def find(self, job: Job) -> Result | None:
-        """Result of an earlier run; None if there is none."""
-        return self._results.get(self._key(job))
-
-    def add(self, job: Job, result: Result) -> None:
-        """Store a result if the journal can be written."""
-        self._results[self._key(job)] = result
-        if self._journal and self._journal.done() < MOST_RUNS:
-            with suppress(SpheretwinError):  # a full disk
-                self._journal.append(self._journal.done(), [self._key(job), *result])
-
-    def _key(self, job: Job) -> str:
-        return f"{self._summaries[job.case.name].key} {job.plant} {job.seed}"
+def earlier_runs(plan: Plan, summaries: Mapping[str, CaseSummary]) -> EarlierRuns:
+    """Return the results of earlier runs of a plan."""
+    keys = {name: summary.key for name, summary in summaries.items()}
+    return EarlierRuns(plan.experiment.name, keys)
 
 
 def run_with_cache(
     plan: Plan, summaries: Mapping[str, CaseSummary], done: Callable[[str], None]
 ) -> PlanResult:
     """Run a plan and its sample; runs in the cache are not run again."""
-    with EarlierRuns(plan, summaries) as earlier:
+    with earlier_runs(plan, summaries) as earlier:
         outcomes = run_plan(plan, done, earlier=earlier)
         return PlanResult(plan, summaries, outcomes, compare_plants(plan, outcomes, done, earlier))
 

@@ -7,11 +7,10 @@ import pytest
 
 from spheretwin.control.supervision.watchdog import Reason
 from spheretwin.models.telemetry.status import Status
-from spheretwin.paper import fault_outcomes, nutation, runner, stability, step_size, tilt
+from spheretwin.paper import earlier_runs, fault_outcomes, nutation, runner, stability, step_size, tilt
+from spheretwin.paper.earlier_runs import key_of
 from spheretwin.paper.page import rows
 from spheretwin.paper.runner import (
-    EarlierRuns,
-    key_of,
     make_plan,
     outcome_of,
     run_plan,
@@ -27,7 +26,7 @@ from tests.twin.paper.cases import IDEAL, NOISY, SHORT, experiment
 def ran(monkeypatch, tmp_path):
     """Scenarios that were really run, with a cache folder of their own."""
     real, results = Rows.run, []
-    monkeypatch.setattr(runner, "cache_folder", lambda: tmp_path)
+    monkeypatch.setattr(earlier_runs, "cache_folder", lambda: tmp_path)
 
     def run(self, row, engine):
         results.append(self.scenario(row, engine))
@@ -42,7 +41,7 @@ def errors(run) -> nutation.Array:
 
 
 def run_cached(plan, **options):
-    with EarlierRuns(plan, summarise(plan)) as earlier:
+    with runner.earlier_runs(plan, summarise(plan)) as earlier:
         return run_plan(plan, earlier=earlier, **options)
 
 
@@ -106,7 +105,7 @@ def test_the_data_of_a_run_are_the_same_from_plain_text(reduce, data):
 
 def test_without_a_journal_everything_runs(ran):
     plan = make_plan(experiment(NOISY), seeds=2)
-    with EarlierRuns(plan, summarise(plan)) as earlier:
+    with runner.earlier_runs(plan, summarise(plan)) as earlier:
         run_plan(plan, earlier=earlier)
         run_cached(plan)  # as in another process, which cannot write the journal
     assert len(ran) == 4
