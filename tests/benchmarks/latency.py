@@ -44,7 +44,8 @@ def linked(seconds: float, start: multiprocessing.Event) -> dict[str, dict]:
         stderr=subprocess.PIPE, **common,
     ) as twin:  # fmt: skip
         address = f"udp://:{twin.stderr.readline().strip().rpartition(':')[2]}"
-        ours = ["--machine", address, "--arm", "--estimator.kind", "kalman", "--limit-rate-rad-s", "1e5"]
+        ours = ["--machine", address, "--arm", "--estimator.kind", "kalman"]
+        ours += ["--limit-rate-rad-s", "1e5", "--limit-chi2", "1e9"]
         start.set()
         done = subprocess.run(
             [*VERB, "drive", "sinusoid", *ours, *times, "--duration", str(seconds)], check=True, **common

@@ -29,7 +29,7 @@ def test_both_verbs_write_their_files_in_real_time(tmp_path):
         address = f"udp://:{process.stderr.readline().strip().rpartition(':')[2]}"
         arm = ["--machine", address, "--arm", "--ramp-s", "0.1", "--duration", "0.3"]
         # A rotor moves on while one of the two waits for a processor.
-        arm += ["--limit-rate-rad-s", "1000"]
+        arm += ["--limit-rate-rad-s", "1000", "--limit-chi2", "1e9"]
         result = call("drive", "sinusoid", *arm, *flags, *files)
         out, _ = process.communicate()
     assert result.code == 0

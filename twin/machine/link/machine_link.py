@@ -152,7 +152,7 @@ class Link:
         self._is_new = True
         self._start_s: float | None = None
         self._reason = Reason.NONE
-        self._is_released = False
+        self._is_released = self._is_after_pause = False
 
     @classmethod
     def open(
@@ -320,7 +320,8 @@ class Link:
         if self._shadow:
             self._shadow.advance(t_s, current_A, angle)
         if self._plausibility and self._settings.armed and not self._reason:
-            self._reason = self._plausibility.advance(t_s, current_A, angle)
+            self._reason = self._plausibility.advance(t_s, current_A, angle, after_pause=self._is_after_pause)
+        self._is_after_pause = False
         is_armed = self._settings.armed and self._reason == Reason.NONE
         flags = Flags.ARMED if is_armed else Flags(0)
         temperature_degC = self._heat.advance(current_A)
@@ -444,6 +445,7 @@ class Link:
         self.jitter.add(delay_s)
         if delay_s > self._period_s:  # do not hurry after a pause of the system
             self._start_s += delay_s
+            self._is_after_pause = True
 
 
 def _measurement(frame: Values) -> Measurement:

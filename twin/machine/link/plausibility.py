@@ -25,6 +25,9 @@ UNLIKELY = 1e-12
 LEAST_NOISE_rad = 1e-3
 """Noise that the check of the motion allows in each angle, whatever the scenario states (assumed)."""
 
+MOST_MISSING = 2
+"""Measurements in a row that may be missing."""
+
 
 class FrozenAngles:
     """Check for measurements that are identical to the bit although their noise is expected.
@@ -87,6 +90,11 @@ class MotionCheck(RunningShadow):
         super().__init__(shadow)
         self._period_s, self.chi2, self.largest_chi2 = period_s, 0.0, 0.0
 
+    def restart(self) -> None:
+        """Begin again: the motion during a pause is not known."""
+        self.shadow, self.chi2 = Shadow(self.shadow.model), 0.0
+        self._rows.clear()
+
     def new(self) -> MotionCheck:
         """Return a check of the same machine at its start."""
         return MotionCheck(Shadow(self.shadow.model), self._period_s)
@@ -116,6 +124,7 @@ class Plausibility:
 
     def __init__(self, frozen: FrozenAngles, motion: MotionCheck, limit_chi2: float) -> None:
         self._frozen, self._motion, self._limit_chi2 = frozen, motion, limit_chi2
+        self._missing = 0
 
     @classmethod
     def of(cls, scenario: Scenario, resolved: ResolvedScenario, limits: Limits) -> Plausibility:
@@ -135,15 +144,23 @@ class Plausibility:
         frozen = FrozenAngles(self._frozen.nominal, sys.maxsize)
         return Plausibility(frozen, self._motion.new(), math.inf)
 
-    def advance(self, t_s: float, current_A: Array, angle_rad: Array) -> Reason:
+    def advance(self, t_s: float, current_A: Array, angle_rad: Array, *, after_pause: bool = False) -> Reason:
         """Take the currents (n,) of a tick and the angles (3,) at its start, NaN if there are no new ones.
+
+        After a pause, and after more than `MOST_MISSING` missing measurements, the time of the motion is not
+        known: its check begins again.
 
         Returns
         -------
         Reason
             To remove the currents, if there is one.
         """
-        self._motion.advance(t_s, current_A, angle_rad)
-        if np.isfinite(angle_rad).all() and self._frozen.advance(angle_rad):
+        is_new = bool(np.isfinite(angle_rad).all())
+        self._missing = 0 if is_new else self._missing + 1
+        if after_pause or self._missing > MOST_MISSING:
+            self._motion.restart()
+        else:
+            self._motion.advance(t_s, current_A, angle_rad)
+        if is_new and self._frozen.advance(angle_rad):
             return Reason.FROZEN
         return Reason.MODEL if self._motion.chi2 > self._limit_chi2 else Reason.NONE

@@ -283,6 +283,22 @@ def test_a_pause_of_the_system_is_not_made_up_for(machine, link):
     assert link.figures()["jitter"]["max_ms"] == pytest.approx(99.0)
 
 
+def test_the_checks_of_the_motion_know_of_a_pause_and_remove_the_currents(machine, link):
+    pauses = []
+
+    class Checks:
+        def advance(self, t_s, current_A, angle_rad, *, after_pause):
+            pauses.append(after_pause)
+            return Reason.MODEL if len(pauses) == 5 else Reason.NONE
+
+    link._plausibility = Checks()
+    reasons(link, 2)
+    machine.script.t_s += 0.002
+    assert reasons(link, 4, first=2) == [Reason.NONE] * 2 + [Reason.MODEL] * 2
+    assert pauses == [False, False, False, True, False]
+    assert machine.commands[-1]["flags"] == 0  # no currents from then on
+
+
 def test_the_shadow_receives_what_was_sent_and_measured(machine):
     received = []
 

@@ -6,7 +6,7 @@ import pytest
 from spheretwin import scenario as scenarios
 from spheretwin.control.supervision.watchdog import Reason
 from spheretwin.machine.link.limits import Limits
-from spheretwin.machine.link.plausibility import FrozenAngles, MotionCheck, Plausibility
+from spheretwin.machine.link.plausibility import MOST_MISSING, FrozenAngles, MotionCheck, Plausibility
 from spheretwin.machine.state_estimation import Shadow, signals
 from spheretwin.models.telemetry.table import Table
 from spheretwin.session import Session
@@ -94,6 +94,22 @@ def test_a_motion_without_a_cause_contradicts_the_model():
         rehearsed.advance(1e-3 * tick, NO_CURRENT, STILL + 0.1 * (tick >= 40)) == Reason.NONE
         for tick in range(60)
     )
+
+
+def jump_after(ticks, **flags):
+    """Reasons for a rotor that is elsewhere after `ticks` without a measurement, or after a pause."""
+    check = Plausibility.of(scenarios.load("hold"), resolved(), Limits(current_A=1.0))
+    found = [check.advance(1e-3 * tick, NO_CURRENT, STILL) for tick in range(40)]
+    found += [check.advance(1e-3 * tick, NO_CURRENT, np.full(3, np.nan)) for tick in range(40, 40 + ticks)]
+    found.append(check.advance(1e-3 * (40 + ticks), NO_CURRENT, STILL + 0.1, **flags))
+    found += [check.advance(1e-3 * tick, NO_CURRENT, STILL + 0.1) for tick in range(41 + ticks, 90)]
+    return set(found)
+
+
+@pytest.mark.uncompiled
+def test_the_motion_during_a_pause_is_not_judged():
+    assert jump_after(0) == jump_after(MOST_MISSING) == {Reason.NONE, Reason.MODEL}
+    assert jump_after(MOST_MISSING + 1) == jump_after(0, after_pause=True) == {Reason.NONE}
 
 
 def test_a_missing_measurement_is_not_frozen(prototype):

@@ -39,7 +39,7 @@ def test_neither_side_does_first_time_work_in_its_loop(tmp_path):
         address = f"udp://:{twin.stderr.readline().strip().rpartition(':')[2]}"
         ours = ["--machine", address, "--arm", "--duration", "60", "--estimator.kind", "kalman", *event]
         # A rotor moves on while one of the two waits for a processor.
-        limits = ["--limit-rate-rad-s", "1000", "--log", tmp_path / "log.parquet"]
+        limits = ["--limit-rate-rad-s", "1000", "--limit-chi2", "1e9", "--log", tmp_path / "log.parquet"]
         shadow = ["--shadow", tmp_path / "shadow.parquet"]
         with side("drive", tmp_path, *ours, *limits, *shadow) as controller:
             results = {"drive": controller.communicate()}
