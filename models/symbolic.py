@@ -6,7 +6,7 @@ sine of each angle. So it computes with anything that has these: expressions of 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from types import FunctionType
 from typing import Any
 
@@ -38,10 +38,10 @@ def on_symbols(function: Callable[..., Any], **replaced: Callable[..., Any]) -> 
     return FunctionType(plain.__code__, scope, plain.__name__)
 
 
-def turns_by(cosine: Callable[[Any], Any], sine: Callable[[Any], Any]) -> Callable[[Sequence[Any]], Turns]:
+def turns_by(cosine: Callable[[Any], Any], sine: Callable[[Any], Any]) -> Callable[[Any], Turns]:
     """Return the function ``turns`` of the kinematics for symbols with this cosine and sine."""
 
-    def turns(q: Sequence[Any]) -> Turns:
+    def turns(q: Any) -> Turns:
         return Turns(*(function(q[i]) for i in range(3) for function in (cosine, sine)))
 
     return turns
