@@ -161,7 +161,8 @@ def draw_names(evidence):
     "experiment": Addition(
         "twin/paper/holding.py",
         """
-from spheretwin.paper.experiment import Case, Experiment, ResultTable, Section
+from spheretwin.paper.experiment import Case, Experiment, Section
+from spheretwin.viz.pages.markdown import ResultTable
 
 
 def cases():

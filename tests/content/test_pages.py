@@ -158,7 +158,7 @@ def html_page() -> str:
             "# A title & more", "", "In *words*, **strong**, `code` and <b>no tag</b>.", "",
             *markdown.contents(["## First part", "### Inner", "## Second part"]), "",
             "## First part", "",
-            *markdown.Table("", ["a", "b | c"], [["1", "x|y"], ["2", "–"]], 0, ["b | c"]).lines(), "",
+            *markdown.ResultTable("", ["a", "b | c"], [["1", "x|y"], ["2", "–"]], 0, ["b | c"]).lines(), "",
             "### Inner", "", "- one", "- two", "",
             "## Second part", "", "```sh", "spheretwin simulate", "```", "",
             *markdown.foot("spheretwin x"),

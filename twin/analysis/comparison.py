@@ -24,7 +24,7 @@ from spheretwin.models.telemetry.table import Table
 from spheretwin.scenario.sections import ResolvedScenario
 from spheretwin.viz.comparison.runs import ComparedRun, EarlyEnd, Spectrum, leaders
 from spheretwin.viz.pages import markdown
-from spheretwin.viz.pages.markdown import Drawing, Page, Section
+from spheretwin.viz.pages.markdown import Drawing, PageSection, ReportPage
 from spheretwin.viz.quantities import Quantity, QuantityRows, compared_quantities
 from spheretwin.viz.terminal.reviews import differences as table_rows
 
@@ -164,14 +164,14 @@ def _early_end(run: Reviewed, events: Sequence[Event]) -> EarlyEnd | None:
     return EarlyEnd(float(run.table["t_s"][-1]), status.replace("_", " "), events[-1][2])
 
 
-def _differences(runs: Sequence[Reviewed]) -> markdown.Table | str:
+def _differences(runs: Sequence[Reviewed]) -> markdown.ResultTable | str:
     """Return the fields in which scenarios differ as a table, a column for each run."""
     rows = scenario_differences([run.record.scenario for run in runs])
     if not rows:
         return "The scenarios of the runs are equal."
     head = ["field", *(f"run {place}" for place in range(1, len(runs) + 1))]
     cells = [[_plain(cell) for cell in (name, *values)] for name, values in rows]
-    return markdown.Table("", head, cells, len(head))
+    return markdown.ResultTable("", head, cells, len(head))
 
 
 def _rows(run: Reviewed, table: Table) -> QuantityRows:
@@ -212,7 +212,7 @@ def _runs_text(runs: Sequence[Reviewed], drawn_runs: Sequence[ComparedRun]) -> s
         end = run.early_end
         text = f"**{end.status} at {end.t_s:.3f} s**: {end.reason}" if end else "completed"
         lines.append(f"- {_plain(label)}, {text}")
-    lines += ["", *Section("Differences of the scenarios", [_differences(runs)]).lines()]
+    lines += ["", *PageSection("Differences of the scenarios", [_differences(runs)]).lines()]
     lines.append("The thin grey line is the reference. A cross marks the end of a run that is not complete.")
     return "\n".join(lines)
 
@@ -276,17 +276,17 @@ def write_figures(
         len(run.table) > interactive.points_per_line(drawn_runs, leading, quantities) for run in drawn_runs
     )
     sections = [
-        Section("Signals over time", [interactive.place(interactive.OVER_TIME)]),
-        Section("Spectra of the tracking errors", [interactive.place(interactive.SPECTRA)]),
-        Section(
+        PageSection("Signals over time", [interactive.place(interactive.OVER_TIME)]),
+        PageSection("Spectra of the tracking errors", [interactive.place(interactive.SPECTRA)]),
+        PageSection(
             "Metrics", ["Differences are from run 1." if len(runs) > 1 else "", _metrics(drawn_runs, figures)]
         ),
     ]
     if len(runs) > 1:
-        sections.append(Section("Differences of the scenarios", [_differences(runs)]))
+        sections.append(PageSection("Differences of the scenarios", [_differences(runs)]))
     lead = f"{USE}{THIN if is_thin else ''}\n\n{interactive.place(interactive.RUNS)}"
     command = f"spheretwin review {' '.join(shlex.quote(run.path.name) for run in runs)} --figures DIR"
-    text = Page("review", _plain(title), lead, sections, command).text()
+    text = ReportPage("review", _plain(title), lead, sections, command).text()
     content = interactive.page(title, text, drawn_runs, over_time, spectral)
     page = markdown.save_text(into / PAGE, content)
     _remove(earlier.difference(saved))
@@ -360,9 +360,9 @@ USE = (
 THIN = " Long runs are drawn by the lowest and highest value of every few ticks, a band, and their mean."
 
 
-def _metrics(drawn: Sequence[ComparedRun], figures: Sequence[dict[str, Any]]) -> markdown.Table:
+def _metrics(drawn: Sequence[ComparedRun], figures: Sequence[dict[str, Any]]) -> markdown.ResultTable:
     head = ["angles in mrad (degrees)", *(_plain(run.label) for run in drawn)]
-    return markdown.Table(
+    return markdown.ResultTable(
         "", head, [[cell.replace("\n", "; ") for cell in row] for row in table_rows(figures, BAND_rad)]
     )
 

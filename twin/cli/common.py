@@ -20,7 +20,7 @@ from typing import Any
 from spheretwin.models import mjcf
 from spheretwin.models.base.checks import Check, broken
 from spheretwin.models.base.files import OPEN_FILES, PartialFile
-from spheretwin.viz.pages.markdown import Table
+from spheretwin.viz.pages.markdown import ResultTable
 from spheretwin.viz.terminal import runs
 from spheretwin.viz.terminal.tables import print_checks, terminal_console
 
@@ -34,7 +34,7 @@ def print_result(
     options: argparse.Namespace,
     name: str,
     figures: Mapping[str, Any],
-    tables: Iterable[Table] = (),
+    tables: Iterable[ResultTable] = (),
     checks: Sequence[Check] = (),
     text: str = "",
     *,
@@ -51,7 +51,7 @@ def print_result(
         Name of the command, for the message about broken checks.
     figures : mapping
         Results for JSON.
-    tables : iterable of Table
+    tables : iterable of ResultTable
     checks : sequence of Check
     text : str
         Between tables and checks.

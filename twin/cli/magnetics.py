@@ -22,7 +22,7 @@ from spheretwin.models.design.workspace import LARGEST_TILT_DEG
 from spheretwin.models.magnet_and_coil import read_magnet_and_coil
 from spheretwin.models.magnetics import SAME, computed_from
 from spheretwin.viz.pages import magnetics
-from spheretwin.viz.pages.markdown import Table, prepare, save_text
+from spheretwin.viz.pages.markdown import ResultTable, prepare, save_text
 from spheretwin.viz.terminal.progress import tracked
 
 CURVE = "torque curve from 0 to 180 degrees, columns phi_deg,torque_Nm_per_A"
@@ -236,7 +236,7 @@ def _report_csv(
     part: str,
     figures: Mapping[str, Any],
     checks: Sequence[Check],
-    tables: Sequence[Table],
+    tables: Sequence[ResultTable],
     csv: str,
 ) -> bool:
     """Write a curve or a field to its file or to stdout; return True if no bound is broken."""

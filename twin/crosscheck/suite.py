@@ -13,7 +13,7 @@ from spheretwin.models.base.checks import Check, bound_shares
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.mjcf import read
 from spheretwin.viz.pages import markdown as pieces
-from spheretwin.viz.pages.markdown import Drawing, Page
+from spheretwin.viz.pages.markdown import Drawing, ReportPage
 
 F = TypeVar("F", bound="PartResult")
 
@@ -230,4 +230,6 @@ def write(folder: Path, evidence: CrosscheckResult, figure_format: str = "svg") 
     )
     figures = pieces.figures_section(draw(evidence) for draw in FIGURES)
     sections = [*figures, pieces.checks_section(evidence.checks)]
-    return Page(NAME, "Cross-check", lead, sections, "spheretwin crosscheck").write(folder, figure_format)
+    return ReportPage(NAME, "Cross-check", lead, sections, "spheretwin crosscheck").write(
+        folder, figure_format
+    )

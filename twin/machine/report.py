@@ -19,7 +19,7 @@ from spheretwin.machine.state_estimation import HINGE_NAMES, chi2_text
 from spheretwin.machine.validation import Structure
 from spheretwin.machine.verdict import Verdict, check
 from spheretwin.models.telemetry.signals import ANGLES
-from spheretwin.viz.pages.markdown import Drawing, Page, Section, Table, save_text
+from spheretwin.viz.pages.markdown import Drawing, PageSection, ReportPage, ResultTable, save_text
 
 MOST_ROWS = 5
 """Suggestions, changes and bins that the terminal shows."""
@@ -32,7 +32,7 @@ LABELS = ("before identification", "after identification")
 _CORRELATED = 0.3
 
 
-def parameter_table(result: Identified, **others: Mapping[str, float]) -> Table:
+def parameter_table(result: Identified, **others: Mapping[str, float]) -> ResultTable:
     """Return the identified values with their intervals, after others by name."""
     rows = [
         (
@@ -45,46 +45,46 @@ def parameter_table(result: Identified, **others: Mapping[str, float]) -> Table:
         for name, one in result.parameters.items()
     ]
     head = ("parameter", *others, "found", "from", "to (95 %)", "unit", "widening")
-    return Table("identified", head, rows, 1, ("unit",))
+    return ResultTable("identified", head, rows, 1, ("unit",))
 
 
-def suggestion_table(suggestions: Sequence[Suggestion]) -> Table:
+def suggestion_table(suggestions: Sequence[Suggestion]) -> ResultTable:
     """Return what would improve the held-out windows."""
     rows = [
         (one.what, f"{one.gain:+.1f}", f"{one.chi2:.3f}", one.member, f"{one.departure:+.3g}", one.unit)
         for one in suggestions
     ]
     head = ("identify also", "log likelihood", "mean square", "largest departure", "of", "unit")
-    return Table("what would improve the held-out windows", head, rows, 1, (head[3], "unit"))
+    return ResultTable("what would improve the held-out windows", head, rows, 1, (head[3], "unit"))
 
 
-def structure_table(structure: Sequence[Structure]) -> Table:
+def structure_table(structure: Sequence[Structure]) -> ResultTable:
     """Return the clearest changes that the residuals show."""
     rows = [
         (one.what, f"{one.size:+.3g}", one.unit, f"{one.deviations:+.1f}") for one in structure[:MOST_ROWS]
     ]
     head = ("a change alone of", "explains", "unit", "standard deviations from 0")
-    return Table("what the residuals show", head, rows, 1, ("unit",))
+    return ResultTable("what the residuals show", head, rows, 1, ("unit",))
 
 
-def design_table(design: Design) -> Table:
+def design_table(design: Design) -> ResultTable:
     """Return what a designed motion determines."""
     rows = [
         (name, *(f"{one:.3g}" for one in (value, design.reference[name])), f"{design.narrower[name]:.2f}")
         for name, value in design.deviations.items()
     ]
     head = ("parameter", "standard deviation", "with the nutation", "times narrower")
-    return Table("design", head, rows)
+    return ResultTable("design", head, rows)
 
 
-def fit_table(fits: Mapping[str, Fit]) -> Table:
+def fit_table(fits: Mapping[str, Fit]) -> ResultTable:
     """Return the mean squares of the residuals of each hinge, a column for each label."""
     rows = [("all", *(chi2_text(fit.chi2) for fit in fits.values()))]
     rows += [(name, *(chi2_text(fit.hinge_chi2[name]) for fit in fits.values())) for name in HINGE_NAMES]
-    return Table("residuals", ("hinge", *fits), rows)
+    return ResultTable("residuals", ("hinge", *fits), rows)
 
 
-def bin_table(fit: Fit) -> Table:
+def bin_table(fit: Fit) -> ResultTable:
     """Return the clearest mean residuals."""
     clearest = sorted(fit.bins, key=lambda one: -abs(one.mean_rad) * one.rows**0.5 / one.rms_rad)
     rows = [
@@ -99,10 +99,10 @@ def bin_table(fit: Fit) -> Table:
         for one in clearest[:MOST_ROWS]
     ]
     head = ("hinge", "by", "range", "rows", "mean residual mrad", "rms mrad")
-    return Table("largest mean residuals", head, rows, 2)
+    return ResultTable("largest mean residuals", head, rows, 2)
 
 
-def log_table(logs: Sequence[Log], verdicts: Sequence[Verdict]) -> Table:
+def log_table(logs: Sequence[Log], verdicts: Sequence[Verdict]) -> ResultTable:
     """Return length, rows and findings of logs."""
     rows = [
         (
@@ -114,7 +114,9 @@ def log_table(logs: Sequence[Log], verdicts: Sequence[Verdict]) -> Table:
         )
         for log, verdict in zip(logs, verdicts, strict=True)
     ]
-    return Table("", ("log", "length, s", "rows", "accepted", "findings"), rows, 1, ("accepted", "findings"))
+    return ResultTable(
+        "", ("log", "length, s", "rows", "accepted", "findings"), rows, 1, ("accepted", "findings")
+    )
 
 
 def residual_drawing(file: str, fits: Mapping[str, Fit], by: str, title: str) -> Drawing:
@@ -154,15 +156,15 @@ def write(
     lead = f"Identification of {scenario} from {len(logs)} logs: **{verdict}**."
     loaded = scenarios.load(scenario, dict(changes))
     sections = [
-        Section("Data", [log_table(logs, [check(log, loaded) for log in logs])]),
-        Section("Excitation", [_motion_table(logs), *_determined(logs, scenario, changes)]),
-        Section("Parameters", [parameter_table(result), *_sentences(result)]),
-        Section("Residuals", _residuals(result)),
-        Section("Refused", [f"- {line}" for line in _refused(result)] or ["Nothing."]),
-        Section("What the model may lack", _lacking(result)),
+        PageSection("Data", [log_table(logs, [check(log, loaded) for log in logs])]),
+        PageSection("Excitation", [_motion_table(logs), *_determined(logs, scenario, changes)]),
+        PageSection("Parameters", [parameter_table(result), *_sentences(result)]),
+        PageSection("Residuals", _residuals(result)),
+        PageSection("Refused", [f"- {line}" for line in _refused(result)] or ["Nothing."]),
+        PageSection("What the model may lack", _lacking(result)),
     ]
     with TemporaryDirectory() as folder:
-        _, html = Page("report", "Identification", lead, sections, command).write(Path(folder))
+        _, html = ReportPage("report", "Identification", lead, sections, command).write(Path(folder))
         save_text(path, html.read_text(encoding="utf-8"))
 
 
@@ -172,7 +174,7 @@ WIDTH_TEXT = (
 )
 
 
-def _motion_table(logs: Sequence[Log]) -> Table:
+def _motion_table(logs: Sequence[Log]) -> ResultTable:
     head = ("log", *(f"{hinge}, °" for hinge in ANGLES), "largest current, A", "rms current, A", "conditions")
     rows = []
     for log in logs:
@@ -186,7 +188,7 @@ def _motion_table(logs: Sequence[Log]) -> Table:
                 ", ".join(f"{name} = {value}" for name, value in log.conditions.items()) or "none",
             )
         )
-    return Table("", head, rows, 1, ("conditions",))
+    return ResultTable("", head, rows, 1, ("conditions",))
 
 
 def _determined(logs: Sequence[Log], scenario: str, changes: Mapping[str, Any]) -> Iterator[str]:
@@ -207,7 +209,7 @@ def _sentences(result: Identified) -> Iterator[str]:
     )
 
 
-def _residuals(result: Identified) -> list[str | Table | Drawing | Section]:
+def _residuals(result: Identified) -> list[str | ResultTable | Drawing | PageSection]:
     if result.held_out is None or result.held_out_before is None:
         return ["Nothing was identified."]
     fits = dict(zip(LABELS, (result.held_out_before, result.held_out), strict=True))
@@ -226,7 +228,7 @@ def _refused(result: Identified) -> list[str]:
     return [*(f"{', '.join(one.parameters)}: {one.why}." for one in result.refused), *reasons]
 
 
-def _lacking(result: Identified) -> list[str | Table | Drawing | Section]:
+def _lacking(result: Identified) -> list[str | ResultTable | Drawing | PageSection]:
     if not result.suggestions:
         return [f"{NO_SUGGESTION}."]
     text = (

@@ -22,7 +22,7 @@ from spheretwin.machine.workflow import CHANGED_s, Watched, Workflow
 from spheretwin.machine.workflow_checks import TRUE_COLUMNS, checks_of, rms_error, settled_errors
 from spheretwin.models.telemetry.signals import ANGLES
 from spheretwin.viz.pages import markdown
-from spheretwin.viz.pages.markdown import Drawing, Page, Section, Table
+from spheretwin.viz.pages.markdown import Drawing, PageSection, ReportPage, ResultTable
 
 Array = NDArray[np.float64]
 
@@ -57,7 +57,7 @@ def write(folder: Path, result: Workflow, command: str, figure_format: str = "sv
         Exists.
     result : Workflow
     command, figure_format : str
-        As in `markdown.Page`.
+        As in `markdown.ReportPage`.
 
     Raises
     ------
@@ -72,17 +72,17 @@ def write(folder: Path, result: Workflow, command: str, figure_format: str = "sv
         f" logs of it, follows its state, is validated, and watches it. {markdown.verdict(checks)}"
     )
     sections = [
-        Section("1. Design", [DESIGN_TEXT, design_table(result.design)]),
-        Section("2. Logs", [LOGS_TEXT, log_table([one.log for one in result.logs], result.verdicts)]),
-        Section(
+        PageSection("1. Design", [DESIGN_TEXT, design_table(result.design)]),
+        PageSection("2. Logs", [LOGS_TEXT, log_table([one.log for one in result.logs], result.verdicts)]),
+        PageSection(
             "3. Identification",
             [
                 _identification_text(result),
                 parameter_table(result.identified, nominal=result.nominal, true=result.true),
             ],
         ),
-        Section("4. Shadow", [SHADOW_TEXT, _shadow_rows(result), shadow]),
-        Section(
+        PageSection("4. Shadow", [SHADOW_TEXT, _shadow_rows(result), shadow]),
+        PageSection(
             "5. Validation",
             [
                 _validation_text(result),
@@ -90,10 +90,10 @@ def write(folder: Path, result: Workflow, command: str, figure_format: str = "sv
                 residuals,
             ],
         ),
-        Section("6. Watch", [WATCH_TEXT, _watch_rows(result), sums]),
+        PageSection("6. Watch", [WATCH_TEXT, _watch_rows(result), sums]),
         markdown.checks_section(checks),
     ]
-    return Page(NAME, TITLE, lead, sections, command).write(folder, figure_format)
+    return ReportPage(NAME, TITLE, lead, sections, command).write(folder, figure_format)
 
 
 DESIGN_TEXT = (
@@ -122,8 +122,8 @@ WORDS = (
 """Headings of columns of words; the others are numbers."""
 
 
-def _table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> Table:
-    return Table("", head, list(rows), 0, WORDS)
+def _table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> ResultTable:
+    return ResultTable("", head, list(rows), 0, WORDS)
 
 
 def _identification_text(result: Workflow) -> str:
@@ -135,7 +135,7 @@ def _identification_text(result: Workflow) -> str:
     return "\n\n".join(f"{line}." for line in lines)
 
 
-def _shadow_rows(result: Workflow) -> Table:
+def _shadow_rows(result: Workflow) -> ResultTable:
     head = ["hinge"]
     columns = []
     for label, judged in zip(LABELS, (result.before, result.after), strict=True):
@@ -160,7 +160,7 @@ def _validation_text(result: Workflow) -> str:
     )
 
 
-def _watch_rows(result: Workflow) -> Table:
+def _watch_rows(result: Workflow) -> ResultTable:
     head = ("change", "named as", "true size", "size", "unit", "after, s", "confidence", "further alarms")
     return _table(head, map(_watch_row, result.watched))
 

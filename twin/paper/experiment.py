@@ -11,7 +11,7 @@ from pydantic import PlainValidator
 
 from spheretwin.models.telemetry.status import Status
 from spheretwin.run import Run
-from spheretwin.viz.pages.markdown import Drawing, Table
+from spheretwin.viz.pages.markdown import Drawing, ResultTable
 
 if TYPE_CHECKING:
     from spheretwin.viz.comparison.trajectories import LawTrajectory
@@ -102,16 +102,13 @@ class Outcomes(dict[str, Sequence[Outcome]]):
         return self.get(case.name, ())
 
 
-ResultTable = Table
-
-
 class Section(NamedTuple):
     """Section of the page: text, tables and figures."""
 
     title: str
     text: str
     """Paragraphs in Markdown."""
-    tables: Sequence[Table] = ()
+    tables: Sequence[ResultTable] = ()
     drawings: Sequence[Callable[[], Drawing]] = ()
     """Functions that draw the figures; only a page calls them."""
 

@@ -10,19 +10,10 @@ from importlib import resources
 from itertools import product
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from spheretwin.paper.experiment import (
-    SEEDS,
-    STATUSES,
-    Case,
-    Experiment,
-    Outcome,
-    Outcomes,
-    ResultTable,
-    Section,
-)
+from spheretwin.paper.experiment import SEEDS, STATUSES, Case, Experiment, Outcome, Outcomes, Section
 from spheretwin.paper.laws import COMPARED_LAWS, printed_rad
 from spheretwin.study.statistics import quantile_text
-from spheretwin.viz.pages.markdown import Drawing
+from spheretwin.viz.pages.markdown import Drawing, ResultTable
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

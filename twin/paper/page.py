@@ -15,8 +15,7 @@ from spheretwin.paper.experiment import Array, Case, Experiment, Finding, Outcom
 from spheretwin.paper.runner import CaseSummary, Plan, PlanResult, command_line, summarise
 from spheretwin.study.agreement import BOUND
 from spheretwin.study.statistics import finite_ends
-from spheretwin.viz.pages import markdown as pieces
-from spheretwin.viz.pages.markdown import Page, Table, save_text
+from spheretwin.viz.pages.markdown import PageSection, ReportPage, ResultTable, save_text
 
 if TYPE_CHECKING:
     from spheretwin.viz.comparison.trajectories import LawTrajectory
@@ -84,21 +83,21 @@ def write(folder: Path, chapters: Sequence[Chapter], command: str, figure_format
     for chapter in chapters:
         if len(chapter.commands) > MOST_COMMANDS:
             save_text(folder / _commands_file(chapter), "\n".join([*chapter.commands, ""]))
-    return [*Page(NAME, TITLE, lead, sections, command).write(folder, figure_format), *recordings]
+    return [*ReportPage(NAME, TITLE, lead, sections, command).write(folder, figure_format), *recordings]
 
 
-def _chapter(chapter: Chapter) -> pieces.Section:
+def _chapter(chapter: Chapter) -> PageSection:
     """Section of an experiment."""
     inner = [
-        pieces.Section(section.title, [section.text, *section.tables, *(draw() for draw in section.drawings)])
+        PageSection(section.title, [section.text, *section.tables, *(draw() for draw in section.drawings)])
         for section in chapter.sections
     ]
-    return pieces.Section(
+    return PageSection(
         chapter.experiment.title, [chapter.experiment.summary, chapter.plants, *inner, *_commands(chapter)]
     )
 
 
-def _results(chapters: Sequence[Chapter]) -> tuple[str, list[pieces.Section]]:
+def _results(chapters: Sequence[Chapter]) -> tuple[str, list[PageSection]]:
     """Summary with the number of reproduced results, and sections with a row for each finding."""
     findings = [(chapter.experiment.name, finding) for chapter in chapters for finding in chapter.findings]
     of_paper = [
@@ -112,14 +111,14 @@ def _results(chapters: Sequence[Chapter]) -> tuple[str, list[pieces.Section]]:
         count = sum(bool(finding.reproduced) for _, finding in findings)
         summary.append(f"{count} of {len(of_paper)} results of the paper were reproduced.")
         sections.append(
-            pieces.Section(REPRODUCED, [Table("", ("experiment", "verdict", "result"), of_paper, 3)])
+            PageSection(REPRODUCED, [ResultTable("", ("experiment", "verdict", "result"), of_paper, 3)])
         )
     if further:
-        sections.append(pieces.Section(FURTHER, [Table("", ("experiment", "finding"), further, 2)]))
+        sections.append(PageSection(FURTHER, [ResultTable("", ("experiment", "finding"), further, 2)]))
     return "\n".join(summary), sections
 
 
-def _commands(chapter: Chapter) -> list[pieces.Section]:
+def _commands(chapter: Chapter) -> list[PageSection]:
     """Commands that run single rows."""
     if not chapter.commands:
         return []
@@ -130,7 +129,7 @@ def _commands(chapter: Chapter) -> list[pieces.Section]:
     else:
         text = "One command for each row of the JSON, in its order, with the first seed; further seeds"
         parts = [f"{text} follow it.", "\n".join(["```sh", *chapter.commands, "```"])]
-    return [pieces.Section("Commands for single runs", parts)]
+    return [PageSection("Commands for single runs", parts)]
 
 
 def _recorded(folder: Path, chapter: Chapter) -> Path:

@@ -7,10 +7,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from spheretwin.paper.experiment import Array, Case, Finding, Outcome, Outcomes, ResultTable, Section
+from spheretwin.paper.experiment import Array, Case, Finding, Outcome, Outcomes, Section
 from spheretwin.paper.experiment_file import ExperimentFile, table
 from spheretwin.paper.laws import PAPER_LAWS, PRINTED_rad, printed_rad
-from spheretwin.viz.pages.markdown import Drawing
+from spheretwin.viz.pages.markdown import Drawing, ResultTable
 
 FILE = ExperimentFile("readings")
 READINGS = [*FILE["reading"], *FILE["reading_with_slope"]]

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from spheretwin.paper.experiment import Array, Finding, Outcome, Outcomes, ResultTable
+from spheretwin.paper.experiment import Array, Finding, Outcome, Outcomes
 from spheretwin.paper.experiment_file import table
 from spheretwin.paper.laws import BY_LAW
 from spheretwin.paper.page import ERRORS, NONE, figures_named
@@ -16,6 +16,7 @@ from spheretwin.run import Run
 from spheretwin.scenario.fields import quantity_text
 from spheretwin.study.optimise import Gain
 from spheretwin.study.statistics import interval
+from spheretwin.viz.pages.markdown import ResultTable
 
 COMPLETE = "prototype"
 """Condition with every imperfection."""

@@ -10,13 +10,13 @@ import numpy as np
 from spheretwin import scenario as scenarios
 from spheretwin.models.telemetry.table import Table
 from spheretwin.paper import frequency_response as responses
-from spheretwin.paper.experiment import Array, Case, Finding, Outcome, Outcomes, ResultTable, Section
+from spheretwin.paper.experiment import Array, Case, Finding, Outcome, Outcomes, Section
 from spheretwin.paper.experiment_file import CaseRuns, Cells, ExperimentFile, column, table
 from spheretwin.paper.laws import BY_LAW
 from spheretwin.paper.lyapunov import Descent, descent
 from spheretwin.paper.page import NONE
 from spheretwin.run import Run
-from spheretwin.viz.pages.markdown import Drawing
+from spheretwin.viz.pages.markdown import Drawing, ResultTable
 
 FILE = ExperimentFile("stability")
 LAWS = [BY_LAW[entry["law"]] for entry in FILE["tested_law"]]

@@ -7,10 +7,11 @@ from typing import NamedTuple
 import numpy as np
 
 from spheretwin.control.laws import LAWS
-from spheretwin.paper.experiment import Array, Finding, Outcomes, ResultTable, Section
+from spheretwin.paper.experiment import Array, Finding, Outcomes, Section
 from spheretwin.paper.experiment_file import CaseRuns, ExperimentFile
 from spheretwin.run import Run
 from spheretwin.scenario.plant_sections import PlantSection
+from spheretwin.viz.pages.markdown import ResultTable
 
 FILE = ExperimentFile("step_size", law=[{"law": law} for law in LAWS])
 

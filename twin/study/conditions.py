@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from spheretwin.scenario.fields import quantity_text
 from spheretwin.study.statistics import Rows, quantile_text
-from spheretwin.viz.pages.markdown import Section, Table
+from spheretwin.viz.pages.markdown import PageSection, ResultTable
 
 MOST_CONDITIONS = 60
 """Largest number of conditions that are listed."""
@@ -24,7 +24,7 @@ METHOD = (
 )
 
 
-def section(rows: Rows) -> list[Section]:
+def section(rows: Rows) -> list[PageSection]:
     """Section of the table; none if there is one condition, more than are listed, or one row of each."""
     numbers = _numbers(rows)
     count = int(numbers.max(initial=-1)) + 1
@@ -41,7 +41,7 @@ def section(rows: Rows) -> list[Section]:
     head = [*map(quantity_text, varied), "law", "rows", *figures]
     head = [name or quantity_text(str(rows.main)) for name in head]
     title = f"Medians by condition: {quantity_text(str(rows.main))}"
-    return [Section(title, [METHOD, Table("", head, body, len(varied) + 1)])]
+    return [PageSection(title, [METHOD, ResultTable("", head, body, len(varied) + 1)])]
 
 
 def _row(rows: Rows, varied: list[str], chosen: NDArray[np.bool_], law: str) -> list[str]:

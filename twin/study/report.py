@@ -17,7 +17,7 @@ from spheretwin.scenario.fields import quantity_text
 from spheretwin.study import conditions
 from spheretwin.study.statistics import Array, Rows, ranked, strongest
 from spheretwin.viz.pages import markdown as pieces
-from spheretwin.viz.pages.markdown import Drawing, Page, Section, Table
+from spheretwin.viz.pages.markdown import Drawing, PageSection, ReportPage, ResultTable
 
 if TYPE_CHECKING:
     from spheretwin.viz.figures.maps import MapPanel, StudyLine
@@ -248,16 +248,16 @@ def write(
     """
     study, command = rows.study, f"spheretwin sweep {shlex.quote(source)}"
     sections = [
-        Section("Metrics of the rows", [medians(summary)]),
+        PageSection("Metrics of the rows", [medians(summary)]),
         *pieces.figures_section(drawings(rows)),
         *conditions.section(rows),
         *_worst(rows, command),
         *_failures(rows),
-        Section("Varied fields", [_axes(study, rows)]),
+        PageSection("Varied fields", [_axes(study, rows)]),
     ]
     limit = f" --limit {requested[0]}" if requested[0] < requested[1] else ""
     lead = "\n".join([study["description"], "", _ends(rows, *requested)])
-    return Page(NAME, study["name"], lead, sections, command + limit).write(folder, figure_format)
+    return ReportPage(NAME, study["name"], lead, sections, command + limit).write(folder, figure_format)
 
 
 def _ends(rows: Rows, of: int, total: int) -> str:
@@ -269,7 +269,7 @@ def _ends(rows: Rows, of: int, total: int) -> str:
     return f"{count} of {of} rows: {ends or 'none'}.{missing}{first}"
 
 
-def medians(summary: Mapping[str, Any], title: str = "") -> Table:
+def medians(summary: Mapping[str, Any], title: str = "") -> ResultTable:
     """Table: of each figure median, its 95 % interval and range, then the statuses."""
     figures = [name for name in next(iter(summary.values()), {}) if name != "statuses"]
     statuses = sorted({status for of_law in summary.values() for status in of_law["statuses"]})
@@ -280,7 +280,9 @@ def medians(summary: Mapping[str, Any], title: str = "") -> Table:
         [f"number of rows: {name}", *(str(of_law["statuses"].get(name, 0)) for of_law in summary.values())]
         for name in statuses
     ]
-    return Table(title, ["median [its 95 % interval] (95 % range) of the completed rows", *summary], body)
+    return ResultTable(
+        title, ["median [its 95 % interval] (95 % range) of the completed rows", *summary], body
+    )
 
 
 def _spread(figure: Mapping[str, Any]) -> str:
@@ -291,7 +293,7 @@ def _spread(figure: Mapping[str, Any]) -> str:
     return f"{figure['median']:.4g} [{', '.join(ends)}] ({low:.4g} to {high:.4g})"
 
 
-def _worst(rows: Rows, command: str) -> list[Section]:
+def _worst(rows: Rows, command: str) -> list[PageSection]:
     """Completed rows with the largest main figure, and the command that runs each alone."""
     if rows.main is None:
         return []
@@ -303,12 +305,12 @@ def _worst(rows: Rows, command: str) -> list[Section]:
         [str(rows.numbers[place]), f"`{rows.keys[place]}`", rows.laws[place], f"{values[place]:.4g}"]
         for place in order[:MOST_NAMED]
     ]
-    table = Table("", ["row", "key", "law", _quantity(rows)], body, 0, ["key", "law"])
+    table = ResultTable("", ["row", "key", "law", _quantity(rows)], body, 0, ["key", "law"])
     alone = f"`{command} --row KEY` runs one row and prints its command line."
-    return [Section("Completed rows with the largest value", [table, alone])]
+    return [PageSection("Completed rows with the largest value", [table, alone])]
 
 
-def _failures(rows: Rows) -> list[Section]:
+def _failures(rows: Rows) -> list[PageSection]:
     """Rows that did not complete by status and reason, with the first of each kind."""
     by_kind: dict[tuple[str, str, str], list[int]] = {}
     for place in np.flatnonzero(~rows.completed).tolist():
@@ -328,10 +330,10 @@ def _failures(rows: Rows) -> list[Section]:
     ]
     head = ["law", "status", "reason", "rows", "first row"]
     rest = f"And {len(kinds) - len(body)} other reasons." if len(kinds) > len(body) else ""
-    return [Section("Rows that did not complete", [Table("", head, body, 3, head[-1:]), rest])]
+    return [PageSection("Rows that did not complete", [ResultTable("", head, body, 3, head[-1:]), rest])]
 
 
-def _axes(study: Mapping[str, Any], rows: Rows) -> Table | str:
+def _axes(study: Mapping[str, Any], rows: Rows) -> ResultTable | str:
     """Axes with the values of the finished rows."""
     if not study["axis"]:
         return "Only the seed differs."
@@ -340,7 +342,7 @@ def _axes(study: Mapping[str, Any], rows: Rows) -> Table | str:
         [quantity_text(field), axis["kind"], _range(rows.axes[field]), f"`{field}`"]
         for field, axis in zip(fields, study["axis"], strict=True)
     ]
-    return Table("", ["quantity", "kind", "values", "field"], body, 4)
+    return ResultTable("", ["quantity", "kind", "values", "field"], body, 4)
 
 
 def _range(values: Any) -> str:

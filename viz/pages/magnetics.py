@@ -10,7 +10,7 @@ from spheretwin.models.design.curve_check import ComputedCurve, CurvePeak, Judge
 from spheretwin.models.design.field_check import FieldVerdict
 from spheretwin.models.design.torque_map import TorqueSurvey, WeakPose, WorkspaceVerdict, direction_text
 from spheretwin.viz.pages import markdown
-from spheretwin.viz.pages.markdown import Drawing, Page, Section, Table
+from spheretwin.viz.pages.markdown import Drawing, PageSection, ReportPage, ResultTable
 
 # A table row for every third tilt: one screen.
 ROW_STRIDE = 3
@@ -40,13 +40,13 @@ MAP_TERMS = (
 """Meaning of the headings of the torque map."""
 
 
-def computed_curve_table(computed: ComputedCurve) -> Table:
+def computed_curve_table(computed: ComputedCurve) -> ResultTable:
     """Return the results for a computed curve."""
     title = "torque curve computed from the geometry"
-    return Table(title, CURVE_HEAD, [("peak", _peak(computed.peak))])
+    return ResultTable(title, CURVE_HEAD, [("peak", _peak(computed.peak))])
 
 
-def judged_curve_table(path: Path, judged: JudgedCurve) -> Table:
+def judged_curve_table(path: Path, judged: JudgedCurve) -> ResultTable:
     """Return the results for a user's curve."""
     geometry = judged.geometry
     rows = [
@@ -58,17 +58,17 @@ def judged_curve_table(path: Path, judged: JudgedCurve) -> Table:
         ("difference from it after scaling", _misfit(geometry.scaled, "its peak")),
         ("difference of look-up table and spline", f"{judged.lookup_error:.1e} of the peak"),
     ]
-    return Table(f"torque curve {path}", CURVE_HEAD, rows)
+    return ResultTable(f"torque curve {path}", CURVE_HEAD, rows)
 
 
-def field_table(verdict: FieldVerdict) -> Table:
+def field_table(verdict: FieldVerdict) -> ResultTable:
     """Return the errors of the torque matrix by tilt."""
     title = f"torque by the curve against the direct sum (largest torque {verdict.largest_torque_Nm:.3f} N·m)"
     rows = [
         (f"{tilt_deg[0]:.0f}° to {tilt_deg[1]:.0f}°", str(poses), *map(_percent, errors))
         for tilt_deg, poses, *errors in verdict.by_tilt
     ]
-    return Table(title, FIELD_HEAD, rows)
+    return ResultTable(title, FIELD_HEAD, rows)
 
 
 def sources_text(verdict: FieldVerdict) -> str:
@@ -82,7 +82,7 @@ def sources_text(verdict: FieldVerdict) -> str:
     )
 
 
-def workspace_tables(verdict: WorkspaceVerdict) -> list[Table]:
+def workspace_tables(verdict: WorkspaceVerdict) -> list[ResultTable]:
     """Return torque by tilt, torque matrix by tilt, and the weakest poses."""
     tilts = [
         tilt for i, tilt in enumerate(verdict.by_tilt) if i % ROW_STRIDE == 0 or i == len(verdict.by_tilt) - 1
@@ -94,9 +94,9 @@ def workspace_tables(verdict: WorkspaceVerdict) -> list[Table]:
         f" worst and median of {verdict.poses} poses"
     )
     return [
-        Table(title, TORQUE_HEAD, torques),
-        Table("torque matrix and copper loss in the worst of these poses", MATRIX_HEAD, matrices),
-        Table("weakest poses", POSE_HEAD, [_weak_row(pose) for pose in verdict.weakest]),
+        ResultTable(title, TORQUE_HEAD, torques),
+        ResultTable("torque matrix and copper loss in the worst of these poses", MATRIX_HEAD, matrices),
+        ResultTable("weakest poses", POSE_HEAD, [_weak_row(pose) for pose in verdict.weakest]),
     ]
 
 
@@ -109,7 +109,7 @@ def write_check(folder: Path, verdict: FieldVerdict, command: str, figure_format
         Exists.
     verdict : FieldVerdict
     command, figure_format : str
-        As in `markdown.Page`.
+        As in `markdown.ReportPage`.
 
     Raises
     ------
@@ -141,7 +141,7 @@ def write_map(
     verdict : WorkspaceVerdict
         `torque_map.judge` of the survey.
     command, figure_format : str
-        As in `markdown.Page`.
+        As in `markdown.ReportPage`.
 
     Raises
     ------
@@ -187,20 +187,20 @@ def _maps(surveyed: TorqueSurvey) -> list[Drawing]:
 
 def _page(
     part: str, lead: str, verdict: FieldVerdict | WorkspaceVerdict, drawings: Sequence[Drawing],
-    sections: Sequence[Section], command: str,
-) -> Page:  # fmt: skip
+    sections: Sequence[PageSection], command: str,
+) -> ReportPage:  # fmt: skip
     """Page of a part: warnings and exceeded bounds are in its summary."""
     warnings = [f"Warning: {warning}." for warning in verdict.warnings]
     summary = " ".join([lead, markdown.verdict(verdict.checks), *warnings])
     sections = [
         *markdown.figures_section(drawings), *sections, markdown.checks_section(verdict.checks)
     ]  # fmt: skip
-    return Page(f"magnetics_{part}", TITLES[part], summary, sections, command)
+    return ReportPage(f"magnetics_{part}", TITLES[part], summary, sections, command)
 
 
-def _section(table: Table, text: str = "") -> Section:
+def _section(table: ResultTable, text: str = "") -> PageSection:
     """Section that has the title of its table."""
-    return Section(f"{table.title[0].upper()}{table.title[1:]}", [table._replace(title=""), text])
+    return PageSection(f"{table.title[0].upper()}{table.title[1:]}", [table._replace(title=""), text])
 
 
 def _weak_row(pose: WeakPose) -> tuple[str, ...]:

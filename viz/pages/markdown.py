@@ -120,7 +120,7 @@ class Drawing(NamedTuple):
     figure: Figure
 
 
-class Table(NamedTuple):
+class ResultTable(NamedTuple):
     """Rows of text under headings, for a page and for the terminal."""
 
     title: str
@@ -139,20 +139,20 @@ class Table(NamedTuple):
         return [_row(self.head), rule, *map(_row, self.rows)]
 
 
-class Section(NamedTuple):
+class PageSection(NamedTuple):
     """Section of a page."""
 
     title: str
-    content: Sequence[str | Table | Drawing | Section]
+    content: Sequence[str | ResultTable | Drawing | PageSection]
     """Texts in Markdown, tables, figures, and sections of the next level; empty texts are left out."""
 
     def lines(self, level: int = 2) -> Iterator[str]:
         """Yield the lines of Markdown, with a heading of some level."""
         yield from (f"{'#' * level} {self.title}", "")
         for part in self.content:
-            if isinstance(part, Section):
+            if isinstance(part, PageSection):
                 yield from part.lines(level + 1)
-            elif isinstance(part, Table):
+            elif isinstance(part, ResultTable):
                 yield from (f"**{part.title}**", "") if part.title else ()
                 yield from (*part.lines(), "")
             elif isinstance(part, Drawing):
@@ -163,7 +163,7 @@ class Section(NamedTuple):
     def drawings(self) -> Iterator[Drawing]:
         """Yield the figures, also of inner sections."""
         for part in self.content:
-            if isinstance(part, Section):
+            if isinstance(part, PageSection):
                 yield from part.drawings()
             elif isinstance(part, Drawing):
                 yield part
@@ -194,7 +194,7 @@ def prepare(folder: Path, *libraries: str) -> None:
     make_folder(folder)
 
 
-class Page(NamedTuple):
+class ReportPage(NamedTuple):
     """Page of a command."""
 
     name: str
@@ -202,7 +202,7 @@ class Page(NamedTuple):
     title: str
     lead: str
     """Summary in Markdown."""
-    sections: Sequence[Section]
+    sections: Sequence[PageSection]
     command: str
     """Command that creates the page."""
 
@@ -237,9 +237,9 @@ class Page(NamedTuple):
         )
 
 
-def figures_section(drawings: Iterable[Drawing]) -> list[Section]:
+def figures_section(drawings: Iterable[Drawing]) -> list[PageSection]:
     """Section of all figures of a page; none without a figure."""
-    return [Section("Figures", all_drawings)] if (all_drawings := tuple(drawings)) else []
+    return [PageSection("Figures", all_drawings)] if (all_drawings := tuple(drawings)) else []
 
 
 CHECK_HEAD = ("check", "compared quantities", "states", "value", "bound", "passed", "reason for the bound")
@@ -252,9 +252,11 @@ def verdict(checks: Sequence[Check]) -> str:
     return f"Number of checks: {len(checks)}. {result}"
 
 
-def checks_section(checks: Iterable[Check]) -> Section:
+def checks_section(checks: Iterable[Check]) -> PageSection:
     """Section with a row for each check."""
-    return Section("Checks", [Table("", CHECK_HEAD, list(map(_check_row, checks)), 2, CHECK_HEAD[-2:])])
+    return PageSection(
+        "Checks", [ResultTable("", CHECK_HEAD, list(map(_check_row, checks)), 2, CHECK_HEAD[-2:])]
+    )
 
 
 def _check_row(check: Check) -> tuple[str, ...]:

@@ -3,8 +3,9 @@
 import numpy as np
 
 from spheretwin.models.telemetry.status import Status
-from spheretwin.paper.experiment import Case, Experiment, Outcome, ResultTable, Section
+from spheretwin.paper.experiment import Case, Experiment, Outcome, Section
 from spheretwin.paper.page import of_axis, spread_deg
+from spheretwin.viz.pages.markdown import ResultTable
 
 SHORT = {"duration": 0.2, "plant.engine": "lagrangian"}
 NOISY = Case("noisy", "tilt", {**SHORT, "plant.engine": "mujoco", "hardware": "electronics"})

@@ -31,9 +31,9 @@ def drawing(name):
 
 def write(folder, figure_format="svg"):
     folder.mkdir()
-    gains = markdown.Section("Gains, `pd`", [markdown.Section("Errors", [])])
-    errors = markdown.Section("Errors", [drawing("first"), drawing("second")])
-    page = markdown.Page("page", "A title", "Two of three hold.", [gains, errors], "spheretwin x")
+    gains = markdown.PageSection("Gains, `pd`", [markdown.PageSection("Errors", [])])
+    errors = markdown.PageSection("Errors", [drawing("first"), drawing("second")])
+    page = markdown.ReportPage("page", "A title", "Two of three hold.", [gains, errors], "spheretwin x")
     return page.write(folder, figure_format)
 
 

@@ -18,7 +18,7 @@ from spheretwin.study.tuning.gains import section_of
 from spheretwin.study.tuning.trials import Ended
 from spheretwin.study.tuning.tuning import LawResult, ReportedTrial, TuningResult
 from spheretwin.viz.pages import markdown as pieces
-from spheretwin.viz.pages.markdown import Drawing, Page, Section, Table, save_text
+from spheretwin.viz.pages.markdown import Drawing, PageSection, ReportPage, ResultTable, save_text
 
 if TYPE_CHECKING:
     from spheretwin.viz.figures import fronts
@@ -178,20 +178,20 @@ def write(
     """
     optimise = section_of(study)
     figures = drawings(study.name, result, optimise.objective) if can_be_drawn() else []
-    sections = [Section("Method", _what(study)), *pieces.figures_section(figures)]
+    sections = [PageSection("Method", _what(study)), *pieces.figures_section(figures)]
     sections += [
-        Section(law, [counted(of_law), chosen(of_law) or NONE_COMPLETED])
+        PageSection(law, [counted(of_law), chosen(of_law) or NONE_COMPLETED])
         for law, of_law in summary(result, optimise.objective)["laws"].items()
     ]
     gains = json.dumps(best(result, optimise.objective), indent=1, ensure_ascii=False)
     lead = f"{study.description}\n\n{result.trials} of {result.of} trials are finished."
     return [
-        *Page(NAME, study.name, lead, sections, command).write(folder, figure_format),
+        *ReportPage(NAME, study.name, lead, sections, command).write(folder, figure_format),
         save_text(folder / GAINS, f"{gains}\n"),
     ]
 
 
-def _what(study: Study) -> list[str | Table]:
+def _what(study: Study) -> list[str | ResultTable]:
     """Objectives, method and ranges."""
     optimise = section_of(study)
     ranges = [
@@ -212,7 +212,7 @@ def _what(study: Study) -> list[str | Table]:
         + (" A trial that can no longer be among the best is pruned." if optimise.prune else "")
         + _limits(optimise)
         + fresh,
-        Table("", ["gain", "law", "from", "to", "fields", "reason"], ranges, 2, ["fields", "reason"]),
+        ResultTable("", ["gain", "law", "from", "to", "fields", "reason"], ranges, 2, ["fields", "reason"]),
     ]
 
 
@@ -253,7 +253,7 @@ def counted(of_law: Mapping[str, Any]) -> str:
 NONE_COMPLETED = "No trial completed."
 
 
-def chosen(of_law: Mapping[str, Any], title: str = "") -> Table | None:
+def chosen(of_law: Mapping[str, Any], title: str = "") -> ResultTable | None:
     """Table of gains, fields and objectives of the start, and of the best or the front.
 
     None if no trial completed.
@@ -279,4 +279,4 @@ def chosen(of_law: Mapping[str, Any], title: str = "") -> Table | None:
         for figures, otherwise in groups if is_fresh else groups[:1]:
             cells += [f"{figures[name]:.4g}" if figures else otherwise for name in values]
         body.append([label, *cells])
-    return Table(title, head, body)
+    return ResultTable(title, head, body)
