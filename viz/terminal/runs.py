@@ -214,7 +214,7 @@ def print_written(paths: Sequence[Path]) -> None:
 def print_rows(
     title: str, head: Sequence[str], rows: Sequence[Sequence[str]], texts: int = 1, words: Sequence[str] = ()
 ) -> None:
-    """Print a table of the fields of `pages.markdown.Table`."""
+    """Print a table of the fields of `pages.markdown.ResultTable`."""
     table = tables.new_table(title, head[0], *head[1:])
     for place, (column, name) in enumerate(zip(table.columns, head, strict=True)):
         column.justify = "left" if not place or place < texts or name in words else "right"
