@@ -3,6 +3,7 @@
 import json
 import os
 import signal
+import socket
 import subprocess
 
 import numpy as np
@@ -74,6 +75,26 @@ def test_frames_through_a_pipe():
     answers = [MEASUREMENT.decode(out[at : at + size]) for at in range(0, len(out), size)]
     assert [answer["echo"] for answer in answers[:-1]] == list(range(1, 12))
     assert np.any(answers[-1]["angle"])  # the currents have moved the rotor
+
+
+def test_a_refused_sender_and_the_peer_have_a_line_each():
+    with (
+        started(*MACHINE, "udp://:0", "--json", "--idle-s", str(UNLIMITED_S)) as process,
+        socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as stranger,
+        socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as peer,
+    ):
+        port = int(process.stderr.readline().strip().rpartition(":")[2])
+        lines = []
+        for end, frames in ((stranger, [b"no frame"]), (peer, [command(1, flags=2), command(2)])):
+            end.connect(("127.0.0.1", port))
+            for frame in frames:
+                end.send(frame)
+            lines.append(process.stderr.readline().strip())
+        names = [f"127.0.0.1:{end.getsockname()[1]}" for end in (stranger, peer)]
+        peer.send(command(3, flags=4))
+        out, _ = process.communicate()
+    assert lines == [f"spheretwin: refused: {names[0]}", f"spheretwin: the peer is {names[1]}"]
+    assert json.loads(out)["link"]["refused_senders"] == {names[0]: 1}
 
 
 def test_a_machine_that_does_not_answer_is_a_failure(monkeypatch):

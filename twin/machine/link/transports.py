@@ -8,8 +8,8 @@ import select
 import socket
 import sys
 import time
-from collections import Counter
-from collections.abc import Callable
+from collections import Counter, deque
+from collections.abc import Callable, Iterator
 from typing import Any, Protocol
 from urllib.parse import urlsplit
 
@@ -26,6 +26,9 @@ MOST_NAMES = 16
 
 LOOK_s, MOST_LOOKS = 0.1, 32
 """Time between two looks at the datagrams of others, and datagrams of a look."""
+
+MOST_QUEUED = 1_000
+"""Datagrams that a socket may hold."""
 
 EXPECTED = "udp://HOST:PORT, serial:DEVICE@BAUD, or - for standard input and output"
 
@@ -84,6 +87,7 @@ class Udp:
         self._peer: Any = None
         self._candidate: Any = None
         self._others: socket.socket | None = None
+        self._early: deque[bytes] = deque()
         self._look_s = 0.0
         self._sender: Any = None
         self._listening = listening
@@ -115,6 +119,8 @@ class Udp:
 
     def receive(self, timeout_s: float) -> bytes:
         """Return a datagram of the peer, or of anyone before there is a peer."""
+        if self._early:
+            return self._early.popleft()
         if self._others and time.monotonic() >= self._look_s:
             self._look_at_others()
         if not _is_readable(self._socket, timeout_s):
@@ -140,9 +146,13 @@ class Udp:
 
     def refuse(self) -> None:
         """Count the last datagram as one of a refused sender, and report it if it is the first of it."""
-        if self._sender == self._peer or not (self._listening and self._sender):
+        if self._listening and self._sender:
+            self._refuse(self._sender)
+
+    def _refuse(self, sender: Any) -> None:
+        if sender == self._peer:
             return
-        name = _name(self._sender)
+        name = _name(sender)
         if name not in self.refused and len(self.refused) >= MOST_NAMES:
             name = "others"
         if not self.refused[name]:
@@ -175,18 +185,23 @@ class Udp:
             self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEPORT, 0)
         own.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEPORT, 0)
         self._socket, self._others = own, self._socket
+        for content, sender in self._datagrams_of_others(MOST_QUEUED):  # sent before the peer had its socket
+            if sender == self._peer:
+                self._early.append(content)
 
     def _look_at_others(self) -> None:
         """Count some datagrams of others; what their queue cannot hold is lost without a count."""
         self._look_s = time.monotonic() + LOOK_s
-        peer_sender = self._sender
-        for _ in range(MOST_LOOKS):
+        for _, sender in self._datagrams_of_others(MOST_LOOKS):
+            self._refuse(sender)
+
+    def _datagrams_of_others(self, most: int) -> Iterator[tuple[bytes, Any]]:
+        """Yield what waits in the socket of others, with its sender."""
+        for _ in range(most):
             if not (self._others and _is_readable(self._others, 0.0)):
-                break
+                return
             with contextlib.suppress(OSError):
-                _, self._sender = self._others.recvfrom(1)
-                self.refuse()
-        self._sender = peer_sender
+                yield self._others.recvfrom(LARGEST_READ)
 
 
 def _name(sender: Any) -> str:

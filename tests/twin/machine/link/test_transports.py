@@ -57,6 +57,14 @@ def test_a_stranger_is_not_heard_after_the_peer(listener, sender):
         assert stranger.receive(0.0) == b""
 
 
+def test_what_the_peer_sends_before_it_has_its_socket_is_not_lost(listener, sender):
+    for content in (b"first", b"second", b"third"):
+        sender.send(content)
+    assert listener.receive(UNLIMITED_S) == b"first"
+    listener.accept()
+    assert [listener.receive(UNLIMITED_S) for _ in range(2)] == [b"second", b"third"]
+
+
 def test_the_port_of_a_peer_is_not_shared(listener, sender):
     sender.send(b"the peer")
     assert listener.receive(UNLIMITED_S)
