@@ -13,9 +13,9 @@ from spheretwin.cli.options import from_zero, number, verb
 from spheretwin.machine.files import conditions_of
 from spheretwin.machine.link.admission import read_key
 from spheretwin.machine.link.controller_scenario import left_out
-from spheretwin.machine.link.limits import Limits
+from spheretwin.machine.link.limits import Limits, LinkSettings
 from spheretwin.machine.link.log_file import LogFile
-from spheretwin.machine.link.machine_link import Link, LinkSettings
+from spheretwin.machine.link.machine_link import Link
 from spheretwin.machine.link.stream import RunningShadow
 from spheretwin.machine.state_estimation import Shadow
 from spheretwin.models.base.files import check_writable

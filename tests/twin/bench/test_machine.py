@@ -8,8 +8,8 @@ import pytest
 from spheretwin import scenario as scenarios
 from spheretwin.bench import Bench
 from spheretwin.bench.commands import COMMANDS
-from spheretwin.machine.link.limits import Limits
-from spheretwin.machine.link.machine_link import Link, LinkSettings
+from spheretwin.machine.link.limits import Limits, LinkSettings
+from spheretwin.machine.link.machine_link import Link
 from spheretwin.machine.link.machine_server import MachineServer
 from spheretwin.models.base.errors import InputError
 from spheretwin.session import Session

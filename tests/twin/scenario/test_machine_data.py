@@ -7,8 +7,8 @@ import pytest
 from spheretwin import cli
 from spheretwin import scenario as scenarios
 from spheretwin.active_config import initial_config, warnings_of
-from spheretwin.machine.link.limits import Limits
-from spheretwin.machine.link.machine_link import Link, LinkSettings
+from spheretwin.machine.link.limits import Limits, LinkSettings
+from spheretwin.machine.link.machine_link import Link
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.coil_group import HEAT
 from spheretwin.scenario.hardware import HARDWARE, MODEL_FILE, PER_GROUP, amplifier_limit_A

@@ -1,11 +1,16 @@
-"""Scenario of the controller alone: that of a run whose plant is a real machine."""
+"""Scenario of the controller alone, whose plant is a real machine, and what that measures."""
 
 from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
 
 from spheretwin.disturbances import Disturbance
 from spheretwin.electronics.drive_section import DriveSection
 from spheretwin.electronics.sensor_chain import SensorsSection
 from spheretwin.external import Measurement
+from spheretwin.machine.link.codec import Values
 from spheretwin.models.base.errors import InputError
 from spheretwin.scenario.plant_sections import NominalSection, PlantSection
 from spheretwin.scenario.sections import ResolvedScenario, Scenario
@@ -90,3 +95,21 @@ def controller_scenario(
         "event": tuple(event for event in scenario.event if not _is_of_plant(event.set)),
     }
     return Scenario.model_construct(**fields)
+
+
+def measurement_of(frame: Values) -> Measurement:
+    """Return the values of a frame; None for those that it does not have, or that are all NaN."""
+    rate, current, temperature = (frame.get(name) for name in ("rate", "current", "temperature"))
+    return Measurement(
+        frame["angle"],
+        *(None if np.all(np.isnan(_numbers(value))) else value for value in (rate, current, temperature)),
+    )
+
+
+def _numbers(value: Any) -> Any:
+    return np.nan if value is None else value
+
+
+def is_finite(measurement: Measurement) -> bool:
+    """Return whether all values of a measurement are finite numbers."""
+    return all(value is None or np.all(np.isfinite(value)) for value in measurement)

@@ -1,4 +1,4 @@
-"""Limits of a machine: each one that is exceeded removes the currents."""
+"""Settings of a link, and limits of a machine: each one that is exceeded removes the currents."""
 
 from __future__ import annotations
 
@@ -16,6 +16,26 @@ from spheretwin.scenario.fields import SettingsModel
 Array = NDArray[np.float64]
 
 Positive = Annotated[float, Field(gt=0, le=1e6)]
+
+
+class LinkSettings(SettingsModel):
+    """Settings of the drive of a machine."""
+
+    model_config = ConfigDict(strict=True)
+
+    armed: bool = Field(False, description="whether currents are sent; otherwise all are 0: a dry run")
+    ramp_s: Annotated[float, Field(ge=0, le=1e3)] = Field(
+        1.0, description="time in which the share of the commands that is sent rises from 0 to 1, s"
+    )
+    timeout_s: Annotated[float, Field(gt=0, le=1e3)] = Field(
+        0.01, description="age of the newest measurement at which the currents are removed, s (assumed)"
+    )
+    connect_s: Annotated[float, Field(gt=0, le=1e3)] = Field(
+        60.0, description="longest wait for the first measurement, s: a machine may have to compile first"
+    )
+    lockstep: bool = Field(
+        False, description="whether a tick waits for the reply of the machine instead of the clock"
+    )
 
 
 class Limits(SettingsModel):

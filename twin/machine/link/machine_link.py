@@ -6,11 +6,10 @@ import secrets
 import time
 from collections.abc import Callable
 from copy import deepcopy
-from typing import Annotated, Any, Protocol
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import ConfigDict, Field
 
 from spheretwin.control.supervision.watchdog import Reason
 from spheretwin.external import Measurement
@@ -18,15 +17,20 @@ from spheretwin.machine.link import frame_format
 from spheretwin.machine.link.admission import ControllerAdmission
 from spheretwin.machine.link.channel import Channel
 from spheretwin.machine.link.codec import Values
-from spheretwin.machine.link.controller_scenario import check_measurement, controller_scenario
+from spheretwin.machine.link.controller_scenario import (
+    check_measurement,
+    controller_scenario,
+    is_finite,
+    measurement_of,
+)
 from spheretwin.machine.link.frame_format import DEFAULT_FRAME, Flags
-from spheretwin.machine.link.limits import CoilHeat, Limits
+from spheretwin.machine.link.limits import CoilHeat, Limits, LinkSettings
 from spheretwin.machine.link.plausibility import Plausibility
 from spheretwin.machine.link.rehearsal import rehearse
+from spheretwin.machine.link.stream import RunningShadow
 from spheretwin.machine.link.timing import Distribution
 from spheretwin.machine.link.transports import open_transport
 from spheretwin.models.base.errors import InputError, SpheretwinError, distinct_texts
-from spheretwin.scenario.fields import SettingsModel
 from spheretwin.scenario.sections import ResolvedScenario, Scenario
 from spheretwin.session import Session
 
@@ -43,39 +47,6 @@ RELEASES = 3
 
 SENT_TIMES = 256
 """Commands whose time is stored for the latency."""
-
-
-class ParallelShadow(Protocol):
-    """Estimator of the state of the machine that runs in parallel."""
-
-    def advance(self, t_s: float, current_A: Array, angle_rad: Array) -> None:
-        """Receive the currents (n,) that were sent at a tick and the angles (3,) at its start.
-
-        The angles are NaN if no new measurement had arrived.
-        """
-
-    def new(self) -> ParallelShadow:
-        """Return an estimator of the same machine at its start."""
-
-
-class LinkSettings(SettingsModel):
-    """Settings of the drive of a machine."""
-
-    model_config = ConfigDict(strict=True)
-
-    armed: bool = Field(False, description="whether currents are sent; otherwise all are 0: a dry run")
-    ramp_s: Annotated[float, Field(ge=0, le=1e3)] = Field(
-        1.0, description="time in which the share of the commands that is sent rises from 0 to 1, s"
-    )
-    timeout_s: Annotated[float, Field(gt=0, le=1e3)] = Field(
-        0.01, description="age of the newest measurement at which the currents are removed, s (assumed)"
-    )
-    connect_s: Annotated[float, Field(gt=0, le=1e3)] = Field(
-        60.0, description="longest wait for the first measurement, s: a machine may have to compile first"
-    )
-    lockstep: bool = Field(
-        False, description="whether a tick waits for the reply of the machine instead of the clock"
-    )
 
 
 def _rehearsed(session: Session) -> None:
@@ -99,7 +70,7 @@ class Link:
     heat : CoilHeat
     period_s : float
         Control period.
-    shadow : ParallelShadow, optional
+    shadow : RunningShadow, optional
     plausibility : Plausibility, optional
         Checks of the motion while it is armed; default: none.
     stop_requested : callable
@@ -130,7 +101,7 @@ class Link:
         heat: CoilHeat,
         period_s: float,
         *,
-        shadow: ParallelShadow | None = None,
+        shadow: RunningShadow | None = None,
         plausibility: Plausibility | None = None,
         stop_requested: Callable[[], bool] = lambda: False,
         now: Callable[[], float] = time.monotonic,
@@ -302,8 +273,8 @@ class Link:
             self._receive(hello_s - now_s)
         self._sent_s.clear()  # the machine may have been starting
         self.latency = Distribution()
-        measurement = _measurement(self._newest)
-        if not _is_finite(measurement):
+        measurement = measurement_of(self._newest)
+        if not is_finite(measurement):
             raise SpheretwinError(f"link {self.name}: expected finite numbers, received others")
         return measurement
 
@@ -334,13 +305,13 @@ class Link:
             self.channel.counts.late += 1
             self.late_ticks.add(round(t_s / self._period_s) + 1)
         self._raise_authority(t_s + self._period_s)
-        measurement = _measurement(self._newest)
+        measurement = measurement_of(self._newest)
         if not self._reason:
             reported = measurement.temperature_degC
             self._reason = self._check(measurement, temperature_degC if reported is None else reported)
-        if not _is_finite(measurement):
+        if not is_finite(measurement):
             self._newest = before
-            measurement = _measurement(before)
+            measurement = measurement_of(before)
         return measurement, self._reason
 
     def release(self) -> None:
@@ -372,7 +343,7 @@ class Link:
             return Reason.STALE
         if self._newest and self._newest.get("flags", 0) & Flags.FAILSAFE:
             return Reason.MACHINE
-        if not _is_finite(measurement):
+        if not is_finite(measurement):
             return Reason.MEASUREMENT
         return self._limits.exceeded(measurement, temperature_degC)
 
@@ -446,20 +417,3 @@ class Link:
         if delay_s > self._period_s:  # do not hurry after a pause of the system
             self._start_s += delay_s
             self._is_after_pause = True
-
-
-def _measurement(frame: Values) -> Measurement:
-    """Return the values of a frame; None for those that it does not have, or that are all NaN."""
-    rate, current, temperature = (frame.get(name) for name in ("rate", "current", "temperature"))
-    return Measurement(
-        frame["angle"],
-        *(None if np.all(np.isnan(_numbers(value))) else value for value in (rate, current, temperature)),
-    )
-
-
-def _numbers(value: Any) -> Any:
-    return np.nan if value is None else value
-
-
-def _is_finite(measurement: Measurement) -> bool:
-    return all(value is None or np.all(np.isfinite(value)) for value in measurement)

@@ -16,7 +16,8 @@ from spheretwin.machine.link.admission import (
 from spheretwin.machine.link.channel import Channel
 from spheretwin.machine.link.codec import HMAC_BYTES, Codec
 from spheretwin.machine.link.frame_format import Flags
-from spheretwin.machine.link.machine_link import Link, LinkSettings
+from spheretwin.machine.link.limits import LinkSettings
+from spheretwin.machine.link.machine_link import Link
 from spheretwin.machine.link.machine_server import MachineServer
 from spheretwin.models.base.errors import InputError
 from tests.twin.machine.link import lines

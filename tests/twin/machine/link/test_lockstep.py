@@ -10,7 +10,8 @@ from spheretwin import scenario as scenarios
 from spheretwin.external import Measurement
 from spheretwin.machine.link import frame_format
 from spheretwin.machine.link.controller_scenario import controller_scenario, left_out
-from spheretwin.machine.link.machine_link import Link, LinkSettings
+from spheretwin.machine.link.limits import LinkSettings
+from spheretwin.machine.link.machine_link import Link
 from spheretwin.machine.link.machine_server import MachineServer
 from spheretwin.session import Session
 from tests.twin.machine.link import lines

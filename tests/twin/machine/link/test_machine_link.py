@@ -5,8 +5,8 @@ import pytest
 
 from spheretwin.control.supervision.watchdog import Reason
 from spheretwin.machine.link.frame_format import Flags
-from spheretwin.machine.link.limits import Limits
-from spheretwin.machine.link.machine_link import Link, LinkSettings
+from spheretwin.machine.link.limits import Limits, LinkSettings
+from spheretwin.machine.link.machine_link import Link
 from spheretwin.machine.link.timing import QUANTILES
 from spheretwin.models.base.errors import SpheretwinError
 from tests.twin.machine.link import lines
