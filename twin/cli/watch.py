@@ -55,9 +55,9 @@ def run(options: argparse.Namespace) -> bool:
         estimator = Shadow(model) if view else None
         for block in blocks(options, log, model.groups, stop_requested):
             alarms = watch.advance(block)
-            if not warned and watch.variance > MOST_VARIANCE:
+            if not (warned or count) and watch.misfit > MOST_VARIANCE:
                 warned = True
-                print_message(_warning(watch.variance, settings, block, is_stream=log is None))
+                print_message(_warning(watch.misfit, settings, block, is_stream=log is None))
             for alarm in alarms:
                 of_log = {"log_sha256": log and log.digest, "accepted_findings": list(block.accepted)}
                 print_json({**alarm._asdict(), **of_log})

@@ -126,6 +126,8 @@ class Watch:
         Of the logarithm of the evidence.
     variance : float
         Variance of the residuals over that of the sensors' noise, measured at the start; at least 1.
+    misfit : float
+        The same if no torque is without a cause: what the twin does not explain of the start.
     judged : list of JudgedWindow
         Windows of the last call of `advance`.
 
@@ -155,7 +157,7 @@ class Watch:
         windows_per_hour = 3600 / self.settings.window_s
         self.threshold = logarithm(windows_per_hour / self.settings.false_alarms_per_hour)
         self.judged: list[JudgedWindow] = []
-        self.variance = 1.0
+        self.variance = self.misfit = 1.0
         self._rows: Log | None = None
         self._place = 0  # row of the estimate
         self._period_s = 0.0
@@ -265,7 +267,7 @@ class Watch:
         squares, determinants, used = self._fits.T
         variances = np.maximum(squares / np.maximum(used, 1), 1.0)
         best = int(np.argmin(used * np.log(variances) + 2 * determinants + squares / variances))
-        self._filters = [self._filters[best]]
+        self._filters, self.misfit = [self._filters[best]], float(variances[0])
         self._filters[0].torque_noise_Nm_s *= float(np.sqrt(variances[best]))
         self.variance = self._linearisation.variance = float(variances[best])
 

@@ -179,7 +179,7 @@ def test_watch_prints_a_line_of_json_for_each_alarm(tmp_path):
 
 
 def test_a_stream_that_the_twin_does_not_explain_warns_before_its_first_alarm(monkeypatch):
-    log = changing_log(2.5, (2.1, "plant.coulomb_Nm", [0.02] * 3), seed=2)
+    log = changing_log(3.1, (2.1173, "plant.coulomb_Nm", [0.02] * 3), seed=2)
     log = replace(log, currents="measured", current_A=np.roll(log.current_A, 12, axis=0))  # late by 12 ms
     lines = []
     monkeypatch.setattr("spheretwin.cli.watch.print_json", lambda alarm: lines.append(alarm["what"]))
