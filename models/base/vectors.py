@@ -10,17 +10,13 @@ from __future__ import annotations
 
 import operator
 from collections.abc import Callable
-from math import copysign
 from typing import Any
 
-import numba
 import numpy as np
 from llvmlite import ir
-from numba.core.cgutils import get_or_insert_function
-from numba.extending import intrinsic, models, register_model
+from numba import types
+from numba.extending import lower_builtin, models, register_model, type_callable
 from numpy.typing import NDArray
-
-from spheretwin.models.base.compiled import implements
 
 WIDTH = 4
 
@@ -34,7 +30,7 @@ _NUMBERS, _INDICES = ir.VectorType(_NUMBER, WIDTH), ir.VectorType(_INDEX, WIDTH)
 _CONTRACT = ("contract",)  # a product and a sum may be fused, as in all compiled functions
 
 
-class _VectorType(numba.types.Type):
+class _VectorType(types.Type):
     def __init__(self) -> None:
         super().__init__(name="Vector")
 
@@ -108,109 +104,15 @@ def cubic(table: Array, place: Vector) -> Vector:
     return of_row[0] + t * (of_row[1] + t * (of_row[2] + t * of_row[3]))
 
 
-@implements(total)
-def _compiled_total(x: Any) -> Callable[..., Any]:
-    def call(x: Any) -> Any:
-        return _entry(x, 0) + _entry(x, 1) + (_entry(x, 2) + _entry(x, 3))
+# Code of a call in compiled functions. It is included in the caller: an `overload` would be a function of its
+# own, with a compilation of its own, for each operator and pair of types.
 
-    return call
+_SIGN, _ONE = 1 << 63, 0x3FF << 52
 
 
-@implements(np.floor)
-def _compiled_floor(x: Any) -> Callable[..., Any] | None:
-    def call(x: Any) -> Any:
-        return _floor(x)
-
-    return call if x is _VECTOR else None
-
-
-@implements(load)
-def _compiled_load(values: Any, first: Any) -> Callable[..., Any]:
-    def call(values: Any, first: Any) -> Any:
-        return _load(values, first)
-
-    return call
-
-
-@implements(store)
-def _compiled_store(vector: Any, values: Any, first: Any) -> Callable[..., Any]:
-    def call(vector: Any, values: Any, first: Any) -> None:
-        _store(vector, values, first)
-
-    def call_number(vector: Any, values: Any, first: Any) -> None:
-        values[first] = vector
-
-    return call if vector is _VECTOR else call_number
-
-
-@implements(like)
-def _compiled_like(x: Any, values: Any, first: Any) -> Callable[..., Any]:
-    def call(x: Any, values: Any, first: Any) -> Any:
-        return _load(values, first)
-
-    def call_number(x: Any, values: Any, first: Any) -> Any:
-        return values[first]
-
-    return call if x is _VECTOR else call_number
-
-
-@implements(limited)
-def _compiled_limited(x: Any, low: Any, high: Any) -> Callable[..., Any]:
-    def call(x: Any, low: Any, high: Any) -> Any:
-        return _limited(x, low, high)
-
-    def call_number(x: Any, low: Any, high: Any) -> Any:
-        return min(max(x, low), high)
-
-    return call if x is _VECTOR else call_number
-
-
-@implements(within)
-def _compiled_within(x: Any, low: Any, high: Any) -> Callable[..., Any]:
-    def call(x: Any, low: Any, high: Any) -> Any:
-        return _within(x, low, high)
-
-    return call
-
-
-@implements(side)
-def _compiled_side(x: Any) -> Callable[..., Any]:
-    def call(x: Any) -> Any:
-        return _side(x)
-
-    def call_number(x: Any) -> Any:
-        return copysign(1.0, x)
-
-    return call if x is _VECTOR else call_number
-
-
-@implements(cubic)
-def _compiled_cubic(table: Any, place: Any) -> Callable[..., Any]:
-    def call(table: Any, place: Any) -> Any:
-        return _cubic(table, place)
-
-    def call_number(table: Any, place: Any) -> Any:
-        row = np.uint64(np.int64(place))  # unsigned: no check for an index below 0 is compiled in
-        t = place - np.float64(row)
-        return table[row, 0] + t * (table[row, 1] + t * (table[row, 2] + t * table[row, 3]))
-
-    return call if place is _VECTOR else call_number
-
-
-@implements(vector)
-def _compiled_vector(a: Any, b: Any, c: Any, d: Any) -> Callable[..., Any]:
-    def call(a: Any, b: Any, c: Any, d: Any) -> Any:
-        return _vector(a, b, c, d)
-
-    return call
-
-
-@implements(entry)
-def _compiled_entry(x: Any, number: Any) -> Callable[..., Any]:
-    def call(x: Any, number: Any) -> Any:
-        return _entry(x, number)
-
-    return call
+def _typed(function: Callable[..., Any], typer: Callable[..., Any]) -> None:
+    """Let a function return the signature that `typer` returns for types of arguments."""
+    type_callable(function)(lambda _: typer)
 
 
 def _all_four(builder: Any, number: Any) -> Any:
@@ -225,98 +127,133 @@ def _arranged(builder: Any, first: Any, second: Any, places: list[int]) -> Any:
 
 
 def _address(context: Any, builder: Any, kind: Any, array: Any, first: Any) -> Any:
-    data = context.make_array(kind)(context, builder, array).data
-    return builder.bitcast(builder.gep(data, [first]), _NUMBERS.as_pointer())
+    return builder.gep(context.make_array(kind)(context, builder, array).data, [first])
 
 
-def _build_load(typing: Any, values: Any, first: Any) -> tuple[Any, Callable[..., Any]]:
-    def build(context: Any, builder: Any, signature: Any, given: Any) -> Any:
-        return builder.load(_address(context, builder, signature.args[0], *given), align=8)
-
-    return _VECTOR(values, numba.types.intp), build
-
-
-def _build_store(typing: Any, vector: Any, values: Any, first: Any) -> tuple[Any, Callable[..., Any]]:
-    def build(context: Any, builder: Any, signature: Any, given: Any) -> Any:
-        target = _address(context, builder, signature.args[1], *given[1:])
-        builder.store(given[0], target, align=8)
-        return context.get_dummy_value()
-
-    return numba.types.void(vector, values, numba.types.intp), build
+def _load(context: Any, builder: Any, signature: Any, given: Any) -> Any:
+    address = _address(context, builder, signature.args[-2], *given[-2:])
+    if signature.return_type is not _VECTOR:
+        return builder.load(address)
+    return builder.load(builder.bitcast(address, _NUMBERS.as_pointer()), align=8)
 
 
-def _build_vector(typing: Any, a: Any, b: Any, c: Any, d: Any) -> tuple[Any, Callable[..., Any]]:
-    def build(context: Any, builder: Any, signature: Any, given: Any) -> Any:
-        made = ir.Constant(_NUMBERS, ir.Undefined)
-        for place, number in enumerate(given):
-            made = builder.insert_element(made, number, ir.Constant(_INDEX, place))
-        return made
-
-    return _VECTOR(numba.float64, numba.float64, numba.float64, numba.float64), build
+_typed(load, lambda values, first: _VECTOR(values, types.intp))
+lower_builtin(load, types.Array, types.Integer)(_load)
+_typed(like, lambda x, values, first: x(x, values, types.intp))
+lower_builtin(like, types.Any, types.Array, types.Integer)(_load)
 
 
-def _build_entry(typing: Any, x: Any, number: Any) -> tuple[Any, Callable[..., Any]]:
-    def build(context: Any, builder: Any, signature: Any, given: Any) -> Any:
-        return builder.extract_element(*given)
-
-    return numba.float64(x, numba.types.intp), build
-
-
-def _build_floor(typing: Any, x: Any) -> tuple[Any, Callable[..., Any]]:
-    def build(context: Any, builder: Any, signature: Any, given: Any) -> Any:
-        kind = ir.FunctionType(_NUMBERS, [_NUMBERS])
-        return builder.call(get_or_insert_function(builder.module, kind, f"llvm.floor.v{WIDTH}f64"), given)
-
-    return _VECTOR(x), build
+def _store(context: Any, builder: Any, signature: Any, given: Any) -> Any:
+    address = _address(context, builder, signature.args[1], *given[1:])
+    if signature.args[0] is _VECTOR:
+        address = builder.bitcast(address, _NUMBERS.as_pointer())
+    builder.store(given[0], address, align=8)
+    return context.get_dummy_value()
 
 
-def _build_limited(typing: Any, x: Any, low: Any, high: Any) -> tuple[Any, Callable[..., Any]]:
-    def build(context: Any, builder: Any, signature: Any, given: Any) -> Any:
-        x, low, high = given[0], _all_four(builder, given[1]), _all_four(builder, given[2])
-        above = builder.select(builder.fcmp_ordered("<", x, low), low, x)
-        return builder.select(builder.fcmp_ordered(">", above, high), high, above)
-
-    return _VECTOR(x, numba.float64, numba.float64), build
+_typed(store, lambda vector, values, first: types.void(vector, values, types.intp))
+lower_builtin(store, types.Any, types.Array, types.Integer)(_store)
 
 
-def _build_within(typing: Any, x: Any, low: Any, high: Any) -> tuple[Any, Callable[..., Any]]:
-    def build(context: Any, builder: Any, signature: Any, given: Any) -> Any:
-        x, low, high = given[0], _all_four(builder, given[1]), _all_four(builder, given[2])
-        inside = builder.and_(builder.fcmp_ordered("<=", low, x), builder.fcmp_ordered("<=", x, high))
-        bits = builder.bitcast(inside, ir.IntType(WIDTH))
-        return builder.icmp_unsigned("==", bits, ir.Constant(ir.IntType(WIDTH), 2**WIDTH - 1))
-
-    return numba.boolean(x, numba.float64, numba.float64), build
+def _vector(context: Any, builder: Any, signature: Any, given: Any) -> Any:
+    made = ir.Constant(_NUMBERS, ir.Undefined)
+    for place, number in enumerate(given):
+        made = builder.insert_element(made, number, ir.Constant(_INDEX, place))
+    return made
 
 
-def _build_side(typing: Any, x: Any) -> tuple[Any, Callable[..., Any]]:
-    def build(context: Any, builder: Any, signature: Any, given: Any) -> Any:
-        bits = builder.bitcast(given[0], _INDICES)
-        of_sign, of_one = (ir.Constant(_INDICES, [bit] * WIDTH) for bit in (1 << 63, 0x3FF << 52))
-        return builder.bitcast(builder.or_(builder.and_(bits, of_sign), of_one), _NUMBERS)
-
-    return _VECTOR(x), build
+_typed(vector, lambda a, b, c, d: _VECTOR(*[types.float64] * WIDTH))
+lower_builtin(vector, *[types.Float] * WIDTH)(_vector)
 
 
-def _build_cubic(typing: Any, table: Any, place: Any) -> tuple[Any, Callable[..., Any]]:
+def _entry(context: Any, builder: Any, signature: Any, given: Any) -> Any:
+    return builder.extract_element(*given)
+
+
+_typed(entry, lambda x, number: types.float64(x, types.intp))
+lower_builtin(entry, _VectorType, types.Integer)(_entry)
+
+
+def _total(context: Any, builder: Any, signature: Any, given: Any) -> Any:
+    a, b, c, d = (builder.extract_element(given[0], ir.Constant(_INDEX, place)) for place in range(WIDTH))
+    first, second = builder.fadd(a, b, flags=_CONTRACT), builder.fadd(c, d, flags=_CONTRACT)
+    return builder.fadd(first, second, flags=_CONTRACT)
+
+
+_typed(total, lambda x: types.float64(x))
+lower_builtin(total, _VectorType)(_total)
+
+
+def _floor(context: Any, builder: Any, signature: Any, given: Any) -> Any:
+    name, kind = f"llvm.floor.v{WIDTH}f64", ir.FunctionType(_NUMBERS, [_NUMBERS])
+    known = builder.module.globals.get(name)  # llvmlite names no functions of vectors by itself
+    return builder.call(known or ir.Function(builder.module, kind, name), given)
+
+
+_typed(np.floor, lambda x: x(x) if x is _VECTOR else None)
+lower_builtin(np.floor, _VectorType)(_floor)
+
+
+def _limited(context: Any, builder: Any, signature: Any, given: Any) -> Any:
+    x, low, high = given
+    if signature.return_type is _VECTOR:
+        low, high = _all_four(builder, low), _all_four(builder, high)
+    above = builder.select(builder.fcmp_ordered("<", x, low), low, x)
+    return builder.select(builder.fcmp_ordered(">", above, high), high, above)
+
+
+_typed(limited, lambda x, low, high: x(x, types.float64, types.float64))
+lower_builtin(limited, types.Any, types.Float, types.Float)(_limited)
+
+
+def _within(context: Any, builder: Any, signature: Any, given: Any) -> Any:
+    x, low, high = given[0], _all_four(builder, given[1]), _all_four(builder, given[2])
+    inside = builder.and_(builder.fcmp_ordered("<=", low, x), builder.fcmp_ordered("<=", x, high))
+    bits = builder.bitcast(inside, ir.IntType(WIDTH))
+    return builder.icmp_unsigned("==", bits, ir.Constant(ir.IntType(WIDTH), 2**WIDTH - 1))
+
+
+_typed(within, lambda x, low, high: types.boolean(x, types.float64, types.float64))
+lower_builtin(within, _VectorType, types.Float, types.Float)(_within)
+
+
+def _side(context: Any, builder: Any, signature: Any, given: Any) -> Any:
+    if signature.return_type is _VECTOR:
+        number, index = _NUMBERS, _INDICES
+        sign, one = (ir.Constant(index, [bit] * WIDTH) for bit in (_SIGN, _ONE))
+    else:
+        number, index = _NUMBER, _INDEX
+        sign, one = ir.Constant(index, _SIGN), ir.Constant(index, _ONE)
+    bits = builder.and_(builder.bitcast(given[0], index), sign)
+    return builder.bitcast(builder.or_(bits, one), number)
+
+
+_typed(side, lambda x: x(x))
+lower_builtin(side, types.Any)(_side)
+
+
+def _cubic(context: Any, builder: Any, signature: Any, given: Any) -> Any:
     """Four rows are loaded as they are and transposed: a read of each number would take twice the time."""
-
-    def build(context: Any, builder: Any, signature: Any, given: Any) -> Any:
-        row = builder.fptosi(given[1], _INDICES)
-        t = builder.fsub(given[1], builder.sitofp(row, _NUMBERS), flags=_CONTRACT)
-        rows = []
-        for entry in range(WIDTH):
-            first = builder.shl(
-                builder.extract_element(row, ir.Constant(_INDEX, entry)), ir.Constant(_INDEX, 2)
-            )
-            rows.append(builder.load(_address(context, builder, signature.args[0], given[0], first), align=8))
-        value, *others = reversed(_transposed(builder, rows))
-        for coefficient in others:
-            product = builder.fmul(t, value, flags=_CONTRACT)
-            value = builder.fadd(coefficient, product, flags=_CONTRACT)
-        return value
-
-    return _VECTOR(table, place), build
+    table, place = given
+    four = signature.return_type is _VECTOR
+    number, index = (_NUMBERS, _INDICES) if four else (_NUMBER, _INDEX)
+    row = builder.fptosi(place, index)
+    t = builder.fsub(place, builder.sitofp(row, number), flags=_CONTRACT)
+    entries = [builder.extract_element(row, ir.Constant(_INDEX, k)) for k in range(WIDTH)] if four else [row]
+    rows = []
+    for entry in entries:
+        first = builder.shl(entry, ir.Constant(_INDEX, 2))
+        address = _address(context, builder, signature.args[0], table, first)
+        rows.append(builder.load(builder.bitcast(address, _NUMBERS.as_pointer()), align=8))
+    of_place = (
+        _transposed(builder, rows)
+        if four
+        else [builder.extract_element(rows[0], ir.Constant(_INDEX, k)) for k in range(WIDTH)]
+    )
+    value, *others = reversed(of_place)
+    for coefficient in others:
+        value = builder.fadd(coefficient, builder.fmul(t, value, flags=_CONTRACT), flags=_CONTRACT)
+    return value
 
 
 def _transposed(builder: Any, rows: list[Any]) -> list[Any]:
@@ -331,38 +268,26 @@ def _transposed(builder: Any, rows: list[Any]) -> list[Any]:
     ]
 
 
-_load: Any = intrinsic(_build_load)
-_store: Any = intrinsic(_build_store)
-_vector: Any = intrinsic(_build_vector)
-_entry: Any = intrinsic(_build_entry)
-_floor: Any = intrinsic(_build_floor)
-_limited: Any = intrinsic(_build_limited)
-_within: Any = intrinsic(_build_within)
-_side: Any = intrinsic(_build_side)
-_cubic: Any = intrinsic(_build_cubic)
+_typed(cubic, lambda table, place: place(table, place))
+lower_builtin(cubic, types.Array, types.Any)(_cubic)
 
 
-def _overload_operator(of_python: Callable[..., Any], of_builder: str) -> None:
-    def build_operation(typing: Any, x: Any, y: Any) -> tuple[Any, Callable[..., Any]]:
-        def build(context: Any, builder: Any, signature: Any, given: Any) -> Any:
-            operands = [
-                value if kind is _VECTOR else _all_four(builder, value)
-                for value, kind in zip(given, signature.args, strict=True)
-            ]
-            return getattr(builder, of_builder)(*operands, flags=_CONTRACT)
+def _implement_operator(of_python: Callable[..., Any], of_builder: str) -> None:
+    def build(context: Any, builder: Any, signature: Any, given: Any) -> Any:
+        operands = [
+            value if kind is _VECTOR else _all_four(builder, value)
+            for value, kind in zip(given, signature.args, strict=True)
+        ]
+        return getattr(builder, of_builder)(*operands, flags=_CONTRACT)
 
-        kinds = (kind if kind is _VECTOR else numba.float64 for kind in (x, y))
-        return _VECTOR(*kinds), build
+    def typer(x: Any, y: Any) -> Any:
+        kinds = (kind if kind is _VECTOR else types.float64 for kind in (x, y))
+        return _VECTOR(*kinds) if x is _VECTOR or y is _VECTOR else None
 
-    operation: Any = intrinsic(build_operation)
-
-    @implements(of_python)
-    def implementation(x: Any, y: Any) -> Callable[..., Any] | None:
-        def call(x: Any, y: Any) -> Any:
-            return operation(x, y)
-
-        return call if x is _VECTOR or y is _VECTOR else None
+    _typed(of_python, typer)
+    for kinds in ((_VectorType, _VectorType), (_VectorType, types.Float), (types.Float, _VectorType)):
+        lower_builtin(of_python, *kinds)(build)
 
 
 for _of_python, _of_builder in ((operator.add, "fadd"), (operator.sub, "fsub"), (operator.mul, "fmul")):
-    _overload_operator(_of_python, _of_builder)
+    _implement_operator(_of_python, _of_builder)
