@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from spheretwin.machine.change_filter import Block, Step, remembered
 from spheretwin.machine.explanations import Candidate
-from spheretwin.models.base.compiled import compiled
+from spheretwin.models.base.matrices import product
 
 Array = NDArray[np.float64]
 Places = NDArray[np.int64]
@@ -99,19 +99,3 @@ def _shares(block: Block, sensor: NDArray[np.bool_], rows: Places) -> Array:
     time = row + np.where(half, 0.5, 1.0)
     moved = np.maximum(time - rows, 0.0) / time
     return np.where(sensor, offset, moved**2)
-
-
-@compiled
-def product(left: Array, right: Array) -> Array:
-    """Return the product of a small matrix and one with many columns.
-
-    A BLAS with several threads is many times slower for these sizes on a busy machine.
-    """
-    rows, inner, columns = left.shape[0], left.shape[1], right.shape[1]
-    result = np.zeros((rows, columns))
-    for i in range(rows):
-        for k in range(inner):
-            factor = left[i, k]
-            for j in range(columns):
-                result[i, j] += factor * right[k, j]
-    return result
