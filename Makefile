@@ -34,6 +34,7 @@ check: .venv-wheel/installed ## format, lint, types, import layers
 
 benchmark: setup ## print the speed ratios and the bars of studies, hold the allocation against linear programmes
 	$(BIN)/python tests/benchmarks/ratios.py
+	$(BIN)/python tests/benchmarks/compilation.py
 	$(BIN)/python tests/benchmarks/lanes.py
 	$(BIN)/python tests/benchmarks/studies.py
 	$(BIN)/python tests/benchmarks/allocation.py
