@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from spheretwin.models.base.compiled import allocation_free
+from spheretwin.models.base.history import push_all
 from spheretwin.models.base.record import Record, Rows, capacity, field
-from spheretwin.models.base.state import push_all
 from spheretwin.models.coil_group import PerGroup
 from spheretwin.models.kinematics import generalised_torque
 from spheretwin.models.magnetics import rotor_torque

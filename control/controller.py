@@ -14,16 +14,17 @@ from spheretwin.control.allocation.bounded import SCRATCH_ROWS
 from spheretwin.control.applied_torque import AppliedTorque, estimate_applied_torque
 from spheretwin.control.compensators import Compensators, apply_compensators
 from spheretwin.control.compensators.prediction import MEASURED
-from spheretwin.control.estimators.estimator import Estimator, estimator_at
+from spheretwin.control.estimators.estimator import Estimator, call_estimator
 from spheretwin.control.manual_currents import Manual, command_manual_currents
 from spheretwin.control.supervision.enabled_groups import EnabledGroups, mask_disabled_groups
 from spheretwin.control.supervision.fault_detector import Detector, detect_faults
 from spheretwin.control.supervision.watchdog import GO, Reason, Watchdog, trip, watch
-from spheretwin.models.base.compiled import compilable
-from spheretwin.models.base.numba_internals.addresses import function_at
+from spheretwin.models.base.addresses import caller_of
+from spheretwin.models.base.compiled import allocation_free
 from spheretwin.models.base.record import Record, Rows, field
 from spheretwin.models.kinematics import cartesian_torque
-from spheretwin.models.magnetics import CachedMatrix, TorqueModel, update_cached_matrix
+from spheretwin.models.magnetics import Arrangement, CachedMatrix, Tables, TorqueModel, update_cached_matrix
+from spheretwin.models.telemetry.signals import width
 
 Array = NDArray[np.float64]
 
@@ -35,9 +36,9 @@ NO_TORQUE = -1.0
 
 _COMMAND = int(Reason.COMMAND)
 
-law_at = function_at(laws.SIGNATURE)
-python_law_at = function_at(types.void(types.float64))
-allocation_at = function_at(allocations.SIGNATURE)
+call_law = caller_of(laws.SIGNATURE)
+call_python_law = caller_of(types.void(types.float64))
+call_allocation = caller_of(allocations.SIGNATURE)
 
 
 class Supervision(Record):
@@ -51,6 +52,7 @@ class Supervision(Record):
 class ControllerData(Record):
     """Data of a controller, except those of its law and its estimator; it has no access to the plant."""
 
+    arrangement: Arrangement = field("nominal poles and coil groups")
     reference: Array = field("desired angle, rate, acceleration as rows; the law may write", "", (3, 3))
     measurement: Array = field("angle, rate, torque as rows; those of `predict`", "", (2 * MEASURED, 3))
     estimator_on: bool = field("whether rates are estimated; otherwise the law receives the measured rates")
@@ -71,28 +73,25 @@ class ControllerData(Record):
 
 
 class Controller(NamedTuple):
-    """Controller of a run: data, law and estimator with their own sizes, and the nominal magnetics."""
+    """Controller of a run: data, law and estimator with their own sizes, and the nominal torque."""
 
-    data: Rows  # of one `ControllerData`
+    data: Rows  # array of one `ControllerData`
     parameters: Array  # of the law
     memory: Array  # state of the law
     estimator_parameters: Array
     estimator_memory: Array
-    magnetics: TorqueModel
+    tables: Tables
 
 
 def controller(
-    law: laws.Law,
-    estimator: Estimator | None,
-    magnetics: TorqueModel,
-    current_limit_A: float,
-    logged: int,
-    delays: int,
+    rows: Rows, law: laws.Law, estimator: Estimator | None, magnetics: TorqueModel, current_limit_A: float
 ) -> Controller:
     """Return a controller without compensators and supervision.
 
     Parameters
     ----------
+    rows : array of one ControllerData
+        In which all numbers are 0; filled.
     law : Law
         Its parameters and state are copied: a law may change both.
     estimator : Estimator or None
@@ -101,26 +100,21 @@ def controller(
         Nominal.
     current_limit_A : float, A
         Largest group current that the controller commands.
-    logged : int
-        Numbers of the law's state that the telemetry logs.
-    delays : int
-        Commands that are stored, of `delay_capacity`.
     """
-    groups, lines = magnetics.group_axes.shape[1], len(magnetics.line_weights)
-    rows = ControllerData.zeros(groups=groups, lines=lines, delays=delays)
-    rows["estimator_on"], rows["logged"] = estimator is not None, logged
-    rows["current_limit_A"], rows["authority"], rows["matrix"]["q"] = current_limit_A, 1.0, np.nan
+    rows["arrangement"], rows["estimator_on"] = magnetics.arrangement, estimator is not None
+    rows["logged"], rows["matrix"]["q"] = width(law.signals), np.nan
+    rows["current_limit_A"], rows["authority"] = current_limit_A, 1.0
     return Controller(
         rows,
         law.parameters.copy(),
         law.state.copy(),
         estimator.parameters.copy() if estimator else np.zeros(0),
         estimator.state.copy() if estimator else np.zeros(0),
-        magnetics,
+        magnetics.tables,
     )
 
 
-@compilable
+@allocation_free
 def control_tick(
     controller: Controller,
     law: Any,
@@ -166,14 +160,18 @@ def control_tick(
     data = controller.data[0]
     watchdog, pose = data.supervision.watchdog, data.pose
     if data.estimator_on:
-        estimator_at(estimate)(
-            measurement[0], controller.estimator_parameters, controller.estimator_memory, measurement[1]
+        call_estimator(
+            estimate,
+            measurement[0],
+            controller.estimator_parameters,
+            controller.estimator_memory,
+            measurement[1],
         )
     for i in range(3):
         pose[i], data.rates[i] = measurement[0, i], measurement[1, i]
     if watchdog.on:
         watch(watchdog, fresh, pose, data.rates)
-    update_cached_matrix(pose, controller.magnetics, data.matrix)
+    update_cached_matrix(pose, data.arrangement, controller.tables, data.matrix)
     if data.supervision.detector.on and watchdog.halt == GO:
         current, detector = data.applied_torque.current, data.supervision.detector
         detect_faults(detector, data.supervision.groups, current, data.matrix.G, pose, data.rates, t)
@@ -197,7 +195,7 @@ def control_tick(
     return share
 
 
-@compilable
+@allocation_free
 def _call_law(
     controller: Controller,
     law: Any,
@@ -212,13 +210,13 @@ def _call_law(
         torque_q[i] = np.nan  # detects a law that writes no torque, or raises
         measurement[2, i] = data.applied_torque.torque_q[i]
     if compensators.on and not apply_compensators(
-        compensators, data.applied_torque, controller.magnetics, measurement, reference
+        compensators, data.applied_torque, data.arrangement, controller.tables, measurement, reference
     ):
         return False
     if data.python_law != 0:
-        python_law_at(data.python_law)(t)
+        call_python_law(data.python_law, t)
     else:
-        law_at(law)(t, reference, measurement, controller.parameters, controller.memory, torque_q[:])
+        call_law(law, t, reference, measurement, controller.parameters, controller.memory, torque_q[:])
     if compensators.feed_forward.on:
         for i in range(3):
             torque_q[i] += compensators.feed_forward.torque_q[i]
@@ -231,7 +229,7 @@ def _call_law(
     return finite
 
 
-@compilable
+@allocation_free
 def _allocate(data: ControllerData, allocate: Any, command: Array) -> float:
     """Compute currents for the law's torque from the enabled groups.
 
@@ -248,12 +246,12 @@ def _allocate(data: ControllerData, allocate: Any, command: Array) -> float:
     cartesian_torque(pose, data.torque_q, data.torque_S)
     mask_disabled_groups(groups, G)
     # Slices: the addressed function takes arrays, not fields of a record.
-    return allocation_at(allocate)(
-        groups.G[:], data.torque_S[:], data.current_limit_A, command, data.scratch[:]
+    return call_allocation(
+        allocate, groups.G[:], data.torque_S[:], data.current_limit_A, command, data.scratch[:]
     )
 
 
-@compilable
+@allocation_free
 def _command_zero(data: ControllerData, memory: Array, command: Array) -> None:
     """Command no torque and no currents; logged values of the law stay unless they are not finite."""
     for i in range(3):

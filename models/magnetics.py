@@ -1,5 +1,7 @@
 """Torque matrix: maps group currents to the torque on the rotor (12)-(15)."""
 
+from __future__ import annotations
+
 from dataclasses import asdict
 from functools import lru_cache
 from math import atan2, pi, sqrt
@@ -12,7 +14,7 @@ from spheretwin.models.actuator import Actuator
 from spheretwin.models.base.cache import cached_array
 from spheretwin.models.base.compiled import allocation_free, inlined
 from spheretwin.models.base.errors import InputError, distinct_texts, one_line
-from spheretwin.models.base.record import Record, field
+from spheretwin.models.base.record import Record, Rows, field
 from spheretwin.models.base.vectors import (
     WIDTH,
     Vector,
@@ -29,6 +31,8 @@ from spheretwin.models.kinematics import rotation_rows
 from spheretwin.models.magnet_and_coil import CoilGeometry, Magnet
 from spheretwin.models.torque_curve import TorqueCurve
 from spheretwin.models.torque_field import TorqueField
+
+Array = NDArray[np.float64]
 
 # The look-up's intervals: wide where |cos phi| is below the knee, narrow above it, where f_t rises and falls
 # (phi below 18 degrees). 780 intervals (25 kB) hold the spline to 2e-7 of its peak; equal intervals would
@@ -52,8 +56,8 @@ SAME = 1e-9
 OPPOSITE_TOLERANCE = 1e-12
 
 
-class TorqueModel(NamedTuple):
-    """Data of the compiled torque matrix.
+class Arrangement(Record):
+    """Pole lines and coil groups of an actuator.
 
     The two coils of a group have axes s and -s, so a pole axis r enters a group's column as
     ``h(r.s) r x s`` with the odd function ``h(c) = g(c) - g(-c)``, ``g = f_t / sin``. Because h is
@@ -64,20 +68,45 @@ class TorqueModel(NamedTuple):
     plus row 1 if the angle between line and group axis is acute, row 0 minus row 1 if it is obtuse.
 
     An actuator with a torque field has no pole lines, but the axes of its coils, group by group; with a
-    torque curve these are empty. Which of both it has is data: the compiled code is the same.
+    torque curve these are empty.
     """
 
-    line_axes: NDArray[np.float64]  # (n_lines, 3), rotor frame
-    line_weights: NDArray[np.float64]  # (n_lines,)
-    group_axes: NDArray[np.float64]  # (3, n), stator frame
-    table: NDArray[np.float64]  # (781, 4), cubic coefficients of h, N·m/A
-    pair_gain: NDArray[np.float64]  # (2, lines × n) factor of h; (2, 0) without scatter
-    pair_stretch: NDArray[np.float64]  # (2, lines × n) share of 1 - |c| that is added to |c|
-    coils: NDArray[np.float64]  # (4, c) axis, stator frame, and torque over that of the field
-    field: NDArray[np.float64]  # (t + 2, p + 3, 3) spline coefficients of the torque field, N·m/A
+    line_axes: Array = field("rotor frame", "", ("lines", 3))
+    line_weights: Array = field("of each pole line", "", "lines")
+    group_axes: Array = field("stator frame", "", (3, "groups"))
+    scattered: bool = field("whether pairs have a gain and a stretch")
+    pair_gain: Array = field("factor of h", "", (2, "pairs"))
+    pair_stretch: Array = field("share of 1 - |c| that is added to |c|", "", (2, "pairs"))
+    coils: Array = field(
+        "of a torque field: axis, stator frame, and torque over that of the field", "", (4, "coils")
+    )
 
 
-def torque_matrix(q: NDArray[np.float64], actuator: Actuator) -> NDArray[np.float64]:
+class Tables(NamedTuple):
+    """Torque of a pole or a coil by its angle: arrays that all actuators with this curve or field share."""
+
+    curve: Array
+    """(781, 4), cubic coefficients of h, N·m/A; (0, 4) with a torque field."""
+    field: Array
+    """(t + 2, p + 3, 3), spline coefficients of the torque field, N·m/A; (0, 0, 3) with a torque curve."""
+
+
+class TorqueModel(NamedTuple):
+    """Data of the compiled torque matrix."""
+
+    arrangement: Rows
+    """Array of one `Arrangement`."""
+    tables: Tables
+
+    @property
+    def sizes(self) -> dict[str, int]:
+        """Sizes of the arrangement, for the records that it is nested in."""
+        data = self.arrangement[0]
+        lines, (_, groups) = len(data.line_weights), data.group_axes.shape
+        return {"lines": lines, "groups": groups, "pairs": lines * groups, "coils": data.coils.shape[1]}
+
+
+def torque_matrix(q: Array, actuator: Actuator) -> Array:
     """Return the torque matrix G_t(q): ``torque_S = G_t(q) @ current`` (15).
 
     Parameters
@@ -101,43 +130,35 @@ def torque_matrix(q: NDArray[np.float64], actuator: Actuator) -> NDArray[np.floa
     if q.shape != (3,) or not np.all(np.isfinite(q)):
         raise InputError(f"torque matrix: expected a pose of three finite angles, received {q}")
     model, G = torque_model(actuator), np.empty((3, len(actuator.groups)))
-    fill_torque_matrix(q, model, G, scratch_of(model))
+    fill_torque_matrix(q, model.arrangement[0], model.tables, G, scratch_of(model))
     return G
 
 
 @lru_cache(maxsize=8)
 def torque_model(actuator: Actuator) -> TorqueModel:
     """Return the data of an actuator for compiled code, cached for the actuators used last."""
-    group_axes = np.ascontiguousarray(actuator.group_axes.T)
     if isinstance(actuator.torque_data, TorqueField):
-        return TorqueModel(
-            line_axes=np.empty((0, 3)),
-            line_weights=np.empty(0),
-            group_axes=group_axes,
-            table=np.empty((0, 4)),
-            pair_gain=np.empty((2, 0)),
-            pair_stretch=np.empty((2, 0)),
-            coils=coils_by_group(actuator, actuator.coil_axes, np.ones(len(actuator.coil_axes))),
-            field=actuator.torque_data.coefficients,
-        )
+        coils = coils_by_group(actuator, actuator.coil_axes, np.ones(len(actuator.coil_axes)))
+        rows = _arrangement(actuator, 0, coils.shape[1])
+        rows["coils"] = coils
+        return TorqueModel(rows, Tables(np.empty((0, 4)), actuator.torque_data.coefficients))
     lines = pole_lines(actuator.pole_axes)
     opposite = np.where(lines[:, 1] < 0, 0.0, actuator.pole_polarity[lines[:, 1]])
-    return TorqueModel(
-        line_axes=np.ascontiguousarray(actuator.pole_axes[lines[:, 0]]),
-        line_weights=actuator.pole_polarity[lines[:, 0]] + opposite,
-        group_axes=group_axes,
-        table=_cached_table(actuator.torque_curve),
-        pair_gain=np.empty((2, 0)),
-        pair_stretch=np.empty((2, 0)),
-        coils=np.empty((4, 0)),
-        field=np.empty((0, 0, 3)),
-    )
+    rows = _arrangement(actuator, len(lines), 0)
+    rows["line_axes"] = actuator.pole_axes[lines[:, 0]]
+    rows["line_weights"] = actuator.pole_polarity[lines[:, 0]] + opposite
+    return TorqueModel(rows, Tables(_cached_table(actuator.torque_curve), np.empty((0, 0, 3))))
 
 
-def coils_by_group(
-    actuator: Actuator, axes: NDArray[np.float64], gain: NDArray[np.float64]
-) -> NDArray[np.float64]:
-    """Return the coils of a torque field as `TorqueModel` has them, from axes (c, 3) and gains (c,)."""
+def _arrangement(actuator: Actuator, lines: int, coils: int) -> Rows:
+    groups = len(actuator.groups)
+    rows = Arrangement.zeros(lines=lines, groups=groups, pairs=lines * groups, coils=coils)
+    rows["group_axes"] = actuator.group_axes.T
+    return rows
+
+
+def coils_by_group(actuator: Actuator, axes: Array, gain: Array) -> Array:
+    """Return the coils of a torque field as `Arrangement` has them, from axes (c, 3) and gains (c,)."""
     of_coils = np.column_stack([axes, actuator.coil_direction * gain])
     return np.ascontiguousarray(of_coils[actuator.groups.ravel()].T)
 
@@ -146,18 +167,20 @@ def scaled(model: TorqueModel, scale: float) -> TorqueModel:
     """Return a model of which all torques are those of another one times a factor."""
     if scale == 1:
         return model
-    weights = np.array([[1.0], [1.0], [1.0], [scale]])
-    return model._replace(line_weights=scale * model.line_weights, coils=weights * model.coils)
+    rows = model.arrangement.copy()
+    rows["line_weights"] *= scale
+    rows["coils"][:, 3] *= scale
+    return model._replace(arrangement=rows)
 
 
-def pole_lines(axes: NDArray[np.float64]) -> NDArray[np.int64]:
+def pole_lines(axes: Array) -> NDArray[np.int64]:
     """Return the poles of each pole line, (lines, 2): one pole and its opposite, or -1 if there is none."""
     opposite = np.all(np.abs(axes[:, None] + axes) <= OPPOSITE_TOLERANCE, axis=2)
     partner = np.where(opposite.any(axis=1), np.argmax(opposite, axis=1), -1)
     return np.array([[pole, other] for pole, other in enumerate(partner) if not 0 <= other < pole])
 
 
-def lookup_table(curve: TorqueCurve) -> NDArray[np.float64]:
+def lookup_table(curve: TorqueCurve) -> Array:
     """Return cubics for ``h(c) = g(c) - g(-c)`` on intervals of c from -1 to 1; `place` finds a cosine's row.
 
     Each cubic interpolates h at four Chebyshev points of its interval. The last row repeats the end of the
@@ -190,7 +213,7 @@ def place(cosine: Vector) -> Vector:
     return CENTRE + WIDE_PER_UNIT * cosine + (NARROW_PER_UNIT - WIDE_PER_UNIT) * beyond
 
 
-def scratch_of(model: TorqueModel) -> NDArray[np.float64]:
+def scratch_of(model: TorqueModel) -> Array:
     """Return the working space of `fill_torque_matrix`.
 
     Returns
@@ -198,21 +221,21 @@ def scratch_of(model: TorqueModel) -> NDArray[np.float64]:
     (lines, 6) array
         Axis of each pole line in the stator frame, and the axis times the weight of the line.
     """
-    return np.empty((len(model.line_weights), SCRATCH_COLUMNS))
+    return np.empty((model.arrangement.dtype["line_weights"].shape[0], SCRATCH_COLUMNS))
 
 
 @inlined
-def fill_torque_matrix(
-    q: NDArray[np.float64], model: TorqueModel, G: NDArray[np.float64], scratch: NDArray[np.float64]
-) -> None:
+def fill_torque_matrix(q: Array, arrangement: Arrangement, tables: Tables, G: Array, scratch: Array) -> None:
     """Write the torque matrix into `G`.
 
     Parameters
     ----------
     q : (3,) array, rad
         Pose; finite.
-    model : TorqueModel
+    arrangement : Arrangement
         Of n groups.
+    tables : Tables
+        Of its curve or field.
     G : (3, n) array, N·m/A
         Result.
     scratch : (lines, 6) array
@@ -227,59 +250,61 @@ def fill_torque_matrix(
     576 pairs in one plain loop. Pairs of opposite coils and of opposite poles leave 144 look-ups (see
     `TorqueModel`), four at a time.
     """
-    if model.coils.shape[1] > 0:
-        _fill_from_field(q, model, G)
+    if arrangement.coils.shape[1] > 0:
+        _fill_from_field(q, arrangement, tables.field, G)
         return
     R_x, R_y, R_z = rotation_rows(q)
-    for line in range(model.line_axes.shape[0]):
-        r, weight = model.line_axes[line], model.line_weights[line]
+    for line in range(arrangement.line_axes.shape[0]):
+        r, weight = arrangement.line_axes[line], arrangement.line_weights[line]
         x = R_x[0] * r[0] + R_x[1] * r[1] + R_x[2] * r[2]
         y = R_y[0] * r[0] + R_y[1] * r[1] + R_y[2] * r[2]
         z = R_z[0] * r[0] + R_z[1] * r[1] + R_z[2] * r[2]
         scratch[line, 0], scratch[line, 1], scratch[line, 2] = x, y, z
         scratch[line, 3], scratch[line, 4], scratch[line, 5] = weight * x, weight * y, weight * z
-    s_x, s_y, s_z = model.group_axes[0], model.group_axes[1], model.group_axes[2]
+    group_axes = arrangement.group_axes
+    s_x, s_y, s_z = group_axes[0], group_axes[1], group_axes[2]
     G_x, G_y, G_z = G[0], G[1], G[2]
     groups = G.shape[1]
     left = groups % WIDTH
     for j in range(0, groups - left, WIDTH):
         axes = load(s_x, j), load(s_y, j), load(s_z, j)
-        of_x, of_y, of_z = _columns(axes, j, model, scratch)
+        of_x, of_y, of_z = _columns(axes, j, arrangement, tables.curve, scratch)
         store(of_x, G_x, j)
         store(of_y, G_y, j)
         store(of_z, G_z, j)
     for j in range(groups - left, groups):
-        G_x[j], G_y[j], G_z[j] = _columns((s_x[j], s_y[j], s_z[j]), j, model, scratch)
+        G_x[j], G_y[j], G_z[j] = _columns((s_x[j], s_y[j], s_z[j]), j, arrangement, tables.curve, scratch)
 
 
 @inlined
 def _columns(
-    axes: tuple[Vector, Vector, Vector], first: int, model: TorqueModel, lines: NDArray[np.float64]
+    axes: tuple[Vector, Vector, Vector], first: int, arrangement: Arrangement, curve: Array, lines: Array
 ) -> tuple[Vector, Vector, Vector]:
     """Return one column of the torque matrix, or four, from the axes of the groups."""
     s_x, s_y, s_z = axes
-    groups, scattered = model.group_axes.shape[1], model.pair_gain.shape[1] > 0
+    groups, scattered = arrangement.group_axes.shape[1], arrangement.scattered
+    gains, stretches = arrangement.pair_gain, arrangement.pair_stretch
     x = y = z = 0.0 * s_x
     for line in range(lines.shape[0]):
         pair = line * groups + first
         cosine = lines[line, 0] * s_x + lines[line, 1] * s_y + lines[line, 2] * s_z
         if scattered:
-            share = like(s_x, model.pair_stretch[0], pair)
-            share = share + side(cosine) * like(s_x, model.pair_stretch[1], pair)
+            share = like(s_x, stretches[0], pair)
+            share = share + side(cosine) * like(s_x, stretches[1], pair)
             cosine = cosine + share * (side(cosine) - cosine)
-        h = cubic(model.table, place(cosine))
+        h = cubic(curve, place(cosine))
         if scattered:
-            gain = like(s_x, model.pair_gain[0], pair)
-            h = h * (gain + side(cosine) * like(s_x, model.pair_gain[1], pair))
+            gain = like(s_x, gains[0], pair)
+            h = h * (gain + side(cosine) * like(s_x, gains[1], pair))
         x, y, z = x + h * lines[line, 3], y + h * lines[line, 4], z + h * lines[line, 5]
     return y * s_z - z * s_y, z * s_x - x * s_z, x * s_y - y * s_x
 
 
 @allocation_free
-def _fill_from_field(q: NDArray[np.float64], model: TorqueModel, G: NDArray[np.float64]) -> None:
+def _fill_from_field(q: Array, arrangement: Arrangement, field: Array, G: Array) -> None:
     """Write the torque matrix of a torque field into `G`, as `TorqueField.torque` computes it."""
     R_x, R_y, R_z = rotation_rows(q)
-    field, coils, groups = model.field, model.coils, G.shape[1]
+    coils, groups = arrangement.coils, G.shape[1]
     size, rows, columns = coils.shape[1] // groups, field.shape[0] - 3, field.shape[1] - 3
     for j in range(groups):
         x = y = z = 0.0  # torque, rotor frame
@@ -322,34 +347,34 @@ def _spline_weights(t: float) -> tuple[float, float, float, float]:
 class CachedMatrix(Record):
     """Torque matrix with its pose: at the same pose it is not computed again."""
 
-    q: NDArray[np.float64] = field("pose; NaN before the first update", "rad", 3)
-    G: NDArray[np.float64] = field("torque matrix", "N·m/A", (3, "groups"))
-    scratch: NDArray[np.float64] = field(
-        "working space of `fill_torque_matrix`", "", ("lines", SCRATCH_COLUMNS)
-    )
+    q: Array = field("pose; NaN before the first update", "rad", 3)
+    G: Array = field("torque matrix", "N·m/A", (3, "groups"))
+    scratch: Array = field("working space of `fill_torque_matrix`", "", ("lines", SCRATCH_COLUMNS))
 
 
 @inlined
-def update_cached_matrix(q: NDArray[np.float64], model: TorqueModel, cached: CachedMatrix) -> None:
+def update_cached_matrix(q: Array, arrangement: Arrangement, tables: Tables, cached: CachedMatrix) -> None:
     """Compute the torque matrix at a pose, unless it is the cached pose.
 
     Parameters
     ----------
     q : (3,) array, rad
         Pose; finite.
-    model : TorqueModel
+    arrangement : Arrangement
         Of n groups.
+    tables : Tables
+        Of its curve or field.
     cached : CachedMatrix
         Changed in place.
     """
     if not (q[0] == cached.q[0] and q[1] == cached.q[1] and q[2] == cached.q[2]):
         # Slices of fields have the type of other arrays: the function is compiled once for both.
-        fill_torque_matrix(q[:], model, cached.G[:], cached.scratch[:])
+        fill_torque_matrix(q[:], arrangement, tables, cached.G[:], cached.scratch[:])
         cached.q[0], cached.q[1], cached.q[2] = q[0], q[1], q[2]
 
 
 @allocation_free
-def rotor_torque(G: NDArray[np.float64], current: NDArray[np.float64], torque_S: NDArray[np.float64]) -> None:
+def rotor_torque(G: Array, current: Array, torque_S: Array) -> None:
     """Compute ``torque_S = G current`` (15).
 
     Parameters
@@ -375,7 +400,7 @@ def rotor_torque(G: NDArray[np.float64], current: NDArray[np.float64], torque_S:
     torque_S[0], torque_S[1], torque_S[2] = x, y, z
 
 
-def _cached_table(curve: TorqueCurve) -> NDArray[np.float64]:
+def _cached_table(curve: TorqueCurve) -> Array:
     """Return the look-up table, from the cache if possible: the spline is slow to import."""
     samples = curve.phi_rad.tobytes() + curve.torque_Nm_per_A.tobytes()
     return cached_array(samples, lambda: lookup_table(curve))

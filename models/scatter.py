@@ -1,6 +1,6 @@
 """Scatter of a real machine: each pole and each coil with its own strength and placement.
 
-A pair of poles and a pair of coils on common axes enter the torque matrix as one look-up (`TorqueModel`).
+A pair of poles and a pair of coils on common axes enter the torque matrix as one look-up (`Arrangement`).
 With scatter their axes are no longer opposite. Their mean axis cancels the placement errors to first order;
 what is left grows with the square of the angles. The strengths are exact: the two combinations of pole and
 coil that are next to each other have other weights than the two that are far apart.
@@ -15,7 +15,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from spheretwin.models.actuator import Actuator
 from spheretwin.models.base.errors import InputError
@@ -114,7 +114,7 @@ def scattered_model(actuator: Actuator, scatter: Scatter) -> TorqueModel:
     if isinstance(actuator.torque_data, TorqueField):
         _check_representable(actuator.torque_data, scatter)
         of_coils = coils_by_group(actuator, coils.axes(actuator.coil_axes), 1 + coils.gain)
-        return torque_model(actuator)._replace(coils=of_coils)
+        return _changed(torque_model(actuator), coils=of_coils)
     pole_axes, coil_axes = poles.axes(actuator.pole_axes), coils.axes(actuator.coil_axes)
     lines, pairs = pole_lines(actuator.pole_axes), actuator.groups
     strength = actuator.pole_polarity * (1 + poles.gain)
@@ -129,13 +129,23 @@ def scattered_model(actuator: Actuator, scatter: Scatter) -> TorqueModel:
         stretched[first ^ second] += weight * stretch
     cancelled = np.abs(gain) < 0.5  # poles whose effects cancel have no common stretch
     stretch = np.where(cancelled, 0.0, stretched / np.where(cancelled, 1.0, gain))
-    return torque_model(actuator)._replace(
+    return _changed(
+        torque_model(actuator),
         line_axes=_mean_axes(pole_axes, lines),
-        line_weights=np.ones(len(lines)),
-        group_axes=np.ascontiguousarray(_mean_axes(coil_axes, pairs).T),
+        line_weights=1.0,
+        group_axes=_mean_axes(coil_axes, pairs).T,
+        scattered=True,
         pair_gain=_mean_and_step(gain.reshape(2, -1)),
         pair_stretch=_mean_and_step(stretch.reshape(2, -1)),
     )
+
+
+def _changed(model: TorqueModel, **fields: ArrayLike) -> TorqueModel:
+    """Return a model with other fields of its arrangement."""
+    rows = model.arrangement.copy()
+    for name, values in fields.items():
+        rows[name] = values
+    return model._replace(arrangement=rows)
 
 
 def _check_representable(field: TorqueField, scatter: Scatter) -> None:

@@ -8,31 +8,29 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spheretwin.channels import CHANNELS
-from spheretwin.control.applied_torque import delay_capacity, fill_applied_torque
+from spheretwin.control.applied_torque import fill_applied_torque
 from spheretwin.control.compensators.feed_forward import NominalRotor, fill_feed_forward
 from spheretwin.control.compensators.prediction import DelayModel, fill_prediction
 from spheretwin.control.compensators.reference_governor import fill_governor
-from spheretwin.control.controller import Controller, controller
+from spheretwin.control.controller import Controller, ControllerData, controller
 from spheretwin.control.estimators.estimator import Estimator, Sampling
 from spheretwin.control.law import Law, NominalModel
 from spheretwin.control.laws import LAWS
-from spheretwin.electronics.transducers import CurrentSensors
+from spheretwin.electronics.sensor_chain import SensorChain
 from spheretwin.faults.schedule import part_names
-from spheretwin.hardware_assembly import draws_of, drive_of, fill_supervision
+from spheretwin.hardware_assembly import delays_of, fill_drive_of, fill_supervision
 from spheretwin.models.actuator import Actuator
 from spheretwin.models.base.errors import InputError, SpheretwinError, exception_text, shown
-from spheretwin.models.base.record import Rows
+from spheretwin.models.base.record import Record, Rows, field
 from spheretwin.models.base.reuse import reused
-from spheretwin.models.magnetics import TorqueModel, scaled, scratch_of, torque_model
+from spheretwin.models.magnetics import TorqueModel, scaled, torque_model
 from spheretwin.models.scatter import scattered_model
-from spheretwin.models.telemetry.signals import Signal, common_signals, width
-from spheretwin.plant.bristle_friction import BristleFriction, fill_bristles
-from spheretwin.plant.end_stops import fill_end_stops
-from spheretwin.plant.friction import Friction, fill_friction
-from spheretwin.plant.magnet_heat import MagnetHeat, fill_heat
+from spheretwin.models.telemetry.signals import Signal, common_signals
 from spheretwin.plant.mass_properties import mass_errors
 from spheretwin.plant.part_scatter import scatter_of
-from spheretwin.plant.plant_tick import ENGINES, Plant, engine_step
+from spheretwin.plant.parts import PARTS
+from spheretwin.plant.plant_part import PlantSetup
+from spheretwin.plant.plant_tick import ENGINES, Plant
 from spheretwin.plant.rotor import Rotor, RotorSettings
 from spheretwin.scenario.files import Files
 from spheretwin.scenario.plant_sections import ResolvedNominal, ResolvedPlant
@@ -133,24 +131,57 @@ def _estimator_of(section: Any, nominal: ResolvedNominal, controller: Any) -> Es
     return estimator
 
 
+class RunData(Record):
+    """Data of a run, except those that laws and estimators declare themselves."""
+
+    plant: Plant = field("true plant", delays="drive_delays")
+    sensors: SensorChain = field("sensors of the angles", delays="sensor_delays")
+    controller: ControllerData = field(
+        "controller",
+        lines="nominal_lines",
+        pairs="nominal_pairs",
+        coils="nominal_coils",
+        delays="command_delays",
+    )
+
+
+def empty_run(scenario: ResolvedScenario, true: TorqueModel, nominal: TorqueModel) -> Rows:
+    """Return an array of one RunData of the sizes of a scenario, in which all numbers are 0."""
+    sizes = true.sizes | {f"nominal_{name}": size for name, size in nominal.sizes.items()}
+    parts = len(part_names(sizes["groups"]))
+    return RunData.zeros(parts=parts, **sizes, **delays_of(scenario))
+
+
 def controller_of(
+    rows: Rows,
     scenario: ResolvedScenario,
     law: Law,
     magnetics: TorqueModel,
     estimator: Estimator | None,
     actuator: Actuator,
 ) -> Controller:
-    """Return the controller of a resolved scenario, at the start of a run, for its nominal actuator."""
+    """Return the controller of a resolved scenario, at the start of a run, for its nominal actuator.
+
+    Parameters
+    ----------
+    rows : array of one ControllerData
+        Filled.
+    scenario : ResolvedScenario
+    law : Law
+    magnetics : TorqueModel
+        Nominal.
+    estimator : Estimator or None
+    actuator : Actuator
+        Nominal.
+    """
     nominal, period_s = scenario.nominal, scenario.controller.period_s
     limit_A = min(nominal.current_limit_A, law.current_limit_A)
-    delays = delay_capacity(nominal.delay_s, period_s)
-    made = controller(law, estimator, magnetics, limit_A, width(law.signals), delays)
+    made = controller(rows, law, estimator, magnetics, limit_A)
     on = law.asks_torque or scenario.detects or scenario.controller.prediction.on
-    applied_torque = made.data["applied_torque"]
-    fill_applied_torque(applied_torque, on, period_s, nominal.delay_s, nominal.time_constant_s)
-    _fill_compensators(made.data["compensators"], scenario)
-    fill_supervision(made.data["supervision"], scenario, actuator)
-    made.data["manual"]["on"] = scenario.manual.on
+    fill_applied_torque(rows["applied_torque"], on, period_s, nominal.delay_s, nominal.time_constant_s)
+    _fill_compensators(rows["compensators"], scenario)
+    fill_supervision(rows["supervision"], scenario, actuator)
+    rows["manual"]["on"] = scenario.manual.on
     return made
 
 
@@ -170,69 +201,34 @@ def true_magnetics(section: ResolvedPlant, seed: int, actuator: Actuator) -> Tor
     return scattered_model(actuator, scatter) if scatter else torque_model(actuator)
 
 
-def plant_of(scenario: ResolvedScenario, files: Files, rotor: Rows, halt: NDArray[np.int64]) -> Plant:
-    """Return the plant of a resolved scenario with a started rotor, the `halt` of its watchdog, at rest."""
-    section, actuator, groups = scenario.plant, files.actuator, len(files.actuator.groups)
-    middle_q, middle_qdot, coil_q, coil_qdot = np.empty((4, 3))
-    magnetics = true_magnetics(section, scenario.seed, actuator)
-    drive, group_gain = drive_of(scenario, actuator), np.array(section.group_gain)
-    current_sensors = CurrentSensors.zeros(groups=groups)
-    current_sensors["on"] = scenario.senses_currents
-    current_sensors["noise_A"] = scenario.sensors.current.noise_A
-    step = engine_step(section.engine)
-    return Plant(
-        step=getattr(step, "address", step),
-        rotor=rotor,
-        magnetics=magnetics,
-        G=np.empty((3, groups)),
-        scratch=scratch_of(magnetics),
-        drive=drive,
-        friction=Friction.filled(_fill_friction, section),
-        bristles=BristleFriction.filled(
-            _fill_bristles, section, actuator.hinge_range_rad, rotor["joint"]["inertia"], scenario.seed
-        ),
-        heat=MagnetHeat.filled(_fill_heat, scenario, drive, groups=groups),
-        group_gain=group_gain,
-        present_gain=np.empty(groups),
-        unmodelled_torque=np.array(section.modelling_torque_Nm),
-        hinge_range=actuator.hinge_range_rad,
-        substeps=scenario.substeps,
-        step_s=section.step_s,
-        middle_q=middle_q,
-        middle_qdot=middle_qdot,
-        coil_q=coil_q,
-        coil_qdot=coil_qdot,
-        last_qdot=rotor["qdot"][0].copy(),
-        current=np.zeros(groups),
-        mean_current=np.zeros(groups),
-        effective_current=np.zeros(groups),
-        torque_S=np.zeros(3),
-        friction_q=np.zeros(3),
-        first_friction_q=np.zeros(3),
-        draws=draws_of(scenario, groups),
-        halt=halt,
-        current_sensors=current_sensors,
-        fault_modes=np.zeros(len(part_names(groups))),
-        fault_start_s=np.full(groups, -1.0),
-    )
+def fill_plant(
+    rows: Rows, scenario: ResolvedScenario, actuator: Actuator, magnetics: TorqueModel, rotor: Rows
+) -> None:
+    """Fill the plant of a resolved scenario, at rest.
 
-
-def _fill_friction(rows: Rows, section: ResolvedPlant) -> None:
-    coulomb_Nm = np.zeros(3) if section.stiction.on else np.array(section.coulomb_Nm)
-    smoothing_rad_s, step_s = section.friction_smoothing_rad_s, section.step_s
-    fill_friction(rows, coulomb_Nm, np.array(section.viscous_Nm_s), smoothing_rad_s, step_s)
-
-
-def _fill_bristles(rows: Rows, section: ResolvedPlant, range_rad: Array, inertia: Array, seed: int) -> None:
-    stiction, step_s = section.stiction, section.step_s
-    fill_end_stops(rows["stops"], section.end_stops, range_rad, inertia, step_s)
-    fill_bristles(rows, stiction, section.coulomb_Nm, section.cable, inertia, step_s, seed)
-
-
-def _fill_heat(rows: Rows, scenario: ResolvedScenario, drive: Rows) -> None:
-    section, period_s = scenario.drive, scenario.controller.period_s
-    winding = section.heat_capacity_J_K, drive["coil"]["settled"][0]
-    fill_heat(rows, scenario.plant.thermal, section.ambient_degC, period_s, *winding)
+    Parameters
+    ----------
+    rows : array of one Plant
+        In which all numbers are 0.
+    scenario : ResolvedScenario
+    actuator : Actuator
+    magnetics : TorqueModel
+        Of `true_magnetics`.
+    rotor : array of one RotorData
+        Started.
+    """
+    section = scenario.plant
+    rows["rotor"], rows["arrangement"], rows["last_qdot"] = rotor, magnetics.arrangement, rotor["qdot"]
+    fill_drive_of(rows["drive"], scenario, actuator)
+    rows["current_sensors"]["on"] = scenario.senses_currents
+    rows["current_sensors"]["noise_A"] = scenario.sensors.current.noise_A
+    setup = PlantSetup(scenario, actuator, rotor, rows["drive"])
+    for name, part in PARTS.items():
+        part.fill(rows["parts"][name], setup)
+    rows["group_gain"], rows["unmodelled_torque"] = section.group_gain, section.modelling_torque_Nm
+    rows["hinge_range"] = actuator.hinge_range_rad
+    rows["substeps"], rows["step_s"] = scenario.substeps, section.step_s
+    rows["fault_start_s"] = -1.0
 
 
 def rotor_of(scenario: ResolvedScenario, files: Files) -> Rotor:

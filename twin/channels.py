@@ -95,7 +95,7 @@ def each_part(name: str, unit: str, meaning: str, states: tuple[str, ...]) -> Co
 def sensed_motion(row: NDArray, controller: Any) -> None:
     """Write the columns of one tick."""
     for i in range(3):
-        row[i], row[3 + i] = controller.data[0].pose[i], controller.data[0].rates[i]
+        row[i], row[3 + i] = controller.pose[i], controller.rates[i]
 
 
 @channel(
@@ -110,7 +110,7 @@ def sensed_motion(row: NDArray, controller: Any) -> None:
 )
 def sensor_states(row: NDArray, sensors: Any) -> None:
     """Write the columns of one tick."""
-    write_sensor_telemetry(sensors[0], row)
+    write_sensor_telemetry(sensors, row)
 
 
 @channel(
@@ -119,7 +119,7 @@ def sensor_states(row: NDArray, sensors: Any) -> None:
 )
 def measured_currents(row: NDArray, plant: Any) -> None:
     """Write the columns of one tick."""
-    measured_A = plant.current_sensors[0].measured_A
+    measured_A = plant.current_sensors.measured_A
     for j in range(measured_A.shape[0]):
         row[j] = measured_A[j]
 
@@ -132,7 +132,7 @@ def measured_currents(row: NDArray, plant: Any) -> None:
 )
 def reference_governor(row: NDArray, controller: Any) -> None:
     """Write the columns of one tick."""
-    motion = controller.data[0].compensators.governor.motion
+    motion = controller.compensators.governor.motion
     for part in range(3):
         for i in range(3):
             row[3 * part + i] = motion[part, i]
@@ -145,7 +145,7 @@ def reference_governor(row: NDArray, controller: Any) -> None:
 )
 def prediction(row: NDArray, controller: Any) -> None:
     """Write the columns of one tick."""
-    predicted = controller.data[0].compensators.prediction
+    predicted = controller.compensators.prediction
     for i in range(3):
         row[i], row[3 + i] = predicted.pose[i], predicted.rates[i]
 
@@ -157,7 +157,7 @@ def prediction(row: NDArray, controller: Any) -> None:
 def feed_forward(row: NDArray, controller: Any) -> None:
     """Write the columns of one tick."""
     for i in range(3):
-        row[i] = controller.data[0].compensators.feed_forward.torque_q[i]
+        row[i] = controller.compensators.feed_forward.torque_q[i]
 
 
 @channel(
@@ -176,7 +176,7 @@ def friction(row: NDArray, plant: Any) -> None:
 )
 def presliding(row: NDArray, plant: Any) -> None:
     """Write the columns of one tick."""
-    log_presliding(plant.bristles[0], row)
+    log_presliding(plant.parts.bristles, row)
 
 
 @channel(
@@ -185,7 +185,7 @@ def presliding(row: NDArray, plant: Any) -> None:
 )
 def cable(row: NDArray, plant: Any) -> None:
     """Write the columns of one tick."""
-    log_cable(plant.bristles[0], row)
+    log_cable(plant.parts.bristles, row)
 
 
 @channel(
@@ -194,7 +194,7 @@ def cable(row: NDArray, plant: Any) -> None:
 )
 def end_stops(row: NDArray, plant: Any) -> None:
     """Write the columns of one tick."""
-    log_end_stops(plant.bristles[0], row)
+    log_end_stops(plant.parts.bristles, row)
 
 
 @channel(
@@ -204,7 +204,7 @@ def end_stops(row: NDArray, plant: Any) -> None:
 )
 def heat(row: NDArray, plant: Any) -> None:
     """Write the columns of one tick."""
-    log_heat(plant.heat[0], row)
+    log_heat(plant.parts.heat, row)
 
 
 @channel(
@@ -218,7 +218,7 @@ def heat(row: NDArray, plant: Any) -> None:
 )
 def drive(row: NDArray, plant: Any) -> None:
     """Write the columns of one tick."""
-    write_drive_telemetry(plant.drive[0], row)
+    write_drive_telemetry(plant.drive, row)
 
 
 NOT_YET = -1.0
@@ -236,7 +236,7 @@ NOT_YET = -1.0
 )
 def faults(row: NDArray, controller: Any, plant: Any) -> None:
     """Write the columns of one tick."""
-    groups, parts = controller.data[0].supervision.groups, plant.fault_modes.shape[0]
+    groups, parts = controller.supervision.groups, plant.fault_modes.shape[0]
     count = groups.out.shape[0]
     for part in range(parts):
         row[part] = plant.fault_modes[part]
@@ -260,7 +260,7 @@ def faults(row: NDArray, controller: Any, plant: Any) -> None:
 )
 def watchdog(row: NDArray, controller: Any) -> None:
     """Write the columns of one tick."""
-    row[0] = controller.data[0].supervision.watchdog.reason
+    row[0] = controller.supervision.watchdog.reason
 
 
 CHANNELS: tuple[Channel, ...] = (

@@ -9,11 +9,11 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from spheretwin.control.controller import Controller
 from spheretwin.control.supervision.watchdog import Reason, trip
 from spheretwin.loop import INTERRUPTED, NO_EXTERNAL, External
 from spheretwin.models.base.compiled import COMPILES, uncompiled
-from spheretwin.plant.plant_tick import GOING, Plant
+from spheretwin.models.base.record import Rows
+from spheretwin.plant.plant_tick import GOING
 
 Array = NDArray[np.float64]
 
@@ -75,8 +75,7 @@ class Connection:
     Parameters
     ----------
     part : ExternalController or ExternalPlant, optional
-    controller : Controller
-    plant : Plant
+    run : array of one RunData
 
     Attributes
     ----------
@@ -84,8 +83,8 @@ class Connection:
         Argument of the loop. It has only addresses: this object keeps the functions alive.
     """
 
-    def __init__(self, part: Any, controller: Controller, plant: Plant) -> None:
-        self._part, self._data, self._plant = part, controller.data, plant
+    def __init__(self, part: Any, run: Rows) -> None:
+        self._part, self._run = part, run
         self._error: BaseException | None = None
         self.external = NO_EXTERNAL
         if part is None:
@@ -94,12 +93,12 @@ class Connection:
         function = self._guarded(self._advance if is_plant else self._command)
         self._callback = _CALLBACK(function)
         entry = ctypes.cast(self._callback, ctypes.c_void_p).value if COMPILES else function
-        groups = len(plant.current)
+        groups = len(run[0].plant.current)
         self.external = External(
             0 if is_plant else entry, entry if is_plant else 0, np.zeros(groups), np.zeros(3)
         )
         if is_plant:
-            controller.data["authority"] = part.authority
+            run["controller"]["authority"] = part.authority
 
     def raise_error(self) -> None:
         """Raise the exception of the part, if there was one: it cannot pass the compiled loop."""
@@ -118,8 +117,8 @@ class Connection:
         return call
 
     def _command(self, t_s: float) -> int:
-        plant, data = self._plant, self._data[0]
-        sensors, drive = plant.current_sensors[0], plant.drive[0]
+        plant, data = self._run[0].plant, self._run[0].controller
+        sensors, drive = plant.current_sensors, plant.drive
         measurement = Measurement(
             data.measurement[0],
             None if data.estimator_on else data.measurement[1],
@@ -133,16 +132,16 @@ class Connection:
         return GOING
 
     def _advance(self, t_s: float) -> int:
-        data, plant, external = self._data[0], self._plant, self.external
+        data, plant, external = self._run[0].controller, self._run[0].plant, self.external
         # Nominal torque of the currents: the true one is not known.
         np.dot(data.matrix.G, external.command, out=external.torque_S)
         result = self._part.advance(t_s, external.command)
         if result is None:
             return INTERRUPTED
         measurement, reason = result
-        plant.rotor["q"] = measurement.angle_rad
+        plant.rotor.q[:] = measurement.angle_rad
         if measurement.rate_rad_s is not None:
-            plant.rotor["qdot"] = measurement.rate_rad_s
+            plant.rotor.qdot[:] = measurement.rate_rad_s
         plant.current[:] = external.command if measurement.current_A is None else measurement.current_A
         if reason:
             _trip(data.supervision.watchdog, int(reason))

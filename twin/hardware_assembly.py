@@ -7,27 +7,20 @@ from math import inf
 import numpy as np
 from numpy.typing import NDArray
 
+from spheretwin.control.applied_torque import delay_capacity
 from spheretwin.control.supervision.fault_detector import NominalCurrents, fill_detector
 from spheretwin.control.supervision.watchdog import MeasurementLimits, fill_watchdog
-from spheretwin.electronics.drive_chain import DriveFaults, build_drive
-from spheretwin.electronics.random_streams import Streams, width_of
-from spheretwin.electronics.sensor_chain import build_sensors
-from spheretwin.faults.effects import Effects
+from spheretwin.electronics.drive_chain import fill_drive, stored_delays
+from spheretwin.electronics.random_streams import Streams
 from spheretwin.faults.fault_injector import FaultInjector
 from spheretwin.faults.schedule import FaultSchedule, noise_streams
 from spheretwin.models.actuator import Actuator
-from spheretwin.models.base.record import Rows
+from spheretwin.models.base.record import Rows, capacity
 from spheretwin.models.inductance import mutual_inductance
-from spheretwin.plant.plant_tick import Plant
 from spheretwin.scenario.plant_sections import ResolvedNominal
 from spheretwin.scenario.sections import ResolvedScenario, Scenario
 
 Array = NDArray[np.float64]
-
-
-def draws_of(scenario: Scenario, groups: int) -> Array:
-    """Return the array of the standard normal numbers of a tick, for faults and current sensors."""
-    return np.zeros(width_of(fault_streams(scenario, groups)))
 
 
 def fault_streams(scenario: Scenario, groups: int) -> Streams:
@@ -36,10 +29,16 @@ def fault_streams(scenario: Scenario, groups: int) -> Streams:
     return (*noise_streams(scenario.fault, groups), *sensors)
 
 
-def sensors_of(scenario: Scenario) -> Rows:
-    """Return the sensors of a scenario, with errors drawn from its seed."""
-    longest_delay = sum(_delays_s(scenario, "adc")) / scenario.controller.period_s
-    return build_sensors(scenario.sensors, scenario.seed, bool(scenario.fault), round(longest_delay))
+def delays_of(scenario: ResolvedScenario) -> dict[str, int]:
+    """Return the sizes of the histories of sensors, drive and controller of a scenario."""
+    nominal, period_s = scenario.nominal, scenario.controller.period_s
+    in_sensors, in_drive = (sum(_delays_s(scenario, target)) for target in ("adc", "controller"))
+    step_s = scenario.plant.step_s
+    return {
+        "sensor_delays": capacity(round(in_sensors / period_s) + 1),
+        "drive_delays": stored_delays(scenario.drive, step_s, scenario.substeps, round(in_drive / step_s)),
+        "command_delays": delay_capacity(nominal.delay_s, period_s),
+    }
 
 
 def _delays_s(scenario: Scenario, target: str) -> list[float]:
@@ -51,17 +50,14 @@ def _delays_s(scenario: Scenario, target: str) -> list[float]:
     ]
 
 
-def drive_of(scenario: ResolvedScenario, actuator: Actuator) -> Rows:
-    """Return the drive of a resolved scenario, at rest; with fault inputs if faults are scheduled.
+def fill_drive_of(rows: Rows, scenario: ResolvedScenario, actuator: Actuator) -> None:
+    """Fill the drive of a resolved scenario, at rest; with fault inputs if faults are scheduled.
 
     A watchdog acts on the drive itself, so that it does not wait for delayed commands.
     """
-    step_s = scenario.plant.step_s
-    longest_delay = round(sum(_delays_s(scenario, "controller")) / step_s)
-    faults = DriveFaults(bool(scenario.fault), longest_delay, scenario.watchdog.on)
     mutual_H = mutual_inductance(actuator) if scenario.drive.coil_coupling else None
-    groups = len(actuator.groups)
-    return build_drive(scenario.drive, step_s, scenario.substeps, groups, scenario.seed, faults, mutual_H)
+    step_s, faulty, halts = scenario.plant.step_s, bool(scenario.fault), scenario.watchdog.on
+    fill_drive(rows, scenario.drive, step_s, scenario.substeps, scenario.seed, faulty, halts, mutual_H)
 
 
 def fill_supervision(rows: Rows, scenario: ResolvedScenario, actuator: Actuator) -> None:
@@ -88,11 +84,8 @@ def _nominal_currents(nominal: ResolvedNominal, period_s: float) -> NominalCurre
     )
 
 
-def faults_of(scenario: ResolvedScenario, plant: Plant, sensors: Rows, groups: Rows) -> FaultInjector:
-    """Return the fault injector of a scenario with the stages of its loop that faults modify."""
-    period_s, count = scenario.controller.period_s, len(plant.current)
-    schedule = FaultSchedule(scenario.fault, count, period_s, scenario.seed)
-    effects = None
-    if scenario.fault:
-        effects = Effects(plant.drive, sensors, plant.group_gain, period_s, scenario.plant.step_s)
-    return FaultInjector(schedule, effects, groups, plant.fault_modes, plant.fault_start_s)
+def faults_of(scenario: ResolvedScenario, run: Rows) -> FaultInjector:
+    """Return the fault injector of a scenario for its run, an array of one RunData."""
+    groups = run["plant"]["current"].shape[1]
+    schedule = FaultSchedule(scenario.fault, groups, scenario.controller.period_s, scenario.seed)
+    return FaultInjector(schedule, run, scenario.plant.step_s)

@@ -132,12 +132,8 @@ class LoopSystem:
         return np.concatenate([self._runtime.q_rad, self._runtime.qdot_rad_s])
 
     def _restore(self, x: ArrayLike) -> None:
-        numbers, parts = np.array(x, np.float64), {}
-        last = rotor = len(self._first.rotor)
-        for name, first in self._first.parts.items():
-            parts[name] = numbers[last : last + len(first)]
-            last += len(first)
-        self._runtime.restore(RuntimeState(numbers[:rotor], parts, self._first.last))
+        ends = np.cumsum([len(part) for part in self._first[:-1]])
+        self._runtime.restore(RuntimeState(*np.split(np.array(x, np.float64), ends[:-1]), self._first.last))
 
 
 def loop_system(scenario: Scenario, law: Law | None = None) -> tuple[Any, Array]:
@@ -189,4 +185,4 @@ def reference_inputs(samples: Sequence[Any] | Array, disturbance_Nm: ArrayLike =
 
 
 def _numbers(state: RuntimeState) -> Array:
-    return np.concatenate([state.rotor, *state.parts.values()])
+    return np.concatenate(state[:-1])

@@ -20,6 +20,7 @@ from spheretwin.control.estimators import estimator as estimators
 from spheretwin.control.law import Law
 from spheretwin.control.supervision.watchdog import GO, Reason, count_rundown, replace_invalid, trip
 from spheretwin.electronics.transducers import sense_currents
+from spheretwin.models.base.addresses import caller_of
 from spheretwin.models.base.compiled import (
     COMPILES,
     allocation_free,
@@ -31,7 +32,6 @@ from spheretwin.models.base.compiled import (
 )
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.base.function_identity import is_of_package
-from spheretwin.models.base.numba_internals.addresses import function_at
 from spheretwin.models.base.numba_internals.callbacks import report_error
 from spheretwin.models.base.numba_internals.functions import Dispatcher
 from spheretwin.models.base.vectors import WIDTH, load, total, vector
@@ -41,8 +41,10 @@ from spheretwin.plant.plant_tick import (
     FAILSAFE,
     GOING,
     LEFT_WORKSPACE,
+    PlantOutput,
+    TickInput,
 )
-from spheretwin.stages import Stages, advance_at, sense_at, write_at
+from spheretwin.stages import Stages, call_advance, call_sense, call_write
 
 Array = NDArray[np.float64]
 
@@ -69,7 +71,7 @@ class Inputs(NamedTuple):
 EXTERNAL_SIGNATURE = types.int64(types.float64)
 """Time of the tick, s; returns the code of a status, `GOING` as a rule."""
 
-external_at = function_at(EXTERNAL_SIGNATURE)
+call_external = caller_of(EXTERNAL_SIGNATURE)
 
 
 class External(NamedTuple):
@@ -135,9 +137,9 @@ def loop(
     first_mean = first_current + groups
     for tick in range(log.shape[0]):
         row, t, disturbance = log[tick], inputs.t[tick], inputs.disturbance[tick]
-        copy_into(stages.draws, 0, inputs.fault_noise[tick], stages.draws.shape[0])
-        is_finite = sense_at(stages.sense)(
-            stages.sensors, stages.q, stages.qdot, inputs.noise[tick], stages.draws, measurement
+        draws = inputs.fault_noise[tick]
+        is_finite = call_sense(
+            stages.sense, stages.sensors, stages.q, stages.qdot, inputs.noise[tick], draws, measurement
         )
         copy_rows(inputs.reference[tick], reference)
         # Logged before the law is called, because the law may overwrite its arguments.
@@ -146,12 +148,12 @@ def loop(
             return tick, DIVERGED
         current_sensors = stages.current_sensors[0]
         if current_sensors.on:
-            sense_currents(current_sensors, stages.current, stages.draws)
+            sense_currents(current_sensors, stages.current, draws)
             if detector.on:
                 copy_into(detector.measured_A, 0, current_sensors.measured_A, groups)
         copy_into(data.manual.current_A, 0, inputs.manual_A[tick], manual_currents)
         if external.controller != 0:
-            code = external_at(external.controller)(t)
+            code = call_external(external.controller, t)
             if code != GOING:
                 return tick, code
         command = row[CURRENT_COMMAND:first_current]
@@ -164,20 +166,23 @@ def loop(
         current, mean_current = row[first_current:first_mean], row[first_mean:scale]
         torque_S = row[TORQUE : TORQUE + 3]
         if external.plant == 0:
-            status = advance_at(stages.advance)(
-                stages.plant, command, disturbance, current, mean_current, torque_S
-            )
+            given = TickInput(command, disturbance, draws, watchdog.halt)
+            output = PlantOutput(current, mean_current, torque_S)
+            status = call_advance(stages.advance, stages.plant, stages.tables, stages.step, given, output)
         else:
             copy_into(external.command, 0, command, groups)
-            status = external_at(external.plant)(t)
+            status = call_external(external.plant, t)
             copy_into(current, 0, command, groups)
             copy_into(mean_current, 0, command, groups)
             copy_into(torque_S, 0, external.torque_S, 3)
         if status == FAILSAFE and watchdog.reason == 0:
             trip(watchdog, _TEMPERATURE)
         for channel in range(stages.columns.shape[0]):
-            write_at(stages.writers[channel])(
-                stages.parts[channel], stages.second_parts[channel], row[stages.columns[channel] :]
+            call_write(
+                stages.writers[channel],
+                stages.parts[channel],
+                stages.second_parts[channel],
+                row[stages.columns[channel] :],
             )
         if not all_finite(row):  # the state cannot be continued either
             return tick, DIVERGED

@@ -16,33 +16,26 @@ from spheretwin.control.allocation import ALLOCATIONS
 from spheretwin.control.law import Law
 from spheretwin.control.supervision.watchdog import REASONS, Reason, transfer_trip
 from spheretwin.electronics.drive_chain import transfer_drive
-from spheretwin.electronics.sensor_chain import measure_again
+from spheretwin.electronics.sensor_chain import fill_sensors, measure_again
 from spheretwin.external import Connection, ExternalController, ExternalPlant
-from spheretwin.hardware_assembly import faults_of, sensors_of
+from spheretwin.hardware_assembly import faults_of
 from spheretwin.loop import dispatch, is_python_law, is_user_law, step_that_writes
 from spheretwin.models.base.compiled import COMPILES, for_types_of
-from spheretwin.models.base.errors import LawError
+from spheretwin.models.base.errors import InputError, LawError
 from spheretwin.models.base.numba_internals.callbacks import callback_errors
-from spheretwin.models.base.state import check_length, restore_state, save_state, transfer_state
+from spheretwin.models.base.record import set_states, states_of, transfer_rows
 from spheretwin.models.base.turns import outside_turn
 from spheretwin.models.telemetry.signals import width
 from spheretwin.plant.rotor import Rotor
 from spheretwin.scenario.changes import StateChange
 from spheretwin.scenario.files import Files
 from spheretwin.scenario.sections import ResolvedScenario
-from spheretwin.stages import compiled_stages
+from spheretwin.stages import compiled_stages, plant_stage
 
 # Only for the types.
 NO_INPUTS = loops.Inputs(
     np.empty(0), np.empty((0, 3, 3)), np.empty((0, 3)), np.empty((0, 0)), np.empty((0, 0)), np.empty((0, 0))
 )
-
-# Names of parts in messages.
-LAW_PARAMETERS, LAW_MEMORY = "the law's parameters", "the law's memory"
-COMPENSATORS = "the governor, the prediction and the feed-forward"
-ESTIMATOR_MEMORY = "the estimator's memory"
-WATCHDOG = "the watchdog's state"
-
 
 _PYTHON_LAW = ctypes.CFUNCTYPE(None, ctypes.c_double)
 
@@ -58,9 +51,12 @@ class LastTick(NamedTuple):
 class RuntimeState(NamedTuple):
     """Complete state of a `Runtime`."""
 
-    rotor: NDArray[np.float64]
-    parts: dict[str, NDArray[np.float64]]
-    """By the names of `Runtime.parts`."""
+    run: NDArray[np.float64]
+    """States of the record of the run."""
+    engine: NDArray[np.float64]
+    law_parameters: NDArray[np.float64]
+    law_memory: NDArray[np.float64]
+    estimator_memory: NDArray[np.float64]
     last: LastTick
 
 
@@ -81,6 +77,8 @@ class Runtime:
 
     Attributes
     ----------
+    rows : array of one RunData
+        Data of the run.
     law : Law
         Active law.
     signals : tuple of Signal
@@ -111,16 +109,19 @@ class Runtime:
         self.law_error: LawError | None = None
         self.signals = assembly.signals_of(scenario, files.actuator, self.law)
         self.row_width = width(self.signals)
-        magnetics = assembly.nominal_magnetics(scenario, files)
+        nominal = assembly.nominal_magnetics(scenario, files)
+        true = assembly.true_magnetics(scenario.plant, scenario.seed, files.actuator)
         estimator = assembly.estimator_of(scenario)
-        self._controller = assembly.controller_of(scenario, self.law, magnetics, estimator, files.nominal)
-        self._data, self._sensors = self._controller.data, sensors_of(scenario)
+        self.rows = rows = assembly.empty_run(scenario, true, nominal)
+        self._tables, self._data = true.tables, rows["controller"]
+        self._controller = assembly.controller_of(
+            self._data, scenario, self.law, nominal, estimator, files.nominal
+        )
+        fill_sensors(rows["sensors"], scenario.sensors, scenario.seed, bool(scenario.fault))
+        assembly.fill_plant(rows["plant"], scenario, files.actuator, true, self._rotor.rows)
         if hasattr(external, "command"):
             self._data["manual"]["on"] = True
-        supervision = self._data["supervision"]
-        halt = supervision["watchdog"]["halt"]
-        self._plant = assembly.plant_of(scenario, files, self._rotor.rows, halt)
-        self._faults = faults_of(scenario, self._plant, self._sensors, supervision["groups"])
+        self._faults = faults_of(scenario, rows)
         # The loop holds only addresses of its functions: this object keeps the functions alive.
         self._functions = dispatch(
             self.law,
@@ -132,7 +133,9 @@ class Runtime:
         if COMPILES and is_python_law(law):
             self._python_law = _PYTHON_LAW(self._call_law(step_that_writes(law)))
             self._data["python_law"] = ctypes.cast(self._python_law, ctypes.c_void_p).value or 0
-        self._connection = Connection(external, self._controller, self._plant)
+        self._connection = Connection(external, rows)
+        # Last: the rotor belongs to another runtime if this one is refused.
+        self._rotor.rows = rows["plant"]["rotor"]
 
     def _call_law(self, step: Callable[..., None]) -> Callable[[float], None]:
         """Return a function of the time of a tick that calls a law in plain Python."""
@@ -148,12 +151,16 @@ class Runtime:
     @property
     def q_rad(self) -> NDArray[np.float64]:
         """Current hinge angles, (3,) in rad."""
-        return self._rotor.rows["q"][0].copy()
+        return self._plant.rotor.q.copy()
 
     @property
     def qdot_rad_s(self) -> NDArray[np.float64]:
         """Current hinge rates, (3,) in rad/s."""
-        return self._rotor.rows["qdot"][0].copy()
+        return self._plant.rotor.qdot.copy()
+
+    @property
+    def _plant(self) -> Any:
+        return self.rows[0].plant
 
     @property
     def _watchdog(self) -> Any:
@@ -167,7 +174,10 @@ class Runtime:
     @cached_property
     def loop(self) -> Callable[[loops.Inputs, NDArray[np.float64]], tuple[int, int]]:
         """Loop of the components, a function of inputs and rows; the first access compiles it."""
-        stages, memory = compiled_stages(self._controller, self._sensors, self._plant, self.signals)
+        plant, sensors = self.rows["plant"], self.rows["sensors"]
+        stage = plant_stage(plant, self._tables, self._scenario.plant.engine)
+        data = {"controller": self._data, "sensors": sensors, "plant": plant}
+        stages = compiled_stages(data, stage, self.signals)
         parts = (
             self._functions.law,
             self._functions.allocate,
@@ -175,12 +185,12 @@ class Runtime:
             self._controller,
             stages,
             self.row_width - width(self.law.signals),
-            self._sensors["fresh"][0],
+            sensors["fresh"][0],
             self._connection.external,
         )
         entry = for_types_of(loops.loop, NO_INPUTS, *parts, np.empty((0, self.row_width)))
 
-        def run(inputs: loops.Inputs, log: NDArray[np.float64], _: object = memory) -> tuple[int, int]:
+        def run(inputs: loops.Inputs, log: NDArray[np.float64]) -> tuple[int, int]:
             return entry(inputs, *parts, log)
 
         return run
@@ -242,29 +252,30 @@ class Runtime:
         law = law or assembly.law_of(scenario)
         other = Runtime(scenario, files, law, rotor, self._external)
         other._last = self._last
-        measure_again(other._sensors, scenario.sensors, self._last.q, self._last.noise)
-        before, after = self.parts, other.parts
-        for name in before.keys() - self._parts_that_start_again(other, user_law):
-            transfer_state(before[name], after[name])
-        transfer_drive(self._plant.drive, other._plant.drive, self._last.command)
-        transfer_trip(before[WATCHDOG], after[WATCHDOG])
+        self._transfer_state(other, user_law)
         return other
 
-    def _parts_that_start_again(self, other: Runtime, user_law: Law | None) -> set[str]:
-        """Return the names of the parts that keep nothing of the state of this runtime in another one."""
-        before, after, parts = self._scenario, other._scenario, set()
-        same_law, same_kind = other.law is self.law, type(after.controller) is type(before.controller)
-        same_size = len(other._controller.memory) == len(self._controller.memory)
-        after_manual = before.manual.on and not after.manual.on
-        if after_manual or not same_law:
-            parts.add(LAW_PARAMETERS)
-        if after_manual or not (same_law or (user_law is None and same_kind and same_size)):
-            parts.add(LAW_MEMORY)
+    def _transfer_state(self, other: Runtime, user_law: Law | None) -> None:
+        """Copy the state into a runtime of another scenario, without the parts that start again."""
+        before, after, was, is_now = self.rows, other.rows, self._scenario, other._scenario
+        measure_again(after["sensors"], is_now.sensors, self._last.q, self._last.noise)
+        after_manual = was.manual.on and not is_now.manual.on
+        compensators = after["controller"]["compensators"].copy()
+        transfer_rows(before, after)
         if after_manual:
-            parts.add(COMPENSATORS)
-        if type(after.estimator) is not type(before.estimator):
-            parts.add(ESTIMATOR_MEMORY)
-        return parts
+            after["controller"]["compensators"] = compensators
+        transfer_drive(before["plant"]["drive"], after["plant"]["drive"], self._last.command)
+        transfer_trip(*(rows["controller"]["supervision"]["watchdog"] for rows in (before, after)))
+        old, new = self._controller, other._controller
+        same_law, same_kind = other.law is self.law, type(is_now.controller) is type(was.controller)
+        if same_law and not after_manual:
+            new.parameters[:] = old.parameters
+        same_size = len(new.memory) == len(old.memory)
+        if not after_manual and (same_law or (user_law is None and same_kind and same_size)):
+            new.memory[:] = old.memory
+        if type(is_now.estimator) is type(was.estimator):
+            kept = min(len(old.estimator_memory), len(new.estimator_memory))
+            new.estimator_memory[:kept] = old.estimator_memory[:kept]
 
     def _law_for(self, scenario: ResolvedScenario) -> Law | None:
         """Return the active law if nothing that it is built from differs in a scenario."""
@@ -275,10 +286,10 @@ class Runtime:
 
     def set_state(self, change: StateChange) -> None:
         """Set the given parts of the state of the plant."""
-        plant, rotor = self._plant, self._rotor.rows[0]
+        plant = self._plant
         for part, given in (
-            (rotor.q, change.q_rad),
-            (rotor.qdot, change.qdot_rad_s),
+            (plant.rotor.q, change.q_rad),
+            (plant.rotor.qdot, change.qdot_rad_s),
             (plant.last_qdot, change.qdot_rad_s),
             (plant.current, change.current_A),
         ):
@@ -287,29 +298,9 @@ class Runtime:
 
     def state(self) -> RuntimeState:
         """Return the complete state."""
-        parts = {name: save_state(part) for name, part in self.parts.items()}
-        return RuntimeState(self._rotor.state(), parts, self._last)
-
-    @property
-    def parts(self) -> dict[str, Any]:
-        """Components with a state, except the rotor, by the names that messages use."""
-        controller, data, supervision = self._controller, self._data, self._data["supervision"]
-        return {
-            "currents": self._plant.current,
-            "the last rates": self._plant.last_qdot,
-            "the drive's state": self._plant.drive,
-            "the presliding state": self._plant.bristles,
-            "the temperatures of stator and rotor": self._plant.heat,
-            LAW_PARAMETERS: controller.parameters,
-            LAW_MEMORY: controller.memory,
-            "the applied torque": data["applied_torque"],
-            COMPENSATORS: data["compensators"],
-            ESTIMATOR_MEMORY: controller.estimator_memory,
-            "the sensors' state": self._sensors,
-            "the groups' states": supervision["groups"],
-            "the detector's state": supervision["detector"],
-            WATCHDOG: supervision["watchdog"],
-        }
+        own = self._controller
+        memories = own.parameters.copy(), own.memory.copy(), own.estimator_memory.copy()
+        return RuntimeState(states_of(self.rows)[0], self._rotor.state(), *memories, self._last)
 
     def restore(self, state: RuntimeState) -> None:
         """Restore the state of a runtime of the same scenario.
@@ -319,17 +310,24 @@ class Runtime:
         InputError
             The state is from another scenario.
         """
-        own, last = self.state(), state.last
+        own, controller = self.state(), self._controller
         # Everything is checked before anything is written: a snapshot that is refused changes nothing.
-        check_length("the engine's state", state.rotor, len(own.rotor))
-        for name, numbers in own.parts.items():
-            check_length(name, state.parts.get(name, np.empty(0)), len(numbers))
-        check_length("the last command", last.command, len(self._plant.current))
-        check_length("the last pose", last.q, 3 if len(last.q) else 0)
-        self._rotor.restore(state.rotor)
-        for name, part in self.parts.items():
-            restore_state(part, state.parts[name], name)
-        self._last = last
+        for name in RuntimeState._fields[:-1]:
+            _check_length(name, getattr(state, name), len(getattr(own, name)))
+        _check_length("last command", state.last.command, len(self._plant.current))
+        _check_length("last pose", state.last.q, 3 if len(state.last.q) else 0)
+        set_states(self.rows, state.run[None])
+        self._rotor.restore(state.engine)
+        controller.parameters[:], controller.memory[:] = state.law_parameters, state.law_memory
+        controller.estimator_memory[:], self._last = state.estimator_memory, state.last
+
+
+def _check_length(name: str, numbers: Any, expected: int) -> None:
+    if np.shape(numbers) != (expected,):
+        raise InputError(
+            f"session: expected a snapshot with {expected} numbers of the {name.replace('_', ' ')},"
+            f" received {np.size(numbers)}"
+        )
 
 
 def _start_rotor(scenario: ResolvedScenario, files: Files) -> Rotor:

@@ -15,7 +15,7 @@ from spheretwin.runtime import RuntimeState
 from spheretwin.scenario.files import Files, digest
 from spheretwin.scenario.sections import ResolvedScenario
 
-VERSION = 4
+VERSION = 5
 """Version of the content of a snapshot; it increases with each change of the state or of its classes."""
 
 

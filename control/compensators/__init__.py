@@ -15,7 +15,7 @@ from spheretwin.control.compensators.prediction import Prediction, advance, pred
 from spheretwin.control.compensators.reference_governor import Governor, govern
 from spheretwin.models.base.compiled import allocation_free
 from spheretwin.models.base.record import Record, field
-from spheretwin.models.magnetics import TorqueModel
+from spheretwin.models.magnetics import Arrangement, Tables
 
 Array = NDArray[np.float64]
 
@@ -33,7 +33,8 @@ class Compensators(Record):
 def apply_compensators(
     compensators: Compensators,
     applied_torque: AppliedTorque,
-    magnetics: TorqueModel,
+    arrangement: Arrangement,
+    tables: Tables,
     measurement: Array,
     reference: Array,
 ) -> bool:
@@ -45,8 +46,9 @@ def apply_compensators(
         Changed in place.
     applied_torque : AppliedTorque
         Estimate at the time of the measurement.
-    magnetics : TorqueModel
-        Nominal.
+    arrangement : Arrangement
+    tables : Tables
+        Of the nominal magnetics.
     measurement, reference : (3, 3) arrays
         Changed in place; the measurement is (6, 3) if the prediction is on.
 
@@ -58,7 +60,7 @@ def apply_compensators(
     if compensators.governor.on and not govern(compensators.governor, measurement, reference):
         return False
     if compensators.prediction.on:
-        if not predict(compensators.prediction, applied_torque, magnetics, measurement):
+        if not predict(compensators.prediction, applied_torque, arrangement, tables, measurement):
             return False
         advance(compensators.prediction, reference)
     if compensators.feed_forward.on:

@@ -26,8 +26,8 @@ from pydantic import BaseModel, ConfigDict, Field
 from spheretwin.control.applied_torque import split_delay
 from spheretwin.control.law import NonNegativeEach, each
 from spheretwin.models.base.compiled import allocation_free
+from spheretwin.models.base.history import delayed_mean, push
 from spheretwin.models.base.record import Record, Rows, field
-from spheretwin.models.base.state import delayed_mean, push
 from spheretwin.models.kinematics import triple, turns
 from spheretwin.models.lagrangian import coriolis_rows, inertia_entries
 

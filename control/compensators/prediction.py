@@ -39,8 +39,9 @@ from spheretwin.models.coil_group import PerGroup
 from spheretwin.models.kinematics import generalised_torque, triple, turns
 from spheretwin.models.lagrangian import acceleration_entries
 from spheretwin.models.magnetics import (
+    Arrangement,
     CachedMatrix,
-    TorqueModel,
+    Tables,
     rotor_torque,
     update_cached_matrix,
 )
@@ -96,7 +97,11 @@ def fill_prediction(rows: Rows, section: PredictionSection, model: DelayModel) -
 
 @allocation_free
 def predict(
-    prediction: Prediction, applied_torque: AppliedTorque, magnetics: TorqueModel, measurement: Array
+    prediction: Prediction,
+    applied_torque: AppliedTorque,
+    arrangement: Arrangement,
+    tables: Tables,
+    measurement: Array,
 ) -> bool:
     """Write the predicted values into rows 0 to 2 of a measurement and the measured values into rows 3 to 5.
 
@@ -106,8 +111,9 @@ def predict(
         Changed in place.
     applied_torque : AppliedTorque
         Estimate at the time of the measurement.
-    magnetics : TorqueModel
-        Nominal.
+    arrangement : Arrangement
+    tables : Tables
+        Of the nominal magnetics.
     measurement : (6, 3) array
         Angle, rate and torque of the last period as rows; changed in place.
 
@@ -126,17 +132,16 @@ def predict(
     whole, fraction, finite = applied_torque.due, applied_torque.fraction, True
     if fraction > 0.0:
         command = applied_torque.commands[whole]
-        finite = _step(
-            prediction, magnetics, command, fraction * prediction.period_s, applied_torque.older_lag
-        )
+        duration_s, lag = fraction * prediction.period_s, applied_torque.older_lag
+        finite = _step(prediction, arrangement, tables, command, duration_s, lag)
         for i in range(3):
             if whole == 0:  # the period that ends there began within the last one
                 measurement[2, i] += fraction * (prediction.torque_q[i] - prediction.first_step_torque_q[i])
             prediction.first_step_torque_q[i] = prediction.torque_q[i]
     for row in range(whole - 1, -1, -1):
-        command = applied_torque.commands[row]
-        finite = finite and _step(prediction, magnetics, command, prediction.period_s, prediction.full_lag)
-    finite = finite and _update_matrix(prediction, magnetics, pose)
+        command, lag = applied_torque.commands[row], prediction.full_lag
+        finite = finite and _step(prediction, arrangement, tables, command, prediction.period_s, lag)
+    finite = finite and _update_matrix(prediction, arrangement, tables, pose)
     for i in range(3):
         if whole > 0:
             measurement[2, i] = prediction.torque_q[i]
@@ -159,13 +164,18 @@ def advance(prediction: Prediction, reference: Array) -> None:
 
 @allocation_free
 def _step(
-    prediction: Prediction, magnetics: TorqueModel, command: Array, duration_s: float, lag: LagStep
+    prediction: Prediction,
+    arrangement: Arrangement,
+    tables: Tables,
+    command: Array,
+    duration_s: float,
+    lag: LagStep,
 ) -> bool:
     """Advance pose, rates and currents while one command acts; return True if the pose stays finite."""
     q, v, midpoint = prediction.pose, prediction.rates, prediction.midpoint
     for i in range(3):
         midpoint[i] = q[i] + 0.5 * duration_s * v[i]
-    if not _update_matrix(prediction, magnetics, midpoint):
+    if not _update_matrix(prediction, arrangement, tables, midpoint):
         return False
     for j in range(command.shape[0]):
         distance = prediction.current[j] - command[j]
@@ -185,10 +195,10 @@ def _step(
 
 
 @allocation_free
-def _update_matrix(prediction: Prediction, magnetics: TorqueModel, pose: Array) -> bool:
+def _update_matrix(prediction: Prediction, arrangement: Arrangement, tables: Tables, pose: Array) -> bool:
     """Update the torque matrix at a pose; return False if the pose is not finite."""
     for i in range(3):
         if not isfinite(pose[i]):
             return False
-    update_cached_matrix(pose, magnetics, prediction.matrix)
+    update_cached_matrix(pose, arrangement, tables, prediction.matrix)
     return True

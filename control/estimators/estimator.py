@@ -29,9 +29,9 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
 
 from spheretwin.control.law import each
+from spheretwin.models.base.addresses import caller_of
 from spheretwin.models.base.compiled import COMPILES, allocation_free, compiled_callback
 from spheretwin.models.base.errors import InputError, shown
-from spheretwin.models.base.numba_internals.addresses import function_at
 from spheretwin.models.telemetry.signals import ANGLES
 
 _vector = types.float64[::1]
@@ -51,7 +51,7 @@ SLOWEST_rad_s, FASTEST_rad_s = 1e-3, 1e6  # a bandwidth beyond these is a mistak
 Bandwidth = Annotated[float, Field(ge=SLOWEST_rad_s, le=FASTEST_rad_s)]
 BandwidthEach = Annotated[tuple[Bandwidth, Bandwidth, Bandwidth], BeforeValidator(each)]
 
-estimator_at = function_at(SIGNATURE)
+call_estimator = caller_of(SIGNATURE)
 
 
 class Estimator(NamedTuple):
@@ -182,7 +182,7 @@ def _follow(
     for tick in range(len(angles)):
         for axis in range(3):
             angle[axis] = angles[tick, axis]
-        estimator_at(step)(angle, parameters, state, rates[tick])
+        call_estimator(step, angle, parameters, state, rates[tick])
 
 
 class Ideal(EstimatorParameters):

@@ -53,7 +53,7 @@ from spheretwin.control.law_components.nominal_motion import (
     inertial_torque,
 )
 from spheretwin.models.base.compiled import allocation_free
-from spheretwin.models.base.state import delayed_mean, push
+from spheretwin.models.base.history import delayed_mean, push
 from spheretwin.models.kinematics import Triple
 
 

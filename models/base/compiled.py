@@ -11,18 +11,17 @@ import numba
 import numpy as np
 from llvmlite import ir
 from numba import types
-from numba.extending import intrinsic, overload
+from numba.extending import lower_builtin, type_callable
 from numpy.typing import NDArray
 
 from spheretwin.models.base.numba_internals.callbacks import c_callback
 from spheretwin.models.base.numba_internals.functions import (
     NO_ALLOCATION,
     Dispatcher,
-    TupleCompiler,
+    PartCompiler,
     compiled_function,
-    inline_overload,
 )
-from spheretwin.models.base.numba_internals.machine_code import fingerprint_of_types
+from spheretwin.models.base.record import Rows
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -35,7 +34,7 @@ _OPTIONS: dict[str, Any] = {
     "forceinline": False,  # otherwise a function takes the option of the caller that needs it first
     "no_cfunc_wrapper": True,  # a conversion for functions that are passed as values: ours go by address
 }
-_ALLOCATION_FREE = {**NO_ALLOCATION, "pipeline_class": TupleCompiler}
+_ALLOCATION_FREE = {**NO_ALLOCATION, "pipeline_class": PartCompiler}
 
 # Attribute of a plain function with its compiled callbacks: they refer to it, and must not outlive it.
 _CALLBACKS = "__spheretwin_callbacks__"
@@ -96,13 +95,22 @@ def for_types_of(function: Any, *arguments: Any) -> Callable[..., Any]:
     """
     if not isinstance(function, Dispatcher):
         return uncompiled(function)
-    key = function, fingerprint_of_types(arguments)
+    key = function, _kind(arguments)
     if key not in _ENTRIES:
         _ENTRIES[key] = function.compile(tuple(map(numba.typeof, arguments)))
     return _ENTRIES[key]
 
 
-_ENTRIES: dict[tuple[Any, bytes], Any] = {}
+def _kind(value: Any) -> Any:
+    """Return what the type of a value depends on: numba's own type takes longer to find than a short run."""
+    if isinstance(value, tuple):
+        return type(value), *map(_kind, value)
+    if isinstance(value, np.ndarray):
+        return value.dtype, value.ndim, value.flags.c_contiguous
+    return type(value)
+
+
+_ENTRIES: dict[tuple[Any, ...], Any] = {}
 
 
 def uncompiled(function: Callable[..., Any]) -> Callable[..., Any]:
@@ -137,26 +145,25 @@ def compiled_callback(signature: Any, function: Callable[..., Any], *, check_bou
     return callbacks[key]
 
 
-def stage_address(signature: Any, function: Callable[..., Any], *values: Any) -> int:
-    """Compile a function of the tuples at some addresses, as `allocation_free` does; return its own address.
+def stage_address(signature: Any, function: Callable[..., Any], *parts: Rows) -> int:
+    """Compile a function of records, as `allocation_free` does; return its own address.
 
-    Its callers are compiled once for all types of tuples.
+    Its callers are compiled once for all types of records.
 
     Parameters
     ----------
     signature : numba signature
-        With the addresses as its first arguments.
+        With the addresses of the records as its first arguments.
     function : callable
-        Plain function; reads a tuple as entry 0 of its argument.
-    *values : tuples
-        Of arrays and numbers; the function gets the addresses of copies by `in_memory`.
+        Plain function of the records.
+    *parts : arrays of records
     """
-    key = function, fingerprint_of_types(values)
+    key = function, tuple(part.dtype for part in parts)
     if key not in _ENTRIES:
-        addresses = (types.CPointer(numba.typeof(value)) for value in values)
-        own = signature.return_type(*addresses, *signature.args[len(values) :])
+        records = (numba.from_dtype(part.dtype) for part in parts)  # by address
+        own = signature.return_type(*records, *signature.args[len(parts) :])
         options = {"nopython": True, **_OPTIONS, **NO_ALLOCATION}
-        _ENTRIES[key] = c_callback(own, function, options, False, TupleCompiler)
+        _ENTRIES[key] = c_callback(own, function, options, False, PartCompiler)
     return int(_ENTRIES[key].address)
 
 
@@ -190,27 +197,6 @@ def _line_of(error: Exception, function: Callable[..., Any]) -> int | None:
     return location.line if location and Path(location.filename).name == file else None
 
 
-def implements(function: Callable[..., Any], *, inline: bool = False) -> Callable[[F], F]:
-    """Decorate the function that returns the implementation of `function` for given types, or None."""
-    if not inline:
-        return cast("Callable[[F], F]", overload(function))
-
-    def decorate(implementation: F) -> F:
-        inline_overload(function, implementation)
-        return implementation
-
-    return decorate
-
-
-def compilable(function: F) -> F:
-    """Keep a function in plain Python, and inline it into the compiled code that calls it.
-
-    For functions that call user functions: in the uncompiled loop these are plain Python.
-    """
-    inline_overload(function, lambda *_: function, **NO_ALLOCATION, **_OPTIONS)
-    return function
-
-
 def _compiled(function: F, **more: Any) -> F:
     if not COMPILES:
         return function
@@ -225,24 +211,19 @@ def high_product(a: np.uint64, b: np.uint64) -> np.uint64:
     return np.uint64(int(a) * int(b) >> 64)
 
 
-def _build_high_product(typing: Any, a: Any, b: Any) -> tuple[Any, Callable[..., Any]]:
-    def build(context: Any, builder: Any, signature: Any, numbers: Any) -> Any:
-        wide = ir.IntType(128)
-        product = builder.mul(*(builder.zext(number, wide) for number in numbers))
-        return builder.trunc(builder.lshr(product, ir.Constant(wide, 64)), ir.IntType(64))
+@type_callable(high_product)
+def _type_high_product(_: Any) -> Callable[..., Any]:
+    def typer(a: Any, b: Any) -> Any:
+        return types.uint64(types.uint64, types.uint64)
 
-    return numba.uint64(numba.uint64, numba.uint64), build
-
-
-_high_product: Any = intrinsic(_build_high_product)
+    return typer
 
 
-@implements(high_product)
-def _compiled_high_product(a: Any, b: Any) -> Callable[..., Any]:
-    def call(a: Any, b: Any) -> Any:
-        return _high_product(a, b)
-
-    return call
+@lower_builtin(high_product, types.Integer, types.Integer)
+def _build_high_product(context: Any, builder: Any, signature: Any, numbers: Any) -> Any:
+    wide = ir.IntType(128)
+    product = builder.mul(*(builder.zext(number, wide) for number in numbers))
+    return builder.trunc(builder.lshr(product, ir.Constant(wide, 64)), ir.IntType(64))
 
 
 @allocation_free

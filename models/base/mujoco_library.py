@@ -181,9 +181,14 @@ def data_array(address: int, field: str, size: int, kind: Any = np.float64) -> N
     kind : dtype
         Of its entries; default: `mjtNum`.
     """
-    first = ctypes.c_void_p.from_address(address + data_offset(field)).value
+    first = array_address(address, field)
     length = size * np.dtype(kind).itemsize
     return np.frombuffer((ctypes.c_byte * length).from_address(first), kind) if first else np.empty(0, kind)
+
+
+def array_address(address: int, field: str) -> int:
+    """Return the address of an array of the `mjData` at an address; 0 if it has no entry."""
+    return ctypes.c_void_p.from_address(address + data_offset(field)).value or 0
 
 
 @cache

@@ -185,6 +185,23 @@ def columns_of(rows: Rows, is_meant: Callable[[Field], bool]) -> Iterator[NDArra
             yield column
 
 
+def states_of(rows: Rows) -> NDArray[np.float64]:
+    """Return a copy of the state of each row, (rows, numbers)."""
+    columns = columns_of(rows, lambda declared: declared.is_state)
+    return np.concatenate(
+        [np.empty((len(rows), 0)), *(column.reshape(len(rows), -1) for column in columns)], axis=1
+    )
+
+
+def set_states(rows: Rows, states: NDArray[np.float64]) -> None:
+    """Write the states (rows, numbers) of rows of the same type, from `states_of`."""
+    first = 0
+    for column in columns_of(rows, lambda declared: declared.is_state):
+        numbers = column[0].size
+        column[...] = states[:, first : first + numbers].reshape(column.shape)
+        first += numbers
+
+
 def transfer_rows(before: Rows, after: Rows) -> None:
     """Copy the state of each row into a row with another configuration.
 

@@ -124,7 +124,7 @@ def _capability(q: Array, actuator: Actuator) -> Capability:
 @compiled
 def _fill_torque_matrices(q: Array, model: TorqueModel, G: Array, scratch: Array) -> None:
     for i in range(q.shape[0]):
-        fill_torque_matrix(q[i], model, G[i], scratch)
+        fill_torque_matrix(q[i], model.arrangement[0], model.tables, G[i], scratch)
 
 
 @compiled

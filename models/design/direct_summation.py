@@ -172,7 +172,7 @@ def compare(
     data = scattered_model(actuator, scatter) if scatter else torque_model(actuator)
     scratch = scratch_of(data)
     for i in track(range(len(q))):
-        fill_torque_matrix(q[i], data, model[i], scratch)
+        fill_torque_matrix(q[i], data.arrangement[0], data.tables, model[i], scratch)
         direct[i] = direct_torque_matrix(q[i], actuator, quadrature, scatter)
         coarse[i] = direct_torque_matrix(q[i], actuator, quadrature.halved(), scatter)
     return Comparison(tilt_rad, q, model, direct, coarse)

@@ -13,6 +13,7 @@ from spheretwin.inputs import InputGenerator
 from spheretwin.machine import IdentifySettings, Log, identify, shadow
 from spheretwin.machine.link.controller_scenario import check_measurement
 from spheretwin.machine.link.transports import open_transport
+from spheretwin.models.magnetics import Arrangement
 from spheretwin.plant.plant_step import roll_out
 from spheretwin.session import Session
 from tests.content.content import content_test, refusal, scratch
@@ -58,7 +59,8 @@ def invalid_plants():
     """Single steps, sequences, many plants at once, and parameters; the plants stay as they were."""
     good = {"q": ZEROS(3), "qdot": ZEROS(3), "currents": ZEROS(18), "disturbance": ZEROS(3), "dt": 5e-4}
     parameters = plant.parameters("nutation")
-    fewer = parameters.magnetics._replace(group_axes=parameters.magnetics.group_axes[:, :12].copy())
+    rows = Arrangement.zeros(**parameters.magnetics.sizes | {"groups": 12})
+    fewer = parameters.magnetics._replace(arrangement=rows)
     fewer = parameters._replace(magnetics=fewer, torque_gain=parameters.torque_gain[:12])
 
     def step(change):

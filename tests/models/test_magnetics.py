@@ -7,6 +7,7 @@ from spheretwin.models import actuator as actuators
 from spheretwin.models.base.vectors import cubic
 from spheretwin.models.kinematics import rotation
 from spheretwin.models.magnetics import (
+    Arrangement,
     fill_torque_matrix,
     lookup_table,
     place,
@@ -60,21 +61,25 @@ def test_matrix_is_the_paper_s_sum_over_all_pairs(actuator):
 @pytest.mark.parametrize("groups", [1, 2, 3, 4, 5, 7, 8, 17])
 def test_columns_are_the_same_for_any_number_of_groups(actuator, groups):
     complete = torque_model(actuator)
-    some = complete._replace(group_axes=np.ascontiguousarray(complete.group_axes[:, :groups]))
+    rows = Arrangement.zeros(**complete.sizes | {"groups": groups, "pairs": 8 * groups})
+    for name in ("line_axes", "line_weights"):
+        rows[name] = complete.arrangement[name]
+    rows["group_axes"] = complete.arrangement["group_axes"][:, :, :groups]
+    some, tables, scratch = rows[0], complete.tables, scratch_of(complete)
     G, around = np.empty((3, groups)), np.full((5, groups), 7.0)
     for q in random_poses(5):
-        fill_torque_matrix(q, some, G, scratch_of(some))
-        fill_torque_matrix(q, some, around[1:4], scratch_of(some))
+        fill_torque_matrix(q, some, tables, G, scratch)
+        fill_torque_matrix(q, some, tables, around[1:4], scratch)
         np.testing.assert_array_equal(G, torque_matrix(q, actuator)[:, :groups])
         np.testing.assert_array_equal(around, np.vstack([np.full(groups, 7.0), G, np.full(groups, 7.0)]))
 
 
 def test_lookup_goes_on_beyond_its_ends(actuator):
     """The cosine of a pole in front of a coil, or behind it, may round past 1."""
-    model, eps = torque_model(actuator), np.finfo(float).eps
+    curve, eps = torque_model(actuator).tables.curve, np.finfo(float).eps
     peak = actuator.torque_curve.peak_Nm_per_A
     for end in (-1.0, 1.0):
-        inside, at, beyond = (cubic(model.table, place(end * (1 + step * eps))) for step in (-64, 0, 4))
+        inside, at, beyond = (cubic(curve, place(end * (1 + step * eps))) for step in (-64, 0, 4))
         assert abs(at - inside) < 1e-9 * peak
         assert abs(beyond - at) < 1e-9 * peak
 

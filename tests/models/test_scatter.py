@@ -28,7 +28,7 @@ def scatter(rng, gain=0.0, angle_rad=0.0, distance_m=0.0):
 def compiled(q, actuator, errors):
     model = scattered_model(actuator, errors)
     G = np.empty((3, len(actuator.groups)))
-    magnetics.fill_torque_matrix(q, model, G, magnetics.scratch_of(model))
+    magnetics.fill_torque_matrix(q, model.arrangement[0], model.tables, G, magnetics.scratch_of(model))
     return G
 
 
@@ -110,7 +110,7 @@ def test_a_pole_alone_has_a_line_of_its_own():
     q = np.array([0.1, 0.4, -0.3])
     summed = summed_torque_matrix(q, alone, errors)
     np.testing.assert_allclose(compiled(q, alone, errors), summed, rtol=0, atol=1e-4 * np.abs(summed).max())
-    assert len(magnetics.torque_model(alone).line_weights) == len(lines)
+    assert magnetics.torque_model(alone).sizes["lines"] == len(lines)
 
 
 def test_a_curve_without_sensitivities_refuses_errors_of_distance():

@@ -131,7 +131,7 @@ def test_inductances_follow_the_directions_of_the_currents():
 def test_a_scaled_model_has_scaled_torques():
     q, G = np.array([0.1, 0.2, 0.3]), np.empty((3, 8))
     model = magnetics.scaled(magnetics.torque_model(VENTUSFF), 1.2)
-    magnetics.fill_torque_matrix(q, model, G, magnetics.scratch_of(model))
+    magnetics.fill_torque_matrix(q, model.arrangement[0], model.tables, G, magnetics.scratch_of(model))
     assert_allclose(G, 1.2 * magnetics.torque_matrix(q, VENTUSFF), rtol=0, atol=1e-16)  # rounding
 
 
@@ -142,7 +142,7 @@ def test_scatter_of_coils_is_exact_and_of_poles_is_refused():
     scatter, G = errors._replace(coils=coils), np.empty((3, 8))
     model = scattered_model(VENTUSFF, scatter)
     for q in random_poses(5):
-        magnetics.fill_torque_matrix(q, model, G, magnetics.scratch_of(model))
+        magnetics.fill_torque_matrix(q, model.arrangement[0], model.tables, G, magnetics.scratch_of(model))
         assert_allclose(G, summed_torque_matrix(q, VENTUSFF, scatter), rtol=0, atol=1e-15)
         assert np.abs(G - magnetics.torque_matrix(q, VENTUSFF)).max() > 1e-4
     poles = errors.poles._replace(gain=np.full(8, 0.01))

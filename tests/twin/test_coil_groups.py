@@ -6,7 +6,7 @@ import pytest
 from spheretwin import scenario as scenarios
 from spheretwin.active_config import initial_config
 from spheretwin.electronics.coil import SHORTED
-from spheretwin.electronics.drive_chain import advance, begin, build_drive, end
+from spheretwin.electronics.drive_chain import DriveChain, advance, begin, end, fill_drive
 from spheretwin.machine.parameters import KINDS, Machine, Parameter
 from spheretwin.models.base.errors import InputError
 from spheretwin.session import Session
@@ -23,7 +23,8 @@ def resolved(path, **changes):
 
 
 def chain_of(drive):
-    return build_drive(drive, STEP_s, round(TICK_s / STEP_s), GROUPS, 0)[0]
+    setting = drive, STEP_s, round(TICK_s / STEP_s), 0
+    return DriveChain.filled(fill_drive, *setting, groups=GROUPS, delays=8)[0]
 
 
 def step(chain, command, current, substep=0):

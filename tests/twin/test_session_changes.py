@@ -100,7 +100,7 @@ def test_a_law_whose_step_is_made_by_its_build_keeps_its_memory(file, name, valu
         after = session.advance(1)["integral"][0]
         # One more tick of an error of at most 0.3 rad over 1 ms.
         np.testing.assert_allclose(after, before, rtol=0, atol=3.1e-4)
-        assert session.snapshot().runtime.parts["the law's parameters"][0] == calls
+        assert session.snapshot().runtime.law_parameters[0] == calls
 
 
 def test_a_memory_of_another_size_begins_anew(file):
@@ -108,7 +108,7 @@ def test_a_memory_of_another_size_begins_anew(file):
         session.advance(10)
         session.set("controller.order", 5)
         session.advance(10)
-        np.testing.assert_array_equal(session.snapshot().runtime.parts["the law's memory"][3:], 0.0)
+        np.testing.assert_array_equal(session.snapshot().runtime.law_memory[3:], 0.0)
 
 
 def test_who_does_not_ask_is_told_nothing_after_one_who_did(file):

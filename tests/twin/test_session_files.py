@@ -66,4 +66,4 @@ def test_another_law_of_the_same_name_begins_with_its_own_memory(name):
     session.advance(8)
     session.set("controller.law", dataclasses.replace(plain_law(name), state=np.array([100.0])))
     session.advance(1)
-    assert session.snapshot().runtime.parts["the law's memory"][0] == 101.0
+    assert session.snapshot().runtime.law_memory[0] == 101.0

@@ -35,8 +35,8 @@ def test_both_engines_track_and_agree():
 def test_plants_in_lanes_move_as_alone():
     changes = {"plant.coulomb_Nm": [1e-4, 0, 2e-4], "plant.payload_kg": 0.01}
     parameters = [plant.parameters("ventusff", changes), plant.parameters("ventusff")] * 10
-    field = parameters[0].magnetics.field
-    weaker = parameters[0].magnetics._replace(field=0.5 * field)
+    tables = parameters[0].magnetics.tables
+    weaker = parameters[0].magnetics._replace(tables=tables._replace(field=0.5 * tables.field))
     parameters[3] = parameters[3]._replace(magnetics=weaker)
     ranges = ((0.6, 3), (5, 3), (1, 8), (1e-3, 3))
     rng = np.random.default_rng(0)
@@ -47,11 +47,12 @@ def test_plants_in_lanes_move_as_alone():
 
 def test_plants_of_different_kinds_are_refused_in_one_line():
     one = plant.parameters("ventusff")
-    smaller = one.magnetics._replace(field=one.magnetics.field[:-2])
-    message = r"expected torque fields of 16 coils and \(39, 75, 3\) coefficients"
+    tables = one.magnetics.tables
+    smaller = one.magnetics._replace(tables=tables._replace(field=tables.field[:-2]))
+    message = r"expected magnetics of .+, 16 coils and \(39, 75, 3\) coefficients of a torque field"
     with pytest.raises(InputError, match=message):
         plant.Plants([one, one._replace(magnetics=smaller)])
-    with pytest.raises(InputError, match="expected 0 pole lines and 8 groups, received 8 and 18"):
+    with pytest.raises(InputError, match=r"expected magnetics of 0 pole lines and 8 groups, .+ received 8"):
         plant.Plants([one, plant.parameters("tilt")])
 
 

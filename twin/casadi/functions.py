@@ -131,24 +131,23 @@ def torque_matrix(parameters: Parameters) -> Any:
     InputError
         The magnetics are not those of a torque curve, or casadi is not installed.
     """
-    ca, model = library(), parameters.magnetics
-    if not model.table.size:
+    ca, curve = library(), parameters.magnetics.tables.curve
+    if not curve.size:
         raise InputError(
             "casadi: expected an actuator with a torque curve, received one with a torque field, which has no"
             " CasADi function"
         )
-    q = ca.MX.sym("q", 3)
+    q, model = ca.MX.sym("q", 3), parameters.magnetics.arrangement[0]
     rows = _symbolic(ca, rotation_rows)(ca.vertsplit(q))
     rotation = ca.vertcat(*(ca.horzcat(*row) for row in rows))
     axes_S = ca.DM(model.line_axes) @ rotation.T  # (lines, 3)
     cosine = ca.fmin(ca.fmax(axes_S @ ca.DM(model.group_axes), -1), 1)  # (lines, n)
     side, shape = ca.if_else(cosine < 0, -1, 1), cosine.shape
-    scatters = model.pair_gain.shape[1] > 0
-    if scatters:
+    if model.scattered:
         stretch, step = (ca.DM(row.reshape(shape)) for row in model.pair_stretch)
         cosine += (stretch + side * step) * (side - cosine)
-    pull = _curve(ca, model.table).map(cosine.numel())(ca.vec(cosine).T).reshape(shape)
-    if scatters:
+    pull = _curve(ca, curve).map(cosine.numel())(ca.vec(cosine).T).reshape(shape)
+    if model.scattered:
         gain, step = (ca.DM(row.reshape(shape)) for row in model.pair_gain)
         pull *= gain + side * step
     weighted = axes_S * ca.repmat(ca.DM(model.line_weights), 1, 3)
@@ -168,7 +167,7 @@ def _check(parameters: Parameters) -> None:
 
 
 def _curve(ca: Any, table: Array) -> Any:
-    """Return the odd function h of a cosine (`TorqueModel`) from its table of cubics."""
+    """Return the odd function h of a cosine (`Arrangement`) from its table of cubics."""
     narrow, wide = round((1 - KNEE) * NARROW_PER_UNIT), round(2 * KNEE * WIDE_PER_UNIT)
     rising = np.arange(narrow + 1) / NARROW_PER_UNIT
     edges = np.concatenate([rising - 1, np.arange(1, wide) / WIDE_PER_UNIT - KNEE, KNEE + rising])

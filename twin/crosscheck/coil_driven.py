@@ -34,8 +34,8 @@ from spheretwin.models.actuator import Actuator
 from spheretwin.models.base.checks import Check
 from spheretwin.models.base.compiled import compiled
 from spheretwin.models.mjcf import read
-from spheretwin.plant.plant_tick import GOING, PlantOutput
-from spheretwin.stages import advance_at, plant_stage
+from spheretwin.plant.plant_tick import GOING, PlantOutput, TickInput
+from spheretwin.stages import PlantStage, call_advance, plant_stage
 
 Array = NDArray[np.float64]
 
@@ -235,20 +235,22 @@ def drive_plant(
     scenario, actuator = begun.scenario, begun.files.actuator
     groups, section = len(actuator.groups), scenario.plant
     rotor = assembly.rotor_of(scenario, begun.files)  # keep it: the stepped plant has addresses within it
-    stepped = rotor.start(np.array(section.initial_rad), np.array(section.initial_rad_s))
-    plant = assembly.plant_of(scenario, begun.files, rotor.rows, np.zeros(1, dtype=np.int64))
+    rotor.start(np.array(section.initial_rad), np.array(section.initial_rad_s))
+    true = assembly.true_magnetics(section, scenario.seed, actuator)
+    plant = assembly.empty_run(scenario, true, assembly.nominal_magnetics(scenario, begun.files))["plant"]
+    assembly.fill_plant(plant, scenario, actuator, true, rotor.rows)
     states = np.full((len(disturbance) // every + 1, 6), np.nan)
     states[0] = [*section.initial_rad, *section.initial_rad_s]
-    stage, output = plant_stage(plant), PlantOutput(np.empty(groups), np.empty(groups), np.empty(3))
-    motion = stepped.q, stepped.qdot
-    _drive(stage.function, stage.data, motion, commands(groups), disturbance, output, every, states)
+    stage = plant_stage(plant, true.tables, section.engine)
+    output = PlantOutput(np.empty(groups), np.empty(groups), np.empty(3))
+    motion = plant["rotor"]["q"][0], plant["rotor"]["qdot"][0]
+    _drive(stage, motion, commands(groups), disturbance, output, every, states)
     return states
 
 
 @compiled
 def _drive(
-    advance: Any,
-    plant: Any,
+    stage: PlantStage,
     motion: tuple[Array, Array],
     commands: Array,
     disturbance: Array,
@@ -257,14 +259,8 @@ def _drive(
     states: Array,
 ) -> None:
     for tick in range(commands.shape[0]):
-        status = advance_at(advance)(
-            plant,
-            commands[tick],
-            disturbance[tick],
-            delivered.current,
-            delivered.mean_current,
-            delivered.torque_S,
-        )
+        given = TickInput(commands[tick], disturbance[tick], delivered.torque_S[:0], 0)
+        status = call_advance(stage.advance, stage.plant, stage.tables, stage.step, given, delivered)
         if status != GOING:
             return
         if (tick + 1) % every == 0:

@@ -36,8 +36,8 @@ from spheretwin.electronics.stages import (
 )
 from spheretwin.electronics.transducers import CHANNELS
 from spheretwin.models.base.compiled import inlined
+from spheretwin.models.base.history import push
 from spheretwin.models.base.record import Record, Rows, field
-from spheretwin.models.base.state import push
 
 Array = NDArray[np.float64]
 

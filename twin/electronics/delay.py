@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field
 
 from spheretwin.models.base.compiled import inlined
+from spheretwin.models.base.history import push_all
 from spheretwin.models.base.record import Record, field
-from spheretwin.models.base.state import push_all
 
 Array = NDArray[np.float64]
 

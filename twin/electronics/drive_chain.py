@@ -9,7 +9,7 @@ the controller its output.
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -104,44 +104,8 @@ class DriveChain(Record):
     before: Array = field("current and sums of the groups at step start", "", (5, "groups"))
 
 
-class DriveFaults(NamedTuple):
-    """What can change the output of the controller besides its delay."""
-
-    scheduled: bool = False
-    """True if faults may occur."""
-    longest_delay_steps: int = 0
-    """Longest additional delay by faults, in physics steps."""
-    watchdog: bool = False
-    """True if a watchdog may halt the drive."""
-
-
-NO_FAULTS = DriveFaults()
-
-
-def build_drive(
-    section: ResolvedDrive,
-    step_s: float,
-    substeps: int,
-    groups: int,
-    seed: int,
-    faults: DriveFaults = NO_FAULTS,
-    mutual_H: Array | None = None,
-) -> Rows:
-    """Return the drive at rest, an array of one record, with errors drawn from the seed.
-
-    Parameters
-    ----------
-    section : ResolvedDrive
-    step_s : float, s
-        Physics step.
-    substeps : int
-        Physics steps in a control period.
-    groups : int
-    seed : int
-        Seed of the run: the same seed gives the same prototype.
-    faults : DriveFaults
-    mutual_H : (n, n) array, H, optional
-        Mutual inductance of the groups by the geometry; None without coupling.
+def stored_delays(section: ResolvedDrive, step_s: float, substeps: int, longest_delay_steps: int = 0) -> int:
+    """Return the commands that a drive stores, with the longest additional delay by faults, in physics steps.
 
     Raises
     ------
@@ -149,22 +113,52 @@ def build_drive(
         The delay is not a whole number of physics steps.
     """
     steps = steps_of(section, step_s, substeps)
-    stored = stored_commands(steps, substeps) - -faults.longest_delay_steps // -substeps
-    rows, period_s = DriveChain.zeros(groups=groups, delays=capacity(stored)), substeps * step_s
-    setup = DriveSetup(seed, faults.scheduled)
-    rows["converts"] = section.converts or faults.scheduled or faults.watchdog
+    return capacity(stored_commands(steps, substeps) - -longest_delay_steps // -substeps)
+
+
+def fill_drive(
+    rows: Rows,
+    section: ResolvedDrive,
+    step_s: float,
+    substeps: int,
+    seed: int,
+    faulty: bool = False,
+    halts: bool = False,
+    mutual_H: Array | None = None,
+) -> None:
+    """Fill a drive at rest, with errors drawn from the seed.
+
+    Parameters
+    ----------
+    rows : array of DriveChain
+        In which all numbers are 0.
+    section : ResolvedDrive
+    step_s : float, s
+        Physics step.
+    substeps : int
+        Physics steps in a control period.
+    seed : int
+        Seed of the run: the same seed gives the same prototype.
+    faulty : bool
+        Whether faults may occur.
+    halts : bool
+        Whether a watchdog may halt the drive.
+    mutual_H : (n, n) array, H, optional
+        Mutual inductance of the groups by the geometry; None without coupling.
+    """
+    setup = DriveSetup(seed, faulty)
+    rows["converts"] = section.converts or faulty or halts
     rows["supplied"] = section.supply_V is not None
     rows["supply_V"] = rows["period"]["supply_V"] = section.supply_V or 0.0
     fill_lag(rows["lag"], section.lag_s, step_s, section.current_limit_A)
     for name, kind in STAGES.items():
         kind.fill(rows["stages"][name], section, setup)
-    rows["delay"]["steps"], rows["delay"]["substeps"] = steps, substeps
+    rows["delay"]["steps"], rows["delay"]["substeps"] = steps_of(section, step_s, substeps), substeps
     fill_fault_line(rows["supply"])
     fill_amplifier(rows["amplifier"], section, section.current_limit_A, step_s, seed)
-    fill_coils(rows["coil"], section, period_s)
+    fill_coils(rows["coil"], section, substeps * step_s)
     if mutual_H is not None:
         fill_coupling(rows["coupling"], section, mutual_H, step_s)
-    return rows
 
 
 @inlined

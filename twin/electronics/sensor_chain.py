@@ -19,7 +19,7 @@ from spheretwin.electronics.random_streams import Streams, width_of
 from spheretwin.electronics.stages import SensorSetup, SensorStage, TickNoise, chained
 from spheretwin.electronics.transducers import CurrentSection, EncoderSection, PotentiometerSection
 from spheretwin.models.base.compiled import copy_into, inlined
-from spheretwin.models.base.record import Record, Rows, capacity, field, record_of
+from spheretwin.models.base.record import Record, Rows, field, record_of
 from spheretwin.trajectories.rounding import CONFIG, Triple
 
 
@@ -76,24 +76,22 @@ class SensorChain(Record):
     output_rad: Array = field("angles of the last tick; NaN before the first", "rad", 3, state=True)
 
 
-def build_sensors(
-    section: SensorsSection, seed: int, faults: bool = False, longest_delay_ticks: int = 0
-) -> Rows:
-    """Return the sensors, an array of one record, with errors drawn from the seed.
+def fill_sensors(rows: Rows, section: SensorsSection, seed: int, faults: bool = False) -> None:
+    """Fill sensors with errors drawn from the seed.
 
     Each stage and channel has its own stream, keyed by its name: no other stage changes its numbers.
 
     Parameters
     ----------
+    rows : array of SensorChain
+        In which all numbers are 0.
     section : SensorsSection
     seed : int
         Seed of the run: the same seed gives the same prototype.
     faults : bool
         Whether a fault may occur.
-    longest_delay_ticks : int
-        Longest additional delay of the converter by faults.
     """
-    rows, first_draw = SensorChain.zeros(delays=capacity(longest_delay_ticks + 1)), 0
+    first_draw = 0
     rows["offset_rad"], rows["skew_s"] = section.angle_offset_rad, (0.0, section.adc.skew_s, 0.0)
     rows["shifts"] = any(section.angle_offset_rad) or section.adc.skew_s > 0
     for name in _NAMES:
@@ -103,7 +101,6 @@ def build_sensors(
         )
         first_draw += parameters.draws(section)
     rows["fresh"], rows["output_rad"] = 1.0, nan
-    return rows
 
 
 def noise_streams(section: SensorsSection) -> Streams:

@@ -20,31 +20,32 @@ Integers = NDArray[np.int64]
 
 
 @inlined
-def pass_nothing(stages: Any, values: Any, draws: Any) -> None:
+def pass_nothing(stages: Any, values: Any, third: Any) -> None:
     """Leave the values as they are."""
 
 
 def chained(functions: Mapping[str, Any]) -> Any:
-    """Return the compiled function ``f(stages, values, draws)`` that calls those of all stages.
+    """Return the compiled function ``f(stages, values, third)`` that calls those of all stages.
 
     Parameters
     ----------
     functions : mapping
-        Compiled ``f(stage, values, draws)`` of each stage by the name of its field in the record `stages`, in
+        Compiled ``f(stage, values, third)`` of each stage by the name of its field in the record `stages`, in
         the order of the calls. A stage has a field `on`, which is 0 if it has no effect: it then costs only a
         branch.
     """
-    if not functions:
+    acting = {name: function for name, function in functions.items() if function is not pass_nothing}
+    if not acting:
         return pass_nothing
-    (name, function), *others = functions.items()
+    (name, function), *others = acting.items()
     rest = chained(dict(others))
 
     @inlined
-    def pass_and_continue(stages: Any, values: Any, draws: Any) -> None:
+    def pass_and_continue(stages: Any, values: Any, third: Any) -> None:
         stage = stages[name]
         if stage.on:
-            function(stage, values, draws)
-        rest(stages, values, draws)
+            function(stage, values, third)
+        rest(stages, values, third)
 
     return pass_and_continue
 

@@ -22,6 +22,7 @@ from spheretwin.export.c_text import constant, definitions, header, source
 from spheretwin.export.motion_code import controller_motion
 from spheretwin.export.plant_code import NUMBERS, magnetic_tables
 from spheretwin.models.base.errors import InputError
+from spheretwin.models.magnetics import TorqueModel
 from spheretwin.scenario.sections import ResolvedScenario
 
 LAWS: dict[Any, tuple[str, ...]] = {
@@ -88,7 +89,8 @@ def controller_code(scenario: str, changes: Mapping[str, Any] | None = None) -> 
     law, estimator = assembly.law_of(resolved), assembly.estimator_of(resolved)
     _check(resolved, law)
     magnetics = assembly.nominal_magnetics(resolved, config.files)
-    controller = assembly.controller_of(resolved, law, magnetics, estimator, config.files.nominal)
+    rows = assembly.empty_run(resolved, magnetics, magnetics)["controller"]
+    controller = assembly.controller_of(rows, resolved, law, magnetics, estimator, config.files.nominal)
     law_files, estimator_file = LAWS[law.step], ESTIMATORS[estimator.step if estimator else None]
     names = ["st_controller.h", "st_controller.c", "st_numbers.h", "st_equations.h"]
     names += [*law_files, estimator_file, *_ALLOCATIONS[resolved.allocation]]
@@ -189,7 +191,7 @@ def _table_header(
             NUMBERS,
             *(f'#define {name} "{file}"' for name, file in files.items()),
             *(constant(name, value) for name, value in {**numbers, **tables}.items()),
-            *magnetic_tables(controller.magnetics),
+            *magnetic_tables(TorqueModel(controller.data["arrangement"], controller.tables)),
         ]
     )
 

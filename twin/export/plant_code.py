@@ -147,28 +147,28 @@ def magnetic_tables(model: TorqueModel) -> list[str]:
     InputError
         The field is not that of pole lines and a torque curve.
     """
-    if model.coils.size:
+    of, curve = model.arrangement[0], model.tables.curve
+    if of.coils.size:
         raise InputError("export: expected an actuator with a torque curve, received one with a torque field")
-    lines, groups = model.line_axes.shape[0], model.group_axes.shape[1]
-    scatter = model.pair_gain.shape[1] > 0
+    lines, groups = len(of.line_axes), of.group_axes.shape[1]
     place = {
         "ST_LINES": lines,
-        "ST_ROWS": len(model.table),
-        "ST_SCATTER": scatter,
+        "ST_ROWS": len(curve),
+        "ST_SCATTER": bool(of.scattered),
         "ST_KNEE": f"ST_C({magnetics.KNEE!r})",
         "ST_CENTRE": f"ST_C({magnetics.CENTRE!r})",
         "ST_WIDE": magnetics.WIDE_PER_UNIT,
         "ST_NARROW": magnetics.NARROW_PER_UNIT,
     }
     tables = {
-        "ST_LINE_AXES": model.line_axes,
-        "ST_LINE_WEIGHTS": model.line_weights,
-        "ST_GROUP_AXES": model.group_axes,
-        "ST_TABLE": model.table,
+        "ST_LINE_AXES": of.line_axes,
+        "ST_LINE_WEIGHTS": of.line_weights,
+        "ST_GROUP_AXES": of.group_axes,
+        "ST_TABLE": curve,
     }
-    if scatter:
-        tables["ST_PAIR_GAIN"] = model.pair_gain.reshape(2, lines, groups)
-        tables["ST_PAIR_STRETCH"] = model.pair_stretch.reshape(2, lines, groups)
+    if of.scattered:
+        tables["ST_PAIR_GAIN"] = of.pair_gain.reshape(2, lines, groups)
+        tables["ST_PAIR_STRETCH"] = of.pair_stretch.reshape(2, lines, groups)
     return [*definitions(place), *(constant(name, table) for name, table in tables.items())]
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from math import inf
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,29 +34,29 @@ class Value(NamedTuple):
 
 
 class Effects(NamedTuple):
-    """Stages that faults modify, in arrays that compiled code reads."""
+    """Stages that faults modify, in records that compiled code reads."""
 
-    drive_rows: Rows  # of DriveChain
-    sensor_rows: Rows  # of SensorChain
-    group_gain: NDArray[np.float64]  # (n,) torque and back-EMF per ampere over those of the torque matrix
+    run: Rows  # array of one RunData
     period_s: float
     step_s: float
-
-    def fault_arrays(self) -> tuple[Any, ...]:
-        """Return the arrays that faults write."""
-        return self.drive_rows, self.sensor_rows, self.group_gain
 
     @property
     def drive(self) -> DriveChain:
         """Drive of the run."""
-        drive: DriveChain = self.drive_rows[0]
+        drive: DriveChain = self.run[0].plant.drive
         return drive
 
     @property
     def sensors(self) -> SensorChain:
         """Sensors of the run."""
-        sensors: SensorChain = self.sensor_rows[0]
+        sensors: SensorChain = self.run[0].sensors
         return sensors
+
+    @property
+    def group_gain(self) -> NDArray[np.float64]:
+        """Torque and back-EMF of each group per ampere over those of the torque matrix, (n,)."""
+        gain: NDArray[np.float64] = self.run[0].plant.group_gain
+        return gain
 
 
 class ActiveFault(NamedTuple):

@@ -2,15 +2,11 @@
 
 from __future__ import annotations
 
-import numpy as np
-from numpy.typing import NDArray
-
 from spheretwin.control.supervision.enabled_groups import REPORTED, STATES, mark_faulty_groups
 from spheretwin.control.supervision.watchdog import REASONS
 from spheretwin.faults.effects import Effects
 from spheretwin.faults.schedule import NEVER, FaultSchedule
-from spheretwin.models.base.record import Rows
-from spheretwin.models.base.state import arrays_of
+from spheretwin.models.base.record import Rows, columns_of
 from spheretwin.models.telemetry.fault_log import ColumnChanges
 from spheretwin.models.telemetry.table import Table
 
@@ -21,27 +17,17 @@ class FaultInjector:
     Parameters
     ----------
     schedule : FaultSchedule
-    effects : Effects or None
-        Stages without a fault; None if nothing can fail.
-    groups : rows of `EnabledGroups`
-        Groups of the controller: reported faults are marked.
-    fault_modes : array
-        Result: for every part the number of its failure mode, or 0.
-    began_s : (n,) array
-        Result: start of the last fault of each group.
+    run : array of one RunData
+        Without a fault. Its stages are modified, its controller gets the marks of reported groups, and its
+        plant the modes and the starts of the faults.
+    step_s : float, s
+        Physics step.
     """
 
-    def __init__(
-        self,
-        schedule: FaultSchedule,
-        effects: Effects | None,
-        groups: Rows,
-        fault_modes: NDArray[np.float64],
-        fault_start_s: NDArray[np.float64],
-    ) -> None:
-        self._schedule, self._effects, self._groups = schedule, effects, groups
-        self._fault_modes, self._fault_start_s = fault_modes, fault_start_s
-        self._written = arrays_of(effects, "fault_arrays") if effects else []
+    def __init__(self, schedule: FaultSchedule, run: Rows, step_s: float) -> None:
+        self._schedule, self._effects = schedule, Effects(run, schedule.period_s, step_s)
+        self._plant, self._groups = run["plant"], run["controller"]["supervision"]["groups"]
+        self._written = list(columns_of(run, lambda field: field.set_by_faults)) if len(schedule) else []
         self._healthy = [array.copy() for array in self._written]
         self._applied: tuple[tuple[int, ...], bytes] | None = None
 
@@ -52,18 +38,15 @@ class FaultInjector:
         active, fault_start_s = self._schedule.active(tick), self._schedule.fault_start_s(tick)
         if (active, fault_start_s.tobytes()) != self._applied:
             self._applied = active, fault_start_s.tobytes()
-            self._fault_start_s[:], self._fault_modes[:] = fault_start_s, self._schedule.mode_numbers(active)
+            self._plant["fault_start_s"] = fault_start_s
+            self._plant["fault_modes"] = self._schedule.mode_numbers(active)
             mark_faulty_groups(
                 self._groups, self._schedule.reported_groups(active), tick * self._schedule.period_s
             )
-            if self._effects:
-                self._clear()
-                self._schedule.apply(active, self._effects)
+            for array, healthy in zip(self._written, self._healthy, strict=True):
+                array[...] = healthy
+            self._schedule.apply(active, self._effects)
         return self._schedule.next_change(tick)
-
-    def _clear(self) -> None:
-        for array, healthy in zip(self._written, self._healthy, strict=True):
-            array[...] = healthy
 
 
 Line = tuple[float, str]

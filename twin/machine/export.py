@@ -10,8 +10,9 @@ from typing import Any
 
 import numpy as np
 
-from spheretwin.electronics.drive_chain import build_drive
-from spheretwin.electronics.sensor_chain import build_sensors
+from spheretwin.electronics.drive_chain import DriveChain, fill_drive
+from spheretwin.electronics.sensor_chain import SensorChain, fill_sensors
+from spheretwin.hardware_assembly import delays_of
 from spheretwin.machine.files import CONDITIONS, CURRENTS, conditions_of, log_signals
 from spheretwin.machine.log import COMMANDED, MEASURED
 from spheretwin.models.base.errors import SpheretwinError
@@ -159,13 +160,15 @@ def _log_file(path: Path, session: Session, available: tuple[str, ...]) -> Signa
 def _true_values(session: Session) -> dict[str, Any]:
     """Return the true parameters of a run at its start, in JSON types, also those drawn from the seed."""
     scenario = session.initial_scenario
-    groups = len(session.actuator.groups)
-    drive = build_drive(scenario.drive, scenario.plant.step_s, scenario.substeps, groups, scenario.seed)
+    plant, delays = scenario.plant, delays_of(scenario)
+    settings = scenario.drive, plant.step_s, scenario.substeps, scenario.seed
+    sizes = {"groups": len(session.actuator.groups), "delays": delays["drive_delays"]}
+    sensors = scenario.sensors, scenario.seed
     return {
         "scenario": scenario.model_dump(mode="json"),
         "plant": _plain(parameters_of(scenario, files_of(scenario))),
-        "drive": _plain(drive[0]),
-        "sensors": _plain(build_sensors(scenario.sensors, scenario.seed)[0]),
+        "drive": _plain(DriveChain.filled(fill_drive, *settings, **sizes)[0]),
+        "sensors": _plain(SensorChain.filled(fill_sensors, *sensors, delays=delays["sensor_delays"])[0]),
         "states": TRUE_STATES,
         "versions": versions(),
     }

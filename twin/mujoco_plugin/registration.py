@@ -2,9 +2,8 @@
 
 The callbacks of a step are compiled: the engine calls them from any thread, without Python. `init` is Python,
 as it reads files and compiles `respond` for the kind of magnetics. It writes the address of a context into
-`mjData.plugin_data`: words with the address of `respond`, that of the coils (the tuple `Coils` as compiled
-code has it in memory), and a mark that `destroy` clears. A later `init` releases the memory of cleared
-contexts.
+`mjData.plugin_data`: words with the address of `respond`, that of the record of the coils, and a mark that
+`destroy` clears. A later `init` releases the memory of cleared contexts.
 """
 
 from __future__ import annotations
@@ -13,54 +12,48 @@ import ctypes
 from typing import Any, NamedTuple
 
 import mujoco
-import numba
 import numpy as np
 from numba import types
 from numpy.typing import NDArray
 
 from spheretwin.models import actuator
 from spheretwin.models.base import mujoco_library as library
-from spheretwin.models.base.compiled import COMPILES, compiled_callback
+from spheretwin.models.base.addresses import caller_of
+from spheretwin.models.base.compiled import COMPILES, compiled_callback, stage_address, uncompiled
 from spheretwin.models.base.errors import EngineError, SpheretwinError, exception_text
-from spheretwin.models.base.numba_internals.addresses import function_at, in_memory
-from spheretwin.mujoco_plugin.coils import ACT_DOT, FORCE, SENSORS, Coils, coils_of, respond
+from spheretwin.models.base.record import Rows
+from spheretwin.mujoco_plugin.coils import ACT_DOT, FORCE, SENSORS, coils_of, respond
 from spheretwin.mujoco_plugin.configuration import PLUGIN, TORQUE, Attributes, Parts, quantity_of, read
 
 RESPOND, COILS, EXISTS = 0, 1, 2
 """Words of a context."""
 
-ARRAYS: dict[str, tuple[str, str, type]] = {
-    "qpos": ("qpos", "nq", np.float64),
-    "qvel": ("qvel", "nv", np.float64),
-    "ctrl": ("ctrl", "nu", np.float64),
-    "act": ("act", "na", np.float64),
-    "act_dot": ("act_dot", "na", np.float64),
-    "force": ("actuator_force", "nout", np.float64),
-    "moment": ("actuator_moment", "nJmom", np.float64),
-    "moment_row": ("moment_rowadr", "nout", np.int32),
-    "sensordata": ("sensordata", "nsensordata", np.float64),
+ARRAYS = {name: name for name in ("qpos", "qvel", "ctrl", "act", "act_dot", "sensordata")} | {
+    "force": "actuator_force",
+    "moment": "actuator_moment",
+    "moment_row": "moment_rowadr",
 }
-"""Arrays of `mjData` with their sizes in `mjModel`, by the field of `Coils`."""
+"""Arrays of `mjData`, by the field of `Coils` with their address."""
 
 
 class Context(NamedTuple):
     """Memory of one instance in one `mjData`."""
 
     words: NDArray[np.intp]
-    memory: NDArray[np.uint8]
-    coils: Coils | None  # whose arrays compiled code reads
+    coils: Rows  # array of one Coils, to which a word refers
 
 
 _CONTEXTS: dict[int, Context] = {}
 """By the address of their words."""
 
-_INVALID = Context(np.zeros(3, np.intp), np.zeros(0, np.uint8), None)
+_INVALID = Context(np.zeros(3, np.intp), np.zeros(0))
 """Of an instance that `init` has refused; `destroy` may be called for it."""
 
 _WORDS = types.CPointer(types.intp)
 _DATA = types.CPointer(types.CPointer(_WORDS))  # word of mjData, instance, word of the context
 _PLUGIN_DATA = library.data_offset("plugin_data") // 8
-_respond_at: Any = function_at(types.void(types.intp, types.intp))
+_RESPOND = types.void(types.intp, types.intp)
+_call_respond: Any = caller_of(_RESPOND)
 
 
 def register() -> None:
@@ -89,12 +82,12 @@ def register() -> None:
 
 def _compute(model: int, data: Any, instance: int, capability: int) -> None:
     context = data[_PLUGIN_DATA][instance]
-    _respond_at(context[RESPOND])(context[COILS], SENSORS if capability == _SENSOR else FORCE)
+    _call_respond(context[RESPOND], context[COILS], SENSORS if capability == _SENSOR else FORCE)
 
 
 def _act_dot(model: int, data: Any, instance: int) -> None:
     context = data[_PLUGIN_DATA][instance]
-    _respond_at(context[RESPOND])(context[COILS], ACT_DOT)
+    _call_respond(context[RESPOND], context[COILS], ACT_DOT)
 
 
 def _destroy(data: Any, instance: int) -> None:
@@ -125,7 +118,7 @@ def _init(model_address: int, data_address: int, instance: int) -> int:
     for address in [key for key, context in _CONTEXTS.items() if not context.words[EXISTS]]:
         del _CONTEXTS[address]
     try:
-        context = _context(*_parts(model_address, instance), data_address)
+        context = _context(_parts(model_address, instance), data_address)
     except SpheretwinError as error:
         return _refuse(f"{error}")
     except Exception as error:  # the engine cannot receive an exception
@@ -156,32 +149,14 @@ def _refuse(message: str) -> int:
     return -1
 
 
-def _parts(model_address: int, instance: int) -> tuple[mujoco.MjModel, Parts]:
+def _parts(model_address: int, instance: int) -> Parts:
     model = library.copy_of_model(model_address)
     texts = {name: library.plugin_config(model, instance, name) for name in Attributes.model_fields}
-    return model, read(model, instance, texts)
+    return read(model, instance, texts)
 
 
-def _context(model: mujoco.MjModel, parts: Parts, data_address: int) -> Context:
-    arrays = {
-        field: library.data_array(data_address, name, getattr(model, size), kind)
-        for field, (name, size, kind) in ARRAYS.items()
-    }
-    coils = coils_of(parts, arrays)
-    memory = in_memory(coils)
-    words = np.array([_respond_address(numba.typeof(coils)), memory.ctypes.data, 1], np.intp)
-    return Context(words, memory, coils)
-
-
-def _respond_address(kind: Any) -> int:
-    """Return the address of `respond` for a type of coils."""
-    if kind not in _RESPONDS:
-
-        def call(coils: Any, task: int) -> None:
-            respond(coils[0], task)
-
-        _RESPONDS[kind] = compiled_callback(types.void(types.CPointer(kind), types.intp), call)
-    return int(_RESPONDS[kind].address)
-
-
-_RESPONDS: dict[Any, Any] = {}
+def _context(parts: Parts, data_address: int) -> Context:
+    addresses = {field: library.array_address(data_address, name) for field, name in ARRAYS.items()}
+    coils = coils_of(parts, addresses)
+    respond_address = stage_address(_RESPOND, uncompiled(respond), coils)
+    return Context(np.array([respond_address, coils.ctypes.data, 1], np.intp), coils)

@@ -29,7 +29,7 @@ Altpeter, "Single state elastoplastic friction models", IEEE Trans. Autom. Contr
 from __future__ import annotations
 
 from math import exp
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,8 +41,9 @@ from spheretwin.models.joint_chain import JointChain, inertia_at
 from spheretwin.models.kinematics import triple
 from spheretwin.models.lagrangian import InertiaEntries, solve_inertia
 from spheretwin.plant.cable import CableSection, acts, constant_torque_Nm
-from spheretwin.plant.end_stops import EndStops, store_stop, with_stop
+from spheretwin.plant.end_stops import EndStops, fill_end_stops, store_stop, with_stop
 from spheretwin.plant.friction import momentum
+from spheretwin.plant.plant_part import PlantPart, PlantSetup
 
 Array = NDArray[np.float64]
 
@@ -354,3 +355,29 @@ def _element(
     if torque > stiffness * slip:
         torque, slope = stiffness * slip, 0.0
     return sign * torque, slope, sign * end
+
+
+@inlined
+def _load(bristles: BristleFriction, plant: Any, substep: int) -> None:
+    rotor = plant.rotor
+    begin_bristles(bristles, plant.middle_q[:], rotor.q[:], rotor.qdot[:], rotor.torque_q[:])
+
+
+@inlined
+def _correct(bristles: BristleFriction, plant: Any, substep: int) -> None:
+    rotor, middle_q, middle_qdot = plant.rotor, plant.middle_q[:], plant.middle_qdot[:]
+    apply_bristles(
+        bristles, rotor.joint, middle_q, middle_qdot, plant.last_qdot[:], rotor.q[:], rotor.qdot[:]
+    )
+    log_bristles(bristles, substep, plant.friction_q[:])
+
+
+def _fill(rows: Rows, setup: PlantSetup) -> None:
+    section, range_rad = setup.scenario.plant, setup.actuator.hinge_range_rad
+    inertia, step_s = setup.rotor["joint"]["inertia"], section.step_s
+    fill_end_stops(rows["stops"], section.end_stops, range_rad, inertia, step_s)
+    seed = setup.scenario.seed
+    fill_bristles(rows, section.stiction, section.coulomb_Nm, section.cable, inertia, step_s, seed)
+
+
+BRISTLES = PlantPart(BristleFriction, _fill, load=_load, after=_correct)

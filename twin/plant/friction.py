@@ -24,6 +24,7 @@ from spheretwin.models.base.record import Record, Rows, field
 from spheretwin.models.joint_chain import JointChain, general_inertia
 from spheretwin.models.kinematics import Triple, triple, turns
 from spheretwin.models.lagrangian import InertiaEntries, inertia_entries, solve_inertia
+from spheretwin.plant.plant_part import PlantPart, PlantSetup
 
 Array = NDArray[np.float64]
 
@@ -260,3 +261,19 @@ def _coefficients(name: str, values: Array) -> Array:
             f"friction: expected {name} of three finite values that are not negative, received {values}"
         )
     return coefficients
+
+
+@inlined
+def _slow_rotor(friction: Friction, plant: Any, substep: int) -> None:
+    rotor = plant.rotor
+    slow_down(friction, rotor.joint, rotor.q[:], rotor.qdot[:], plant.friction_q[:])
+
+
+def _fill(rows: Rows, setup: PlantSetup) -> None:
+    section = setup.scenario.plant
+    coulomb_Nm = np.zeros(3) if section.stiction.on else np.array(section.coulomb_Nm)
+    smoothing_rad_s = section.friction_smoothing_rad_s
+    fill_friction(rows, coulomb_Nm, np.array(section.viscous_Nm_s), smoothing_rad_s, section.step_s)
+
+
+FRICTION = PlantPart(Friction, _fill, before=_slow_rotor, after=_slow_rotor)

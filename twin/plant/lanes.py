@@ -13,10 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spheretwin.models.base.compiled import allocation_free, inlined
+from spheretwin.models.base.record import Rows
 from spheretwin.models.base.trigonometry import sine_cosine
 from spheretwin.models.kinematics import Triple, Turns
 from spheretwin.models.lagrangian import acceleration_entries, inertia_entries
-from spheretwin.models.magnetics import TorqueModel, fill_torque_matrix, rotor_torque
+from spheretwin.models.magnetics import Tables, fill_torque_matrix, rotor_torque
 from spheretwin.plant.friction import slowed
 
 Array = NDArray[np.float64]
@@ -36,15 +37,10 @@ WEIGHT, SMOOTHING, ROWS = 51 * LANES, 52 * LANES, 53
 class LaneField(NamedTuple):
     """Magnetics of all plants, and working space."""
 
-    line_axes: Array  # (n, lines, 3), as in `TorqueModel`
-    line_weights: Array  # (n, lines)
-    group_axes: Array  # (n, 3, groups)
-    tables: Array  # (tables, intervals, 4)
+    arrangement: Rows  # (n,) of Arrangement
+    curves: Array  # (tables, intervals, 4)
     fields: Array  # (tables, t + 2, p + 3, 3)
-    table_of: NDArray[np.int64]  # (n,) number of each plant's table and field
-    pair_gain: Array  # (n, 2, pairs)
-    pair_stretch: Array  # (n, 2, pairs)
-    coils: Array  # (n, 4, coils)
+    table_of: NDArray[np.int64]  # (n,) number of each plant's curve and field
     torque_gain: Array  # (n, groups)
     G: Array  # (3, groups)
     scratch: Array  # (lines, 6)
@@ -126,21 +122,13 @@ def _predict(block: Array, dt: float) -> None:
 @allocation_free
 def _compute_field(block: Array, lane: int, field: LaneField, plant: int, current: Array) -> None:
     """Compute the torque of the coils of one plant in the stator frame."""
-    model = TorqueModel(
-        field.line_axes[plant],
-        field.line_weights[plant],
-        field.group_axes[plant],
-        field.tables[field.table_of[plant]],
-        field.pair_gain[plant],
-        field.pair_stretch[plant],
-        field.coils[plant],
-        field.fields[field.table_of[plant]],
-    )
+    table = field.table_of[plant]
+    tables = Tables(field.curves[table], field.fields[table])
     q, effective, torque_S = field.vectors[0], field.vectors[1], field.vectors[2]
     gain, groups = field.torque_gain[plant], field.torque_gain.shape[1]
     for i in range(3):
         q[i] = block[MIDDLE_Q + i * LANES + lane]
-    fill_torque_matrix(q, model, field.G, field.scratch)
+    fill_torque_matrix(q, field.arrangement[plant], tables, field.G, field.scratch)
     for j in range(groups):
         effective[j] = gain[j] * current[j]
     rotor_torque(field.G, effective[:groups], torque_S)

@@ -12,7 +12,7 @@ bearings are neglected: eddy currents are below 1 mW at 1 rad/s, friction is bel
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +23,7 @@ from spheretwin.models.base.compiled import inlined
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.base.record import Record, Rows, field
 from spheretwin.models.coil_group import PerGroup, of_each_group
+from spheretwin.plant.plant_part import PlantPart, PlantSetup
 
 Array = NDArray[np.float64]
 Capacity = Annotated[float, Field(ge=1e-3, le=1e7)]
@@ -166,14 +167,12 @@ def remanence(section: ResolvedThermal, ambient_degC: float) -> float:
 
 
 @inlined
-def begin_heat(heat: MagnetHeat, group_gain: Array, present: Array, coil: GroupCoils) -> None:
-    """Compute the gains (n,) with the present remanence and, with heat, the coils' surroundings."""
-    factor = 1.0
-    if heat.on:
-        factor += heat.remanence_per_K * (heat.rotor_degC - REFERENCE_degC)
-        coil.surroundings_degC = heat.stator_degC
-    for j in range(group_gain.shape[0]):
-        present[j] = factor * group_gain[j]
+def begin_heat(heat: MagnetHeat, gain: Array, coil: GroupCoils) -> None:
+    """Multiply the gains (n,) by the present remanence; the stator is the surroundings of the coils."""
+    factor = 1.0 + heat.remanence_per_K * (heat.rotor_degC - REFERENCE_degC)
+    coil.surroundings_degC = heat.stator_degC
+    for j in range(gain.shape[0]):
+        gain[j] *= factor
 
 
 @inlined
@@ -191,8 +190,6 @@ def advance_heat(heat: MagnetHeat, winding_degC: Array, copper_J: Array) -> None
     copper_J : (groups,) array, J
         Losses of the windings in this period.
     """
-    if not heat.on:
-        return
     released_J = 0.0
     for j in range(copper_J.shape[0]):
         released_J += copper_J[j] - heat.winding_J_K[j] * (winding_degC[j] - heat.last_degC[j])
@@ -210,3 +207,23 @@ def advance_heat(heat: MagnetHeat, winding_degC: Array, copper_J: Array) -> None
 def log_heat(heat: MagnetHeat, row: Array) -> None:
     """Write the temperatures of stator and rotor into the beginning of a row."""
     row[0], row[1] = heat.stator_degC, heat.rotor_degC
+
+
+@inlined
+def _begin(heat: MagnetHeat, plant: Any, substep: int) -> None:
+    begin_heat(heat, plant.present_gain[:], plant.drive.coil)
+
+
+@inlined
+def _end(heat: MagnetHeat, plant: Any, substep: int) -> None:
+    advance_heat(heat, plant.drive.coil.temperature_degC[:], plant.drive.flow.copper_J[:])
+
+
+def _fill(rows: Rows, setup: PlantSetup) -> None:
+    scenario, settled = setup.scenario, setup.drive["coil"]["settled"][0]
+    section, period_s = scenario.drive, scenario.controller.period_s
+    winding_J_K = section.heat_capacity_J_K
+    fill_heat(rows, scenario.plant.thermal, section.ambient_degC, period_s, winding_J_K, settled)
+
+
+HEAT = PlantPart(MagnetHeat, _fill, begin=_begin, end=_end)

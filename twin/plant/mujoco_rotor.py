@@ -8,12 +8,12 @@ from typing import Any
 import mujoco
 import numpy as np
 from numba import types
-from numba.extending import intrinsic
 from numpy.typing import NDArray
 
+from spheretwin.models.base.addresses import external_function
 from spheretwin.models.base.compiled import COMPILES, allocation_free
+from spheretwin.models.base.memory import read_integer, read_number, write_number
 from spheretwin.models.base.mujoco_library import addresses, step_address
-from spheretwin.models.base.numba_internals.addresses import external_function
 from spheretwin.models.mjcf import Mjcf, idle_stages
 from spheretwin.plant.mass_properties import MassErrors, true_model
 from spheretwin.plant.rotor import EngineKind, RotorData, RotorSettings
@@ -126,60 +126,20 @@ else:
     _mj_step = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p)(step_address())
 
 
-def _read(address: int, place: int) -> float:
-    """Return a number of an array of MuJoCo, in compiled code or in Python."""
-    return ctypes.c_double.from_address(int(address) + 8 * place).value
-
-
-def _write(address: int, place: int, value: float) -> None:
-    """Write a number of an array of MuJoCo, in compiled code or in Python."""
-    ctypes.c_double.from_address(int(address) + 8 * place).value = value
-
-
-def _count(address: int, place: int) -> int:
-    """Return a count of MuJoCo, an integer of four bytes, in compiled code or in Python."""
-    return ctypes.c_int32.from_address(int(address) + 4 * place).value
-
-
-def _access(number: Any, is_read: bool) -> Any:
-    """Return the intrinsic that reads or writes a number of an array at an address."""
-
-    def build(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        pointer = builder.inttoptr(arguments[0], context.get_value_type(number).as_pointer())
-        entry = builder.gep(pointer, [arguments[1]])
-        if is_read:
-            return builder.load(entry)
-        builder.store(arguments[2], entry)
-        return context.get_dummy_value()
-
-    def read(_: Any, address: Any, place: Any) -> tuple[Any, Any]:
-        return number(types.int64, types.int64), build
-
-    def write(_: Any, address: Any, place: Any, value: Any) -> tuple[Any, Any]:
-        return types.void(types.int64, types.int64, number), build
-
-    return intrinsic(read if is_read else write)
-
-
-if COMPILES:
-    _read, _write = _access(types.float64, True), _access(types.float64, False)
-    _count = _access(types.int32, True)
-
-
 @allocation_free
 def step(rotor: RotorData) -> None:
     """Advance MuJoCo by one physics step from the pose, rates and torque of a rotor."""
     addresses = rotor.addresses
     for i in range(3):
-        _write(addresses[POSE], i, rotor.q[i])
-        _write(addresses[RATES], i, rotor.qdot[i])
-        _write(addresses[TORQUE], i, rotor.torque_q[i])
+        write_number(addresses[POSE], i, rotor.q[i])
+        write_number(addresses[RATES], i, rotor.qdot[i])
+        write_number(addresses[TORQUE], i, rotor.torque_q[i])
     _mj_step(int(addresses[MODEL]), int(addresses[DATA]))
     for i in range(3):
-        rotor.q[i], rotor.qdot[i] = _read(addresses[POSE], i), _read(addresses[RATES], i)
+        rotor.q[i], rotor.qdot[i] = read_number(addresses[POSE], i), read_number(addresses[RATES], i)
     rotor.warnings = 0
     for kind in range(WARNINGS):
-        rotor.warnings += _count(addresses[COUNTS], 2 * kind + 1)
+        rotor.warnings += read_integer(addresses[COUNTS], 2 * kind + 1)
 
 
 def _set_up(settings: RotorSettings) -> MujocoRotor:

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from spheretwin.models.base.compiled import allocation_free, compiled
+from spheretwin.models.base.compiled import allocation_free, compiled, inlined
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.base.record import Rows
 from spheretwin.models.joint_chain import JointChain, torque_on_hinges, update_ideal_motion
@@ -86,6 +86,16 @@ def _is_finite(joint: JointChain) -> bool:
     return total == 0.0
 
 
+@inlined
+def _groups(parameters: Parameters) -> int:
+    return parameters.magnetics.arrangement[0].group_axes.shape[1]
+
+
+@inlined
+def _lines(parameters: Parameters) -> int:
+    return parameters.magnetics.arrangement[0].line_weights.shape[0]
+
+
 @allocation_free
 def check_parameters(parameters: Parameters) -> None:
     """Check the numbers of parameters; compiled code would read beyond the end of a shorter array.
@@ -95,8 +105,9 @@ def check_parameters(parameters: Parameters) -> None:
     InputError
         An array has another length, or a number is not finite or out of its range.
     """
-    magnetics, groups = parameters.magnetics, parameters.magnetics.group_axes.shape[1]
-    inertia = parameters.inertia_kg_m2
+    if parameters.magnetics.arrangement.shape[0] != 1:
+        raise InputError("plant: expected magnetics of one arrangement, received others")
+    groups, inertia = _groups(parameters), parameters.inertia_kg_m2
     if not (_has(inertia, 3) and inertia[0] > 0 and inertia[1] > 0 and inertia[2] > 0):
         raise InputError("plant: expected inertia_kg_m2 of 3 finite numbers above 0, received others")
     if not (_has(parameters.coulomb_Nm, 3) and _has(parameters.viscous_Nm_s, 3)):
@@ -113,9 +124,6 @@ def check_parameters(parameters: Parameters) -> None:
         )
     if parameters.joint.shape[0] != 1 or not _is_finite(parameters.joint[0]):
         raise InputError("plant: expected joint as an array of one joint of finite numbers, received another")
-    lines, pairs = magnetics.line_axes.shape[0], magnetics.pair_gain.shape[1]
-    if magnetics.line_weights.shape[0] != lines or magnetics.pair_stretch.shape[1] != pairs:
-        raise InputError("plant: expected magnetics with arrays of matching lengths, received others")
 
 
 @allocation_free
@@ -156,7 +164,7 @@ def torque_matrix(q: Array, parameters: Parameters) -> Array:
         raise InputError("plant: expected q_rad of 3 finite numbers, received others")
     groups = parameters.torque_gain.shape[0]
     G = np.empty((3, groups))
-    scratch = np.empty((parameters.magnetics.line_weights.shape[0], SCRATCH_COLUMNS))
+    scratch = np.empty((_lines(parameters), SCRATCH_COLUMNS))
     _fill(q, parameters, np.empty((3, 3)), G, scratch)
     for j in range(groups):
         for i in range(3):
@@ -200,7 +208,7 @@ def step(state: State, currents: Array, disturbance: Array, parameters: Paramete
     # of a step.
     groups = parameters.torque_gain.shape[0]
     G, vectors = np.empty((3, groups)), np.empty((8, max(3, groups)))
-    scratch = np.empty((parameters.magnetics.line_weights.shape[0], SCRATCH_COLUMNS))
+    scratch = np.empty((_lines(parameters), SCRATCH_COLUMNS))
     q, qdot = state.q_rad.copy(), state.qdot_rad_s.copy()
     _advance(q, qdot, currents, disturbance, parameters, dt, vectors, G, scratch)
     if not (_has(q, 3) and _has(qdot, 3)):
@@ -216,7 +224,7 @@ def step_of_checked(
     groups = parameters.torque_gain.shape[0]
     # Few allocations: with one for each vector the step takes half as long again.
     G, vectors = np.empty((3, groups)), np.empty((8, max(3, groups)))
-    scratch = np.empty((parameters.magnetics.line_weights.shape[0], SCRATCH_COLUMNS))
+    scratch = np.empty((_lines(parameters), SCRATCH_COLUMNS))
     q, qdot = state.q_rad.copy(), state.qdot_rad_s.copy()
     _advance(q, qdot, currents, disturbance, parameters, dt, vectors, G, scratch)
     return State(q, qdot)
@@ -257,7 +265,7 @@ def roll_out(
         )
     groups = parameters.torque_gain.shape[0]
     G, vectors = np.empty((3, groups)), np.empty((8, max(3, groups)))
-    scratch = np.empty((parameters.magnetics.line_weights.shape[0], SCRATCH_COLUMNS))
+    scratch = np.empty((_lines(parameters), SCRATCH_COLUMNS))
     present, qdot = state.q_rad.copy(), state.qdot_rad_s.copy()
     for k in range(currents.shape[0]):
         for _ in range(steps):
@@ -310,4 +318,5 @@ def _fill(q: Array, parameters: Parameters, vectors: Array, G: Array, scratch: A
     for i in range(3):
         rates[i] = 0.0
     update_ideal_motion(parameters.joint[0], q, rates, ideal_q, ideal_rates)
-    fill_torque_matrix(ideal_q, parameters.magnetics, G, scratch)
+    magnetics = parameters.magnetics
+    fill_torque_matrix(ideal_q, magnetics.arrangement[0], magnetics.tables, G, scratch)

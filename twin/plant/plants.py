@@ -9,7 +9,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from spheretwin.models.base.arrays import is_real, real_array
 from spheretwin.models.base.errors import InputError, shown
-from spheretwin.models.magnetics import TorqueModel, scratch_of
+from spheretwin.models.base.record import Rows
+from spheretwin.models.magnetics import Tables, scratch_of
 from spheretwin.plant import lanes
 from spheretwin.plant.lanes import LANES, LaneField
 from spheretwin.plant.plant_step import LONGEST_STEP_s, Parameters, State, check_parameters, roll_out
@@ -63,23 +64,16 @@ class Plants:
         if not each:
             raise InputError("plants: expected at least one plant, received none")
         self._parameters = each
-        models = [one.magnetics for one in each]
-        pairs = max(model.pair_gain.shape[1] for model in models)
-        lines, groups = models[0].line_axes.shape[0], models[0].group_axes.shape[1]
-        n, blocks = len(each), -(-len(each) // LANES)
+        first, n, blocks = each[0].magnetics, len(each), -(-len(each) // LANES)
+        groups = first.sizes["groups"]
         self.field = LaneField(
-            line_axes=np.empty((n, lines, 3)),
-            line_weights=np.empty((n, lines)),
-            group_axes=np.empty((n, 3, groups)),
-            tables=models[0].table[None],
-            fields=models[0].field[None],
+            arrangement=np.empty(n, first.arrangement.dtype),
+            curves=first.tables.curve[None],
+            fields=first.tables.field[None],
             table_of=np.zeros(n, np.int64),
-            pair_gain=np.empty((n, 2, pairs)),
-            pair_stretch=np.empty((n, 2, pairs)),
-            coils=np.empty((n, *models[0].coils.shape)),
             torque_gain=np.empty((n, groups)),
             G=np.empty((3, groups)),
-            scratch=scratch_of(models[0]),
+            scratch=scratch_of(first),
             vectors=np.empty((3, max(3, groups))),
         )
         self.blocks = np.zeros((blocks, lanes.ROWS * LANES))
@@ -87,7 +81,7 @@ class Plants:
         self._write(lanes.INERTIA, np.ones((blocks * LANES, 3)))
         self.blocks[:, lanes.SMOOTHING : lanes.SMOOTHING + LANES] = 1.0
         self._constant_Nm = np.zeros((n, 3))
-        self._tables = [models[0]]
+        self._tables = [first.tables]
         for number, one in enumerate(each):
             self._set(number, one)
 
@@ -240,16 +234,12 @@ class Plants:
     def _set(self, number: int, parameters: Parameters) -> None:
         check_parameters(parameters)
         model, field = parameters.magnetics, self.field
-        if model.line_axes.shape != field.line_axes[0].shape or model.group_axes.shape[1] != self.groups:
-            raise InputError(
-                f"plants: expected {field.line_axes.shape[1]} pole lines and {self.groups} groups,"
-                f" received {model.line_axes.shape[0]} and {model.group_axes.shape[1]}"
-            )
-        if (model.coils.shape, model.field.shape) != (field.coils[0].shape, field.fields[0].shape):
-            raise InputError(
-                f"plants: expected torque fields of {field.coils.shape[2]} coils and {field.fields[0].shape}"
-                f" coefficients, received {model.coils.shape[1]} and {model.field.shape}"
-            )
+        expected, received = (
+            _shape(self._tables[0], field.arrangement),
+            _shape(model.tables, model.arrangement),
+        )
+        if received != expected:
+            raise InputError(f"plants: expected magnetics of {expected}, received {received}")
         self._parameters[number] = parameters
         block, lane = divmod(number, LANES)
         column = self.blocks[block].reshape(lanes.ROWS, LANES)[:, lane]
@@ -264,38 +254,22 @@ class Plants:
         column[lanes.SMOOTHING // LANES] = parameters.friction_smoothing_rad_s
         self._constant_Nm[number] = parameters.constant_torque_Nm
         field.torque_gain[number] = parameters.torque_gain
-        self._set_model(number, model)
+        field.arrangement[number] = model.arrangement[0]
+        field.table_of[number] = self._place_of(model.tables)
 
     @property
     def _slows(self) -> bool:
         return bool(np.any(self._read(lanes.COULOMB)) or np.any(self._read(lanes.VISCOUS)))
 
-    def _set_model(self, number: int, model: TorqueModel) -> None:
-        field, pairs = self.field, model.pair_gain.shape[1]
-        if pairs > field.pair_gain.shape[2]:  # the first plant with scatter
-            shape = len(self), 2, pairs
-            field = field._replace(pair_gain=np.zeros(shape), pair_stretch=np.zeros(shape))
-            field.pair_gain[:, 0] = 1.0
-        field.line_axes[number], field.line_weights[number] = model.line_axes, model.line_weights
-        field.group_axes[number] = model.group_axes
-        field.coils[number] = model.coils
-        if field.pair_gain.shape[2]:
-            field.pair_gain[number] = model.pair_gain if pairs else ([1.0], [0.0])
-            field.pair_stretch[number] = model.pair_stretch if pairs else 0.0
-        places = [
-            place
-            for place, other in enumerate(self._tables)
-            if other.table is model.table and other.field is model.field
-        ]
-        if not places:
-            places = [len(self._tables)]
-            self._tables.append(model)
-            field = field._replace(
-                tables=np.stack([one.table for one in self._tables]),
-                fields=np.stack([one.field for one in self._tables]),
-            )
-        field.table_of[number] = places[0]
-        self.field = field
+    def _place_of(self, tables: Tables) -> int:
+        """Return the number of a curve and field among those of all plants, after adding it if it is new."""
+        for place, (curve, field) in enumerate(self._tables):
+            if curve is tables.curve and field is tables.field:
+                return place
+        self._tables.append(tables)
+        curves, fields = (np.stack(one) for one in zip(*self._tables, strict=True))
+        self.field = self.field._replace(curves=curves, fields=fields)
+        return len(self._tables) - 1
 
     def _advance_general(
         self, currents: Array, disturbance: Array, dt: float, steps: int, angles: Array | None = None
@@ -338,6 +312,13 @@ class Plants:
         complete[: len(values)] = values
         rows = complete.reshape(-1, LANES, 3).transpose(0, 2, 1)
         self.blocks[:, first : first + 3 * LANES] = rows.reshape(len(self.blocks), -1)
+
+
+def _shape(tables: Tables, arrangement: Rows) -> str:
+    """Return the sizes of magnetics that are equal for all plants."""
+    lines, groups, coils = (arrangement.dtype[name].shape for name in ("line_axes", "group_axes", "coils"))
+    field = f", {coils[1]} coils and {tables.field.shape} coefficients of a torque field" if coils[1] else ""
+    return f"{lines[0]} pole lines and {groups[1]} groups{field}"
 
 
 def _checked(name: str, values: ArrayLike, count: int, width: int, *, single: bool = False) -> Array:

@@ -15,6 +15,7 @@ from spheretwin.plant.end_stops import EndStopsSection
 from spheretwin.plant.magnet_heat import ResolvedThermal, ThermalSection
 from spheretwin.plant.mass_properties import MassSection
 from spheretwin.plant.part_scatter import PartScatter
+from spheretwin.plant.parts import PartSections
 from spheretwin.plant.plant_tick import ENGINES
 from spheretwin.scenario.fields import SHIPPED
 from spheretwin.trajectories.rounding import Bounded, Triple
@@ -36,7 +37,7 @@ class Section(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
 
 
-class PlantSection(Section):
+class PlantSection(PartSections, Section):
     """True rotor, and the integration of its motion."""
 
     engine: EngineName = Field(

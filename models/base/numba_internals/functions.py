@@ -1,4 +1,4 @@
-"""Compiled functions: for Python or for compiled callers, with tuples as values, inlined implementations.
+"""Compiled functions, for Python or for compiled callers.
 
 *Functions for compiled callers* (`CPUDispatcher`, its `_cache`, `_compiler`, `overloads` and `add_overload`;
 `JITCodeLibrary`, the flag `no_compile`). Reason: numba optimises each function completely, makes machine code
@@ -6,16 +6,8 @@ and a conversion of Python arguments of it, and does the same again in each call
 that the first run compiles in three quarters of the time. Consequence of a change: a loop compiles longer, or
 a function is compiled at every call.
 
-*Inlined implementations without machine code* (`make_overload_template`, `_get_jit_decorator`,
-`_can_compile`). Reason: numba compiles an implementation completely, then inlines it and drops the code, a
-tenth of the compile time of a loop. Consequence: the loop does not compile, or takes longer.
-
 *No reference counting* (`_nrt`). Reason: it takes a third of the loop's own time. Consequence: the option is
 refused, or the loop is slower.
-
-*Tuples as values* (`Lower._find_singly_assigned_variable`). Reason: numba gives each variable that several
-blocks use a place in memory, and LLVM spends most of the compile time on copies of tuples of many arrays.
-Consequence: the loop compiles two to three times as long.
 
 `tests/models/base/test_internals.py` checks each of them.
 """
@@ -23,25 +15,18 @@ Consequence: the loop compiles two to three times as long.
 from __future__ import annotations
 
 import threading
-from collections import Counter
 from collections.abc import Callable
 from typing import Any
 
-from numba import njit, types
 from numba.core import event
-from numba.core import ir as numba_ir
-from numba.core.analysis import compute_cfg_from_blocks, compute_use_defs, must_use_alloca
 from numba.core.caching import NullCache
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import Compiler, CompilerBase, CompileResult, DefaultPassBuilder
 from numba.core.compiler_lock import global_compiler_lock
-from numba.core.compiler_machinery import PassManager, register_pass
+from numba.core.compiler_machinery import PassManager
 from numba.core.dispatcher import Dispatcher as Dispatcher  # the class of compiled functions
-from numba.core.lowering import Lower
 from numba.core.registry import CPUDispatcher
 from numba.core.sigutils import normalize_signature
-from numba.core.typed_passes import NativeLowering
-from numba.core.typing.templates import infer, infer_global, make_overload_template
 
 from spheretwin.models.base.numba_internals.machine_code import MachineCode
 
@@ -103,7 +88,7 @@ class CompiledFunction(CPUDispatcher):
             if known is not None and not is_part and not _is_callable(known):
                 del self.overloads[arguments]
             self._compiler.targetoptions = {**self.targetoptions, "no_cpython_wrapper": is_part}
-            if is_part and self._compiler.pipeline_class is TupleCompiler:
+            if is_part and self._compiler.pipeline_class is PartCompiler:
                 return self._compile_part(arguments)
             cache, self._cache = self._cache, self._part_cache if is_part else self._cache
             try:
@@ -157,85 +142,12 @@ def compiled_function(
     return own
 
 
-class _TupleLower(Lower):
-    """Translation to LLVM in which a tuple that is assigned once is a value, not a place in memory.
-
-    For functions without reference counting: numba may release a variable where it has no value.
-    """
-
-    def _find_singly_assigned_variable(self) -> None:
-        super()._find_singly_assigned_variable()
-        blocks = self.func_ir.blocks
-        dominators, flow = compute_cfg_from_blocks(blocks).dominators(), compute_use_defs(blocks)
-        assignments = Counter(
-            statement.target.name
-            for block in blocks.values()
-            for statement in block.find_insts(numba_ir.Assign)
-        )
-        in_memory = must_use_alloca(blocks)
-        for label, names in flow.defmap.items():
-            for name in names:
-                is_tuple = isinstance(self.typeof(name), types.BaseTuple)
-                if not is_tuple or assignments[name] != 1 or name in in_memory:
-                    continue
-                users = [user for user, used in flow.usemap.items() if name in used]
-                # Blocks are translated in the order of their labels.
-                if all(label < user and label in dominators[user] for user in users):
-                    self._singly_assigned_vars.add(name)
-
-
-@register_pass(mutates_CFG=True, analysis_only=False)
-class _TupleLowering(NativeLowering):
-    """Pass with this translation."""
-
-    _name = "tuple_lowering"
-
-    @property
-    def lowering_class(self) -> type[Lower]:
-        return _TupleLower
-
-
-class TupleCompiler(CompilerBase):
-    """Numba's compiler with tuples as values."""
+class PartCompiler(CompilerBase):
+    """Numba's compiler without machine code for functions that compiled functions call."""
 
     def define_pipelines(self) -> list[PassManager]:
         """Return the passes."""
         if _NESTING.depth:
             self.state.flags.no_compile = True
             self.state.library = _PartLibrary(self.state.targetctx.codegen(), "part")
-        passes = DefaultPassBuilder.define_nopython_pipeline(self.state)
-        passes.passes = [
-            (_TupleLowering if kind is NativeLowering else kind, name) for kind, name in passes.passes
-        ]
-        passes.finalize()
-        return [passes]
-
-
-def inline_overload(function: Callable[..., Any], implementation: Callable[..., Any], **options: Any) -> None:
-    """Inline what `implementation` returns for the argument types into compiled callers.
-
-    As ``numba.extending.overload(function, inline="always")``, without machine code of the implementation.
-
-    Parameters
-    ----------
-    function : callable
-        Plain function.
-    implementation : callable
-        Returns a plain function for types of arguments, or None.
-    **options
-        Of `numba.jit`.
-    """
-    jit_options = {"no_cpython_wrapper": True, **options}
-    complete: Any = make_overload_template(function, implementation, jit_options, False, "always")
-
-    class Typed(complete):
-        def _get_jit_decorator(self) -> Callable[..., Any]:
-            def decorator(function: Callable[..., Any]) -> Any:
-                dispatcher = njit(**jit_options)(function)
-                dispatcher._can_compile = False  # the inliner infers the types by itself
-                return dispatcher
-
-            return lambda **_: decorator
-
-    infer(Typed)
-    infer_global(function, types.Function(Typed))
+        return [DefaultPassBuilder.define_nopython_pipeline(self.state)]

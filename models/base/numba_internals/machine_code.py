@@ -1,11 +1,8 @@
-"""Machine code of compiled functions in the cache of this package, and the key of their types.
+"""Machine code of compiled functions in the cache of this package.
 
 *Machine code in a cache of this package* (`CompileResult._rebuild` and `_reduce`, `rtsys`). Reason: numba's
 cache tracks one file of sources, and a damaged entry is an error at every call. Consequence of a change: a
 function is compiled in every process, or an exception at its first call.
-
-*Fingerprint of types* (`_dispatcher.compute_fingerprint`). Reason: numba's type of the hundred arrays of a
-loop takes half of the start-up time of a session. Consequence: an exception at the first loop.
 
 *Names of records in machine code* (`types.Record.mangling_args`). Reason: numba names them by numbers that
 each process counts anew, so that functions of two processes for different records can have one name.
@@ -23,7 +20,7 @@ import warnings
 from collections.abc import Callable
 from typing import Any
 
-from numba import _dispatcher, types
+from numba import types
 from numba.core.caching import NullCache
 from numba.core.compiler import CompileResult
 from numba.core.errors import NumbaWarning
@@ -117,18 +114,3 @@ class MachineCode(NullCache):
         key = repr((self._name, identity, self._kind, str(sig), codegen.magic_tuple()))
         readable = re.sub(r"\W+", "-", self._name.removeprefix("spheretwin."))[:60]
         return f"{readable}-{hashlib.sha256(key.encode()).hexdigest()[:24]}"
-
-
-def fingerprint_of_types(values: tuple[Any, ...]) -> bytes:
-    """Return a key of numba's types of values: values with one key have one type.
-
-    Numba itself looks up the type of an argument by it. It has the names of a named tuple's class and fields,
-    and no two classes of this package share both.
-
-    Raises
-    ------
-    NotImplementedError
-        A value is no number, array or tuple of them.
-    """
-    key: bytes = _dispatcher.compute_fingerprint(values)
-    return key

@@ -29,7 +29,7 @@ class Controller(LeafSystem):
         self._problem = problem
         self._law = plain.PlainPd(problem.law["stiffness"], problem.law["damping"], problem.nominal_inertia)
         self._step = 0
-        self._command = self._current = np.zeros(problem.magnetics.group_axes.shape[1])
+        self._command = self._current = np.zeros(problem.magnetics.sizes["groups"])
         self._torque_q = np.zeros(3)
         self.q_rad, self.current_A = [], []
         self._state = self.DeclareVectorInputPort("state", 6)

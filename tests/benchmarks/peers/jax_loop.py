@@ -76,7 +76,7 @@ def closed_loop(problem: Problem, law, rotor, traced: bool = False):
 
     def row(reference, disturbance, inertia):
         nothing = 0.0 * inertia[0]
-        none, at_rest = (nothing,) * 3, jnp.zeros(problem.magnetics.group_axes.shape[1])
+        none, at_rest = (nothing,) * 3, jnp.zeros(problem.magnetics.sizes["groups"])
         start = rotor.start(tuple(reference[0, 0]), inertia), law.start(), at_rest, none, none
         (*_, worst, squares), traces = jax.lax.scan(tick, start, (reference, disturbance))
         if traced:
@@ -100,9 +100,9 @@ def on_hinges(at: Turns, torque_S):
 
 def torque_matrix_of(problem: Problem):
     """Return a function for the rows of the torque matrix, (18,) each, by our table and pole lines."""
-    magnetics = problem.magnetics
-    lines, weights, axes = magnetics.line_axes, magnetics.line_weights, magnetics.group_axes
-    cubics = jnp.asarray(magnetics.table)
+    of = problem.magnetics.arrangement[0]
+    lines, weights, axes = of.line_axes, of.line_weights, of.group_axes
+    cubics = jnp.asarray(problem.magnetics.tables.curve)
 
     def torque_matrix(at):
         R = (

@@ -45,6 +45,7 @@ class Way:
         self.period_s, self.delay = period_s, delay
         self.inertia = actuator.inertia if inertia is None else inertia
         self.model = torque_model(actuator)
+        self.magnetics = self.model.arrangement[0], self.model.tables
         self.ticks = round(delay) + 20
         self.commands = [commands_at(-period_s * (self.ticks - k)) for k in range(self.ticks)]
         delayed = DelayModel(period_s, delay * period_s, LAG_S, self.inertia)
@@ -53,7 +54,7 @@ class Way:
             PredictionSection(on=True),
             delayed,
             groups=18,
-            lines=len(self.model.line_weights),
+            lines=self.model.sizes["lines"],
         )[0]
         delay_s = delay * period_s
         self.applied_torque = AppliedTorque.filled(
@@ -69,7 +70,7 @@ class Way:
 
     def predict(self):
         self.measurement[:3] = Q, V, self.applied_torque.torque_q
-        assert predict(self.mine, self.applied_torque, self.model, self.measurement)
+        assert predict(self.mine, self.applied_torque, *self.magnetics, self.measurement)
 
     def current(self, t):
         """Exact response to the delayed commands, switch by switch; at rest before the first."""

@@ -5,7 +5,7 @@ from itertools import count
 import numba
 import numpy as np
 
-from spheretwin.control.controller import law_at
+from spheretwin.control.controller import call_law
 from spheretwin.control.law import SIGNATURE, NominalModel
 from spheretwin.models.base.compiled import compiled_callback
 
@@ -23,7 +23,7 @@ WEAK = {
 @numba.njit
 def by_address(address, t, reference, measurement, parameters, state, torque):
     """Call a law as the loop does: its machine code."""
-    law_at(address)(t, reference, measurement, parameters, state, torque)
+    call_law(address, t, reference, measurement, parameters, state, torque)
 
 
 def machine_code(law):

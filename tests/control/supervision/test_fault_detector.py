@@ -25,7 +25,7 @@ from spheretwin.electronics.amplifier import Amplifier, AmplifierSection, Flow, 
 from spheretwin.electronics.coil import CoilSection, GroupCoils, fill_coils
 from spheretwin.electronics.converters import Dac, convert, fill_dac
 from spheretwin.electronics.drive_section import DriveSection, ResolvedDrive, drive_sheet
-from spheretwin.models.base.state import restore_state, save_state
+from spheretwin.models.base.record import set_states, states_of
 from spheretwin.models.kinematics import rate_jacobian
 from spheretwin.models.magnetics import torque_matrix
 from spheretwin.scenario.hardware import PROTOTYPE_DRIVE
@@ -261,9 +261,9 @@ def test_the_state_is_complete(actuator):
             hold(watcher[0], state[0], draws.normal(size=COUNT) * 0.3, 1.0, qdot=qdot, actuator=actuator)
 
     ticks(one, first, 85, 7)
-    restore_state(other, save_state(one), "detector")
-    restore_state(second, save_state(first), "groups")
+    set_states(other, states_of(one))
+    set_states(second, states_of(first))
     ticks(one, first, 5, 20)
     ticks(other, second, 5, 20)
     for restored, part in ((other, one), (second, first)):
-        assert save_state(restored).tobytes() == save_state(part).tobytes()
+        assert states_of(restored).tobytes() == states_of(part).tobytes()

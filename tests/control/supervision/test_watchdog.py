@@ -21,7 +21,7 @@ from spheretwin.control.supervision.watchdog import (
     trip,
     watch,
 )
-from spheretwin.models.base.state import restore_state, save_state, transfer_state
+from spheretwin.models.base.record import set_states, states_of, transfer_rows
 
 PERIOD_S, NOISE_RAD, QUANTUM_RAD = 1e-3, np.array([3e-4, 3e-4, 0.0]), np.array([8e-5, 8e-5, 3e-3])
 RANGE_RAD = np.array([[-1.4, 1.4], [-1.4, 1.4], [-np.inf, np.inf]])
@@ -116,27 +116,27 @@ def test_the_state_is_complete(samples):
     one, other = rows_of(), rows_of()
     for place, (angle, rate, fresh) in enumerate(samples):
         if place == len(samples) // 2:
-            restore_state(other, save_state(one), "watchdog")
+            set_states(other, states_of(one))
         for each in (one, other) if place >= len(samples) // 2 else (one,):
             looked(each[0], [angle, 0, 0], [rate, 0, 0], [fresh, 1, 1])
             count_rundown(each[0])
     if samples:
-        assert save_state(other).tobytes() == save_state(one).tobytes()
+        assert states_of(other).tobytes() == states_of(one).tobytes()
 
 
 def test_a_watchdog_that_was_off_starts_again():
     before, after = rows_of(), rows_of(largest_rate_rad_s=10.0)
     looked(before[0], [0.3, 0, 0])
-    transfer_state(before, after)
+    transfer_rows(before, after)
     assert looked(after[0], STILL) == Reason.JUMP
     before["on"], after = False, rows_of()
-    transfer_state(before, after)
+    transfer_rows(before, after)
     assert looked(after[0], [-0.9, 0, 0]) == Reason.NONE
 
 
 def test_a_trip_stays_when_the_watchdog_is_switched_off():
     before, after = rows_of(), rows_of(on=False)
     looked(before[0], [0, 0, 0], [1e5, 0, 0])
-    transfer_state(before, after)
+    transfer_rows(before, after)
     transfer_trip(before, after)
     assert (after[0].halt, after[0].reason) == (RELEASE, Reason.SPEED)

@@ -82,7 +82,7 @@ def write_package(root):
     base.mkdir()
     for folder in (models, base):
         (folder / "__init__.py").write_text("")
-    names = ("cache", "compiled", "compilation", "errors", "files", "function_identity")
+    names = ("cache", "compiled", "compilation", "errors", "files", "function_identity", "record")
     for name in (f"{name}.py" for name in names):
         shutil.copy(SOURCE / name, base)
     shutil.copytree(SOURCE / "numba_internals", base / "numba_internals")

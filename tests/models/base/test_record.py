@@ -5,7 +5,15 @@ import pytest
 from numpy.typing import NDArray
 
 from spheretwin.models.base.compiled import allocation_free
-from spheretwin.models.base.record import Record, columns_of, field, transfer_rows
+from spheretwin.models.base.record import (
+    Record,
+    capacity,
+    columns_of,
+    field,
+    set_states,
+    states_of,
+    transfer_rows,
+)
 
 Array = NDArray[np.float64]
 
@@ -93,6 +101,16 @@ def test_columns_of_the_state_are_views():
     assert len(list(columns_of(rows, lambda declared: declared.set_by_faults))) == 2
 
 
+def test_the_state_is_restored_to_the_last_bit_and_parameters_stay():
+    before, after = bank(1), bank(5)
+    before["count"], after["first"]["gain"] = -(2**50) + 1, 2.5
+    set_states(after, states_of(before))
+    assert states_of(after).tobytes() == states_of(before).tobytes()
+    assert states_of(after).shape == (3, 2 + 16 + 1)
+    np.testing.assert_array_equal(after["first"]["gain"], 2.5)
+    assert (after["count"] == -(2**50) + 1).all()
+
+
 def test_transfer_keeps_parameters_and_the_state_of_parts_that_are_off():
     before, after = bank(1), bank(5)
     before["first"]["on"], after["first"]["gain"] = [1, 0, 1], 2.5
@@ -117,3 +135,7 @@ def test_a_history_of_another_length_repeats_the_oldest_entry(taps):
     np.testing.assert_array_equal(
         after["pair"]["memory"][1, 1, 1:], [before["pair"]["memory"][1, 1, 1]] * (taps - 1)
     )
+
+
+def test_the_capacity_of_a_history_is_a_power_of_two_of_at_least_eight():
+    assert [capacity(entries) for entries in (1, 2, 8, 9, 16, 17, 1002)] == [8, 8, 8, 16, 16, 32, 1024]

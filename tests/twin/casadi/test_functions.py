@@ -94,7 +94,8 @@ def test_a_general_joint_is_refused():
 
 
 def test_other_magnetics_are_refused(parameters):
-    field = parameters.magnetics._replace(table=np.empty((0, 4)))
+    tables = parameters.magnetics.tables._replace(curve=np.empty((0, 4)))
+    field = parameters.magnetics._replace(tables=tables)
     with pytest.raises(InputError, match="expected an actuator with a torque curve, received one with a"):
         casadi.torque_matrix(parameters._replace(magnetics=field))
 

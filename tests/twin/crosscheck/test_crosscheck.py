@@ -19,7 +19,7 @@ from spheretwin.plant.mujoco_rotor import MujocoRotor
 from spheretwin.simulation import simulate
 from tests.twin.crosscheck.commands import FEW, ROWS, broken, crosscheck
 
-assembly_of_the_plant = coil_driven.assembly.plant_of
+fill_plant = coil_driven.assembly.fill_plant
 QUANTITIES = [quantity.name for quantity in dynamics.QUANTITIES]
 ENGINES = ("MuJoCo", "Pinocchio")
 CLOSED = "closed loop"
@@ -216,14 +216,15 @@ def test_wrong_plant_breaks_the_closed_loop(monkeypatch, error, rows):
     assert broken(trajectories.compare_closed_loop(actuators.MJCF_PATH, actuators.load()).checks) == rows
 
 
-def lagging(*arguments):
+def fill_lagging(rows, *arguments):
     """The plant with its torque matrix taken at the start of each step, as if a step had no middle."""
-    return assembly_of_the_plant(*arguments)._replace(step_s=0.0)
+    fill_plant(rows, *arguments)
+    rows["step_s"] = 0.0
 
 
 @pytest.mark.release("1 to 2 s; other rows are broken in less")
 def test_a_field_that_lags_by_half_a_step_breaks_every_row_of_coils(monkeypatch, actuator):
-    monkeypatch.setattr(coil_driven.assembly, "plant_of", lagging)
+    monkeypatch.setattr(coil_driven.assembly, "fill_plant", fill_lagging)
     checks = coil_driven.compare(actuators.MJCF_PATH, actuator).checks
     assert broken(checks) == {check.name for check in checks}
     assert len(checks) == 6
@@ -233,18 +234,16 @@ def test_a_field_that_lags_by_half_a_step_breaks_every_row_of_coils(monkeypatch,
 
 
 @pytest.mark.parametrize(
-    ("plant_of", "rows"),
-    [(assembly_of_the_plant, set()), (lagging, {f"{CLOSED}: step size, MuJoCo", LAGRANGIAN_STEP})],
+    ("fill", "rows"),
+    [(fill_plant, set()), (fill_lagging, {f"{CLOSED}: step size, MuJoCo", LAGRANGIAN_STEP})],
     ids=["right", "lagging by half a step"],
 )
-def test_closed_loops_of_the_shipped_joint_keep_their_bounds_unless_the_field_lags(
-    monkeypatch, plant_of, rows
-):
+def test_closed_loops_of_the_shipped_joint_keep_their_bounds_unless_the_field_lags(monkeypatch, fill, rows):
     """Both engines under both laws; the general joint is compared in the complete cross-check."""
     conditions = {law: fields for law, fields in trajectories.CONDITIONS.items() if "joint" not in law}
     assert list(conditions) == ["PD", "AFSM"]
     monkeypatch.setattr(trajectories, "CONDITIONS", conditions)
-    monkeypatch.setattr(coil_driven.assembly, "plant_of", plant_of)
+    monkeypatch.setattr(coil_driven.assembly, "fill_plant", fill)
     checks = trajectories.compare_closed_loop(actuators.MJCF_PATH, actuators.load()).checks
     assert broken(checks) == rows
     assert len(checks) == 4

@@ -8,7 +8,7 @@ from scipy.linalg import expm
 from spheretwin import scenario as scenarios
 from spheretwin.electronics.coil import OPEN, SHORTED
 from spheretwin.electronics.coil_coupling import TOLERANCE_A
-from spheretwin.electronics.drive_chain import NO_FAULTS, advance, begin, build_drive
+from spheretwin.electronics.drive_chain import DriveChain, advance, begin, fill_drive
 from spheretwin.electronics.drive_section import ResolvedDrive
 from spheretwin.models.actuator import load
 from spheretwin.models.inductance import mutual_inductance
@@ -30,7 +30,8 @@ def chain_of(mutual_H, step_s, **changed):
     }  # fmt: skip
     groups = GROUPS if mutual_H is None else len(mutual_H)
     section = ResolvedDrive(**fields | changed)
-    return build_drive(section, step_s, 1, groups, 0, NO_FAULTS, mutual_H)[0]
+    setting = section, step_s, 1, 0, False, False, mutual_H
+    return DriveChain.filled(fill_drive, *setting, groups=groups, delays=8)[0]
 
 
 class Steps:

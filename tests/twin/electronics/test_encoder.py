@@ -7,12 +7,16 @@ from hypothesis import strategies as st
 from pydantic import ValidationError
 
 from spheretwin import scenario as scenarios
-from spheretwin.electronics.sensor_chain import SensorsSection, build_sensors, sense
+from spheretwin.electronics.sensor_chain import SensorChain, SensorsSection, fill_sensors, sense
 from spheretwin.electronics.stages import SensorSetup
 from spheretwin.electronics.transducers import Encoder, EncoderSection, counted
 from spheretwin.session import Session
 
 COUNTS = st.integers(1, 2**20)
+
+
+def sensors_of(section, seed):
+    return SensorChain.filled(fill_sensors, section, seed, delays=8)[0]
 
 
 def encoder_of(counts):
@@ -54,7 +58,11 @@ LINE = 2 * np.pi / 2000
 
 def measured(q, seed=0, rates=None, **section):
     """Measured angles (n, 3) at poses (n, 3)."""
-    chain, row, angles = build_sensors(SensorsSection(**section), seed)[0], np.empty((3, 3)), []
+    chain, row, angles = (
+        sensors_of(SensorsSection(**section), seed),
+        np.empty((3, 3)),
+        [],
+    )
     for pose, rate in zip(q, np.zeros_like(q) if rates is None else rates, strict=True):
         sense(chain, pose, rate, np.zeros(8), np.zeros(0), row)
         angles.append(row[0].copy())

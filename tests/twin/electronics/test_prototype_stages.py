@@ -8,7 +8,7 @@ from spheretwin import scenario as scenarios
 from spheretwin.control.estimators import ESTIMATORS
 from spheretwin.control.estimators.estimator import estimates
 from spheretwin.electronics.random_streams import noise_table
-from spheretwin.electronics.sensor_chain import build_sensors, noise_streams, sense
+from spheretwin.electronics.sensor_chain import SensorChain, fill_sensors, noise_streams, sense
 from spheretwin.models.lagrangian import inertia_matrix
 from spheretwin.session import Session
 from spheretwin.simulation import simulate
@@ -26,7 +26,7 @@ def test_the_law_is_handed_what_the_stages_make_of_the_true_state(kind):
     """Sensors and estimator called one after the other, outside the loop, give the logged columns."""
     run = simulate(prototype("tilt", **{"estimator.kind": kind, "duration": 0.5}))
     table, resolved = run.telemetry, run.scenario
-    chain = build_sensors(resolved.sensors, resolved.seed)[0]
+    chain = SensorChain.filled(fill_sensors, resolved.sensors, resolved.seed, delays=8)[0]
     noise = noise_table(resolved.seed, 0, len(table), noise_streams(resolved.sensors))
     measurement, angles = np.empty((3, 3)), np.empty((len(table), 3))
     for tick, (q, qdot) in enumerate(zip(table["q_rad"], table["qdot_rad_s"], strict=True)):
@@ -73,7 +73,7 @@ def test_work_at_the_coils_is_heat_motion_and_field():
     for step_s in (5e-4, 2.5e-4, 1.25e-4):
         with Session(prototype(duration=0.06, **still, **{"plant.step_s": step_s})) as session:
             table, inertia = session.advance(60), session.actuator.inertia
-            current = session._runtime._plant.current
+            current = session._runtime.rows[0].plant.current
             q, qdot = session.q_rad, session._runtime.qdot_rad_s
             work = table["coil_power_W"].sum() * 1e-3
             heat = table["copper_loss_W"].sum() * 1e-3

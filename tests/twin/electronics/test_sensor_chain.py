@@ -9,7 +9,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from spheretwin.electronics.random_streams import noise_table, width_of
-from spheretwin.electronics.sensor_chain import SensorsSection, build_sensors, noise_streams, sense
+from spheretwin.electronics.sensor_chain import (
+    SensorChain,
+    SensorsSection,
+    fill_sensors,
+    noise_streams,
+    sense,
+)
 from spheretwin.scenario.hardware import PROTOTYPE_SENSORS
 from tests.twin.plant.allocations import allocates_nothing
 
@@ -19,6 +25,10 @@ STAGES = {
     "adc": {"bits": 10, "offset_V": 1e-2, "gain_error": 1e-2},
     "encoder": {"counts": 100},
 }
+
+
+def sensors_of(section, seed):
+    return SensorChain.filled(fill_sensors, section, seed, delays=8)[0]
 
 
 def prototype(**more):
@@ -32,7 +42,7 @@ def prototype(**more):
 
 def measured(section, seed, q, first=0):
     """Angles (n, 3) that are handed over at poses q (n, 3) of consecutive ticks."""
-    sensors, streams = build_sensors(section, seed)[0], noise_streams(section)
+    sensors, streams = sensors_of(section, seed), noise_streams(section)
     noise = noise_table(seed, first, len(q), streams)
     measurement, angles = np.empty((3, 3)), np.empty_like(q)
     for tick in range(len(q)):
@@ -59,7 +69,7 @@ def poses(ticks, seed=0):
 @given(q=st.tuples(*[st.floats(allow_nan=False)] * 3), qdot=st.tuples(*[st.floats(allow_nan=False)] * 3))
 def test_an_ideal_chain_hands_over_the_very_bits(section, q, qdot):
     measurement, state = np.full((3, 3), 7.0), np.array([q, qdot])
-    sensors = build_sensors(section, 0)[0]
+    sensors = sensors_of(section, 0)
     assert sense(sensors, state[0], state[1], NO_NOISE, NO_NOISE, measurement) == np.isfinite(state).all()
     assert measurement[:2].tobytes() == state.tobytes()
     np.testing.assert_array_equal(measurement[2], 7.0)  # the torque believed, which is another's
@@ -85,7 +95,7 @@ def test_a_mounting_error_alone_is_added_to_each_angle():
 
 
 def test_rates_are_the_true_ones_and_what_was_handed_over_is_kept():
-    sensors, measurement = build_sensors(prototype(), 0)[0], np.zeros((3, 3))
+    sensors, measurement = sensors_of(prototype(), 0), np.zeros((3, 3))
     rates = np.array([1.0, -2.0, 3.0])
     sense(sensors, np.array([0.1, 0.2, 0.3]), rates, np.zeros(2), NO_NOISE, measurement)
     np.testing.assert_array_equal(measurement[1], rates)
@@ -126,7 +136,7 @@ def sensed(section, state, draws):
     measurement = np.zeros((3, 3))
     noise = np.resize(np.array(draws), width_of(noise_streams(section)))
     q, qdot = np.array(state[:3]), np.array(state[3:])
-    finite = sense(build_sensors(section, 0)[0], q, qdot, noise, NO_NOISE, measurement)
+    finite = sense(sensors_of(section, 0), q, qdot, noise, NO_NOISE, measurement)
     return finite, measurement[:2]
 
 
@@ -160,11 +170,16 @@ def test_no_stage_makes_a_number_of_none(place):
 def test_a_short_row_of_noise_is_no_number_either():
     measurement = np.zeros((3, 3))
     assert not sense(
-        build_sensors(prototype(), 0)[0], np.zeros(3), np.zeros(3), NO_NOISE, NO_NOISE, measurement
+        sensors_of(prototype(), 0),
+        np.zeros(3),
+        np.zeros(3),
+        NO_NOISE,
+        NO_NOISE,
+        measurement,
     )
 
 
 def test_sensing_allocates_nothing():
     section = prototype(**{"sensors.adc.oversampling": 4})
     arguments = np.zeros(3), np.zeros(3), np.zeros(8), NO_NOISE, np.zeros((3, 3))
-    assert allocates_nothing(sense, build_sensors(section, 0)[0], *arguments)
+    assert allocates_nothing(sense, sensors_of(section, 0), *arguments)

@@ -83,21 +83,21 @@ BAD = st.sampled_from([np.nan, np.inf, -np.inf, 1e308, -1e308, 1e200, 1e12, 5e-3
 
 # Whatever a tick goes on from, by what it belongs to.
 INPUTS = {
-    "angle": lambda machine: machine._rotor.rows["q"][0],
-    "rate": lambda machine: machine._rotor.rows["qdot"][0],
+    "angle": lambda machine: machine._plant.rotor.q,
+    "rate": lambda machine: machine._plant.rotor.qdot,
     "current": lambda machine: machine._plant.current,
-    "temperature": lambda machine: machine._plant.drive[0].coil.temperature_degC,
-    "resistance": lambda machine: machine._plant.drive[0].coil.resistance_ohm,
-    "on their way": lambda machine: machine._plant.drive[0].delay.history.ravel(),
-    "held": lambda machine: machine._plant.drive[0].stages["dac"].line.last,
+    "temperature": lambda machine: machine._plant.drive.coil.temperature_degC,
+    "resistance": lambda machine: machine._plant.drive.coil.resistance_ohm,
+    "on their way": lambda machine: machine._plant.drive.delay.history.ravel(),
+    "held": lambda machine: machine._plant.drive.stages["dac"].line.last,
     "group gain": lambda machine: machine._plant.group_gain,
     "estimate": lambda machine: machine._controller.estimator_memory,
     "law": lambda machine: machine._controller.memory,
-    "belief": lambda machine: machine._controller.data[0].applied_torque.current,
-    "detector": lambda machine: machine._controller.data[0].supervision.detector.shorted_A,
-    "wiper": lambda machine: machine._sensors[0].stages["potentiometer"].line.last,
-    "converted": lambda machine: machine._sensors[0].stages["adc"].delayed_rad.ravel(),
-    "seen": lambda machine: machine._controller.data[0].supervision.watchdog.last_rad,
+    "belief": lambda machine: machine.rows[0].controller.applied_torque.current,
+    "detector": lambda machine: machine.rows[0].controller.supervision.detector.shorted_A,
+    "wiper": lambda machine: machine.rows[0].sensors.stages["potentiometer"].line.last,
+    "converted": lambda machine: machine.rows[0].sensors.stages["adc"].delayed_rad.ravel(),
+    "seen": lambda machine: machine.rows[0].controller.supervision.watchdog.last_rad,
 }
 
 PLAN = [

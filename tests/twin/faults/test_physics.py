@@ -152,7 +152,7 @@ def test_several_noises_of_one_source_are_one_of_their_root_sum_of_squares():
     faults = each("noise", "amplifier", value=0.3) + each("noise", "amplifier", value=0.4)
     with Session(prototype(*faults)) as session:
         session.advance(1)
-        drive = session._runtime._plant.drive[0]
+        drive = session._runtime._plant.drive
     np.testing.assert_allclose(drive.stages["amplifier"].line.noise, 0.5, rtol=1e-15)
     assert not drive.stages["dac"].line.noise.any()
     assert len(FaultSchedule(session.scenario.fault, GROUPS, STEP_S, 0)) == 36

@@ -9,7 +9,7 @@ from scipy.linalg import expm, solve
 from spheretwin import scenario as scenarios
 from spheretwin import simulate
 from spheretwin.electronics.coil import advance_temperature
-from spheretwin.electronics.drive_chain import build_drive
+from spheretwin.electronics.drive_chain import DriveChain, fill_drive
 from spheretwin.electronics.drive_section import ResolvedDrive
 from spheretwin.models.actuator import load
 from spheretwin.models.base.errors import InputError
@@ -40,7 +40,7 @@ def heat_of(period_s, section=SECTION):
     coils = {"supply_V": 24.0, "resistance_ohm": 1.3, "inductance_H": 9e-4, "current_limit_A": 8.0}
     heat = {"heat_capacity_J_K": WINDING_J_K, "thermal_resistance_K_W": WINDING_K_W}
     drive = ResolvedDrive(resistance_per_K=0.0, ambient_degC=AMBIENT_degC, **coils, **heat)
-    coil = build_drive(drive, period_s, 1, GROUPS, 0)[0].coil
+    coil = DriveChain.filled(fill_drive, drive, period_s, 1, 0, groups=GROUPS, delays=8)[0].coil
     fields = section, AMBIENT_degC, period_s, WINDING_J_K, coil.settled
     return coil, MagnetHeat.filled(fill_heat, *fields, groups=GROUPS)[0]
 
@@ -48,10 +48,10 @@ def heat_of(period_s, section=SECTION):
 def heated(duration_s, period_s, section=SECTION):
     """Return the temperatures of stator and rotor at the end of each period, with constant losses."""
     coil, heat = heat_of(period_s, section)
-    copper_J, gain = LOSS_W * period_s, np.ones(GROUPS)
+    copper_J = LOSS_W * period_s
     degC = np.empty((round(duration_s / period_s), 2))
     for row in degC:
-        begin_heat(heat, gain, gain.copy(), coil)
+        begin_heat(heat, np.ones(GROUPS), coil)
         advance_temperature(coil, copper_J)
         advance_heat(heat, coil.temperature_degC, copper_J)
         row[:] = heat.stator_degC, heat.rotor_degC
@@ -109,8 +109,8 @@ def test_energy_is_conserved(stator_J_K, rotor_J_K, stator_K_W, gap_K_W, rotor_K
 def test_gains_fall_with_the_remanence():
     gains = np.array([1.0, 0.9, 1.1, 1.0])
     coil, heat = heat_of(1e-3, thermal(rotor_degC=60.0))
-    present = np.empty(GROUPS)
-    begin_heat(heat, gains, present, coil)
+    present = gains.copy()
+    begin_heat(heat, present, coil)
     np.testing.assert_allclose(present, gains * (1 - 0.0011 * 40), rtol=1e-15)
 
 

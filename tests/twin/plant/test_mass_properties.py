@@ -63,7 +63,7 @@ def test_the_plant_has_general_parts_only_if_it_needs_them(engine, fields, gener
     changes = fields | {"plant.engine": engine, "plant.payload_kg": 0.05}
     with Session(scenarios.load("hold", changes)) as session:
         plant = session._runtime._plant
-    joint = plant.rotor["joint"][0]
+    joint = plant.rotor.joint
     assert (joint.is_tilted, joint.on) == (skewed, general)
 
 

@@ -64,7 +64,8 @@ def test_plants_of_different_kinds_move_as_alone():
 
 def test_torque_curves_of_different_plants_stay_apart():
     shipped = plant.parameters("tilt")
-    stronger = shipped._replace(magnetics=shipped.magnetics._replace(table=1.1 * shipped.magnetics.table))
+    tables = shipped.magnetics.tables._replace(curve=1.1 * shipped.magnetics.tables.curve)
+    stronger = shipped._replace(magnetics=shipped.magnetics._replace(tables=tables))
     parameters = [shipped, stronger, shipped, stronger]
     case = motion(4, seed=2)
     assert_equal(together(parameters, *case, 10), one_by_one(parameters, *case, 10))
