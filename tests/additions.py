@@ -29,7 +29,16 @@ UNCOUPLED = {"Lagrangian": "Uncoupled", "LAGRANGIAN": "UNCOUPLED", '"lagrangian"
 ADDITIONS = {
     "law": Addition(
         "control/laws/lazy.py",
-        copy_of("control/laws/pd.py", {"PD(": "Lazy(", '"pd"': '"lazy"', "stiffness": "slackness"}),
+        copy_of(
+            "control/laws/pd.py",
+            {
+                "PD(": "Lazy(",
+                '"pd"': '"lazy"',
+                "stiffness": "slackness",
+                "np.zeros(0)": "np.zeros(3)",
+                "        torque[axis] =": "        state[axis] += error\n        torque[axis] =",
+            },
+        ),
         "control/laws/__init__.py",
         ("    | AFSMWithObserver,\n", "    | AFSMWithObserver\n    | Lazy,\n"),
         "from spheretwin.control.laws.lazy import Lazy\n",
@@ -90,6 +99,53 @@ def largest(row, plant):
             "        lagrangian_rotor.LAGRANGIAN,\n        stiff.UNCOUPLED,\n",
         ),
         "from spheretwin.plant import stiff\n",
+    ),
+    "plant part": Addition(
+        "twin/plant/dashpot.py",
+        '''
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import BaseModel, Field
+
+from spheretwin.models.base.compiled import inlined
+from spheretwin.models.base.record import Record, field
+from spheretwin.plant.plant_part import PlantPart
+
+
+class DashpotSection(BaseModel):
+    """Dashpot that follows the motion with a delay."""
+
+    damping_Nm_s: float = Field(0.0, description="torque per unit of the delayed rate, N·m·s")
+
+
+class Dashpot(Record):
+    on: bool = field("whether it acts")
+    damping_Nm_s: float = field("torque per unit of the delayed rate", "N·m·s")
+    rate_rad_s: NDArray[np.float64] = field("delayed rates", "rad/s", 3, state=True)
+
+
+@inlined
+def follow(part, plant, substep):
+    for i in range(3):
+        part.rate_rad_s[i] += 0.25 * (plant.rotor.qdot[i] - part.rate_rad_s[i])
+
+
+@inlined
+def load(part, plant, substep):
+    for i in range(3):
+        plant.rotor.torque_q[i] -= part.damping_Nm_s * part.rate_rad_s[i]
+
+
+def fill(rows, setup):
+    rows["damping_Nm_s"] = setup.scenario.plant.dashpot.damping_Nm_s
+    rows["on"] = rows["damping_Nm_s"] > 0
+
+
+DASHPOT = PlantPart(Dashpot, fill, DashpotSection, begin=follow, load=load)
+''',
+        "twin/plant/parts.py",
+        ('    "heat": HEAT,\n', '    "heat": HEAT,\n    "dashpot": DASHPOT,\n'),
+        "from spheretwin.plant.dashpot import DASHPOT\n",
     ),
     "metric": Addition(
         "twin/metrics/effort.py",
@@ -209,6 +265,7 @@ from spheretwin.electronics.stages import FaultLine, fill_fault_line, through
 class Gear(Record):
     on: bool = field("whether a ratio has an error")
     ratio: NDArray[np.float64] = field("ratio of each gear", "", 3)
+    turned_rad: NDArray[np.float64] = field("sum of the angles so far", "rad", 3, state=True)
     line: FaultLine = field("of the turned angles, rad", channels=3)
 
 
@@ -237,6 +294,7 @@ class GearSection(SensorStage):
 def turn(stage, measurement, noise):
     for i in range(3):
         turned = stage.ratio[i] * measurement[0, i]
+        stage.turned_rad[i] += turned
         measurement[0, i] = through(stage.line, i, turned, noise.faults)
 ''',
         "twin/electronics/sensor_chain.py",

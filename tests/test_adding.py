@@ -37,9 +37,9 @@ import numpy as np
 
 def drawn_numbers():
     from spheretwin import scenario as scenarios
-    from spheretwin.electronics.drive_chain import build_drive
+    from spheretwin.electronics.drive_chain import DriveChain, fill_drive
     from spheretwin.electronics.random_streams import noise_table
-    from spheretwin.electronics.sensor_chain import build_sensors, noise_streams, sense
+    from spheretwin.electronics.sensor_chain import SensorChain, fill_sensors, noise_streams, sense
     from spheretwin.faults.schedule import FaultSchedule
     from spheretwin.hardware_assembly import fault_streams
     from spheretwin.session import Session
@@ -53,8 +53,8 @@ def drawn_numbers():
     with Session(scenario) as session:
         scenario = session.scenario
     plan = FaultSchedule(scenario.fault, 18, 1e-3, 3)
-    sensors = build_sensors(scenario.sensors, 3)[0]
-    drive = build_drive(scenario.drive, 5e-4, 2, 18, 3)[0]
+    sensors = SensorChain.filled(fill_sensors, scenario.sensors, 3, delays=8)[0]
+    drive = DriveChain.filled(fill_drive, scenario.drive, 5e-4, 2, 3, groups=18, delays=8)[0]
     noise, measurement = noise_table(3, 0, 5, noise_streams(scenario.sensors)), np.empty((3, 3))
     sense(sensors, np.array([0.1, -0.2, 0.3]), np.zeros(3), noise[0], np.zeros(0), measurement)
     return {
@@ -105,6 +105,8 @@ damping = [0.05, 0.05, 0.05]
 kind = "rough"
 [plant]
 engine = "uncoupled"
+[plant.dashpot]
+damping_Nm_s = 1e-3
 [[disturbance.terms]]
 kind = "kick"
 torque_Nm = 0.02
@@ -151,6 +153,22 @@ with Session(scenario) as session:
     recorder.finish(Status.BORED)
     recorder.close()
 
+from spheretwin.models.base.record import states_of
+
+with Session(scenario) as session:
+    begun = session.advance(6)
+    snapshot, states = session.snapshot(), []
+    for again in range(2):
+        went_on = session.advance(6)
+        states.append(states_of(session._runtime.rows).tolist())
+        own = session._runtime.rows[0], session._runtime._controller.memory.tolist()
+        if not again:
+            session.restore(snapshot)
+    moved = {
+        name: [*begun[name].tolist(), *went_on[name].tolist()]
+        for name in ("qdot_rad_s", "q_measured_rad", "q_rad", "q_ref_rad")
+    }
+
 part = suite.PARTS[-1]
 evidence = CrosscheckResult({part.name: part.examine(Subject(actuators.MJCF_PATH, actuators.load(), 10))})
 suite.FIGURES = suite.FIGURES[-1:]
@@ -165,6 +183,8 @@ print("RESULT" + json.dumps({
     "ratio": errors(0, "sensors.gear", 3, 1)[:, 0].tolist(), "q": table["q_rad"].tolist(),
     "measured": table["q_measured_rad"].tolist(), "asked": table["current_command_A"].tolist(),
     "carried": table["current_A"].tolist(), "random": drawn_numbers(),
+    "states": states, "delayed": own[0].plant.parts.dashpot.rate_rad_s.tolist(), "moved": moved,
+    "turned": own[0].sensors.stages.gear.turned_rad.tolist(), "errors": own[1],
     "largest": table["largest_current_A"].tolist(), "q_ref": table["q_ref_rad"][-1].tolist(),
     "disturbance": table["disturbance_Nm"][:, 1].tolist(), "current": abs(table["current_command_A"]).max(),
     "page": (folder / "crosscheck.md").read_text(), "figure": (folder / "names.svg").stat().st_size,
@@ -265,6 +285,22 @@ def test_a_telemetry_column(grown):
 def test_a_plant(grown):
     assert grown["summary"]["scenario"]["plant"]["engine"] == "uncoupled"
     assert "'uncoupled'" in grown["refused"]["plant.engine"]
+
+
+def test_a_state_of_physics_of_a_sensor_and_of_a_law(grown):
+    """Each is computed from the telemetry, and part of a snapshot without another line of code."""
+    qdot, measured, q, q_ref = (np.array(values) for values in grown["moved"].values())
+    delayed = np.zeros(3)
+    for rates in qdot:
+        delayed += 0.25 * (rates - delayed)
+    # Sums of twelve numbers below 10.
+    np.testing.assert_allclose(grown["delayed"], delayed, rtol=0, atol=1e-14)
+    np.testing.assert_allclose(grown["errors"], (measured - q_ref).sum(axis=0), rtol=0, atol=1e-14)
+    turned = ((1 + 0.1 * np.array(grown["ratio"])) * q).sum(axis=0)
+    np.testing.assert_allclose(grown["turned"], turned, rtol=0, atol=1e-14)
+    assert np.abs(grown["delayed"]).min() > 0
+    assert grown["states"][0] == grown["states"][1]
+    assert grown["helped"]["--plant.dashpot.damping-Nm-s"] == "torque per unit of the delayed rate, N·m·s"
 
 
 def test_an_estimator(grown):
