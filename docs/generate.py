@@ -17,12 +17,14 @@ from typing import Any
 from pydantic import BaseModel
 
 from spheretwin import cli
+from spheretwin.assembly import RunData
 from spheretwin.channels import CHANNELS
 from spheretwin.control.law import NominalModel
 from spheretwin.control.laws import LAWS
 from spheretwin.faults.targets import TARGETS
 from spheretwin.metrics import METRICS
 from spheretwin.models import actuator as actuators
+from spheretwin.models.base.record import Record, kinds_of
 from spheretwin.models.telemetry.signals import Signal, common_signals
 from spheretwin.models.telemetry.status import Status
 from spheretwin.scenario.fields import Kind, kind_of, unit_of
@@ -64,6 +66,7 @@ DOCSTRINGS = {
 SOURCES = {
     "models/telemetry/signals.py": "telemetry_columns",
     "models/telemetry/status.py": "statuses",
+    "models/base/record.py": "records",
     "twin/cli/__init__.py": "commands",
     "twin/faults/targets.py": "fault_modes",
     "twin/metrics/__init__.py": "metrics",
@@ -94,6 +97,7 @@ def write_pages(folder: Path) -> None:
         "statuses": statuses(),
         "metrics": metrics(),
         "fault_modes": fault_modes(),
+        "records": records(),
         **{name: readme(path) for path, name in READMES.items()},
         **{name: docstring(*page) for name, page in DOCSTRINGS.items()},
     }
@@ -293,6 +297,41 @@ def fault_modes() -> str:
         lines += ["", f"## {target.name}", "", f"Targets: {shown}.{note}", ""]
         lines += _table(("mode", "value", "default"), rows)
     return _page(lines)
+
+
+def records() -> str:
+    """Return the page of the records of a run: every field of every part."""
+    lines = [
+        "# Records of a run",
+        "",
+        "Generated from the declarations. A run is one record, `run`; a nested record has a section of its"
+        " own. *Kept*: the field belongs to the state, which a snapshot has. *Faults*: faults write it.",
+    ]
+    for place, kind in _records("run", RunData):
+        kinds = kinds_of(kind)
+        rows = [
+            (
+                f"`{name}`",
+                f"record `{kinds[name].__name__}`" if issubclass(kinds[name], Record) else declared.unit,
+                " × ".join(map(str, declared.shape)),
+                "kept" if declared.is_state else "faults" if declared.set_by_faults else "",
+                _cell(declared.meaning),
+            )
+            for name, declared in kind.fields().items()
+        ]
+        lines += ["", f"## {kind.__name__}", "", f"`{place}`. {_summary(kind)}", ""]
+        lines += _table(("field", "unit", "shape", "", "meaning"), rows)
+    return _page(lines)
+
+
+def _records(place: str, kind: type[Record]) -> Iterator[tuple[str, type[Record]]]:
+    """Yield the first place and the class of each kind of record."""
+    found = {kind: place}
+    for name, inner in kinds_of(kind).items():
+        if issubclass(inner, Record):
+            for below, of_below in _records(f"{place}.{name}", inner):
+                found.setdefault(of_below, below)
+    yield from ((below, of_below) for of_below, below in found.items())
 
 
 def _value_default(value: Any) -> str:
