@@ -133,7 +133,8 @@ class LoopSystem:
 
     def _restore(self, x: ArrayLike) -> None:
         ends = np.cumsum([len(part) for part in self._first[:-1]])
-        self._runtime.restore(RuntimeState(*np.split(np.array(x, np.float64), ends[:-1]), self._first.last))
+        parts = np.split(np.array(x, np.float64), ends[:-1])
+        self._runtime.restore(RuntimeState._make([*parts, self._first.last]))
 
 
 def loop_system(scenario: Scenario, law: Law | None = None) -> tuple[Any, Array]:

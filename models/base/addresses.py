@@ -49,10 +49,10 @@ def caller_of(signature: Any) -> Callable[..., Any]:
     )
     type_callable(call)(lambda _: typer)
 
-    @lower_builtin(call, types.intp, *signature.args)
     def build(context: Any, builder: Any, _: Any, given: Any) -> Any:
         kinds = [context.get_value_type(kind) for kind in signature.args]
         kind = ir.FunctionType(context.get_value_type(signature.return_type), kinds)
         return builder.call(builder.inttoptr(given[0], kind.as_pointer()), given[1:])
 
+    lower_builtin(call, types.intp, *signature.args)(build)
     return call

@@ -211,19 +211,14 @@ def high_product(a: np.uint64, b: np.uint64) -> np.uint64:
     return np.uint64(int(a) * int(b) >> 64)
 
 
-@type_callable(high_product)
-def _type_high_product(_: Any) -> Callable[..., Any]:
-    def typer(a: Any, b: Any) -> Any:
-        return types.uint64(types.uint64, types.uint64)
-
-    return typer
-
-
-@lower_builtin(high_product, types.Integer, types.Integer)
 def _build_high_product(context: Any, builder: Any, signature: Any, numbers: Any) -> Any:
     wide = ir.IntType(128)
     product = builder.mul(*(builder.zext(number, wide) for number in numbers))
     return builder.trunc(builder.lshr(product, ir.Constant(wide, 64)), ir.IntType(64))
+
+
+type_callable(high_product)(lambda _: lambda a, b: types.uint64(types.uint64, types.uint64))
+lower_builtin(high_product, types.Integer, types.Integer)(_build_high_product)
 
 
 @allocation_free

@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 
 from spheretwin.machine.change_filter import Step
 from spheretwin.machine.explanations import LOADS, Candidate, evidence
-from spheretwin.machine.signatures import Places, Signatures, product
+from spheretwin.machine.signatures import Places, Signatures
+from spheretwin.models.base.matrices import product
 
 Array = NDArray[np.float64]
 Begin = tuple[int, int, int]

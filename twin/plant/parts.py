@@ -31,7 +31,10 @@ after_step = chained({name: part.after for name, part in reversed(PARTS.items())
 end_parts = chained({name: part.end for name, part in PARTS.items()})
 
 if TYPE_CHECKING:
-    PartSections = BaseModel
+
+    class PartSections(BaseModel):
+        """Sections of the parts."""
+
 else:
     PartSections = create_model(
         "PartSections",
