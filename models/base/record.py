@@ -228,8 +228,8 @@ def _of_length(history: NDArray[Any], length: tuple[int, ...]) -> NDArray[Any]:
 
 
 def capacity(entries: int) -> int:
-    """Return the length of a history that holds some entries: 8, 16, 32 …, so that types are few."""
-    return max(8, 1 << (entries - 1).bit_length())
+    """Return the length of a history that holds some entries: 32, 64, 128 …, so that types are few."""
+    return max(32, 1 << (entries - 1).bit_length())
 
 
 def record_of(name: str, meaning: str, kinds: dict[str, type[Record]]) -> type[Record]:

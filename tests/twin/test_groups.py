@@ -13,10 +13,7 @@ from tests.models.model_files import edited
 RING = re.compile(r'(?s)<replicate count="12" euler="0 0 30">\s*<site name="coil_middle".*?</replicate>')
 
 
-FEWER = pytest.mark.release("13 s to compile, as each number of groups; more groups are in the first suite")
-
-
-@pytest.fixture(params=[pytest.param(12, marks=FEWER), 24])
+@pytest.fixture(params=[12, 24])
 def groups(request):
     return request.param
 
@@ -45,6 +42,7 @@ def test_the_matrix_has_a_column_for_each_group(model, groups):
             np.testing.assert_allclose(column, sign * whole[:, same][:, 0], rtol=0, atol=1e-15)
 
 
+@pytest.mark.release("18 s to compile for each number of groups; test_torque_fields tracks with 8")
 @pytest.mark.parametrize("engine", ["mujoco", "lagrangian"])
 @pytest.mark.parametrize("allocation", ["least_norm", "bounded"])
 def test_a_run_tracks_with_the_groups_there_are(model, groups, engine, allocation):

@@ -137,5 +137,5 @@ def test_a_history_of_another_length_repeats_the_oldest_entry(taps):
     )
 
 
-def test_the_capacity_of_a_history_is_a_power_of_two_of_at_least_eight():
-    assert [capacity(entries) for entries in (1, 2, 8, 9, 16, 17, 1002)] == [8, 8, 8, 16, 16, 32, 1024]
+def test_the_capacity_of_a_history_is_a_power_of_two_of_at_least_32():
+    assert [capacity(entries) for entries in (1, 8, 32, 33, 64, 65, 1002)] == [32, 32, 32, 64, 64, 128, 1024]
