@@ -104,7 +104,8 @@ class Runtime:
     ) -> None:
         self._scenario, self._external = scenario, external
         self._rotor = rotor or _start_rotor(scenario, files)
-        self._last = LastTick(np.empty(0), np.empty(0), np.zeros(len(files.actuator.groups)))
+        self._groups = len(files.actuator.groups)
+        self._last = LastTick(np.empty(0), np.empty(0), np.zeros(self._groups))
         self.law = law
         self.law_error: LawError | None = None
         self.signals = assembly.signals_of(scenario, files.actuator, self.law)
@@ -204,7 +205,7 @@ class Runtime:
         ticks, code = self._run(inputs, log)
         if ticks:
             first = loops.CURRENT_COMMAND
-            row = log[ticks - 1, : first + len(self._plant.current)].copy()  # the caller owns the log
+            row = log[ticks - 1, : first + self._groups].copy()  # the caller owns the log
             self._last = LastTick(row[loops.ANGLE : loops.ANGLE + 3], inputs.noise[ticks - 1], row[first:])
         return ticks, code
 
@@ -314,7 +315,7 @@ class Runtime:
         # Everything is checked before anything is written: a snapshot that is refused changes nothing.
         for name in RuntimeState._fields[:-1]:
             _check_length(name, getattr(state, name), len(getattr(own, name)))
-        _check_length("last command", state.last.command, len(self._plant.current))
+        _check_length("last command", state.last.command, self._groups)
         _check_length("last pose", state.last.q, 3 if len(state.last.q) else 0)
         set_states(self.rows, state.run[None])
         self._rotor.restore(state.engine)

@@ -173,7 +173,7 @@ def _allocate_all(G, torque, limit, scratch):
 def _repeat(calls, q, model, G, scratch):
     for _ in range(calls):
         q[2] += 1e-3
-        fill_torque_matrix(q, model, G, scratch)
+        fill_torque_matrix(q, model.arrangement[0], model.tables, G, scratch)
 
 
 def run_seconds(scenario: Scenario, folder: Path | None, rate_Hz: float | None = None) -> Callable[[], float]:

@@ -96,7 +96,7 @@ def _lines(parameters: Parameters) -> int:
     return parameters.magnetics.arrangement[0].line_weights.shape[0]
 
 
-@allocation_free
+@inlined
 def check_parameters(parameters: Parameters) -> None:
     """Check the numbers of parameters; compiled code would read beyond the end of a shorter array.
 
@@ -126,13 +126,13 @@ def check_parameters(parameters: Parameters) -> None:
         raise InputError("plant: expected joint as an array of one joint of finite numbers, received another")
 
 
-@allocation_free
+@inlined
 def _check_state(state: State) -> None:
     if not (_has(state.q_rad, 3) and _has(state.qdot_rad_s, 3)):
         raise InputError("plant: expected q_rad and qdot_rad_s of 3 finite numbers, received others")
 
 
-@allocation_free
+@inlined
 def _check_load(disturbance: Array, dt: float) -> None:
     if not _has(disturbance, 3):
         raise InputError("plant: expected a disturbance of 3 finite numbers, received others")
