@@ -61,7 +61,7 @@ def _dispatcher_with_bounds_checks(value: Any, copies: dict[int, Any]) -> Any:
     if id(value) not in copies:
         copy = _copied(value.py_func)
         options = {**value.targetoptions, "boundscheck": True}
-        copies[id(value)] = type(value)(copy, value.locals, options)
+        copies[id(value)] = type(value)(copy, value.locals, options, value._compiler.pipeline_class)
         _name_copies(value.py_func, copy, copies)  # last: functions may call each other
     return copies[id(value)]
 

@@ -38,8 +38,8 @@ def test_the_shipped_actuator_passes(actuator, monkeypatch):
 def test_a_wrong_matrix_is_not_attributed_to_the_curve(actuator, monkeypatch):
     right = direct_summation.fill_torque_matrix
 
-    def negative(q, model, G, scratch):
-        right(q, model, G, scratch)
+    def negative(q, arrangement, tables, G, scratch):
+        right(q, arrangement, tables, G, scratch)
         G *= -1
 
     monkeypatch.setattr(direct_summation, "fill_torque_matrix", negative)
