@@ -60,8 +60,9 @@ def _dispatcher_with_bounds_checks(value: Any, copies: dict[int, Any]) -> Any:
         return value
     if id(value) not in copies:
         copy = _copied(value.py_func)
-        options = {**value.targetoptions, "boundscheck": True}
-        copies[id(value)] = type(value)(copy, value.locals, options, value._compiler.pipeline_class)
+        own: Any = value
+        options = {**own.targetoptions, "boundscheck": True}
+        copies[id(value)] = type(own)(copy, own.locals, options, own._compiler.pipeline_class)
         _name_copies(value.py_func, copy, copies)  # last: functions may call each other
     return copies[id(value)]
 
