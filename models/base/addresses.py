@@ -43,7 +43,8 @@ def caller_of(signature: Any) -> Callable[..., Any]:
         return signature.return_type(types.intp, *signature.args)
 
     names = [f"argument_{place}" for place in range(len(signature.args) + 1)]
-    # Numba matches the arguments of a call with these.
+    # Numba binds the arguments of a call to the names of the typer, and a name for all would take them as one
+    # tuple. `inspect.signature` reads this attribute of any function, which mypy does not know.
     typer.__signature__ = Signature(  # type: ignore[attr-defined]
         [Parameter(name, Parameter.POSITIONAL_OR_KEYWORD) for name in names]
     )

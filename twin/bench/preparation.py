@@ -69,7 +69,7 @@ class Preparation:
     def _run(self, work: Callable[[], Any]) -> None:
         try:
             self._future.set_result(work())
-        except Exception as error:
+        except Exception as error:  # of any kind: the command that waits for the result raises it
             self._future.set_exception(error)
         except BaseException as error:  # code of the user may raise what would end the loop's thread
             reason = f"bench: expected {self._name} to be prepared, received {exception_text(error)}"

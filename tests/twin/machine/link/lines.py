@@ -19,7 +19,7 @@ class Transport:
     """What the connections of tests have in common."""
 
     datagrams, is_closed = True, False
-    refused = Counter()  # noqa: RUF012 (nothing is refused)
+    refused = Counter()  # noqa: RUF012  (shared by all lines of tests: none of them refuses, so it stays empty)
 
     def accept(self, *, is_peer=True):
         pass

@@ -63,7 +63,9 @@ def test_a_block_in_real_time_leaves_the_process_as_it_was():
     assert (os.sched_getscheduler(0) if sys.platform == "linux" else 0) == scheduler
 
 
-@pytest.mark.skipif(sys.platform != "linux", reason="other systems grant neither")
+@pytest.mark.skipif(
+    sys.platform != "linux", reason="memory is locked, and its limit is read in /proc, on Linux alone"
+)
 def test_a_limited_amount_of_memory_is_not_locked(monkeypatch, tmp_path):
     import resource
 

@@ -31,7 +31,9 @@ def test_it_listens_at_the_loopback_unless_an_address_is_given(listener):
     assert listener._socket.getsockname()[0] == "127.0.0.1"
 
 
-@pytest.mark.skipif(not hasattr(socket, "SO_REUSEPORT"), reason="one socket receives all there")
+@pytest.mark.skipif(
+    not hasattr(socket, "SO_REUSEPORT"), reason="without SO_REUSEPORT a peer cannot have a socket of its own"
+)
 def test_a_stranger_is_not_heard_after_the_peer(listener, sender):
     lines = []
     listener.announce = lines.append
