@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict
 from functools import lru_cache
 from math import atan2, pi, sqrt
 from typing import NamedTuple
@@ -13,7 +12,7 @@ from numpy.typing import NDArray
 from spheretwin.models.actuator import Actuator
 from spheretwin.models.base.cache import cached_array
 from spheretwin.models.base.compiled import allocation_free, inlined
-from spheretwin.models.base.errors import InputError, distinct_texts, one_line
+from spheretwin.models.base.errors import InputError
 from spheretwin.models.base.record import Record, Rows, field
 from spheretwin.models.base.vectors import (
     WIDTH,
@@ -28,7 +27,6 @@ from spheretwin.models.base.vectors import (
     vector,
 )
 from spheretwin.models.kinematics import rotation_rows
-from spheretwin.models.magnet_and_coil import CoilGeometry, Magnet
 from spheretwin.models.torque_curve import TorqueCurve
 from spheretwin.models.torque_field import TorqueField
 
@@ -44,13 +42,6 @@ CENTRE = KNEE * WIDE_PER_UNIT + (1 - KNEE) * NARROW_PER_UNIT  # row of the cosin
 
 # Columns of the working space of `fill_torque_matrix`, which has a row for each pole line.
 SCRATCH_COLUMNS = 6
-
-# Numbers that older curve files do not name: before poles could be ground they were flat.
-UNSAID = {"magnet front_radius_m": 0.0}
-
-# The model's lengths come from sums and rotations, with errors of 1e-15; the torque is a low power of them.
-# This tolerance means equality; a difference of a millionth of a percent is reported.
-SAME = 1e-9
 
 # Of the coordinates of opposite axes, which come from rotations of degrees.
 OPPOSITE_TOLERANCE = 1e-12
@@ -404,40 +395,3 @@ def _cached_table(curve: TorqueCurve) -> Array:
     """Return the look-up table, from the cache if possible: the spline is slow to import."""
     samples = curve.phi_rad.tobytes() + curve.torque_Nm_per_A.tobytes()
     return cached_array(samples, lambda: lookup_table(curve))
-
-
-def computed_from(magnet: Magnet, coil: CoilGeometry) -> dict[str, float]:
-    """Return every number that a computed curve depends on, by part and name, such as ``coil turns``."""
-    parts = {"magnet": asdict(magnet), "coil": asdict(coil)}
-    return {f"{part} {name}": value for part, data in parts.items() for name, value in data.items()}
-
-
-def of_coil(coil: CoilGeometry) -> dict[str, float]:
-    """Return every number of a coil that a torque field depends on, as `computed_from` does."""
-    return {f"coil {name}": value for name, value in asdict(coil).items()}
-
-
-def disagreements(actuator: Actuator) -> list[str]:
-    """Return the differences between an actuator and the geometry of its torque curve, one line per number.
-
-    Parameters
-    ----------
-    actuator : Actuator
-        The actuator, with its torque curve or field.
-
-    Returns
-    -------
-    list of str
-        Empty if both agree, and for a curve without the numbers of its geometry: measured, or from another
-        program. A curve with these numbers, but without the front radius, was computed for flat poles.
-    """
-    curve = actuator.torque_data
-    unsaid = UNSAID if isinstance(curve, TorqueCurve) else {}  # a field is of any arrangement of magnets
-    computed_for = unsaid | dict(curve.computed_for) if curve.computed_for else {}
-    lines = []
-    for name, has in computed_from(actuator.magnet, actuator.coil).items():
-        had = computed_for.get(name, has)
-        if abs(had - has) > SAME * max(abs(had), abs(has)):
-            first, second = distinct_texts(had, has)
-            lines.append(one_line(f"{curve.name} was computed for {name} {first}, the model has {second}"))
-    return lines

@@ -24,9 +24,9 @@ from spheretwin.models.base.errors import InputError, distinct_texts, shown
 from spheretwin.models.base.reuse import reused
 from spheretwin.models.base.user_code import is_reference
 from spheretwin.models.coil_group import per_group
+from spheretwin.models.curve_origin import disagreements
 from spheretwin.models.inductance import mutual_inductance
 from spheretwin.models.lagrangian import loaded_inertia
-from spheretwin.models.magnetics import disagreements
 from spheretwin.models.mjcf import Mjcf
 from spheretwin.models.mjcf_reader import HINGES
 from spheretwin.models.telemetry.run_record import Change

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from spheretwin.models.actuator import Actuator, from_model
 from spheretwin.models.base.errors import InputError
+from spheretwin.models.curve_origin import disagreements
 from spheretwin.models.magnet_and_coil import CoilGeometry, Magnet
-from spheretwin.models.magnetics import disagreements
 from spheretwin.models.mjcf import read
 from spheretwin.models.torque_curve import TorqueCurve
 

@@ -20,8 +20,8 @@ from numpy.typing import NDArray
 
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.base.extras import missing
+from spheretwin.models.curve_origin import computed_from
 from spheretwin.models.magnet_and_coil import CoilGeometry, Magnet
-from spheretwin.models.magnetics import computed_from
 from spheretwin.models.torque_curve import TorqueCurve, head
 
 Array = NDArray[np.float64]

@@ -20,9 +20,9 @@ from spheretwin.models.actuator import polarities
 from spheretwin.models.base.checks import Check
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.base.extras import missing
+from spheretwin.models.curve_origin import of_coil
 from spheretwin.models.design.direct_summation import Rule, conductors, cylinders, torque_on_coils
 from spheretwin.models.magnet_and_coil import CoilGeometry, Magnet, front_radius, read_coil
-from spheretwin.models.magnetics import of_coil
 from spheretwin.models.mjcf import read
 from spheretwin.models.mjcf_reader import check_bounded, number, sites
 from spheretwin.models.torque_curve import head

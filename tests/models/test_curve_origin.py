@@ -4,8 +4,8 @@ from dataclasses import fields, replace
 
 import pytest
 
+from spheretwin.models.curve_origin import disagreements
 from spheretwin.models.magnet_and_coil import CoilGeometry, Magnet
-from spheretwin.models.magnetics import disagreements
 
 
 @pytest.mark.parametrize(

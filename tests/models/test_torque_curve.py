@@ -8,7 +8,7 @@ from numpy.testing import assert_allclose
 
 from spheretwin.models import torque_curve
 from spheretwin.models.actuator import TORQUE_CURVE_PATH
-from spheretwin.models.magnetics import computed_from
+from spheretwin.models.curve_origin import computed_from
 
 SHIPPED = torque_curve.read(TORQUE_CURVE_PATH)
 

@@ -12,6 +12,7 @@ from spheretwin.export.plant_code import magnetic_tables
 from spheretwin.models import actuator as actuators
 from spheretwin.models import magnetics, torque_field
 from spheretwin.models.base.errors import InputError
+from spheretwin.models.curve_origin import disagreements
 from spheretwin.models.inductance import mutual_inductance
 from spheretwin.models.kinematics import rotation
 from spheretwin.models.mjcf import contents_digest
@@ -167,8 +168,8 @@ def test_a_file_is_read_back_in_any_order(tmp_path):
 def test_the_coil_of_a_computed_field_is_compared_with_the_model(tmp_path):
     field = replace(VENTUSFF.torque_data, computed_for={"coil turns": 300.0, "coil distance_m": 0.037})
     line = "torque field torque_field.csv was computed for coil turns 300, the model has 400"
-    assert magnetics.disagreements(replace(VENTUSFF, torque_data=field)) == [line]
-    assert magnetics.disagreements(VENTUSFF) == []
+    assert disagreements(replace(VENTUSFF, torque_data=field)) == [line]
+    assert disagreements(VENTUSFF) == []
 
 
 def written(tmp_path, *replacements):

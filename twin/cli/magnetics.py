@@ -17,10 +17,10 @@ from spheretwin.models.actuator import TORQUE_CURVE_PATH
 from spheretwin.models.base.checks import Check
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.base.files import check_writable
+from spheretwin.models.curve_origin import SAME, computed_from
 from spheretwin.models.design import curve_check, field_check, rotor_field, torque_map
 from spheretwin.models.design.workspace import LARGEST_TILT_DEG
 from spheretwin.models.magnet_and_coil import read_magnet_and_coil
-from spheretwin.models.magnetics import SAME, computed_from
 from spheretwin.viz.pages import magnetics
 from spheretwin.viz.pages.markdown import ResultTable, prepare, save_text
 from spheretwin.viz.terminal.progress import tracked
