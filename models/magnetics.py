@@ -39,6 +39,7 @@ KNEE = 0.95
 WIDE_PER_UNIT = 200
 NARROW_PER_UNIT = 4000
 CENTRE = KNEE * WIDE_PER_UNIT + (1 - KNEE) * NARROW_PER_UNIT  # row of the cosine 0
+CURVE_ROWS = round(2 * CENTRE) + 1
 
 # Columns of the working space of `fill_torque_matrix`, which has a row for each pole line.
 SCRATCH_COLUMNS = 6

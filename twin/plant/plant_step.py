@@ -17,7 +17,13 @@ from spheretwin.models.base.errors import InputError
 from spheretwin.models.base.record import Rows
 from spheretwin.models.joint_chain import JointChain, torque_on_hinges, update_ideal_motion
 from spheretwin.models.kinematics import triple
-from spheretwin.models.magnetics import SCRATCH_COLUMNS, TorqueModel, fill_torque_matrix, rotor_torque
+from spheretwin.models.magnetics import (
+    CURVE_ROWS,
+    SCRATCH_COLUMNS,
+    TorqueModel,
+    fill_torque_matrix,
+    rotor_torque,
+)
 from spheretwin.plant.friction import slow_hinges
 from spheretwin.plant.lagrangian_rotor import runge_kutta
 
@@ -107,6 +113,11 @@ def check_parameters(parameters: Parameters) -> None:
     """
     if parameters.magnetics.arrangement.shape[0] != 1:
         raise InputError("plant: expected magnetics of one arrangement, received others")
+    tables, coils = parameters.magnetics.tables, parameters.magnetics.arrangement[0].coils.shape[1]
+    if _lines(parameters) > 0 and (tables.curve.shape[0] != CURVE_ROWS or tables.curve.shape[1] != 4):
+        raise InputError("plant: expected tables.curve of `torque_model`, received one of another shape")
+    if coils > 0 and (min(tables.field.shape[0], tables.field.shape[1]) < 4 or tables.field.shape[2] != 3):
+        raise InputError("plant: expected tables.field of `torque_model`, received one of another shape")
     groups, inertia = _groups(parameters), parameters.inertia_kg_m2
     if not (_has(inertia, 3) and inertia[0] > 0 and inertia[1] > 0 and inertia[2] > 0):
         raise InputError("plant: expected inertia_kg_m2 of 3 finite numbers above 0, received others")
