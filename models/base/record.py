@@ -169,6 +169,21 @@ def _marks(kind: type[Record]) -> list[tuple[bool, bool]]:
     return [(declared.is_state, declared.set_by_faults) for declared in kind.fields().values()]
 
 
+def put(rows: Rows, **columns: Any) -> None:
+    """Fill columns of rows.
+
+    Parameters
+    ----------
+    rows : (n,) array of records
+    **columns : array_like
+        By field: a number, or one for each entry, that all rows share; or an array with n as its first length
+        and 1 or the number of entries as the last one, as `models.base.columns` makes them.
+    """
+    for name, values in columns.items():
+        column = rows[name]
+        (column[..., None] if column.ndim == rows.ndim else column)[...] = values
+
+
 def is_rows(value: Any) -> bool:
     """True if a value is an array of records."""
     return isinstance(value, np.ndarray) and value.dtype.names is not None
