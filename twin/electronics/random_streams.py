@@ -11,7 +11,7 @@ bits of which each number is a hash of the state. NumPy guarantees both algorith
 from __future__ import annotations
 
 from contextlib import AbstractContextManager, nullcontext
-from functools import cache
+from functools import cache, lru_cache
 from hashlib import blake2b
 from math import sqrt
 from typing import Any
@@ -58,13 +58,17 @@ def stream_key(name: str) -> int:
     return int.from_bytes(blake2b(name.encode(), digest_size=8).digest(), "little")
 
 
-def uniforms(seed: int, name: str, channels: int, count: int) -> NDArray[np.float64]:
+Seed = int | NDArray[Any]
+"""Seed of a run, from 0 on; or whole numbers (n, 1), the seeds of n rows."""
+
+
+def uniforms(seed: Seed, name: str, channels: int, count: int) -> NDArray[np.float64]:
     """Return the first numbers of the streams of some channels.
 
     Parameters
     ----------
-    seed : int
-        Seed of the run; from 0 on.
+    seed : int or (n, 1) array of int
+        Seed of the run, from 0 on, or that of each row.
     name : str
         Name of the part.
     channels : int
@@ -73,14 +77,14 @@ def uniforms(seed: int, name: str, channels: int, count: int) -> NDArray[np.floa
 
     Returns
     -------
-    (channels, count) array
-        Row k is ``np.random.default_rng([seed, stream_key(name), k]).random(count)``: from 0 to below 1.
+    (channels, count) array, or (n, channels, count) array for n rows
+        Channel k is ``np.random.default_rng([seed, stream_key(name), k]).random(count)``: from 0 to below 1.
     """
-    drawn = np.empty((channels, count))
-    entropy = np.array([*_words(seed), *_words(stream_key(name)), 0], dtype=np.uint64)
+    seeds, key = _words(seed), _words(stream_key(name))[0]
+    drawn = np.empty((len(seeds), channels, count))
     with _overflowing():
-        _draw(entropy, np.empty(_POOL, dtype=np.uint64), np.empty(2 * _POOL, dtype=np.uint64), drawn)
-    return drawn
+        _draw(seeds, key, _scratch(seeds, key), drawn)
+    return drawn if isinstance(seed, np.ndarray) else drawn[0]
 
 
 def _overflowing() -> AbstractContextManager[None]:
@@ -88,39 +92,76 @@ def _overflowing() -> AbstractContextManager[None]:
     return nullcontext() if COMPILES else np.errstate(over="ignore")
 
 
-def errors(seed: int, name: str, channels: int, count: int) -> NDArray[np.float64]:
-    """Return shares of bounds, (channels, count), from -1 to 1, of the same streams as `uniforms`."""
+def errors(seed: Seed, name: str, channels: int, count: int) -> NDArray[np.float64]:
+    """Return shares of bounds, from -1 to 1, of the same streams and of the same shape as `uniforms`."""
     return 2 * uniforms(seed, name, channels, count) - 1
 
 
-def _words(number: int) -> list[int]:
-    """Return the words of 32 bits of a whole number, the lowest first; 0 has one word."""
-    words = [number & 0xFFFFFFFF]
-    while number := number >> 32:
-        words.append(number & 0xFFFFFFFF)
-    return words
+@lru_cache(maxsize=256)
+def _words_of(number: int) -> NDArray[np.uint64]:
+    return _words(np.array([[number]]))  # of Python's numbers if 64 bits do not suffice
+
+
+def _words(numbers: Seed) -> NDArray[np.uint64]:
+    """Return the words of 32 bits of whole numbers, (n, words), the lowest first."""
+    if not isinstance(numbers, np.ndarray):
+        return _words_of(numbers)
+    rest, words = numbers, [numbers & 0xFFFFFFFF]
+    while (rest := rest >> 32).any():
+        words.append(rest & 0xFFFFFFFF)
+    return np.concatenate(words, axis=1, dtype=np.uint64, casting="unsafe")
+
+
+def _scratch(seeds: NDArray[np.uint64], key: NDArray[np.uint64]) -> NDArray[np.uint64]:
+    """Return scratch for the hashes: rows for entropy, pool and words."""
+    return np.empty((3, 2 * _POOL + seeds.shape[1] + len(key) + 1), dtype=np.uint64)
 
 
 @allocation_free
 def _draw(
-    entropy: NDArray[np.uint64], pool: NDArray[np.uint64], words: NDArray[np.uint64], drawn: NDArray
+    seeds: NDArray[np.uint64], key: NDArray[np.uint64], scratch: NDArray[np.uint64], drawn: NDArray
 ) -> None:
-    """Fill `drawn` (channels, count); `entropy` ends with the channel number, other arrays are scratch."""
-    for channel in range(drawn.shape[0]):
-        entropy[entropy.shape[0] - 1] = channel
-        _fill_pool(entropy, pool)
-        _fill_words(pool, words)
-        # Two words are a half of 64 bits, the lower one first; halves are the higher one first.
-        start_high, start_low = words[0] | words[1] << _HALF, words[2] | words[3] << _HALF
-        odd_high, odd_low = words[4] | words[5] << _HALF, words[6] | words[7] << _HALF
-        odd_high, odd_low = odd_high << _ONE | odd_low >> (_FULL - _ONE), odd_low << _ONE | _ONE
-        high, low = _sum(odd_high, odd_low, start_high, start_low)
+    """Fill `drawn` (n, channels, count) from the words of the seeds (n, words) and of the key."""
+    words = scratch[2]
+    for row in range(drawn.shape[0]):
+        for channel in range(drawn.shape[1]):
+            _hash(seeds[row], key, channel, scratch)
+            _draw_channel(words, drawn[row, channel])
+
+
+@allocation_free
+def _draw_channel(words: NDArray[np.uint64], drawn: NDArray) -> None:
+    """Fill `drawn` (count,)."""
+    # Two words are a half of 64 bits, the lower one first; halves are the higher one first.
+    start_high, start_low = words[0] | words[1] << _HALF, words[2] | words[3] << _HALF
+    odd_high, odd_low = words[4] | words[5] << _HALF, words[6] | words[7] << _HALF
+    odd_high, odd_low = odd_high << _ONE | odd_low >> (_FULL - _ONE), odd_low << _ONE | _ONE
+    high, low = _sum(odd_high, odd_low, start_high, start_low)
+    high, low = _next(high, low, odd_high, odd_low)
+    for place in range(drawn.shape[0]):
         high, low = _next(high, low, odd_high, odd_low)
-        for place in range(drawn.shape[1]):
-            high, low = _next(high, low, odd_high, odd_low)
-            folded, turn = high ^ low, high >> _TURN
-            back = (_FULL - turn) & (_FULL - _ONE)
-            drawn[channel, place] = np.float64((folded >> turn | folded << back) >> _UNUSED) * NUMBER
+        folded, turn = high ^ low, high >> _TURN
+        back = (_FULL - turn) & (_FULL - _ONE)
+        drawn[place] = np.float64((folded >> turn | folded << back) >> _UNUSED) * NUMBER
+
+
+@allocation_free
+def _hash(seed: NDArray[np.uint64], key: NDArray[np.uint64], last: int, scratch: NDArray[np.uint64]) -> None:
+    """Write into the last row of scratch the hash of the words of seed and key, and of a last number.
+
+    A seed may have zeros after its last word, as other seeds are longer.
+    """
+    entropy, length = scratch[0], seed.shape[0]
+    while length > 1 and seed[length - 1] == 0:
+        length -= 1
+    for i in range(length):
+        entropy[i] = seed[i]
+    for i in range(key.shape[0]):
+        entropy[length + i] = key[i]
+    length += key.shape[0]
+    entropy[length] = last
+    _fill_pool(entropy[: length + 1], scratch[1])
+    _fill_words(scratch[1], scratch[2])
 
 
 @allocation_free
@@ -156,7 +197,7 @@ def _mixed(word: np.uint64, other: np.uint64) -> np.uint64:
 @allocation_free
 def _fill_words(pool: NDArray[np.uint64], words: NDArray[np.uint64]) -> None:
     factor = _START_B
-    for i in range(words.shape[0]):
+    for i in range(2 * _POOL):
         word = pool[i % _POOL] ^ factor
         factor = factor * _FACTOR_B & _WORD
         word = word * factor & _WORD
@@ -194,7 +235,11 @@ def width_of(streams: Streams) -> int:
     return sum(width for _, width in streams)
 
 
-def noise_table(seed: int, first: int, ticks: int, streams: Streams) -> NDArray[np.float64]:
+# Numbers that are transformed at a time, so that they stay in the cache of a processor.
+_CACHED = 2**14
+
+
+def noise_table(seed: Seed, first: int, ticks: int, streams: Streams) -> NDArray[np.float64]:
     """Return standard normal numbers at consecutive control ticks, one stream next to the other.
 
     Every four columns of a stream are a ``np.random.Philox(SeedSequence([seed, stream_key(name), block]))``,
@@ -205,8 +250,8 @@ def noise_table(seed: int, first: int, ticks: int, streams: Streams) -> NDArray[
 
     Parameters
     ----------
-    seed : int
-        Seed of the run.
+    seed : int or (n, 1) array of int
+        Seed of the run, or that of each row.
     first : int
         First tick.
     ticks : int
@@ -216,66 +261,72 @@ def noise_table(seed: int, first: int, ticks: int, streams: Streams) -> NDArray[
 
     Returns
     -------
-    (ticks, total width) array
+    (ticks, total width) array, or (n, ticks, total width) array for n rows
         At most 8.6 in magnitude: the uniform numbers are multiples of 2⁻⁵³.
     """
-    rows, column = np.empty((ticks, width_of(streams))), 0
+    seeds, column = _words(seed), 0
+    table = np.empty((len(seeds), ticks, width_of(streams)))
     for name, width in streams:
-        last = column + width
-        entropy = np.array([*_words(seed), *_words(stream_key(name)), 0], dtype=np.uint64)
-        _fill_normal(entropy, first, rows[:, column:last])
-        column = last
-    return rows
+        key, some = _words(stream_key(name))[0], 1 + _CACHED // (1 + ticks * width)
+        for row in range(0, len(seeds), some):
+            part = table[row : row + some, :, column : column + width]
+            _fill_normal(seeds[row : row + some], key, first, part)
+        column += width
+    return table if isinstance(seed, np.ndarray) else table[0]
 
 
-def _fill_normal(entropy: NDArray[np.uint64], first: int, rows: NDArray[np.float64]) -> None:
-    """Fill the rows of one stream; `entropy` ends with the number of the block, which is overwritten.
+def _fill_normal(
+    seeds: NDArray[np.uint64], key: NDArray[np.uint64], first: int, table: NDArray[np.float64]
+) -> None:
+    """Fill the table (n, ticks, width) of one stream.
 
     The functions are those of NumPy: compiled ones of another library round differently.
     """
-    ticks, width = rows.shape
+    rows, ticks, width = table.shape
     pairs, with_sine = 2 * -(-width // NUMBERS_PER_COUNT), 2 * ((width + 1) // NUMBERS_PER_COUNT)
-    uniform, angle = np.empty((2, pairs, ticks))
+    uniform, angle = np.empty((2, pairs, rows, ticks))
     with _overflowing():
-        _fill_pairs(entropy, np.empty((2, _POOL), np.uint64), np.uint64(first), uniform, angle)
+        _fill_pairs(seeds, key, _scratch(seeds, key), np.uint64(first), uniform, angle)
     logarithm, sine = np.log1p(uniform, out=uniform), np.sin(angle[:with_sine])
-    _transform(logarithm, np.cos(angle, out=angle), sine, rows)
+    _transform(logarithm, np.cos(angle, out=angle), sine, table)
 
 
 @rounding_each
 def _fill_pairs(
-    entropy: NDArray[np.uint64],
+    seeds: NDArray[np.uint64],
+    key: NDArray[np.uint64],
     scratch: NDArray[np.uint64],
     first: np.uint64,
     uniform: NDArray[np.float64],
     angle: NDArray[np.float64],
 ) -> None:
-    """Fill ``-u`` and ``2 pi v`` (pairs, ticks) with the uniform numbers of two pairs of each block."""
-    pool, words = scratch[0], scratch[1]
-    for block in range(uniform.shape[0] // 2):
-        entropy[entropy.shape[0] - 1] = block
-        _fill_pool(entropy, pool)
-        _fill_words(pool, words)
-        key_0, key_1 = words[0] | words[1] << _HALF, words[2] | words[3] << _HALF
-        for tick in range(uniform.shape[1]):
-            a, b, c, d = _philox(first + np.uint64(tick) + _ONE, key_0, key_1)
-            uniform[2 * block, tick] = -(np.float64(a >> _UNUSED) * NUMBER)
-            uniform[2 * block + 1, tick] = -(np.float64(b >> _UNUSED) * NUMBER)
-            angle[2 * block, tick] = 2 * np.pi * (np.float64(c >> _UNUSED) * NUMBER)
-            angle[2 * block + 1, tick] = 2 * np.pi * (np.float64(d >> _UNUSED) * NUMBER)
+    """Fill ``-u`` and ``2 pi v`` (pairs, n, ticks) with the uniform numbers of two pairs of each block."""
+    words, (pairs, rows, ticks) = scratch[2], uniform.shape
+    for row in range(rows):
+        for block in range(pairs // 2):
+            _hash(seeds[row], key, block, scratch)
+            key_0, key_1 = words[0] | words[1] << _HALF, words[2] | words[3] << _HALF
+            for tick in range(ticks):
+                a, b, c, d = _philox(first + np.uint64(tick) + _ONE, key_0, key_1)
+                uniform[2 * block, row, tick] = -(np.float64(a >> _UNUSED) * NUMBER)
+                uniform[2 * block + 1, row, tick] = -(np.float64(b >> _UNUSED) * NUMBER)
+                angle[2 * block, row, tick] = 2 * np.pi * (np.float64(c >> _UNUSED) * NUMBER)
+                angle[2 * block + 1, row, tick] = 2 * np.pi * (np.float64(d >> _UNUSED) * NUMBER)
 
 
 @rounding_each
 def _transform(
-    logarithm: NDArray[np.float64], cosine: NDArray[np.float64], sine: NDArray[np.float64], rows: NDArray
+    logarithm: NDArray[np.float64], cosine: NDArray[np.float64], sine: NDArray[np.float64], table: NDArray
 ) -> None:
-    """Fill rows with the normal numbers of all pairs: cosines of a block first, then its sines."""
-    for tick in range(rows.shape[0]):
-        for column in range(rows.shape[1]):
-            block, place = column // NUMBERS_PER_COUNT, column % NUMBERS_PER_COUNT
-            pair = 2 * block + place % 2
-            turn = cosine[pair, tick] if place < 2 else sine[pair, tick]
-            rows[tick, column] = sqrt(-2.0 * logarithm[pair, tick]) * turn
+    """Fill the table with the normal numbers of all pairs: cosines of a block first, then its sines."""
+    rows, ticks, width = table.shape
+    for row in range(rows):
+        for tick in range(ticks):
+            for column in range(width):
+                block, place = column // NUMBERS_PER_COUNT, column % NUMBERS_PER_COUNT
+                pair = 2 * block + place % 2
+                turn = cosine[pair, row, tick] if place < 2 else sine[pair, row, tick]
+                table[row, tick, column] = sqrt(-2.0 * logarithm[pair, row, tick]) * turn
 
 
 @inlined

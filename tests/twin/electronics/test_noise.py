@@ -77,6 +77,19 @@ def test_streams_are_those_of_numpy(seed, name, channels, count):
     np.testing.assert_array_equal(errors(seed, name, channels, count), streams)
 
 
+@given(
+    st.lists(st.sampled_from(SEEDS) | st.integers(0, 2**63 - 1), min_size=1, max_size=5), st.integers(0, 300)
+)
+def test_rows_are_those_of_their_seeds(seeds, ticks):
+    streams = (("pot.alpha noise", 2), (STREAM, WIDTH), ("much", 70))
+    column = np.array([[seed] for seed in seeds], dtype=None if max(seeds) < 2**63 else object)
+    for function in (uniforms, errors):
+        rows = function(column, STREAM, 3, 5)
+        assert rows.tobytes() == b"".join(function(seed, STREAM, 3, 5).tobytes() for seed in seeds)
+    rows = noise_table(column, 7, ticks, streams)
+    assert rows.tobytes() == b"".join(noise_table(seed, 7, ticks, streams).tobytes() for seed in seeds)
+
+
 def test_a_key_with_one_word_is_hashed_as_numpy_does(monkeypatch):
     """One key in 2³² has no second word, which then is not hashed."""
     monkeypatch.setattr(random_streams, "stream_key", lambda name: 101)
