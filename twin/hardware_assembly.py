@@ -63,8 +63,8 @@ def fill_drive_of(rows: Rows, scenario: ResolvedScenario, actuator: Actuator) ->
 def fill_supervision(rows: Rows, scenario: ResolvedScenario, actuator: Actuator) -> None:
     """Fill supervisions of groups, measurements and commands for a nominal actuator."""
     period_s, nominal = scenario.controller.period_s, scenario.nominal
-    noise_rad, quantum_rad = np.array(nominal.angle_noise_rad), np.array(nominal.angle_resolution_rad)
-    limits = MeasurementLimits(period_s, noise_rad, quantum_rad, actuator.hinge_range_rad)
+    errors_rad = nominal.angle_noise_rad, nominal.angle_resolution_rad
+    limits = MeasurementLimits(period_s, *errors_rad, actuator.hinge_range_rad)
     currents = _nominal_currents(nominal, period_s)
     fill_detector(rows["detector"], scenario.detector, scenario.detects, currents)
     fill_watchdog(rows["watchdog"], scenario.watchdog, limits)
@@ -78,7 +78,7 @@ def _nominal_currents(nominal: ResolvedNominal, period_s: float) -> NominalCurre
         static_error_A=nominal.offset_error_A + nominal.gain_error * nominal.current_limit_A,
         noise_A=nominal.current_noise_A,
         time_constant_s=nominal.time_constant_s,
-        swing_V=nominal.swing_V if nominal.swing_V > 0 else inf,
+        swing_V=np.where(np.greater(nominal.swing_V, 0), nominal.swing_V, inf),
         resistance_ohm=nominal.resistance_ohm,
         inductance_H=nominal.inductance_H,
     )

@@ -20,14 +20,14 @@ from math import sqrt
 from typing import Annotated, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 from pydantic import BaseModel, ConfigDict, Field
 
 from spheretwin.control.applied_torque import split_delay
 from spheretwin.control.law import NonNegativeEach, each
 from spheretwin.models.base.compiled import allocation_free
 from spheretwin.models.base.history import delayed_mean, push
-from spheretwin.models.base.record import Record, Rows, field
+from spheretwin.models.base.record import Record, Rows, field, put
 from spheretwin.models.kinematics import triple, turns
 from spheretwin.models.lagrangian import coriolis_rows, inertia_entries
 
@@ -75,9 +75,9 @@ class FeedForward(Record):
 class NominalRotor(NamedTuple):
     """Nominal inertia and friction of the rotor."""
 
-    inertia: Array  # (3,) kg·m²
-    coulomb_Nm: Array  # (3,)
-    viscous_Nm_s: Array  # (3,)
+    inertia: ArrayLike  # (3,) kg·m²
+    coulomb_Nm: ArrayLike  # (3,)
+    viscous_Nm_s: ArrayLike  # (3,)
 
 
 def fill_feed_forward(
@@ -93,11 +93,18 @@ def fill_feed_forward(
     period_s, delay_s : float, s
         Control period, and the delay that the law receives.
     """
-    rows["on"], rows["share"], rows["inertia"] = section.on, section.inertia, rotor.inertia
-    rows["coulomb_Nm"] = np.array(section.friction) * rotor.coulomb_Nm
-    rows["viscous_Nm_s"] = np.array(section.friction) * rotor.viscous_Nm_s
-    rows["smoothing_rad_s"] = section.smoothing_rad_s
-    rows["due"], rows["fraction"] = split_delay(delay_s, period_s)
+    due, fraction = split_delay(delay_s, period_s)
+    put(
+        rows,
+        on=section.on,
+        share=section.inertia,
+        inertia=rotor.inertia,
+        coulomb_Nm=np.multiply(section.friction, rotor.coulomb_Nm),
+        viscous_Nm_s=np.multiply(section.friction, rotor.viscous_Nm_s),
+        smoothing_rad_s=section.smoothing_rad_s,
+        due=due,
+        fraction=fraction,
+    )
 
 
 @allocation_free

@@ -34,7 +34,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from spheretwin.control.applied_torque import AppliedTorque, LagStep, fill_lag_step
 from spheretwin.models.base.compiled import allocation_free
-from spheretwin.models.base.record import Record, Rows, field
+from spheretwin.models.base.record import Record, Rows, field, put
 from spheretwin.models.coil_group import PerGroup
 from spheretwin.models.kinematics import generalised_torque, triple, turns
 from spheretwin.models.lagrangian import acceleration_entries
@@ -90,8 +90,8 @@ class DelayModel(NamedTuple):
 
 def fill_prediction(rows: Rows, section: PredictionSection, model: DelayModel) -> None:
     """Fill predictions without pending commands."""
-    rows["on"], rows["ahead_s"], rows["period_s"] = section.on, model.delay_s, model.period_s
-    rows["inertia"], rows["matrix"]["q"] = model.inertia, np.nan
+    put(rows, on=section.on, ahead_s=model.delay_s, period_s=model.period_s, inertia=model.inertia)
+    rows["matrix"]["q"] = np.nan
     fill_lag_step(rows["full_lag"], model.period_s, model.time_constant_s)
 
 

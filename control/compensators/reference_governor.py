@@ -31,7 +31,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from spheretwin.control.law import PositiveEach
 from spheretwin.models.base.compiled import allocation_free
-from spheretwin.models.base.record import Record, Rows, field
+from spheretwin.models.base.record import Record, Rows, field, put
 
 Array = NDArray[np.float64]
 
@@ -70,8 +70,8 @@ class Governor(Record):
 
 def fill_governor(rows: Rows, section: GovernorSection, period_s: float) -> None:
     """Fill governors before the first tick."""
-    rows["on"], rows["period_s"] = section.on, period_s
-    rows["largest_rad_s2"] = section.acceleration_rad_s2 or 1.0
+    given = section.acceleration_rad_s2
+    put(rows, on=section.on, period_s=period_s, largest_rad_s2=1.0 if given is None else given)
 
 
 @allocation_free

@@ -29,8 +29,8 @@ that time it may look like no current. The detector waits for that many ticks, a
 
 from __future__ import annotations
 
-from math import ceil, exp
-from typing import Annotated, NamedTuple
+from math import exp
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -44,8 +44,8 @@ from spheretwin.control.supervision.enabled_groups import (
     EnabledGroups,
 )
 from spheretwin.models.base.compiled import allocation_free
-from spheretwin.models.base.record import Record, Rows, field
-from spheretwin.models.coil_group import PerGroup, of_each_group
+from spheretwin.models.base.record import Record, Rows, field, put
+from spheretwin.models.coil_group import PerGroup
 from spheretwin.models.kinematics import angular_velocity
 
 DEVIATIONS = 6.0
@@ -83,7 +83,7 @@ class NominalCurrents(NamedTuple):
     noise_A: float
     """Standard deviation of a measured current."""
     time_constant_s: PerGroup
-    swing_V: float
+    swing_V: float | Array
     """Of the amplifiers; infinite if unknown."""
     resistance_ohm: PerGroup
     inductance_H: PerGroup
@@ -106,34 +106,35 @@ class Detector(Record):
     rate_S: Array = field("angular velocity, stator frame", "rad/s", 3)
 
 
-def derived_threshold_A(nominal: NominalCurrents) -> float:
+def derived_threshold_A(nominal: NominalCurrents) -> Any:
     """Return the threshold that avoids false alarms; see the module's docstring."""
     errors = nominal.static_error_A + DEVIATIONS * nominal.noise_A
-    return max(LEAST_SHARE * nominal.current_limit_A, errors)
+    return np.maximum(LEAST_SHARE * nominal.current_limit_A, errors)
 
 
-def derived_ticks(nominal: NominalCurrents) -> int:
+def derived_ticks(nominal: NominalCurrents) -> NDArray[np.float64]:
     """Return the ticks for which a healthy current of the slowest group may look like none, plus one."""
-    values = nominal.resistance_ohm, nominal.inductance_H, nominal.time_constant_s
-    slow_s = 0.0
-    for R, L, lag_s in zip(*map(np.ravel, np.broadcast_arrays(*values)), strict=True):
-        spare_V = nominal.swing_V - R * nominal.current_limit_A
-        # If the swing cannot drive the limit at all, the current settles with L/R at best.
-        natural_s = SETTLING * L / R
-        swing_s = 2 * nominal.current_limit_A * L / spare_V if spare_V > 0 else natural_s
-        slow_s = max(slow_s, min(swing_s, natural_s) + SETTLING * lag_s)
-    return 1 + ceil(slow_s / nominal.period_s)
+    R, L, lag_s = map(np.atleast_1d, (nominal.resistance_ohm, nominal.inductance_H, nominal.time_constant_s))
+    spare_V = nominal.swing_V - R * nominal.current_limit_A
+    # If the swing cannot drive the limit at all, the current settles with L/R at best.
+    swing_s = 2 * nominal.current_limit_A * L / np.where(spare_V > 0, spare_V, np.nan)
+    slow_s = np.fmin(swing_s, SETTLING * L / R) + SETTLING * lag_s
+    return 1 + np.ceil(np.max(slow_s, axis=-1, keepdims=True) / nominal.period_s)
 
 
 def fill_detector(rows: Rows, section: DetectorSection, on: bool, nominal: NominalCurrents) -> None:
     """Fill detectors before the first measurement, for the nominal currents of healthy groups."""
-    resistance_ohm = of_each_group(nominal.resistance_ohm, rows["decay"].shape[-1])
-    periods = nominal.period_s * resistance_ohm / nominal.inductance_H
-    rows["on"] = on
-    rows["threshold_A"] = section.threshold_A or derived_threshold_A(nominal)
-    rows["ticks"] = section.ticks or derived_ticks(nominal)
-    rows["decay"] = [exp(-rate) for rate in periods]
-    rows["resistance_ohm"], rows["reach_A"] = resistance_ohm, nominal.swing_V / resistance_ohm
+    resistance_ohm = np.asarray(nominal.resistance_ohm)
+    periods = np.asarray(nominal.period_s * resistance_ohm / nominal.inductance_H)
+    put(
+        rows,
+        on=on,
+        threshold_A=derived_threshold_A(nominal) if section.threshold_A is None else section.threshold_A,
+        ticks=derived_ticks(nominal) if section.ticks is None else section.ticks,
+        decay=np.reshape([exp(-rate) for rate in periods.ravel()], periods.shape),
+        resistance_ohm=resistance_ohm,
+        reach_A=nominal.swing_V / resistance_ohm,
+    )
 
 
 @allocation_free

@@ -16,11 +16,11 @@ from math import isfinite, sqrt
 from typing import Annotated, Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 from pydantic import BaseModel, ConfigDict, Field
 
 from spheretwin.models.base.compiled import allocation_free
-from spheretwin.models.base.record import Record, Rows, field
+from spheretwin.models.base.record import Record, Rows, field, put
 
 Array = NDArray[np.float64]
 
@@ -115,22 +115,26 @@ class MeasurementLimits(NamedTuple):
     """Sampling, sensor errors and hinge ranges that bound a plausible measurement."""
 
     period_s: float
-    noise_rad: Array  # (3,) standard deviation of each measured angle
-    quantum_rad: Array  # (3,)
+    noise_rad: ArrayLike  # (3,) standard deviation of each measured angle
+    quantum_rad: ArrayLike  # (3,)
     hinge_range_rad: Array  # (3, 2) nominal
 
 
 def fill_watchdog(rows: Rows, section: WatchdogSection, limits: MeasurementLimits) -> None:
     """Fill watchdogs before the first measurement."""
-    low, high = limits.hinge_range_rad.T
-    rows["on"], rows["action"] = section.on, SHORT if section.action == "short" else RELEASE
-    rows["rundown_ticks"] = round(section.rundown_s / limits.period_s)
-    rows["stale_ticks"] = section.stale_ticks
-    rows["largest_rate_rad_s"] = section.largest_rate_rad_s
-    rows["step_rad"] = section.largest_rate_rad_s * limits.period_s
-    rows["noise_rad"] = DEVIATIONS * sqrt(2) * limits.noise_rad + limits.quantum_rad
-    rows["lowest_rad"], rows["highest_rad"] = low + section.edge_margin_rad, high - section.edge_margin_rad
-    rows["last_rad"] = np.nan
+    put(
+        rows,
+        on=section.on,
+        action=SHORT if section.action == "short" else RELEASE,
+        rundown_ticks=np.rint(section.rundown_s / limits.period_s),
+        stale_ticks=section.stale_ticks,
+        largest_rate_rad_s=section.largest_rate_rad_s,
+        step_rad=section.largest_rate_rad_s * limits.period_s,
+        noise_rad=np.multiply(DEVIATIONS * sqrt(2), limits.noise_rad) + limits.quantum_rad,
+        lowest_rad=limits.hinge_range_rad[..., 0] + section.edge_margin_rad,
+        highest_rad=limits.hinge_range_rad[..., 1] - section.edge_margin_rad,
+        last_rad=np.nan,
+    )
 
 
 @allocation_free
