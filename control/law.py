@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Iterable
 from copy import deepcopy
 from dataclasses import dataclass, replace
@@ -155,8 +156,8 @@ class Law:
                 f"law {self.name}: expected signals of at most {len(self.state)} numbers, the size of its"
                 f" state, received {shown(width(self.signals))}"
             )
-        names = [*COMMON_NAMES, *(signal.name for signal in self.signals)]
-        if twice := sorted({name for name in names if names.count(name) > 1}):
+        names = Counter([*COMMON_NAMES, *(signal.name for signal in self.signals)])
+        if twice := sorted(name for name, count in names.items() if count > 1):
             raise InputError(f"law {self.name}: expected new names of signals, received {', '.join(twice)}")
         period_s, limit_A = self.period_s, self.current_limit_A
         if period_s is not None and not (isinstance(period_s, int | float) and 0 < period_s < np.inf):
@@ -214,9 +215,9 @@ def _numbers(law: str, field: str, value: ArrayLike) -> NDArray[np.float64]:
         raise InputError(
             f"law {law}: expected {field} as a one-dimensional array, received shape {array.shape}"
         )
-    numbers = np.array(array, order="C")
-    if not np.all(np.isfinite(numbers)):
-        entry = int(np.argmin(np.isfinite(numbers)))
+    numbers, is_finite = np.array(array, order="C"), np.isfinite(array)
+    if not is_finite.all():
+        entry = int(is_finite.argmin())
         raise InputError(
             f"law {law}: expected finite numbers in {field}, received {numbers[entry]} as entry {entry}"
         )

@@ -17,6 +17,7 @@ hardware a faster one is better. `spheretwin reproduce rivals` reports the figur
 searches ω and w_e.
 """
 
+from functools import lru_cache
 from typing import Literal
 
 import numpy as np
@@ -33,6 +34,7 @@ BANDWIDTH_rad_s = 60.0
 FASTEST = 10.0
 
 
+@lru_cache(maxsize=64)
 def regulator(
     error_weight: float, rate_weight: float, integral_weight: float, period_s: float
 ) -> tuple[float, float, float]:
