@@ -20,8 +20,9 @@ from spheretwin.control.supervision.enabled_groups import EnabledGroups, mask_di
 from spheretwin.control.supervision.fault_detector import Detector, detect_faults
 from spheretwin.control.supervision.watchdog import GO, Reason, Watchdog, trip, watch
 from spheretwin.models.base.addresses import caller_of
+from spheretwin.models.base.columns import MixedRowsError, column_of
 from spheretwin.models.base.compiled import allocation_free
-from spheretwin.models.base.record import Record, Rows, field
+from spheretwin.models.base.record import Record, Rows, field, put
 from spheretwin.models.kinematics import cartesian_torque
 from spheretwin.models.magnetics import Arrangement, CachedMatrix, Tables, TorqueModel, update_cached_matrix
 from spheretwin.models.telemetry.signals import width
@@ -83,35 +84,73 @@ class Controller(NamedTuple):
     tables: Tables
 
 
+class ControllerRows(NamedTuple):
+    """Controllers of the runs of a block, one for each row; `row` is one of them."""
+
+    data: Rows  # array of `ControllerData`
+    parameters: Array  # (rows, p)
+    memory: Array  # (rows, m)
+    estimator_parameters: Array
+    estimator_memory: Array
+    tables: Tables
+
+    def row(self, i: int) -> Controller:
+        """Return the controller of a row, which shares its numbers."""
+        return Controller(
+            self.data[i : i + 1],
+            self.parameters[i],
+            self.memory[i],
+            self.estimator_parameters[i],
+            self.estimator_memory[i],
+            self.tables,
+        )
+
+
 def controller(
-    rows: Rows, law: laws.Law, estimator: Estimator | None, magnetics: TorqueModel, current_limit_A: float
-) -> Controller:
-    """Return a controller without compensators and supervision.
+    rows: Rows,
+    law: laws.Law | list[laws.Law],
+    estimator: Estimator | list[Estimator] | None,
+    magnetics: TorqueModel,
+    current_limit_A: Any,
+) -> ControllerRows:
+    """Return controllers without compensators and supervision.
 
     Parameters
     ----------
-    rows : array of one ControllerData
+    rows : array of ControllerData
         In which all numbers are 0; filled.
-    law : Law
-        Its parameters and state are copied: a law may change both.
-    estimator : Estimator or None
+    law : Law, or list with one for each row
+        Parameters and state are copied: a law may change both.
+    estimator : Estimator, or list with one for each row, or None
         Estimator of the rates; None if the law receives the measured rates.
     magnetics : TorqueModel
         Nominal.
-    current_limit_A : float, A
-        Largest group current that the controller commands.
+    current_limit_A : float, or one for each row, A
+        Largest group current that the controller commands, unless that of the law is less.
+
+    Raises
+    ------
+    MixedRowsError
+        The laws, or the estimators, have other functions or sizes in some rows than in others.
     """
-    rows["arrangement"], rows["estimator_on"] = magnetics.arrangement, estimator is not None
-    rows["logged"], rows["matrix"]["q"] = width(law.signals), np.nan
-    rows["current_limit_A"], rows["authority"] = current_limit_A, 1.0
-    return Controller(
-        rows,
-        law.parameters.copy(),
-        law.state.copy(),
-        estimator.parameters.copy() if estimator else np.zeros(0),
-        estimator.state.copy() if estimator else np.zeros(0),
-        magnetics.tables,
-    )
+    members = law if isinstance(law, list) else [law] * len(rows)
+    estimators = estimator if isinstance(estimator, list) else [estimator] * len(rows)
+    limit_A = np.minimum(current_limit_A, column_of([member.current_limit_A for member in members]))
+    rows["logged"], rows["estimator_on"] = width(members[0].signals), estimators[0] is not None
+    rows["arrangement"], rows["matrix"]["q"], rows["authority"] = magnetics.arrangement, np.nan, 1.0
+    put(rows, current_limit_A=limit_A)
+    numbers = *_numbers("law", members), *_numbers("estimator", estimators)
+    return ControllerRows(rows, *numbers, magnetics.tables)
+
+
+def _numbers(part: str, members: list[Any]) -> tuple[Array, Array]:
+    """Return parameters and state of the laws, or of the estimators, of all rows; none of None."""
+    if not any(members):
+        return np.zeros((len(members), 0)), np.zeros((len(members), 0))
+    kinds = [member and (member.step, len(member.parameters), len(member.state)) for member in members]
+    if any(kind != kinds[0] for kind in kinds):
+        raise MixedRowsError(f"expected one kind of {part} in all rows, received others")
+    return np.array([member.parameters for member in members]), np.array([member.state for member in members])
 
 
 @allocation_free

@@ -21,7 +21,7 @@ from spheretwin.faults.schedule import part_names
 from spheretwin.hardware_assembly import delays_of, fill_drive_of, fill_supervision
 from spheretwin.models.actuator import Actuator
 from spheretwin.models.base.errors import InputError, SpheretwinError, exception_text, shown
-from spheretwin.models.base.record import Record, Rows, field
+from spheretwin.models.base.record import Record, Rows, field, put
 from spheretwin.models.base.reuse import reused
 from spheretwin.models.magnetics import TorqueModel, scaled, torque_model
 from spheretwin.models.scatter import scattered_model
@@ -83,10 +83,8 @@ def _known(scenario: ResolvedScenario) -> NominalModel:
 
 @reused
 def _known_to(section: Any, nominal: ResolvedNominal) -> NominalModel:
-    period_s, delay_s, inertia = section.period_s, nominal.delay_s, np.array(nominal.inertia_kg_m2)
-    if section.prediction.on:
-        return NominalModel(period_s, 0.0, inertia, ahead_s=delay_s)
-    return NominalModel(period_s, delay_s, inertia)
+    ahead_s, inertia = nominal.delay_s * section.prediction.on, np.array(nominal.inertia_kg_m2)
+    return NominalModel(section.period_s, nominal.delay_s - ahead_s, inertia, ahead_s)
 
 
 def signals_of(scenario: ResolvedScenario, actuator: Actuator, law: Law) -> tuple[Signal, ...]:
@@ -175,21 +173,20 @@ def controller_of(
         Nominal.
     """
     nominal, period_s = scenario.nominal, scenario.controller.period_s
-    limit_A = min(nominal.current_limit_A, law.current_limit_A)
-    made = controller(rows, law, estimator, magnetics, limit_A)
+    made = controller(rows, law, estimator, magnetics, nominal.current_limit_A)
     on = law.asks_torque or scenario.detects or scenario.controller.prediction.on
     fill_applied_torque(rows["applied_torque"], on, period_s, nominal.delay_s, nominal.time_constant_s)
     _fill_compensators(rows["compensators"], scenario)
     fill_supervision(rows["supervision"], scenario, actuator)
-    rows["manual"]["on"] = scenario.manual.on
-    return made
+    put(rows["manual"], on=scenario.manual.on)
+    return made.row(0)
 
 
 def _fill_compensators(rows: Rows, scenario: ResolvedScenario) -> None:
     section, nominal, known = scenario.controller, scenario.nominal, _known(scenario)
     delay = DelayModel(known.period_s, known.ahead_s, nominal.time_constant_s, known.inertia)
-    rotor = NominalRotor(known.inertia, np.array(nominal.coulomb_Nm), np.array(nominal.viscous_Nm_s))
-    rows["on"] = section.governor.on or section.prediction.on or section.feed_forward.on
+    rotor = NominalRotor(known.inertia, nominal.coulomb_Nm, nominal.viscous_Nm_s)
+    put(rows, on=section.governor.on | section.prediction.on | section.feed_forward.on)
     fill_governor(rows["governor"], section.governor, known.period_s)
     fill_prediction(rows["prediction"], section.prediction, delay)
     fill_feed_forward(rows["feed_forward"], section.feed_forward, rotor, known.period_s, known.delay_s)
