@@ -282,7 +282,7 @@ class GearSection(SensorStage):
 
     def fill(self, rows, setup):
         rows["on"] = not self.ideal or setup.faults
-        rows["ratio"] = 1 + self.ratio_error * errors(setup.seed, setup.name, 3, 1)[:, 0]
+        rows["ratio"] = 1 + self.ratio_error * errors(setup.seed, setup.name, 3, 1)[..., 0]
         fill_fault_line(rows["line"])
 
     @classmethod

@@ -16,7 +16,7 @@ Settling (20 µs) and glitches are neglected: a few hundredths of a physics step
 
 from __future__ import annotations
 
-from math import hypot, isnan, nan
+from math import isnan, nan
 from typing import Annotated, Any, ClassVar
 
 import numpy as np
@@ -37,7 +37,7 @@ from spheretwin.electronics.stages import (
 from spheretwin.electronics.transducers import CHANNELS
 from spheretwin.models.base.compiled import inlined
 from spheretwin.models.base.history import push
-from spheretwin.models.base.record import Record, Rows, field
+from spheretwin.models.base.record import Record, Rows, field, put
 
 Array = NDArray[np.float64]
 
@@ -274,18 +274,15 @@ class AdcSection(SensorStage):
     def fill(self, rows: Rows, setup: SensorSetup) -> None:
         """Fill the channels, with errors from the seed; they also convert if the tracks have errors."""
         track = setup.sensors.potentiometer
-        converts = not (self.ideal and track.ideal)
-        shares = np.zeros((CHANNELS, ERRORS))
-        if self.offset_V or self.gain_error:
-            shares = errors(setup.seed, setup.name, CHANNELS, ERRORS)
-        rows["on"], rows["converts"] = converts or setup.faults, converts
-        rows["volts_per_rad"], rows["noise_V"] = track.volts_per_rad, self.input_noise_V(setup.sensors)
-        for channel in range(CHANNELS):
-            fill_adc(rows["channels"][:, channel], self, shares[channel])
-        rows["first_draw"] = setup.first_draw
-        rows["end_draw"] = setup.first_draw + self.draws(setup.sensors)
+        converts = ~np.logical_and(self.ideal, track.ideal)
+        put(rows, on=converts | setup.faults, converts=converts, volts_per_rad=track.volts_per_rad)
+        put(rows, noise_V=setup.sensors.conversion_noise_V)
+        rows["first_draw"], rows["end_draw"], rows["delayed_rad"] = setup.first_draw, setup.end_draw, nan
+        shares, draws = np.zeros((CHANNELS, ERRORS)), np.logical_or(self.offset_V, self.gain_error)
+        if np.count_nonzero(draws):
+            shares = np.where(draws[..., None], errors(setup.seed, setup.name, CHANNELS, ERRORS), 0.0)
+        fill_adcs(rows["channels"], self, shares)
         fill_fault_line(rows["line"])
-        rows["delayed_rad"] = nan
 
     @classmethod
     def function(cls) -> Any:
@@ -294,12 +291,7 @@ class AdcSection(SensorStage):
 
     def draws(self, sensors: Any) -> int:
         """Return one number for each conversion and channel; 0 without noise."""
-        return CHANNELS * self.oversampling if self.input_noise_V(sensors) else 0
-
-    def input_noise_V(self, sensors: Any) -> float:
-        """Return the noise of one conversion, V rms, of wiper and converter, which are independent."""
-        track = sensors.potentiometer
-        return hypot(track.volts_per_rad * track.noise_rad, self.noise_V)
+        return CHANNELS * self.oversampling if sensors.conversion_noise_V else 0
 
     @property
     def step_V(self) -> float:
@@ -329,19 +321,20 @@ def _delayed(stage: Adcs, channel: int, angle: float) -> float:
     return history[stage.delay_ticks, channel]
 
 
-def fill_adc(rows: Rows, section: AdcSection, shares: Array) -> None:
-    """Fill a channel with its own offset and gain error.
+def fill_adcs(rows: Rows, section: AdcSection, shares: Array) -> None:
+    """Fill channels, each with its own offset and gain error.
 
     Parameters
     ----------
-    rows : array of Adc
+    rows : (n, channels) array of Adc
     section : AdcSection
-    shares : (`ERRORS`,) array
-        Shares of the largest offset and of the largest gain error, -1 to 1, drawn for this channel.
+    shares : (channels, `ERRORS`) or (n, channels, `ERRORS`) array
+        Shares of the largest offset and of the largest gain error, -1 to 1.
     """
     half = 2.0 ** (section.bits - 1)
     rows["step_V"], rows["lowest"], rows["highest"] = section.step_V, -half, half - 1
-    rows["offset_V"], rows["gain"] = section.offset_V * shares[0], 1 + section.gain_error * shares[1]
+    rows["offset_V"] = section.offset_V * shares[..., 0]
+    rows["gain"] = 1 + section.gain_error * shares[..., 1]
 
 
 @inlined

@@ -7,7 +7,7 @@ the last angle again, with a flag that it is not new.
 
 from __future__ import annotations
 
-from math import isfinite, isnan, nan
+from math import hypot, isfinite, isnan, nan
 from typing import Any
 
 import numpy as np
@@ -15,11 +15,12 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, Field
 
 from spheretwin.electronics.converters import AdcSection
-from spheretwin.electronics.random_streams import Streams, width_of
+from spheretwin.electronics.random_streams import Seed, Streams, width_of
 from spheretwin.electronics.stages import SensorSetup, SensorStage, TickNoise, chained
 from spheretwin.electronics.transducers import CurrentSection, EncoderSection, PotentiometerSection
+from spheretwin.models.base.columns import MixedRowsError
 from spheretwin.models.base.compiled import copy_into, inlined
-from spheretwin.models.base.record import Record, Rows, field, record_of
+from spheretwin.models.base.record import Record, Rows, field, put, record_of
 from spheretwin.trajectories.rounding import CONFIG, Triple
 
 
@@ -44,6 +45,34 @@ class SensorsSection(BaseModel):
         """True if the controller receives the true angles."""
         stages = (getattr(self, name) for name in STAGES)
         return not any(self.angle_offset_rad) and all(stage.ideal for stage in stages)
+
+    @property
+    def shifts(self) -> bool:
+        """True if any offset or skew is not 0."""
+        return any(self.angle_offset_rad) or self.adc.skew_s > 0
+
+    @property
+    def draws(self) -> tuple[int, ...]:
+        """Standard normal numbers per tick that each stage needs."""
+        return tuple(getattr(self, name).draws(self) for name in STAGES)
+
+    @property
+    def conversion_noise_V(self) -> float:
+        """Noise of one conversion, V rms, of wiper and converter, which are independent."""
+        track = self.potentiometer
+        return hypot(track.volts_per_rad * track.noise_rad, self.adc.noise_V)
+
+    @property
+    def angle_noise_rad(self) -> Triple:
+        """Standard deviation of the noise of each angle; with oversampling, of the mean of conversions."""
+        noise_rad = self.conversion_noise_V / self.potentiometer.volts_per_rad / self.adc.oversampling**0.5
+        return noise_rad, noise_rad, 0.0
+
+    @property
+    def angle_resolution_rad(self) -> Triple:
+        """Step between two values of each angle; 0 for none."""
+        step_rad = self.adc.step_V / self.potentiometer.volts_per_rad / self.adc.oversampling
+        return step_rad, step_rad, 2 * np.pi / self.encoder.counts if self.encoder.counts else 0.0
 
 
 STAGES: dict[str, type[SensorStage]] = {
@@ -76,7 +105,7 @@ class SensorChain(Record):
     output_rad: Array = field("angles of the last tick; NaN before the first", "rad", 3, state=True)
 
 
-def fill_sensors(rows: Rows, section: SensorsSection, seed: int, faults: bool = False) -> None:
+def fill_sensors(rows: Rows, section: SensorsSection, seed: Seed, faults: bool = False) -> None:
     """Fill sensors with errors drawn from the seed.
 
     Each stage and channel has its own stream, keyed by its name: no other stage changes its numbers.
@@ -86,53 +115,38 @@ def fill_sensors(rows: Rows, section: SensorsSection, seed: int, faults: bool = 
     rows : array of SensorChain
         In which all numbers are 0.
     section : SensorsSection
-    seed : int
-        Seed of the run: the same seed gives the same prototype.
+    seed : int or (n, 1) array of int
+        Seed of the run, or that of each row: the same seed gives the same prototype.
     faults : bool
         Whether a fault may occur.
     """
-    first_draw = 0
-    rows["offset_rad"], rows["skew_s"] = section.angle_offset_rad, (0.0, section.adc.skew_s, 0.0)
-    rows["shifts"] = any(section.angle_offset_rad) or section.adc.skew_s > 0
-    for name in _NAMES:
-        parameters = getattr(section, name)
-        parameters.fill(
-            rows["stages"][name], SensorSetup(section, seed, f"sensors.{name}", first_draw, faults)
-        )
-        first_draw += parameters.draws(section)
-    rows["fresh"], rows["output_rad"] = 1.0, nan
+    put(rows, offset_rad=section.angle_offset_rad, shifts=section.shifts)
+    rows["skew_s"][:, 1:2], rows["fresh"], rows["output_rad"] = section.adc.skew_s, 1.0, nan
+    first = 0
+    for name, width in _draws(section):
+        setup = SensorSetup(section, seed, f"sensors.{name}", first, first + width, faults)
+        getattr(section, name).fill(rows["stages"][name], setup)
+        first += width
+
+
+def _draws(section: SensorsSection) -> list[tuple[str, int]]:
+    """Return the names of the stages and their random numbers per tick, which all rows have."""
+    widths = section.draws
+    if isinstance(widths, np.ndarray):
+        raise MixedRowsError("expected as many random numbers of the sensors in all rows, received others")
+    return list(zip(_NAMES, widths, strict=True))
 
 
 def noise_streams(section: SensorsSection) -> Streams:
     """Return the random streams that `sense` needs, with their widths."""
-    widths = ((f"sensors.{name} noise", getattr(section, name).draws(section)) for name in _NAMES)
-    return tuple((name, width) for name, width in widths if width)
-
-
-def accuracy(section: SensorsSection) -> tuple[Triple, Triple]:
-    """Return noise and resolution of the three measured angles.
-
-    Returns
-    -------
-    tuple of 3 floats, rad
-        Standard deviation of the noise of each angle; with oversampling, of the mean of all conversions.
-    tuple of 3 floats, rad
-        Step between two values of each angle; 0 for none.
-    """
-    track, converter, lines = section.potentiometer, section.adc, section.encoder.counts
-    noise_rad = converter.input_noise_V(section) / track.volts_per_rad / converter.oversampling**0.5
-    step_V = 2 * converter.range_V / 2**converter.bits if converter.bits else 0.0
-    step_rad = step_V / track.volts_per_rad / converter.oversampling
-    count_rad = 2 * np.pi / lines if lines else 0.0
-    return (noise_rad, noise_rad, 0.0), (step_rad, step_rad, count_rad)
+    return tuple((f"sensors.{name} noise", width) for name, width in _draws(section) if width)
 
 
 def sensor_sheet(sensors: SensorsSection) -> dict[str, Any]:
     """Return the nominal values of the sensors, by field of `nominal`."""
-    noise_rad, resolution_rad = accuracy(sensors)
     return {
-        "angle_noise_rad": noise_rad,
-        "angle_resolution_rad": resolution_rad,
+        "angle_noise_rad": sensors.angle_noise_rad,
+        "angle_resolution_rad": sensors.angle_resolution_rad,
         "current_noise_A": sensors.current.noise_A,
     }
 

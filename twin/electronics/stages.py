@@ -11,8 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel
 
+from spheretwin.electronics.random_streams import Seed
 from spheretwin.models.base.compiled import inlined
-from spheretwin.models.base.record import Record, Rows, field
+from spheretwin.models.base.record import Record, Rows, field, put
 from spheretwin.trajectories.rounding import CONFIG
 
 Array = NDArray[np.float64]
@@ -71,7 +72,7 @@ def fill_fault_line(rows: Rows, last: float = nan) -> None:
     last : float
         Value that is held if a fault occurs before the first value; NaN to hold the first value.
     """
-    rows["gain"], rows["last"] = 1.0, last
+    put(rows, gain=1.0, last=last)
 
 
 @inlined
@@ -103,11 +104,13 @@ class SensorSetup(NamedTuple):
 
     sensors: Any
     """Section with the parameters of all stages."""
-    seed: int
+    seed: Seed
     name: str
     """Name of the stage, which keys its random streams."""
     first_draw: int
     """Column of its first random number."""
+    end_draw: int
+    """Column after its last random number."""
     faults: bool
     """True if a fault may occur."""
 

@@ -19,7 +19,7 @@ from spheretwin.electronics.stages import (
     through,
 )
 from spheretwin.models.base.compiled import inlined
-from spheretwin.models.base.record import Record, Rows, field
+from spheretwin.models.base.record import Record, Rows, field, put
 from spheretwin.trajectories.rounding import CONFIG
 
 Array = NDArray[np.float64]
@@ -127,17 +127,15 @@ class PotentiometerSection(SensorStage):
 
     def fill(self, rows: Rows, setup: SensorSetup) -> None:
         """Fill the potentiometers, with residuals from the seed; with ends if the converter is not ideal."""
-        converts = not (self.ideal and setup.sensors.adc.ideal)
-        phases = np.zeros((CHANNELS, HARMONICS))
-        if self.nonlinearity_rad:
-            phases = uniforms(setup.seed, setup.name, CHANNELS, HARMONICS)
-        rows["on"], rows["converts"] = converts or setup.faults, converts
-        rows["volts_per_rad"] = self.volts_per_rad
-        for channel in range(CHANNELS):
-            fill_potentiometer(rows["channels"][:, channel], self, phases[channel])
-        fill_fault_line(rows["line"])
-        rows["half_play_rad"], rows["repeatability_rad"] = self.hysteresis_rad / 2, self.repeatability_rad
+        converts = ~np.logical_and(self.ideal, setup.sensors.adc.ideal)
+        put(rows, on=converts | setup.faults, converts=converts, volts_per_rad=self.volts_per_rad)
+        put(rows, half_play_rad=self.hysteresis_rad / 2, repeatability_rad=self.repeatability_rad)
         rows["first_draw"], rows["wiper_rad"] = setup.first_draw, nan
+        phases = np.zeros((CHANNELS, HARMONICS))
+        if np.count_nonzero(self.nonlinearity_rad):
+            phases = uniforms(setup.seed, setup.name, CHANNELS, HARMONICS)
+        fill_potentiometers(rows["channels"], self, phases)
+        fill_fault_line(rows["line"])
 
     def draws(self, sensors: Any) -> int:
         """Return one number for each channel, used at a reversal; 0 if the play is constant."""
@@ -192,25 +190,27 @@ def wiper_angle(stage: Potentiometers, channel: int, angle_rad: float, draws: Ar
     return wiper
 
 
-def fill_potentiometer(rows: Rows, section: PotentiometerSection, shares: Array) -> None:
-    """Fill a potentiometer with its own residual.
+def fill_potentiometers(rows: Rows, section: PotentiometerSection, shares: Array) -> None:
+    """Fill potentiometers, each with its own residual.
 
     The residual is a sum of the first harmonics of the track, the k-th with an amplitude of 1/k² and a phase
     drawn at random, scaled so that its largest magnitude on the track is the stated one.
 
     Parameters
     ----------
-    rows : array of Potentiometer
+    rows : (n, channels) array of Potentiometer
     section : PotentiometerSection
-    shares : (HARMONICS,) array
-        Phases of the harmonics as shares of a turn, 0 to 1, drawn for this channel.
+    shares : (channels, HARMONICS) or (n, channels, HARMONICS) array
+        Phases of the harmonics as shares of a turn, 0 to 1.
     """
-    if section.nonlinearity_rad:
+    if np.count_nonzero(section.nonlinearity_rad):
+        largest_rad = np.reshape(section.nonlinearity_rad, (-1, 1, 1))
         shape = np.exp(1j * (2 * pi * shares)) / np.arange(1, HARMONICS + 1) ** 2
-        residual = section.nonlinearity_rad / _peak(shape) * shape
-        rows["cosine_rad"], rows["sine_rad"] = residual.real, -residual.imag
-    rows["volts_per_rad"] = section.volts_per_rad
-    rows["half_angle_rad"], rows["half_supply_V"] = section.electrical_angle_rad / 2, section.supply_V / 2
+        residual = largest_rad / _peak(shape) * shape
+        harmonics = np.where(largest_rad == 0, 0.0, (residual.real, -residual.imag))
+        rows["cosine_rad"], rows["sine_rad"] = harmonics
+    rows["volts_per_rad"], rows["half_supply_V"] = section.volts_per_rad, section.supply_V / 2
+    rows["half_angle_rad"] = section.electrical_angle_rad / 2
     rows["turns"] = 2 * pi / section.electrical_angle_rad
 
 
@@ -239,19 +239,21 @@ def wiper_voltage(potentiometer: Potentiometer, angle_rad: float) -> float:
     return volts
 
 
-def _peak(shape: NDArray[np.complex128]) -> float:
-    """Return the largest magnitude of ``Re Σ shape[k-1]·exp(ikθ)``: exact, from the roots of its slope.
+def _peak(shape: NDArray[np.complex128]) -> Array:
+    """Return the largest magnitude (…, 1) of ``Re Σ shape[k-1]·exp(ikθ)``: exact, from roots of its slope.
 
     With z = exp(iθ) the slope times zⁿ is a polynomial of degree 2n. Roots off the unit circle are no
     extrema, but the sum is taken at their angle, where it is no larger than its peak.
     """
-    order = np.arange(1, len(shape) + 1)
+    order = np.arange(1, HARMONICS + 1)
     slope = 1j * order * shape
-    coefficients = np.concatenate([slope[::-1], [0], slope.conj()])
-    companion = np.eye(2 * len(shape), k=-1, dtype=np.complex128)
-    companion[0] = -coefficients[1:] / coefficients[0]
-    roots = np.linalg.eigvals(companion)  # as `np.roots`, whose checks take as long
-    return float(np.abs((np.exp(1j * np.outer(np.angle(roots), order)) @ shape).real).max())
+    companion = np.empty((*shape.shape[:-1], 2 * HARMONICS, 2 * HARMONICS), np.complex128)
+    companion[...] = np.eye(2 * HARMONICS, k=-1)
+    companion[..., 0, : HARMONICS - 1] = -slope[..., -2::-1] / slope[..., -1:]
+    companion[..., 0, HARMONICS:] = -slope.conj() / slope[..., -1:]
+    angles = np.angle(np.linalg.eigvals(companion))  # as `np.roots`, whose checks take as long
+    sums = np.exp(1j * (angles[..., None] * order)) @ shape[..., None]
+    return np.abs(sums[..., 0].real).max(axis=-1, keepdims=True)
 
 
 class Encoder(Record):
@@ -314,16 +316,16 @@ class EncoderSection(SensorStage):
 
     def fill(self, rows: Rows, setup: SensorSetup) -> None:
         """Fill the encoder, with a phase of the eccentricity and an error of the start from the seed."""
-        phase = start = 0.0
-        if self.eccentricity_rad or self.start_error_rad:
-            phase, start = errors(setup.seed, setup.name, 1, 2)[0].tolist()
-        rows["on"], rows["counts_per_turn"] = not self.ideal or setup.faults, self.counts
+        shares, draws = np.zeros(2), np.logical_or(self.eccentricity_rad, self.start_error_rad)
+        if np.count_nonzero(draws):
+            shares = np.where(draws, errors(setup.seed, setup.name, 1, 2)[..., 0, :], 0.0)
+        phase, start = shares[..., :1], shares[..., 1:]
+        put(rows, on=~np.asarray(self.ideal) | setup.faults, counts_per_turn=self.counts, turns=nan)
+        put(rows, eccentricity_rad=self.eccentricity_rad, phase_rad=pi * phase)
+        put(rows, starts_with_error=np.greater(self.start_error_rad, 0))
+        put(rows, index_count=np.rint(self.index_rad * self.counts / (2 * pi)))
+        put(rows, error_counts=np.rint(start * self.start_error_rad * self.counts / (2 * pi)))
         fill_fault_line(rows["line"])
-        rows["eccentricity_rad"], rows["phase_rad"] = self.eccentricity_rad, pi * phase
-        rows["starts_with_error"] = self.start_error_rad > 0
-        rows["index_count"] = np.rint(self.index_rad * self.counts / (2 * pi))
-        rows["error_counts"] = np.rint(start * self.start_error_rad * self.counts / (2 * pi))
-        rows["turns"] = nan
 
     @classmethod
     def function(cls) -> Any:

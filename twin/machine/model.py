@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from spheretwin import scenario as scenarios
 from spheretwin.active_config import initial_config
-from spheretwin.electronics.sensor_chain import SensorsSection, accuracy
+from spheretwin.electronics.sensor_chain import SensorsSection
 from spheretwin.models.actuator import Actuator
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.coil_group import PerGroup
@@ -106,7 +106,7 @@ def _noise(sensors: SensorsSection) -> tuple[Array, Array]:
 
     The step of a converter is small against the noise, and is used as noise; that of the encoder is not.
     """
-    noise_rad, step_rad = (np.array(values) for values in accuracy(sensors))
+    noise_rad, step_rad = np.array(sensors.angle_noise_rad), np.array(sensors.angle_resolution_rad)
     half_count_rad = np.where([False, False, True], step_rad / 2, 0.0)
     noise_rad = np.hypot(noise_rad, np.where(half_count_rad > 0, 0.0, step_rad / np.sqrt(12)))
     eccentricity_rad = sensors.encoder.eccentricity_rad / np.sqrt(2)

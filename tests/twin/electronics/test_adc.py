@@ -5,14 +5,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from spheretwin.electronics.converters import Adc, AdcSection, converted, fill_adc
+from spheretwin.electronics.converters import Adc, AdcSection, converted, fill_adcs
 
 NO_DRAWS = np.empty(0)
 
 
 def made(seed=0, **fields):
     shares = np.random.default_rng([seed, 2, 0]).uniform(-1, 1, 2)
-    return Adc.filled(fill_adc, AdcSection(**fields), shares)[0]
+    return Adc.filled(fill_adcs, AdcSection(**fields), shares)[0]
 
 
 def quiet(channel, volts, noise_V=0.0, draws=NO_DRAWS):

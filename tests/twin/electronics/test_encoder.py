@@ -20,7 +20,7 @@ def sensors_of(section, seed):
 
 
 def encoder_of(counts):
-    setup = SensorSetup(None, 0, "encoder", first_draw=0, faults=False)
+    setup = SensorSetup(None, 0, "encoder", first_draw=0, end_draw=0, faults=False)
     return Encoder.filled(EncoderSection(counts=counts).fill, setup)[0]
 
 

@@ -16,7 +16,7 @@ from spheretwin.electronics.transducers import (
     Potentiometer,
     Potentiometers,
     PotentiometerSection,
-    fill_potentiometer,
+    fill_potentiometers,
     wiper_angle,
     wiper_voltage,
 )
@@ -29,7 +29,7 @@ FINITE = st.floats(allow_nan=False, allow_infinity=False)
 def track_of(seed=0, **fields):
     section = PotentiometerSection(**fields)
     shares = np.random.default_rng([seed, 1, 0]).random(4)
-    return Potentiometer.filled(fill_potentiometer, section, shares)[0]
+    return Potentiometer.filled(fill_potentiometers, section, shares)[0]
 
 
 def residual(track, angles):
@@ -97,7 +97,7 @@ WIDTH, SPREAD = 4e-3, 1e-3
 
 def made(hysteresis=WIDTH, repeatability=SPREAD):
     section = PotentiometerSection(hysteresis_rad=hysteresis, repeatability_rad=repeatability)
-    setup = SensorSetup(SensorsSection(), 0, "potentiometer", first_draw=0, faults=False)
+    setup = SensorSetup(SensorsSection(), 0, "potentiometer", first_draw=0, end_draw=0, faults=False)
     return Potentiometers.filled(section.fill, setup)[0]
 
 

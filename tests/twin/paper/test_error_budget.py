@@ -5,7 +5,6 @@ import pytest
 
 from spheretwin import scenario as scenarios
 from spheretwin.active_config import initial_config
-from spheretwin.electronics.sensor_chain import accuracy
 from spheretwin.paper import error_budget
 from spheretwin.paper.error_budget import BASES, PROTOTYPE, STAGES, Budget, fields_of
 from spheretwin.paper.experiment import Outcomes
@@ -62,7 +61,8 @@ def test_the_controller_knows_the_parts_of_a_stage_but_not_the_mass(stage, actua
     assert nominal.inertia_kg_m2 == tuple(actuator.inertia.tolist())
     assert (nominal.delay_s, nominal.time_constant_s) == (drive.delay_s, drive.lag_s)
     assert (nominal.coulomb_Nm, nominal.viscous_Nm_s) == (run.plant.coulomb_Nm, run.plant.viscous_Nm_s)
-    assert (nominal.angle_noise_rad, nominal.angle_resolution_rad) == accuracy(run.sensors)
+    assert nominal.angle_noise_rad == run.sensors.angle_noise_rad
+    assert nominal.angle_resolution_rad == run.sensors.angle_resolution_rad
 
 
 @OF_STAGES
