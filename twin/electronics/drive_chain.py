@@ -105,15 +105,15 @@ class DriveChain(Record):
 
 
 def stored_delays(section: ResolvedDrive, step_s: float, substeps: int, longest_delay_steps: int = 0) -> int:
-    """Return the commands that a drive stores, with the longest additional delay by faults, in physics steps.
+    """Return the commands that a drive stores, at the longest delay with additional physics steps by faults.
 
     Raises
     ------
     ValueError
         The delay is not a whole number of physics steps.
     """
-    steps = steps_of(section, step_s, substeps)
-    return capacity(stored_commands(steps, substeps) - -longest_delay_steps // -substeps)
+    steps = steps_of(section, step_s, substeps) + longest_delay_steps
+    return capacity(stored_commands(steps, substeps))
 
 
 def fill_drive(

@@ -6,15 +6,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from spheretwin.electronics.delay import Delay, DelaySection, due, latch, steps_of
-from spheretwin.models.base.record import capacity
+from spheretwin.electronics.drive_chain import stored_delays
 
 STEP_S = 5e-4
 
 
 def delay_of(section, step_s, substeps, groups):
-    steps = steps_of(section, step_s, substeps)
-    rows = Delay.zeros(groups=groups, delays=capacity(-(-steps // substeps) + 1))
-    rows["steps"], rows["substeps"] = steps, substeps
+    rows = Delay.zeros(groups=groups, delays=stored_delays(section, step_s, substeps))
+    rows["steps"], rows["substeps"] = steps_of(section, step_s, substeps), substeps
     return rows[0]
 
 
@@ -59,3 +58,10 @@ def test_a_delay_of_too_many_periods_is_refused():
     steps_of(DelaySection(delay_s=1.0), STEP_S, 2)
     with pytest.raises(ValueError, match="at most 1000 control periods"):
         steps_of(DelaySection(delay_s=1.0), STEP_S, 1)
+
+
+@given(st.integers(0, 100), st.integers(0, 1000), st.integers(1, 7))
+def test_the_history_holds_the_longest_delay_by_faults(steps, more_steps, substeps):
+    section = DelaySection(delay_s=steps * STEP_S)
+    stored = stored_delays(section, STEP_S, substeps, more_steps)
+    assert stored * substeps >= steps + more_steps + substeps  # entry 0 is the command of this period
