@@ -7,13 +7,14 @@ k - n - 1 for a share f of the period, then command k - n. The lag is solved exa
 from __future__ import annotations
 
 from math import exp, expm1
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from spheretwin.models.base.compiled import allocation_free
 from spheretwin.models.base.history import push_all
-from spheretwin.models.base.record import Record, Rows, capacity, field
+from spheretwin.models.base.record import Record, Rows, capacity, field, put
 from spheretwin.models.coil_group import PerGroup
 from spheretwin.models.kinematics import generalised_torque
 from spheretwin.models.magnetics import rotor_torque
@@ -64,12 +65,10 @@ def fill_applied_torque(
     time_constant_s : float or one for each group, s
         Time constant L/R of the lag; 0 for none.
     """
-    rows["on"] = on
-    rows["due"], fraction = split_delay(delay_s if on else 0.0, period_s)
-    rows["fraction"] = fraction
+    due, fraction = split_delay(np.where(on, delay_s, 0.0), period_s)
+    put(rows, on=on, due=due, fraction=fraction, torque_q=np.where(on, 0.0, np.nan))
     fill_lag_step(rows["older_lag"], fraction * period_s, time_constant_s)
     fill_lag_step(rows["newer_lag"], (1 - fraction) * period_s, time_constant_s)
-    rows["torque_q"] = 0.0 if on else np.nan
 
 
 @allocation_free
@@ -112,27 +111,29 @@ def estimate_applied_torque(
     generalised_torque(pose, applied_torque.torque_S, applied_torque.torque_q)
 
 
-def split_delay(delay_s: float, period_s: float) -> tuple[int, float]:
-    """Return the whole periods of a delay and the remaining share of a period."""
-    periods = delay_s / period_s
-    whole = int(periods * (1 + ROUNDING) + ROUNDING)
-    return whole, max(0.0, periods - whole)
+def split_delay(delay_s: ArrayLike, period_s: ArrayLike) -> tuple[Any, Any]:
+    """Return the whole periods of delays and the remaining shares of a period."""
+    periods = np.divide(delay_s, period_s)
+    whole = np.floor(periods * (1 + ROUNDING) + ROUNDING).astype(int)
+    return whole, np.maximum(0.0, periods - whole)
 
 
-def delay_capacity(delay_s: float, period_s: float) -> int:
-    """Return the length of a history of commands for a delay."""
-    return capacity(split_delay(delay_s, period_s)[0] + 2)
+def delay_capacity(delay_s: ArrayLike, period_s: ArrayLike) -> int:
+    """Return the length of a history of commands for the longest of some delays."""
+    return capacity(int(np.max(split_delay(delay_s, period_s)[0])) + 2)
 
 
-def fill_lag_step(rows: Rows, duration_s: float, time_constant_s: ArrayLike) -> None:
+def fill_lag_step(rows: Rows, duration_s: ArrayLike, time_constant_s: ArrayLike) -> None:
     """Fill first-order lags of all groups over a duration: `LagStep`, or a record with its fields."""
-    rows["decay"], rows["mean_share"] = lag_step(duration_s, time_constant_s)
+    decay, mean_share = lag_step(duration_s, time_constant_s)
+    put(rows, decay=decay, mean_share=mean_share)
 
 
-def lag_step(duration_s: float, time_constant_s: ArrayLike) -> tuple[Array, Array]:
-    """Return remaining and mean remaining shares of a first-order lag over a duration, for each constant."""
-    shares = [_shares(duration_s, constant_s) for constant_s in np.ravel(time_constant_s).tolist()]
-    decay, mean_share = np.array(shares).T.copy()
+def lag_step(duration_s: ArrayLike, time_constant_s: ArrayLike) -> tuple[Array, Array]:
+    """Return remaining and mean remaining shares of first-order lags, for each duration and constant."""
+    pairs = np.broadcast(duration_s, time_constant_s)
+    shares = [_shares(float(duration), float(constant)) for duration, constant in pairs]
+    decay, mean_share = np.reshape([*zip(*shares, strict=True)], (2, *pairs.shape))
     return decay, mean_share
 
 
