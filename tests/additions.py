@@ -308,9 +308,11 @@ def turn(stage, measurement, noise):
         "",
         '''from typing import ClassVar
 
+import numpy as np
+
 from spheretwin.electronics.stages import FaultLine, fill_fault_line, pass_line
 from spheretwin.models.base.compiled import inlined
-from spheretwin.models.base.record import Record, field
+from spheretwin.models.base.record import Record, field, put
 
 
 class Filter(Record):
@@ -332,7 +334,7 @@ class FilterSection(DriveStage):
 
     @staticmethod
     def fill(rows, section, setup):
-        rows["on"], rows["gain"] = section.filter_gain != 1 or setup.faults, section.filter_gain
+        put(rows, on=np.not_equal(section.filter_gain, 1) | setup.faults, gain=section.filter_gain)
         fill_fault_line(rows["line"], 0.0)
 
     @staticmethod

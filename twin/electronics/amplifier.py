@@ -31,11 +31,11 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
-from spheretwin.electronics.coil import OPEN, GroupCoils, Relaxation, relaxation
+from spheretwin.electronics.coil import OPEN, GroupCoils, Relaxation, relaxation, relaxations
 from spheretwin.electronics.random_streams import UNIFORM, errors
 from spheretwin.electronics.stages import DriveSetup, DriveStage, FaultLine, fill_fault_line
 from spheretwin.models.base.compiled import inlined
-from spheretwin.models.base.record import Record, Rows, field
+from spheretwin.models.base.record import Record, Rows, field, put
 from spheretwin.models.base.vectors import WIDTH, Vector, load, store, within
 
 Array = NDArray[np.float64]
@@ -102,7 +102,7 @@ class AmplifierSection(DriveStage):
     @staticmethod
     def fill(rows: Rows, section: Any, setup: DriveSetup) -> None:
         """Fill the inputs of the amplifiers, which only faults change."""
-        rows["on"] = setup.faults
+        put(rows, on=setup.faults)
         fill_fault_line(rows["line"], 0.0)
 
 
@@ -143,19 +143,20 @@ def fill_amplifier(
 
     Offsets are drawn uniformly within their bound, each from a separate stream.
     """
-    if section.amplifier_offset_V:
-        drawn = errors(seed, "drive.amplifier", rows["offset_A"].shape[1], 1)[:, 0]
-        rows["offset_A"] = section.amplifier_offset_V * section.transconductance_A_V * drawn
+    if np.any(section.amplifier_offset_V):
+        drawn = errors(seed, "drive.amplifier", rows["offset_A"].shape[1], 1)[..., 0]
+        offset_A = section.amplifier_offset_V * section.transconductance_A_V * drawn
+        put(rows, offset_A=np.where(section.amplifier_offset_V, offset_A, 0.0))
     supply_V = inf if section.supply_V is None else section.supply_V
-    rows["drop_up_V"], rows["drop_down_V"] = section.drop_up_V, section.drop_down_V
-    rows["bandwidth_rad_s"], rows["current_limit_A"] = section.bandwidth_rad_s, current_limit_A
+    put(rows, drop_up_V=section.drop_up_V, drop_down_V=section.drop_down_V)
+    put(rows, highest_V=supply_V - section.drop_up_V, lowest_V=section.drop_down_V - supply_V)
+    put(rows, bandwidth_rad_s=section.bandwidth_rad_s, current_limit_A=current_limit_A)
     fill_step(rows["whole"], section, step_s)
-    rows["highest_V"], rows["lowest_V"] = supply_V - section.drop_up_V, section.drop_down_V - supply_V
 
 
 def fill_step(rows: Rows, section: AmplifierSection, step_s: float) -> None:
     """Fill a step of the amplifiers."""
-    rows["step_s"], rows["following"] = step_s, relaxation(section.bandwidth_rad_s * step_s)
+    put(rows, step_s=step_s, following=relaxations(section.bandwidth_rad_s * step_s))
 
 
 @inlined

@@ -12,12 +12,12 @@ from math import expm1, factorial, inf
 from typing import Annotated, Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 from pydantic import BaseModel, ConfigDict, Field
 
 from spheretwin.control.applied_torque import fill_lag_step
 from spheretwin.models.base.compiled import inlined
-from spheretwin.models.base.record import Record, Rows, field
+from spheretwin.models.base.record import Record, Rows, field, put
 from spheretwin.models.coil_group import PerGroup
 
 Array = NDArray[np.float64]
@@ -67,6 +67,11 @@ def relaxation(x: float) -> Relaxation:
         0.5 * remaining * settled,
         settled_settled,
     )
+
+
+def relaxations(x: ArrayLike) -> Array:
+    """Return the shares (n, 5) for n times."""
+    return np.array([relaxation(time) for time in np.ravel(x).tolist()])
 
 
 @inlined
@@ -167,17 +172,14 @@ def fill_coils(rows: Rows, section: Any, period_s: float) -> None:
     period_s : float, s
         Control period, in which the temperature advances once.
     """
-    thermal_K_W = np.ravel(section.thermal_resistance_K_W)
-    time_constants_s = thermal_K_W * np.ravel(section.heat_capacity_J_K)
-    rows["settled"] = [
-        relaxation(period_s / time_s).settled if time_s > 0 else 1.0 for time_s in time_constants_s
-    ]
-    rows["inductance_H"], rows["resistance_per_K"] = section.inductance_H, section.resistance_per_K
-    rows["cold_resistance_ohm"] = section.resistance_ohm
-    rows["thermal_resistance_K_W"] = thermal_K_W
-    rows["shutdown_degC"] = inf if section.shutdown_degC is None else section.shutdown_degC
-    rows["period_s"] = period_s
-    rows["temperature_degC"] = rows["surroundings_degC"][:, None] = section.ambient_degC
+    time_constants_s = np.multiply(section.thermal_resistance_K_W, section.heat_capacity_J_K)
+    pairs = np.broadcast(period_s, time_constants_s)
+    settled = [relaxation(period / time).settled if time > 0 else 1.0 for period, time in pairs]
+    put(rows, settled=np.reshape(settled, pairs.shape), period_s=period_s)
+    put(rows, inductance_H=section.inductance_H, thermal_resistance_K_W=section.thermal_resistance_K_W)
+    put(rows, shutdown_degC=inf if section.shutdown_degC is None else section.shutdown_degC)
+    put(rows, temperature_degC=section.ambient_degC, surroundings_degC=section.ambient_degC)
+    put(rows, cold_resistance_ohm=section.resistance_ohm, resistance_per_K=section.resistance_per_K)
     warm = 1.0 + rows["resistance_per_K"] * (section.ambient_degC - REFERENCE_degC)
     rows["resistance_ohm"] = rows["cold_resistance_ohm"] * warm
 
@@ -253,7 +255,7 @@ class CurrentLag(Record):
 def fill_lag(rows: Rows, time_constant_s: PerGroup, step_s: float, current_limit_A: float) -> None:
     """Fill the lag for time constants L/R (s; 0: ideal amplifiers), a physics step (s) and a limit (A)."""
     fill_lag_step(rows, step_s, time_constant_s)
-    rows["current_limit_A"] = current_limit_A
+    put(rows, current_limit_A=current_limit_A)
 
 
 @inlined

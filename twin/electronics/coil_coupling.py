@@ -29,8 +29,7 @@ from spheretwin.electronics.coil import GroupCoils
 from spheretwin.electronics.drive_section import ResolvedDrive
 from spheretwin.models.base.compiled import inlined
 from spheretwin.models.base.errors import InputError, distinct_texts
-from spheretwin.models.base.record import Record, Rows, field
-from spheretwin.models.coil_group import of_each_group
+from spheretwin.models.base.record import Record, Rows, field, put
 
 Array = NDArray[np.float64]
 
@@ -59,12 +58,14 @@ class Coupling(Record):
 
 
 def fill_coupling(rows: Rows, section: ResolvedDrive, mutual_H: Array, step_s: float) -> None:
-    """Fill the coupling of the groups of a drive with mutual inductances (n, n), H."""
+    """Fill the coupling of the groups of drives with mutual inductances (n, n), H; 0 without coupling."""
     check_coupling(section, mutual_H)
-    first_s = min(FIRST_PART / section.bandwidth_rad_s, step_s / 2)
+    first_s = np.minimum(FIRST_PART / section.bandwidth_rad_s, step_s / 2)
     fill_step(rows["parts"][:, 0], section, first_s)
     fill_step(rows["parts"][:, 1], section, step_s - first_s)
-    rows["on"], rows["mutual_H"] = True, section.coil_coupling * mutual_H
+    share = np.asarray(section.coil_coupling)[..., None]
+    put(rows, on=True, mutual_H=share * mutual_H)
+    rows[np.broadcast_to(share == 0, (len(rows), 1, 1))[:, 0, 0]] = np.zeros(1, rows.dtype)
 
 
 def check_coupling(section: ResolvedDrive, mutual_H: Array) -> None:
@@ -75,15 +76,17 @@ def check_coupling(section: ResolvedDrive, mutual_H: Array) -> None:
     InputError
         They do not, so that some currents would have a negative magnetic energy.
     """
-    inductance_H = of_each_group(section.inductance_H, len(mutual_H))
-    least_H = float(inductance_H.min())
-    shares = mutual_H / np.sqrt(np.outer(inductance_H, inductance_H))
-    largest = section.coil_coupling * float(np.abs(np.linalg.eigvalsh(shares)).max())
-    if not largest < 1:
-        smallest, received = distinct_texts(largest * least_H, least_H)
+    inductance_H = np.multiply(section.inductance_H, np.ones(len(mutual_H)))
+    shares = mutual_H / np.sqrt(inductance_H[..., None] * inductance_H[..., None, :])
+    largest = section.coil_coupling * np.abs(np.linalg.eigvalsh(shares)).max(axis=-1, keepdims=True)
+    least_H = inductance_H.min(axis=-1, keepdims=True)
+    if (wrong := ~(largest < 1)).any():
+        columns = np.broadcast_arrays(largest, least_H, section.coil_coupling)
+        share, least, coupling = (values[wrong].item(0) for values in columns)
+        smallest, received = distinct_texts(share * least, least)
         raise InputError(
             f"drive: expected inductance_H above {smallest} H for a coil_coupling of"
-            f" {section.coil_coupling:g} of the model's coils, received {received} H"
+            f" {coupling:g} of the model's coils, received {received} H"
         )
 
 

@@ -107,7 +107,7 @@ class DacSection(DriveStage):
     def fill(rows: Rows, section: Any, setup: DriveSetup) -> None:
         """Fill the converter, for amplifiers of the transconductance of the section."""
         fill_dac(rows["dac"], section, section.transconductance_A_V, setup.seed)
-        rows["on"] = section.dac_bits > 0 or setup.faults
+        put(rows, on=np.greater(section.dac_bits, 0) | setup.faults)
         fill_fault_line(rows["line"], 0.0)
 
     @staticmethod
@@ -128,19 +128,18 @@ def fill_dac(rows: Rows, section: DacSection, transconductance_A_V: float, seed:
     The errors of a channel are drawn uniformly within their bounds; the INL curve stays within its bound for
     every code. Each channel has its own stream: no field, group or other stage changes its numbers.
     """
-    groups = rows["gain"].shape[1]
+    groups, converts = rows["gain"].shape[1], np.greater(section.dac_bits, 0)
     drawn = np.zeros((groups, 2 + HARMONICS))
-    if section.dac_bits:  # an ideal converter needs no numbers
-        drawn = errors(seed, "drive.dac", groups, 2 + HARMONICS)
-    harmonics = drawn[:, 2:] / np.maximum(1.0, np.abs(drawn[:, 2:]).sum(axis=1, keepdims=True))
-    codes = 2.0**section.dac_bits
-    rows["converts"], rows["transconductance_A_V"] = section.dac_bits > 0, transconductance_A_V
-    rows["span_A"] = 2 * section.dac_range_V * transconductance_A_V
-    rows["lsb_V"] = 2 * section.dac_range_V / codes
-    rows["lowest"], rows["highest"] = -codes / 2, codes / 2 - 1
-    rows["offset_V"] = section.dac_offset_V * drawn[:, 0]
-    rows["gain"] = 1 + section.dac_gain_error * drawn[:, 1]
-    rows["inl_lsb"] = section.dac_inl_lsb * harmonics
+    if np.any(converts):  # an ideal converter needs no numbers
+        drawn = np.where(converts[..., None], errors(seed, "drive.dac", groups, 2 + HARMONICS), 0.0)
+    curves = drawn[..., 2:]
+    harmonics = curves / np.maximum(1.0, np.abs(curves).sum(axis=-1, keepdims=True))
+    codes = np.ldexp(1.0, section.dac_bits)
+    put(rows, converts=converts, transconductance_A_V=transconductance_A_V)
+    put(rows, span_A=2 * section.dac_range_V * transconductance_A_V, lsb_V=2 * section.dac_range_V / codes)
+    put(rows, lowest=-codes / 2, highest=codes / 2 - 1)
+    put(rows, offset_V=section.dac_offset_V * drawn[..., 0], gain=1 + section.dac_gain_error * drawn[..., 1])
+    put(rows, inl_lsb=np.asarray(section.dac_inl_lsb)[..., None] * harmonics)
 
 
 @inlined

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,25 +41,28 @@ class Delay(Record):
     substeps: int = field("physics steps in a control period")
 
 
-def steps_of(section: DelaySection, step_s: float, substeps: int) -> int:
-    """Return the physics steps (of step_s) of a delay.
+def steps_of(section: DelaySection, step_s: float, substeps: int) -> Any:
+    """Return the physics steps (of step_s) of a delay, whole numbers.
 
     Raises
     ------
     ValueError
         The delay is not a whole number of physics steps, or longer than 1000 control periods.
     """
-    ratio = section.delay_s / step_s
-    steps = round(ratio)
-    if abs(ratio - steps) > WHOLE * ratio or steps > MOST_PERIODS * substeps:
+    ratio = np.divide(section.delay_s, step_s)
+    steps = np.rint(ratio).astype(int)
+    wrong = (np.abs(ratio - steps) > WHOLE * ratio) | (steps > np.multiply(MOST_PERIODS, substeps))
+    if wrong.any():
+        columns = np.broadcast_arrays(section.delay_s, step_s)
+        delay_s, received_s = (values[wrong].item(0) for values in columns)
         raise ValueError(
             f"expected drive.delay_s a whole multiple of plant.step_s, at most {MOST_PERIODS} control"
-            f" periods, received {section.delay_s!r} and {step_s!r} s"
+            f" periods, received {delay_s!r} and {received_s!r} s"
         )
     return steps
 
 
-def stored_commands(steps: int, substeps: int) -> int:
+def stored_commands(steps: int, substeps: int) -> Any:
     """Return the commands that a delay of some physics steps stores."""
     return -(-steps // substeps) + 1
 

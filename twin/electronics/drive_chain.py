@@ -50,7 +50,7 @@ from spheretwin.electronics.delay import Delay, due, latch, steps_of, stored_com
 from spheretwin.electronics.drive_section import STAGES, ResolvedDrive
 from spheretwin.electronics.stages import DriveSetup, FaultLine, chained, fill_fault_line, through
 from spheretwin.models.base.compiled import allocation_free, copy_into, inlined
-from spheretwin.models.base.record import Record, Rows, capacity, field, record_of, transfer_rows
+from spheretwin.models.base.record import Record, Rows, capacity, field, put, record_of, transfer_rows
 from spheretwin.models.kinematics import angular_velocity
 
 Array = NDArray[np.float64]
@@ -113,7 +113,7 @@ def stored_delays(section: ResolvedDrive, step_s: float, substeps: int, longest_
         The delay is not a whole number of physics steps.
     """
     steps = steps_of(section, step_s, substeps) + longest_delay_steps
-    return capacity(stored_commands(steps, substeps))
+    return capacity(int(np.max(stored_commands(steps, substeps))))
 
 
 def fill_drive(
@@ -126,13 +126,16 @@ def fill_drive(
     halts: bool = False,
     mutual_H: Array | None = None,
 ) -> None:
-    """Fill a drive at rest, with errors drawn from the seed.
+    """Fill drives at rest, with errors drawn from the seed.
+
+    Numbers and switches that differ between rows are (rows, 1) arrays.
 
     Parameters
     ----------
     rows : array of DriveChain
         In which all numbers are 0.
     section : ResolvedDrive
+        Of all rows, or the `Columns` of their sections.
     step_s : float, s
         Physics step.
     substeps : int
@@ -144,16 +147,17 @@ def fill_drive(
     halts : bool
         Whether a watchdog may halt the drive.
     mutual_H : (n, n) array, H, optional
-        Mutual inductance of the groups by the geometry; None without coupling.
+        Mutual inductance of the groups by the geometry; None without coupling in any row.
     """
     setup = DriveSetup(seed, faulty)
-    rows["converts"] = section.converts or faulty or halts
-    rows["supplied"] = section.supply_V is not None
-    rows["supply_V"] = rows["period"]["supply_V"] = section.supply_V or 0.0
+    supplied = section.supply_V is not None
+    supply_V = section.supply_V if supplied else 0.0
+    put(rows, converts=section.converts | faulty | halts, supplied=supplied, supply_V=supply_V)
+    put(rows["period"], supply_V=supply_V)
     fill_lag(rows["lag"], section.lag_s, step_s, section.current_limit_A)
     for name, kind in STAGES.items():
         kind.fill(rows["stages"][name], section, setup)
-    rows["delay"]["steps"], rows["delay"]["substeps"] = steps_of(section, step_s, substeps), substeps
+    put(rows["delay"], steps=steps_of(section, step_s, substeps), substeps=substeps)
     fill_fault_line(rows["supply"])
     fill_amplifier(rows["amplifier"], section, section.current_limit_A, step_s, seed)
     fill_coils(rows["coil"], section, substeps * step_s)

@@ -53,6 +53,25 @@ class DriveSection(DelaySection, DacSection, AmplifierSection, CoilSection):
         """True if the setpoint of the amplifiers can differ from the command."""
         return self.delay_s > 0 or not all(kind.ideal(self) for kind in STAGES.values())
 
+    @property
+    def swing_V(self) -> float:
+        """Largest voltage in the worse direction; 0 for amplifiers without a supply and limit."""
+        return 0.0 if self.supply_V is None else self.supply_V - max(self.drop_up_V, self.drop_down_V)
+
+    @property
+    def offset_error_A(self) -> float:
+        """Largest offset of a current: of amplifier, converter and rounding."""
+        offset_V = self.amplifier_offset_V
+        if self.dac_bits:
+            lsb_V = 2 * self.dac_range_V / 2**self.dac_bits
+            offset_V += self.dac_offset_V + (self.dac_inl_lsb + 0.5) * lsb_V
+        return self.transconductance_A_V * offset_V
+
+    @property
+    def gain_error(self) -> float:
+        """Largest relative gain error of a current."""
+        return self.dac_gain_error if self.dac_bits else 0.0
+
 
 STAGES: dict[str, type[DriveStage]] = {
     kind.stage: kind for kind in DriveSection.__bases__ if issubclass(kind, DriveStage)
@@ -86,20 +105,7 @@ def amplifier_sheet(drive: DriveSection) -> dict[str, Any]:
     return {
         "delay_s": drive.delay_s,
         "time_constant_s": drive.lag_s,
-        "swing_V": _swing_V(drive),
-        "offset_error_A": drive.transconductance_A_V * _offset_V(drive),
-        "gain_error": drive.dac_gain_error if drive.dac_bits else 0.0,
+        "swing_V": drive.swing_V,
+        "offset_error_A": drive.offset_error_A,
+        "gain_error": drive.gain_error,
     }
-
-
-def _swing_V(drive: DriveSection) -> float:
-    """Return the largest voltage in the worse direction; 0 for amplifiers without a supply and limit."""
-    return 0.0 if drive.supply_V is None else drive.supply_V - max(drive.drop_up_V, drive.drop_down_V)
-
-
-def _offset_V(drive: DriveSection) -> float:
-    """Return the largest offset at the input of an amplifier: amplifier, converter and rounding."""
-    if not drive.dac_bits:
-        return drive.amplifier_offset_V
-    lsb_V = 2 * drive.dac_range_V / 2**drive.dac_bits
-    return drive.amplifier_offset_V + (drive.dac_offset_V + (drive.dac_inl_lsb + 0.5) * lsb_V)

@@ -153,7 +153,7 @@ class SensorStage(BaseModel):
 
 
 class DriveSetup(NamedTuple):
-    """Conditions that a stage is built for."""
+    """Conditions that a stage is built for; (rows, 1) arrays if they differ between rows."""
 
     seed: int
     faults: bool
@@ -182,7 +182,10 @@ class DriveStage(BaseModel):
     @staticmethod
     @abstractmethod
     def fill(rows: Rows, section: Any, setup: DriveSetup) -> None:
-        """Fill the records, in which every number is 0; they are on if not ideal or if a fault may occur."""
+        """Fill the records, in which every number is 0; they are on if not ideal or if a fault may occur.
+
+        The section is that of all rows, or the `Columns` of their sections.
+        """
 
     @staticmethod
     def convert() -> Any:
