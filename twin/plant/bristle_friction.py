@@ -32,11 +32,12 @@ from math import exp
 from typing import Annotated, Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 from pydantic import BaseModel, ConfigDict, Field
 
+from spheretwin.electronics.random_streams import Seed
 from spheretwin.models.base.compiled import allocation_free, copy_into, inlined
-from spheretwin.models.base.record import Record, Rows, field
+from spheretwin.models.base.record import Record, Rows, field, put
 from spheretwin.models.joint_chain import JointChain, inertia_at
 from spheretwin.models.kinematics import triple
 from spheretwin.models.lagrangian import InertiaEntries, solve_inertia
@@ -113,48 +114,55 @@ class BristleFriction(Record):
 def fill_bristles(
     bristles: Rows,
     stiction: StictionSection,
-    coulomb_Nm: tuple[float, ...],
+    coulomb_Nm: ArrayLike,
     cable: CableSection,
     inertia: Array,
-    step_s: float,
-    seed: int = 0,
+    step_s: ArrayLike,
+    seed: Seed = 0,
 ) -> None:
     """Fill the elements of the hinges (alpha, beta, gamma), all without deflection.
 
     Parameters
     ----------
     bristles : array of BristleFriction
-        With their end stops.
+        With their end stops; all other numbers are 0.
     stiction : StictionSection
-    coulomb_Nm : (3,) tuple, N·m
+    coulomb_Nm : (3,) tuple or (n, 3) array, N·m
         Coulomb level.
     cable : CableSection
     inertia : (3,) or (n, 3) array, kg·m²
         Principal inertias about the joint centre, modelling error and payload included.
-    step_s : float, s
+    step_s : float or (n, 1) array, s
         Physics step.
-    seed : int
+    seed : int or (n, 1) array
         Seed of the run, for the constant torque of the cable.
     """
-    bristles["on"] = stiction.on | acts(cable) | bristles["stops"]["on"]
-    slip = np.array([*SLIP_SHARES, 0.0]) * stiction.presliding_rad
-    slip[CABLE] = cable.hysteresis_rad
-    stiffness, damping = np.zeros((ELEMENTS, 3)), bristles["damping_Nm_s"]
-    if stiction.on:
-        stiffness[:CABLE] = stiction.break_away * np.array(coulomb_Nm) / slip[:CABLE].sum()
-        # Critical damping is 2 sqrt(k J); each element has its share.
-        each = np.asarray(inertia)[..., None, :]
-        damping[:, :CABLE] = stiction.damping_ratio * np.sqrt(2.0 * stiffness[:CABLE] * each)
-    stiffness[CABLE] = np.array(cable.hysteresis_Nm) / cable.hysteresis_rad
+    slip, stiffness = bristles["slip_rad"], bristles["stiffness_Nm_rad"]
+    damping, spring = bristles["damping_Nm_s"], bristles["spring"]
+    slip[:, :CABLE] = stiction.presliding_rad * np.array(SLIP_SHARES)
+    slip[:, CABLE:] = cable.hysteresis_rad
+    break_away_Nm = np.where(stiction.on, stiction.break_away * np.asarray(coulomb_Nm), 0.0)
+    stiffness[:, :CABLE] = break_away_Nm[..., None, :] / slip[:, :CABLE].sum(axis=1)[:, None, None]
+    stiffness[:, CABLE] = np.divide(cable.hysteresis_Nm, cable.hysteresis_rad)
+    # Critical damping is 2 sqrt(k J); each element of the bearing has its share.
+    each, ratio = np.asarray(inertia)[..., None, :], np.asarray(stiction.damping_ratio)[..., None]
+    damping[:, :CABLE] = ratio * np.sqrt(2.0 * stiffness[:, :CABLE] * each)
     # Squares of step times natural frequency, and of step times decay, at most.
-    least = np.min(inertia, axis=-1)
-    stiff = step_s**2 * stiffness.sum(axis=0).max() / least
-    stiff = stiff + (step_s * damping.sum(axis=1).max(axis=1) / least) ** 2
-    bristles["stiffness_Nm_rad"], bristles["slip_rad"] = stiffness, slip
-    bristles["coulomb_share"], bristles["stribeck_rad_s"] = 1.0 / stiction.break_away, stiction.stribeck_rad_s
-    bristles["spring"] = cable.stiffness_Nm_rad, cable.neutral_rad, constant_torque_Nm(cable, seed)
-    bristles["implicitness"], bristles["step_s"] = 0.5 + 0.5 * stiff / (stiff + 4.0), step_s
-    bristles["stribeck_factor"] = 1.0
+    least = np.min(inertia, axis=-1, keepdims=True)
+    stiff = np.square(step_s) * stiffness.sum(axis=1).max(axis=1, keepdims=True) / least
+    stiff = stiff + np.square(step_s * damping.sum(axis=1).max(axis=1, keepdims=True) / least)
+    torques = cable.stiffness_Nm_rad, cable.neutral_rad, constant_torque_Nm(cable, seed)
+    for kind, values in enumerate(torques):
+        spring[:, kind] = values
+    put(
+        bristles,
+        on=stiction.on | acts(cable) | bristles["stops"]["on"][:, None],
+        coulomb_share=1.0 / stiction.break_away,
+        stribeck_rad_s=stiction.stribeck_rad_s,
+        implicitness=0.5 + 0.5 * stiff / (stiff + 4.0),
+        step_s=step_s,
+        stribeck_factor=1.0,
+    )
 
 
 @inlined

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field
 
-from spheretwin.electronics.random_streams import UNIFORM, errors
+from spheretwin.electronics.random_streams import UNIFORM, Seed, errors
 
 Size = Annotated[float, Field(ge=0, le=100)]
 Signed = Annotated[float, Field(ge=-100, le=100)]
@@ -42,13 +42,14 @@ class CableSection(BaseModel):
     )
 
 
-def acts(section: CableSection) -> bool:
-    """True if there is a cable."""
-    torques_Nm = (*section.torque_Nm, *section.torque_error_Nm, *section.hysteresis_Nm)
-    return any((*section.stiffness_Nm_rad, *torques_Nm))
+def acts(section: CableSection) -> Any:
+    """True if there is a cable: one entry, or (n, 1) for many sections."""
+    torques_Nm = section.torque_Nm, section.torque_error_Nm, section.hysteresis_Nm
+    values = np.broadcast_arrays(section.stiffness_Nm_rad, *torques_Nm)
+    return np.any(np.any(values, axis=0), axis=-1, keepdims=True)
 
 
-def constant_torque_Nm(section: CableSection, seed: int) -> NDArray[np.float64]:
-    """Return the constant torque on the hinges, (3,) N·m, with the error that is drawn from a seed."""
-    drawn_Nm = np.array(section.torque_error_Nm) * errors(seed, "plant.cable", 3, 1)[:, 0]
-    return np.array(section.torque_Nm) + drawn_Nm
+def constant_torque_Nm(section: CableSection, seed: Seed) -> NDArray[np.float64]:
+    """Return the constant torque on the hinges, (3,) or (n, 3) N·m, with the error drawn from the seed."""
+    drawn_Nm = errors(seed, "plant.cable", 3, 1)[..., 0] * section.torque_error_Nm
+    return drawn_Nm + section.torque_Nm

@@ -22,12 +22,12 @@ from __future__ import annotations
 from typing import Annotated
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 from pydantic import BaseModel, ConfigDict, Field
 
 from spheretwin.models.base.compiled import inlined
 from spheretwin.models.base.errors import InputError
-from spheretwin.models.base.record import Record, Rows, field
+from spheretwin.models.base.record import Record, Rows, field, put
 
 Array = NDArray[np.float64]
 
@@ -64,19 +64,20 @@ class EndStops(Record):
 
 
 def fill_end_stops(
-    stops: Rows, section: EndStopsSection, hinge_range_rad: Array, inertia: Array, step_s: float
+    stops: Rows, section: EndStopsSection, hinge_range_rad: Array, inertia: Array, step_s: ArrayLike
 ) -> None:
     """Fill the end stops of the hinges (alpha, beta, gamma), which may be off.
 
     Parameters
     ----------
     stops : array of EndStops
+        In which all numbers are 0.
     section : EndStopsSection
     hinge_range_rad : (3, 2) array
         A hinge without end has an infinite range.
     inertia : (3,) or (n, 3) array, kg·m²
         Principal inertias about the joint centre, for the damping.
-    step_s : float, s
+    step_s : float or (n, 1) array, s
         Physics step.
 
     Raises
@@ -84,17 +85,20 @@ def fill_end_stops(
     InputError
         The buffers of a hinge overlap.
     """
-    if not section.on:
+    if not np.any(section.on):
         return
-    contact = hinge_range_rad + section.travel_rad * np.array([1.0, -1.0])
-    if np.any(contact[:, 0] >= contact[:, 1]):
+    travel_rad, stiffness = np.asarray(section.travel_rad), section.stiffness_Nm_rad
+    contact = hinge_range_rad + travel_rad[..., None] * np.array([1.0, -1.0])
+    overlap = section.on & np.any(contact[..., 0] >= contact[..., 1], axis=-1, keepdims=True)
+    if overlap.any():
         raise InputError(
             "plant.end_stops: expected a travel_rad below half of each hinge's range,"
-            f" received {section.travel_rad:g}"
+            f" received {np.broadcast_to(travel_rad, overlap.shape)[overlap][0]:g}"
         )
-    stops["on"], stops["contact_rad"], stops["step_s"] = 1, contact, step_s
-    stiffness = stops["stiffness_Nm_rad"] = section.stiffness_Nm_rad
-    stops["damping_Nm_s"] = 2 * section.damping_ratio * np.sqrt(stiffness * np.asarray(inertia))
+    damping = 2 * section.damping_ratio * np.sqrt(stiffness * np.asarray(inertia))
+    put(stops, on=section.on, contact_rad=contact, step_s=step_s)
+    put(stops, stiffness_Nm_rad=stiffness, damping_Nm_s=damping)
+    stops[stops["on"] == 0] = 0
 
 
 @inlined

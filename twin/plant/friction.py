@@ -16,11 +16,11 @@ from math import sqrt
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from spheretwin.models.base.compiled import allocation_free, inlined
 from spheretwin.models.base.errors import InputError
-from spheretwin.models.base.record import Record, Rows, field
+from spheretwin.models.base.record import Record, Rows, field, put
 from spheretwin.models.joint_chain import JointChain, general_inertia
 from spheretwin.models.kinematics import Triple, triple, turns
 from spheretwin.models.lagrangian import InertiaEntries, inertia_entries, solve_inertia
@@ -47,7 +47,11 @@ class Friction(Record):
 
 
 def fill_friction(
-    frictions: Rows, coulomb_Nm: Array, viscous_Nm_s: Array, smoothing_rate_rad_s: float, step_s: float
+    frictions: Rows,
+    coulomb_Nm: ArrayLike,
+    viscous_Nm_s: ArrayLike,
+    smoothing_rate_rad_s: ArrayLike,
+    step_s: ArrayLike,
 ) -> None:
     """Fill the friction on the hinges (alpha, beta, gamma) of rotors.
 
@@ -56,8 +60,8 @@ def fill_friction(
     frictions : array of Friction
     coulomb_Nm : (3,) or (n, 3) array, N·m
     viscous_Nm_s : (3,) or (n, 3) array, N·m·s
-    smoothing_rate_rad_s : float or (n,) array, rad/s
-    step_s : float, s
+    smoothing_rate_rad_s : float or (n, 1) array, rad/s
+    step_s : float or (n, 1) array, s
 
     Raises
     ------
@@ -65,14 +69,17 @@ def fill_friction(
         A coefficient that is negative or not finite, or a smoothing rate that is too small or not finite.
     """
     for name, values in (("coulomb_Nm", coulomb_Nm), ("viscous_Nm_s", viscous_Nm_s)):
-        frictions[name] = _coefficients(name, values)
-    if not np.all(np.isfinite(smoothing_rate_rad_s) & (smoothing_rate_rad_s >= SLOWEST_SMOOTHING_rad_s)):
+        _check_coefficients(name, np.atleast_2d(values))
+    rates = np.ravel(smoothing_rate_rad_s)
+    valid = np.isfinite(rates) & (rates >= SLOWEST_SMOOTHING_rad_s)
+    if not valid.all():
         raise InputError(
             f"friction: expected a finite smoothing_rate_rad_s of at least {SLOWEST_SMOOTHING_rad_s:g},"
-            f" received {smoothing_rate_rad_s:g}"
+            f" received {rates[~valid][0]:g}"
         )
+    put(frictions, coulomb_Nm=coulomb_Nm, viscous_Nm_s=viscous_Nm_s)
+    put(frictions, smoothing_rate_rad_s=smoothing_rate_rad_s, step_s=step_s)
     frictions["on"] = np.any(frictions["coulomb_Nm"] + frictions["viscous_Nm_s"], axis=1)
-    frictions["smoothing_rate_rad_s"], frictions["step_s"] = smoothing_rate_rad_s, step_s
 
 
 @inlined
@@ -254,13 +261,11 @@ def _slowed_ideal(M: InertiaEntries, damping: Triple, before: Triple) -> Triple:
     return alpha_re + alpha_im, beta, gamma
 
 
-def _coefficients(name: str, values: Array) -> Array:
-    coefficients = np.asarray(values, dtype=np.float64)
-    if coefficients.shape[-1:] != (3,) or not np.all(np.isfinite(coefficients) & (coefficients >= 0)):
+def _check_coefficients(name: str, rows: Array) -> None:
+    for values in rows[~np.all(np.isfinite(rows) & (rows >= 0), axis=1)] if rows.shape[1] == 3 else rows:
         raise InputError(
             f"friction: expected {name} of three finite values that are not negative, received {values}"
         )
-    return coefficients
 
 
 @inlined
@@ -271,9 +276,8 @@ def _slow_rotor(friction: Friction, plant: Any, substep: int) -> None:
 
 def _fill(rows: Rows, setup: PlantSetup) -> None:
     section = setup.scenario.plant
-    coulomb_Nm = np.zeros(3) if section.stiction.on else np.array(section.coulomb_Nm)
-    smoothing_rad_s = section.friction_smoothing_rad_s
-    fill_friction(rows, coulomb_Nm, np.array(section.viscous_Nm_s), smoothing_rad_s, section.step_s)
+    coulomb_Nm = np.where(section.stiction.on, 0.0, section.coulomb_Nm)
+    fill_friction(rows, coulomb_Nm, section.viscous_Nm_s, section.friction_smoothing_rad_s, section.step_s)
 
 
 FRICTION = PlantPart(Friction, _fill, before=_slow_rotor, after=_slow_rotor)

@@ -15,14 +15,14 @@ from __future__ import annotations
 from typing import Annotated, Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 from pydantic import BaseModel, ConfigDict, Field
 
 from spheretwin.electronics.coil import GroupCoils, REFERENCE_degC
 from spheretwin.models.base.compiled import inlined
 from spheretwin.models.base.errors import InputError
-from spheretwin.models.base.record import Record, Rows, field
-from spheretwin.models.coil_group import PerGroup, of_each_group
+from spheretwin.models.base.record import Record, Rows, field, put
+from spheretwin.models.coil_group import PerGroup
 from spheretwin.plant.plant_part import PlantPart, PlantSetup
 
 Array = NDArray[np.float64]
@@ -109,8 +109,8 @@ class MagnetHeat(Record):
 def fill_heat(
     heats: Rows,
     section: ResolvedThermal,
-    ambient_degC: float,
-    period_s: float,
+    ambient_degC: ArrayLike,
+    period_s: float | Array,
     winding_J_K: PerGroup,
     settled: Array,
 ) -> None:
@@ -119,13 +119,14 @@ def fill_heat(
     Parameters
     ----------
     heats : array of MagnetHeat
+        In which all numbers are 0.
     section : ResolvedThermal
-    ambient_degC : float, °C
-    period_s : float, s
+    ambient_degC : float or (n, 1) array, °C
+    period_s : float or (n, 1) array, s
         Control period.
     winding_J_K : float or one for each group, J/K
         Heat capacity of the winding of a group.
-    settled : (groups,) array
+    settled : (groups,) or (n, groups) array
         Share of a step of the power that the temperature of each winding reaches in a period.
 
     Raises
@@ -134,28 +135,46 @@ def fill_heat(
         The windings exchange more heat with the stator in a period than it can store: the stator and the
         windings take their steps in turn.
     """
-    if not section.on:
+    if not np.any(section.on):
         return
-    windings_J_K = of_each_group(winding_J_K, len(settled))
-    exchanged_J_K = float(np.sum(settled * windings_J_K))
-    if not exchanged_J_K < section.stator_heat_capacity_J_K:
+    put(heats, on=section.on, winding_J_K=winding_J_K)
+    _check_stator(heats, section.stator_heat_capacity_J_K, settled)
+    capacity = _of_both(section.stator_heat_capacity_J_K, section.rotor_heat_capacity_J_K) / period_s
+    outer = 1 / _of_both(section.stator_to_ambient_K_W, section.rotor_to_ambient_K_W)
+    gap = 1 / np.asarray(section.air_gap_K_W)[..., None]
+    diagonal = (capacity + outer + gap[..., 0])[..., None] * np.eye(2)
+    put(
+        heats,
+        remanence_per_K=section.remanence_per_K,
+        ambient_degC=ambient_degC,
+        period_s=period_s,
+        matrix_W_K=diagonal + gap * np.array([[0.0, -1.0], [-1.0, 0.0]]),
+        capacity_W_K=capacity,
+        to_ambient_W_K=outer,
+        stator_degC=ambient_degC,
+        last_degC=ambient_degC,
+        rotor_degC=initial_degC(section, ambient_degC),
+    )
+    heats[heats["on"] == 0] = 0
+
+
+def _check_stator(heats: Rows, stator_J_K: ArrayLike, settled: Array) -> None:
+    exchanged_J_K = np.sum(settled * heats["winding_J_K"], axis=1)
+    stator_J_K = np.broadcast_to(stator_J_K, (len(heats), 1))[:, 0]
+    for row in np.flatnonzero((heats["on"] != 0) & ~(exchanged_J_K < stator_J_K)):
         raise InputError(
-            f"scenario: expected a plant.thermal.stator_heat_capacity_J_K above {exchanged_J_K:g} J/K, which"
-            " the windings exchange with the stator in a control period,"
-            f" received {section.stator_heat_capacity_J_K:g} J/K"
+            "scenario: expected a plant.thermal.stator_heat_capacity_J_K above"
+            f" {exchanged_J_K[row]:g} J/K, which the windings exchange with the stator in a control period,"
+            f" received {stator_J_K[row]:g} J/K"
         )
-    capacity = np.array([section.stator_heat_capacity_J_K, section.rotor_heat_capacity_J_K]) / period_s
-    outer = 1 / np.array([section.stator_to_ambient_K_W, section.rotor_to_ambient_K_W])
-    gap = 1 / section.air_gap_K_W
-    heats["on"], heats["remanence_per_K"], heats["ambient_degC"] = 1, section.remanence_per_K, ambient_degC
-    heats["winding_J_K"], heats["period_s"] = windings_J_K, period_s
-    heats["matrix_W_K"] = np.diag(capacity + outer + gap) + gap * np.array([[0.0, -1.0], [-1.0, 0.0]])
-    heats["capacity_W_K"], heats["to_ambient_W_K"] = capacity, outer
-    heats["stator_degC"] = heats["last_degC"] = ambient_degC
-    heats["rotor_degC"] = initial_degC(section, ambient_degC)
 
 
-def initial_degC(section: ThermalSection, ambient_degC: float) -> float:
+def _of_both(stator: ArrayLike, rotor: ArrayLike) -> Array:
+    """Return numbers of stator and rotor, (2,) or (n, 2)."""
+    return np.concatenate(np.broadcast_arrays(np.atleast_1d(stator), np.atleast_1d(rotor)), axis=-1)
+
+
+def initial_degC(section: ThermalSection, ambient_degC: Any) -> Any:
     """Return the initial temperature of the rotor."""
     return ambient_degC if section.rotor_degC is None else section.rotor_degC
 
@@ -220,10 +239,9 @@ def _end(heat: MagnetHeat, plant: Any, substep: int) -> None:
 
 
 def _fill(rows: Rows, setup: PlantSetup) -> None:
-    scenario, settled = setup.scenario, setup.drive["coil"]["settled"][0]
-    section, period_s = scenario.drive, scenario.controller.period_s
-    winding_J_K = section.heat_capacity_J_K
-    fill_heat(rows, scenario.plant.thermal, section.ambient_degC, period_s, winding_J_K, settled)
+    scenario, settled, section = setup.scenario, setup.drive["coil"]["settled"], setup.scenario.drive
+    ambient_degC, period_s = section.ambient_degC, scenario.controller.period_s
+    fill_heat(rows, scenario.plant.thermal, ambient_degC, period_s, section.heat_capacity_J_K, settled)
 
 
 HEAT = PlantPart(MagnetHeat, _fill, begin=_begin, end=_end)

@@ -16,12 +16,12 @@ class PlantSetup(NamedTuple):
     """Conditions that a part is filled for."""
 
     scenario: Any
-    """Resolved."""
+    """Resolved; or the columns of those of n rows."""
     actuator: Actuator
     rotor: Rows
-    """Array of RotorData, started."""
+    """Array of RotorData, one for each row, started."""
     drive: Rows
-    """Array of DriveChain."""
+    """Array of DriveChain, one for each row."""
 
 
 class PlantPart(NamedTuple):
