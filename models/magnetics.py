@@ -7,7 +7,7 @@ from math import atan2, pi, sqrt
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from spheretwin.models.actuator import Actuator
 from spheretwin.models.base.cache import cached_array
@@ -87,7 +87,7 @@ class TorqueModel(NamedTuple):
     """Data of the compiled torque matrix."""
 
     arrangement: Rows
-    """Array of one `Arrangement`."""
+    """Array of `Arrangement`: one for each row, or one for all."""
     tables: Tables
 
     @property
@@ -150,19 +150,25 @@ def _arrangement(actuator: Actuator, lines: int, coils: int) -> Rows:
 
 
 def coils_by_group(actuator: Actuator, axes: Array, gain: Array) -> Array:
-    """Return the coils of a torque field as `Arrangement` has them, from axes (c, 3) and gains (c,)."""
-    of_coils = np.column_stack([axes, actuator.coil_direction * gain])
-    return np.ascontiguousarray(of_coils[actuator.groups.ravel()].T)
+    """Return the coils of a torque field as `Arrangement` has them, from axes (…, c, 3) and gains (…, c)."""
+    of_coils = np.concatenate([axes, (actuator.coil_direction * gain)[..., None]], axis=-1)
+    return np.ascontiguousarray(of_coils[..., actuator.groups.ravel(), :].mT)
 
 
-def scaled(model: TorqueModel, scale: float) -> TorqueModel:
-    """Return a model of which all torques are those of another one times a factor."""
-    if scale == 1:
+def scaled(model: TorqueModel, scale: ArrayLike) -> TorqueModel:
+    """Return a model of which all torques are those of another one times a factor, or n factors (n, 1)."""
+    if np.all(np.equal(scale, 1)):
         return model
-    rows = model.arrangement.copy()
+    rows = rows_of(model, scale)
     rows["line_weights"] *= scale
     rows["coils"][:, 3] *= scale
     return model._replace(arrangement=rows)
+
+
+def rows_of(model: TorqueModel, *columns: ArrayLike) -> Rows:
+    """Return a copy of an arrangement for as many rows as columns (n, 1) have, which numbers may be too."""
+    shape = np.broadcast_shapes((len(model.arrangement), 1), *map(np.shape, columns))
+    return np.broadcast_to(model.arrangement, shape[:1]).copy()
 
 
 def pole_lines(axes: Array) -> NDArray[np.int64]:

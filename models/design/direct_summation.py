@@ -123,7 +123,7 @@ def direct_torque_matrix(
         magpylib is not installed.
     """
     quadrature = quadrature or _standard(actuator.magnet)
-    poles, coils = scatter or no_scatter(actuator)
+    poles, coils, _ = scatter or no_scatter(actuator)
     near_angle = _rim_reaches_winding(actuator)
     pole_axes = poles.axes(actuator.pole_axes) @ rotation(np.asarray(q, dtype=np.float64)).T  # stator frame
     coil_axes = coils.axes(actuator.coil_axes)

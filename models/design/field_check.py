@@ -114,12 +114,11 @@ def _scatter(actuator: Actuator, seed: int) -> list[Check]:
     if actuator.torque_curve.distance_sensitivity is None:
         return []
     rng = np.random.default_rng([seed, 3])
-    scatter = Scatter(
-        *(
-            part_errors(rng.uniform(-1, 1, (len(axes), 4)) * SCATTER_BOUNDS)
-            for axes in (actuator.pole_axes, actuator.coil_axes)
-        )
+    poles, coils = (
+        part_errors(rng.uniform(-1, 1, (len(axes), 4)) * SCATTER_BOUNDS)
+        for axes in (actuator.pole_axes, actuator.coil_axes)
     )
+    scatter = Scatter(poles, coils)
     compared = direct_summation.compare(
         actuator, np.radians(_tilts_deg(SCATTER_POSES, seed)), seed, scatter=scatter
     )

@@ -7,7 +7,7 @@ from typing import Annotated, Any
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
 
-from spheretwin.electronics.random_streams import UNIFORM, errors
+from spheretwin.electronics.random_streams import UNIFORM, Seed, errors
 from spheretwin.models.actuator import Actuator
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.scatter import PartErrors, Scatter, part_errors
@@ -49,12 +49,12 @@ class PartScatter(BaseModel):
         """True if a part has an error."""
         return bool(self.errors or self.gain_error or self.angle_error_rad or self.distance_error_m)
 
-    def part_errors(self, seed: int, name: str, parts: int) -> PartErrors:
-        """Return the errors of the parts of a machine.
+    def part_errors(self, seed: Seed, name: str, parts: int) -> PartErrors:
+        """Return the errors of the parts of a machine, or of n machines.
 
         Parameters
         ----------
-        seed : int
+        seed : int or (n, 1) array
             Seed of the run.
         name : str
             Name of the section, which keys the random stream.
@@ -67,23 +67,23 @@ class PartScatter(BaseModel):
             Errors are given for another number of parts.
         """
         if self.errors is None:
-            bounds = [self.gain_error, self.angle_error_rad, self.angle_error_rad, self.distance_error_m]
-            return part_errors(errors(seed, name, parts, len(bounds)) * bounds)
-        if len(self.errors) != parts:
-            raise InputError(
-                f"scenario: expected {name}.errors of {parts} parts, received {len(self.errors)}"
-            )
-        return part_errors(np.array(self.errors))
+            bounds = self.gain_error, self.angle_error_rad, self.angle_error_rad, self.distance_error_m
+            columns = np.stack(np.broadcast_arrays(*bounds), axis=-1)  # (4,) or (n, 1, 4)
+            return part_errors(errors(seed, name, parts, len(bounds)) * columns)
+        table = np.reshape(self.errors, (*np.shape(self.errors)[:-2], -1, 4))
+        if table.shape[-2] != parts:
+            raise InputError(f"scenario: expected {name}.errors of {parts} parts, received {table.shape[-2]}")
+        return part_errors(table)
 
 
-def scatter_of(plant: Any, seed: int, actuator: Actuator) -> Scatter | None:
-    """Return the scatter of a plant section; None if it has none.
+def scatter_of(plant: Any, seed: Seed, actuator: Actuator) -> Scatter | None:
+    """Return the scatter of a plant section, or of n of them; None if they have none.
 
     Parameters
     ----------
     plant : PlantSection
         Its sections `poles` and `coils`.
-    seed : int
+    seed : int or (n, 1) array
         Seed of the run.
     actuator : Actuator
         Nominal machine.
@@ -93,8 +93,9 @@ def scatter_of(plant: Any, seed: int, actuator: Actuator) -> Scatter | None:
     InputError
         The given errors do not fit the machine.
     """
-    if not (plant.poles.acts or plant.coils.acts):
+    acts = plant.poles.acts | plant.coils.acts
+    if not np.any(acts):
         return None
     poles = plant.poles.part_errors(seed, "plant.poles", len(actuator.pole_axes))
     coils = plant.coils.part_errors(seed, "plant.coils", len(actuator.coil_axes))
-    return Scatter(poles, coils)
+    return Scatter(poles, coils, acts)

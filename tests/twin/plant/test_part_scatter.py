@@ -37,7 +37,7 @@ def test_one_error_does_not_move_another():
 def test_given_errors_replace_those_of_the_seed():
     table = tuple((0.01 * (k % 3), 1e-3, -1e-3, 1e-5 * k) for k in range(16))
     plant = PlantSection(poles=PartScatter(errors=table), coils=PartScatter())
-    poles, coils = scatter_of(plant, 0, ACTUATOR)
+    poles, coils, _ = scatter_of(plant, 0, ACTUATOR)
     np.testing.assert_array_equal(np.column_stack([*poles[:1], poles.angle_rad, poles.distance_m]), table)
     assert not any(np.any(values) for values in coils)
     with pytest.raises(InputError, match=r"expected plant.poles.errors of 16 parts, received 3"):
