@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from spheretwin.models.base.compiled import allocation_free, inlined
-from spheretwin.models.base.record import Record, Rows, field
+from spheretwin.models.base.record import Record, Rows, field, put
 from spheretwin.models.kinematics import Triple, generalised_torque, triple, turns
 from spheretwin.models.lagrangian import InertiaEntries, acceleration_entries, inertia_entries, solve_inertia
 from spheretwin.models.mjcf import gravity
@@ -57,10 +57,10 @@ def fill_ideal(joints: Rows, inertia: ArrayLike, weight_moment: ArrayLike = 0.0)
     joints : array of JointChain
     inertia : (3,) or (n, 3) array, kg·m²
         Principal moments about the joint centre, payload included.
-    weight_moment : float or (n,) array, N·m
+    weight_moment : float or (n, 1) array, N·m
         Weight of the payload times its height.
     """
-    joints["inertia"], joints["weight_moment"], joints["axes"] = inertia, weight_moment, np.eye(3)
+    put(joints, inertia=inertia, weight_moment=weight_moment, axes=np.eye(3))
 
 
 def fill_chain(joints: Rows, model: mujoco.MjModel) -> None:

@@ -84,21 +84,23 @@ def coriolis_matrix(
     return C
 
 
-def loaded_inertia(inertia: NDArray[np.float64], payload_kg: float, height_m: float) -> NDArray[np.float64]:
+def loaded_inertia(
+    inertia: NDArray[np.float64], payload_kg: float | NDArray[np.float64], height_m: float
+) -> NDArray[np.float64]:
     """Return the principal inertias about the joint centre with a point mass on the third axis.
 
     Parameters
     ----------
-    inertia : (3,) array, kg·m²
+    inertia : (3,) or (n, 3) array, kg·m²
         Principal inertias of the rotor alone.
-    payload_kg : float, kg
+    payload_kg : float or (n, 1) array, kg
         The point mass.
     height_m : float, m
         Its distance from the joint centre.
 
     Returns
     -------
-    (3,) array, kg·m²
+    (3,) or (n, 3) array, kg·m²
         ``J + m l**2`` on the two axes normal to the shaft.
     """
     return inertia + payload_kg * height_m**2 * np.array([1.0, 1.0, 0.0])

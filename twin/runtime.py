@@ -301,7 +301,7 @@ class Runtime:
         """Return the complete state."""
         own = self._controller
         memories = own.parameters.copy(), own.memory.copy(), own.estimator_memory.copy()
-        return RuntimeState(states_of(self.rows)[0], self._rotor.state(), *memories, self._last)
+        return RuntimeState(states_of(self.rows)[0], self._rotor.state()[0], *memories, self._last)
 
     def restore(self, state: RuntimeState) -> None:
         """Restore the state of a runtime of the same scenario.
@@ -318,7 +318,7 @@ class Runtime:
         _check_length("last command", state.last.command, self._groups)
         _check_length("last pose", state.last.q, 3 if len(state.last.q) else 0)
         set_states(self.rows, state.run[None])
-        self._rotor.restore(state.engine)
+        self._rotor.restore([state.engine])
         controller.parameters[:], controller.memory[:] = state.law_parameters, state.law_memory
         controller.estimator_memory[:], self._last = state.estimator_memory, state.last
 
@@ -341,6 +341,6 @@ def _transfer_rotor(rotor: Rotor, scenario: ResolvedScenario, files: Files) -> R
     """Return the rotor of another scenario in the state of a started one."""
     other, state = assembly.rotor_of(scenario, files), rotor.state()
     other.start(rotor.rows["q"][0], rotor.rows["qdot"][0])
-    if len(other.state()) == len(state):  # otherwise a body was added or removed: only pose and rates remain
+    if len(other.state()[0]) == len(state[0]):  # otherwise another number of bodies: pose and rates remain
         other.restore(state)
     return other

@@ -5,16 +5,17 @@ It is independent of MuJoCo, so that a closed loop on both engines shows the err
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from spheretwin.models import mjcf
 from spheretwin.models.actuator import Actuator
 from spheretwin.models.base.compiled import allocation_free, inlined
 from spheretwin.models.base.errors import InputError
-from spheretwin.models.base.record import Rows
+from spheretwin.models.base.record import Rows, put
 from spheretwin.models.joint_chain import JointChain, acceleration_at, fill_ideal
 from spheretwin.models.kinematics import Triple, triple
 from spheretwin.models.lagrangian import GRAVITY_m_s2, loaded_inertia
@@ -24,13 +25,13 @@ Array = NDArray[np.float64]
 
 
 class LagrangianRotor:
-    """Rotor of one run with the Lagrangian equations of motion.
+    """Rotor of a run, or of n rows, with the Lagrangian equations of motion.
 
     Parameters
     ----------
     actuator : Actuator
         Inertia and mount of the payload.
-    step_s : float, s
+    step_s : float or (n, 1) array, s
         Physics step.
     integrator : str
         Only ``RK4``.
@@ -40,12 +41,12 @@ class LagrangianRotor:
         Point mass at the payload mount; 0 for none.
     gravity_m_s2 : float, m/s²
         Gravity on the payload along -z of the stator frame.
-    joint : array of one JointChain
+    joint : array of JointChain, one for each row
         Replaces all of the above but the step and the integrator; default: an ideal joint.
 
     Attributes
     ----------
-    rows : array of one RotorData
+    rows : array of RotorData
 
     Raises
     ------
@@ -56,7 +57,7 @@ class LagrangianRotor:
     def __init__(
         self,
         actuator: Actuator,
-        step_s: float,
+        step_s: ArrayLike,
         integrator: str = "RK4",
         modelling_error: float = 0.0,
         payload_kg: float = 0.0,
@@ -71,37 +72,38 @@ class LagrangianRotor:
                 "Lagrangian plant: expected a payload mount on the rotor's third axis,"
                 f" received one at ({x:g}, {y:g}, {height:g}) m"
             )
-        self.rows = RotorData.zeros()
         if joint is None:
             inertia = loaded_inertia((1 + modelling_error) * actuator.inertia, payload_kg, height)
             joint = JointChain.filled(fill_ideal, inertia, payload_kg * gravity_m_s2 * height)
-        self.rows["step_s"], self.rows["joint"] = step_s, joint
+        self.rows = RotorData.zeros(len(joint))
+        put(self.rows, step_s=step_s)
+        self.rows["joint"] = joint
 
     @property
     def joint(self) -> Rows:
-        """Array of one JointChain."""
+        """Array of JointChain."""
         return self.rows["joint"]
 
-    def start(self, q: Array, qdot: Array) -> Any:
-        """Set pose and rates at time 0; return the record that compiled code steps.
+    def start(self, q: ArrayLike, qdot: ArrayLike) -> Any:
+        """Set pose and rates at time 0; return the first record, which compiled code steps.
 
         Parameters
         ----------
-        q : (3,) array, rad
+        q : (3,) or (n, 3) array, rad
             Hinge angles.
-        qdot : (3,) array, rad/s
+        qdot : (3,) or (n, 3) array, rad/s
             Hinge rates.
         """
-        self.rows["q"], self.rows["qdot"], self.rows["torque_q"] = q, qdot, 0.0
+        put(self.rows, q=q, qdot=qdot, torque_q=0.0)
         return self.rows[0]
 
-    def state(self) -> Array:
-        """Return the complete state."""
-        return np.concatenate([self.rows["q"][0], self.rows["qdot"][0]])
+    def state(self) -> list[Array]:
+        """Return the complete state of each row."""
+        return list(np.concatenate([self.rows["q"], self.rows["qdot"]], axis=1))
 
-    def restore(self, state: Array) -> None:
-        """Restore a state."""
-        self.rows["q"], self.rows["qdot"] = state[:3], state[3:]
+    def restore(self, states: Sequence[Array]) -> None:
+        """Restore the state of each row."""
+        self.rows["q"], self.rows["qdot"] = np.hsplit(np.array(states), 2)
 
 
 @allocation_free  # inlined, it makes the loop 7 % slower
@@ -147,9 +149,9 @@ def _set_up(settings: RotorSettings) -> LagrangianRotor:
             "Lagrangian plant: expected rigid bodies on three hinges, received a model with"
             f" {', '.join(unsupported)}; plant.engine mujoco computes it"
         )
-    return LagrangianRotor(
-        settings.actuator, settings.step_s, settings.integrator, joint=JointChain.filled(settings.fill_joint)
-    )
+    joint = JointChain.zeros(settings.rows)
+    settings.fill_joint(joint)
+    return LagrangianRotor(settings.actuator, settings.step_s, settings.integrator, joint=joint)
 
 
 LAGRANGIAN = EngineKind("lagrangian", _set_up, step)

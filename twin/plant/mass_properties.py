@@ -17,7 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field
 
-from spheretwin.electronics.random_streams import UNIFORM, errors
+from spheretwin.electronics.random_streams import UNIFORM, Seed, errors
+from spheretwin.models.base.columns import Columns
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.mjcf import PAYLOAD, ROTOR, Mjcf
 from spheretwin.models.mjcf_reader import LARGEST_OFFSET_M, LARGEST_TILT_RAD
@@ -86,17 +87,29 @@ class MassErrors(NamedTuple):
     ring_inertia_kg_m2: Array  # (2, 3)
 
 
-def mass_errors(section: MassSection, seed: int) -> MassErrors | None:
-    """Return the differences of a machine from its model file; None if there are none.
+def row_of(value: Any, row: int) -> Any:
+    """Return the value of a row: from columns or a list, or one that all rows share."""
+    if isinstance(value, np.ndarray):
+        return value[row, 0]
+    return list(value)[row] if isinstance(value, Columns | list) else value
+
+
+def mass_errors(section: MassSection, seed: Seed) -> MassErrors | list[Any] | None:
+    """Return the differences of a machine from its model file, or a list of those of n machines.
+
+    They are None for a machine without differences, and for all machines of an ideal section.
 
     Parameters
     ----------
     section : MassSection
-    seed : int
+    seed : int or (n, 1) array
         Seed of the run; the stream of each quantity is keyed by its name.
     """
     if section == IDEAL:
         return None
+    if isinstance(section, Columns) or isinstance(seed, np.ndarray):
+        rows = len(section) if isinstance(section, Columns) else np.size(seed)
+        return [mass_errors(row_of(section, row), int(row_of(seed, row))) for row in range(rows)]
 
     def value(name: str, bound: float) -> Array:
         given = np.array(getattr(section, name))

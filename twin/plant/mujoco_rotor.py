@@ -3,20 +3,22 @@
 from __future__ import annotations
 
 import ctypes
+from collections.abc import Sequence
 from typing import Any
 
 import mujoco
 import numpy as np
 from numba import types
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from spheretwin.models.base.addresses import external_function
 from spheretwin.models.base.compiled import COMPILES, allocation_free
 from spheretwin.models.base.memory import read_integer, read_number, write_number
 from spheretwin.models.base.mujoco_library import addresses, step_address
+from spheretwin.models.base.record import put
 from spheretwin.models.mjcf import Mjcf, idle_stages
-from spheretwin.plant.mass_properties import MassErrors, true_model
-from spheretwin.plant.rotor import EngineKind, RotorData, RotorSettings
+from spheretwin.plant.mass_properties import MassErrors, row_of, true_model
+from spheretwin.plant.rotor import EngineKind, Number, RotorData, RotorSettings
 
 Array = NDArray[np.float64]
 
@@ -34,7 +36,7 @@ def integrator_name(number: int) -> str:
 
 
 class MujocoRotor:
-    """Rotor of one run in MuJoCo.
+    """Rotor of a run, or of n rows, in MuJoCo: numbers may be arrays (n, 1).
 
     Parameters
     ----------
@@ -50,64 +52,91 @@ class MujocoRotor:
         Point mass at the payload mount; 0 for none.
     gravity_m_s2 : float, m/s²
         Gravity along -z; default: that of the model.
-    mass : MassErrors
+    mass : MassErrors, or list of MassErrors or None
         Differences from the model file; default: none.
+    rows : int
+        n.
+
+    Attributes
+    ----------
+    machines : list of (MjModel, MjData)
+        Of each row.
+    rows : array of RotorData
     """
 
     def __init__(
         self,
         mjcf: Mjcf,
-        step_s: float,
+        step_s: Number,
         integrator: str,
-        modelling_error: float,
-        payload_kg: float,
-        gravity_m_s2: float | None = None,
-        mass: MassErrors | None = None,
+        modelling_error: Number,
+        payload_kg: Number,
+        gravity_m_s2: Number | None = None,
+        mass: MassErrors | list[Any] | None = None,
+        rows: int = 1,
     ) -> None:
-        self.model = true_model(mjcf, modelling_error, payload_kg, gravity_m_s2, mass)
-        self.model.opt.timestep = step_s
-        self.model.opt.integrator = INTEGRATORS[integrator]
-        # A diverged state must stay visible: the automatic reset would replace it by zeros.
-        self.model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET) | idle_stages(self.model)
-        self.data = mujoco.MjData(self.model)
-        mujoco.mj_setConst(self.model, self.data)
-        self.rows = RotorData.zeros()
+        values = mjcf, step_s, integrator, modelling_error, payload_kg, gravity_m_s2, mass
+        self.machines = [_machine(*(row_of(value, row) for value in values)) for row in range(rows)]
+        self.rows = RotorData.zeros(rows)
 
-    def start(self, q: Array, qdot: Array) -> Any:
-        """Set pose and rates at time 0; return the record that compiled code steps.
+    @property
+    def model(self) -> mujoco.MjModel:
+        """Model of the first row."""
+        return self.machines[0][0]
+
+    @property
+    def data(self) -> mujoco.MjData:
+        """Data of the first row."""
+        return self.machines[0][1]
+
+    def start(self, q: ArrayLike, qdot: ArrayLike) -> Any:
+        """Set pose and rates at time 0; return the first record, which compiled code steps.
 
         Parameters
         ----------
-        q : (3,) array, rad
+        q : (3,) or (n, 3) array, rad
             Hinge angles.
-        qdot : (3,) array, rad/s
+        qdot : (3,) or (n, 3) array, rad/s
             Hinge rates.
         """
-        mujoco.mj_resetData(self.model, self.data)
-        data = self.data
-        arrays = data.qpos, data.qvel, data.qfrc_applied, data.warning.lastinfo
-        places = [array.ctypes.data for array in arrays]
-        self.rows["addresses"] = *addresses(self.model, data), *places
-        self.rows["q"], self.rows["qdot"], self.rows["torque_q"], self.rows["warnings"] = q, qdot, 0.0, 0
-        self._write_pose()
+        put(self.rows, q=q, qdot=qdot, torque_q=0.0, warnings=0)
+        for (model, data), row in zip(self.machines, self.rows, strict=True):
+            mujoco.mj_resetData(model, data)
+            arrays = data.qpos, data.qvel, data.qfrc_applied, data.warning.lastinfo
+            row["addresses"] = *addresses(model, data), *(array.ctypes.data for array in arrays)
+        self._write_poses()
         return self.rows[0]
 
-    def state(self) -> Array:
-        """Return the complete state, including the warm start of the solver."""
-        self._write_pose()
-        state = np.empty(mujoco.mj_stateSize(self.model, _STATE))
-        mujoco.mj_getState(self.model, self.data, state, _STATE)
-        return state
+    def state(self) -> list[Array]:
+        """Return the complete state of each row, including the warm start of the solver."""
+        self._write_poses()
+        states = [np.empty(mujoco.mj_stateSize(model, _STATE)) for model, _ in self.machines]
+        for (model, data), state in zip(self.machines, states, strict=True):
+            mujoco.mj_getState(model, data, state, _STATE)
+        return states
 
-    def restore(self, state: Array) -> None:
-        """Restore a state of a rotor with the same model."""
-        mujoco.mj_setState(self.model, self.data, state, _STATE)
-        self.rows["q"], self.rows["qdot"] = self.data.qpos, self.data.qvel
-        self.rows["torque_q"] = self.data.qfrc_applied
+    def restore(self, states: Sequence[Array]) -> None:
+        """Restore the state of each row of a rotor with the same models."""
+        for (model, data), row, state in zip(self.machines, self.rows, states, strict=True):
+            mujoco.mj_setState(model, data, state, _STATE)
+            row["q"], row["qdot"], row["torque_q"] = data.qpos, data.qvel, data.qfrc_applied
 
-    def _write_pose(self) -> None:
-        """Write pose and rates of the record to MuJoCo, as a step does."""
-        self.data.qpos[:], self.data.qvel[:] = self.rows["q"][0], self.rows["qdot"][0]
+    def _write_poses(self) -> None:
+        """Write pose and rates of the records to MuJoCo, as a step does."""
+        for (_, data), row in zip(self.machines, self.rows, strict=True):
+            data.qpos[:], data.qvel[:] = row["q"], row["qdot"]
+
+
+def _machine(
+    mjcf: Mjcf, step_s: float, integrator: str, *differences: Any
+) -> tuple[mujoco.MjModel, mujoco.MjData]:
+    model = true_model(mjcf, *differences)
+    model.opt.timestep, model.opt.integrator = step_s, INTEGRATORS[integrator]
+    # A diverged state must stay visible: the automatic reset would replace it by zeros.
+    model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET) | idle_stages(model)
+    data = mujoco.MjData(model)
+    mujoco.mj_setConst(model, data)
+    return model, data
 
 
 _STATE = int(mujoco.mjtState.mjSTATE_INTEGRATION)
@@ -151,6 +180,7 @@ def _set_up(settings: RotorSettings) -> MujocoRotor:
         settings.payload_kg,
         settings.gravity_m_s2,
         settings.mass,
+        settings.rows,
     )
     settings.fill_joint(rotor.rows["joint"])
     return rotor

@@ -2,36 +2,39 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import NamedTuple, Protocol
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from spheretwin.models.actuator import Actuator
 from spheretwin.models.base.record import Record, Rows, field
 from spheretwin.models.joint_chain import JointChain, fill_chain, fill_ideal
 from spheretwin.models.lagrangian import loaded_inertia
 from spheretwin.models.mjcf import Mjcf
-from spheretwin.plant.mass_properties import MassErrors, true_model
+from spheretwin.plant.mass_properties import MassErrors, row_of, true_model
 
 Array = NDArray[np.float64]
+Number = float | Array
 
 
 class RotorSettings(NamedTuple):
-    """Settings of a rotor."""
+    """Settings of a rotor, or of n rotors: numbers may be arrays (n, 1)."""
 
     model: Mjcf
     actuator: Actuator
-    step_s: float
+    step_s: Number
     integrator: str
-    modelling_error: float
+    modelling_error: Number
     """m: the rotor's inertia is (1 + m) times the model's (11), (54)."""
-    payload_kg: float
-    gravity_m_s2: float | None
+    payload_kg: Number
+    gravity_m_s2: Number | None
     """Gravity along -z; None: that of the model."""
-    mass: MassErrors | None = None
-    """Differences of the machine from the model file."""
+    mass: MassErrors | list[Any] | None = None
+    """Differences of the machine from the model file, or a list of those of n machines."""
+    rows: int = 1
+    """Number of rotors."""
 
     def fill_joint(self, joints: Rows) -> None:
         """Fill the joint of the true rotor: an ideal one if its closed equations of motion hold.
@@ -40,12 +43,15 @@ class RotorSettings(NamedTuple):
         ----------
         joints : array of JointChain
         """
-        error, payload_kg, gravity_m_s2 = self.modelling_error, self.payload_kg, self.gravity_m_s2
         x, y, height = map(float, self.actuator.payload_mount_m)
-        inertia = loaded_inertia((1 + error) * self.actuator.inertia, payload_kg, height)
-        fill_ideal(joints, inertia, payload_kg * (gravity_m_s2 or 0.0) * height)
-        if self.mass is not None or not self.model.has_ideal_joint or (payload_kg and (x or y)):
-            fill_chain(joints, true_model(self.model, error, payload_kg, gravity_m_s2, self.mass))
+        inertia = loaded_inertia((1 + self.modelling_error) * self.actuator.inertia, self.payload_kg, height)
+        gravity_m_s2 = 0.0 if self.gravity_m_s2 is None else self.gravity_m_s2
+        fill_ideal(joints, inertia, self.payload_kg * gravity_m_s2 * height)
+        settings = self.model, self.modelling_error, self.payload_kg, self.gravity_m_s2, self.mass
+        for row in range(self.rows):
+            model, error, payload_kg, gravity, mass = (row_of(value, row) for value in settings)
+            if mass is not None or not model.has_ideal_joint or (payload_kg and (x or y)):
+                fill_chain(joints[row : row + 1], true_model(model, error, payload_kg, gravity, mass))
 
 
 class RotorData(Record):
@@ -61,29 +67,29 @@ class RotorData(Record):
 
 
 class Rotor(Protocol):
-    """Rotor of one run."""
+    """Rotor of a run, or rotors of n rows."""
 
     rows: Rows
-    """Array of one RotorData."""
+    """Array of RotorData, one for each row."""
 
-    def start(self, q: Array, qdot: Array) -> RotorData:
-        """Set pose and rates; return the record of `rows`.
+    def start(self, q: ArrayLike, qdot: ArrayLike) -> RotorData:
+        """Set pose and rates; return the first record of `rows`.
 
         Parameters
         ----------
-        q : (3,) array, rad
+        q : (3,) or (n, 3) array, rad
             Hinge angles.
-        qdot : (3,) array, rad/s
+        qdot : (3,) or (n, 3) array, rad/s
             Their rates.
         """
         ...
 
-    def state(self) -> Array:
-        """Return the complete state."""
+    def state(self) -> list[Array]:
+        """Return the complete state of each row."""
         ...
 
-    def restore(self, state: Array) -> None:
-        """Restore a state."""
+    def restore(self, states: Sequence[Array]) -> None:
+        """Restore the state of each row."""
         ...
 
 
