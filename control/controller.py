@@ -84,26 +84,13 @@ class Controller(NamedTuple):
     tables: Tables
 
 
-class ControllerRows(NamedTuple):
-    """Controllers of the runs of a block, one for each row; `row` is one of them."""
-
-    data: Rows  # array of `ControllerData`
-    parameters: Array  # (rows, p)
-    memory: Array  # (rows, m)
-    estimator_parameters: Array
-    estimator_memory: Array
-    tables: Tables
+class ControllerRows(Controller):
+    """Controllers of many runs: the first dimension of each array is that of the runs."""
 
     def row(self, i: int) -> Controller:
-        """Return the controller of a row, which shares its numbers."""
-        return Controller(
-            self.data[i : i + 1],
-            self.parameters[i],
-            self.memory[i],
-            self.estimator_parameters[i],
-            self.estimator_memory[i],
-            self.tables,
-        )
+        """Return the controller of a run, which shares its numbers."""
+        own = self.parameters[i], self.memory[i], self.estimator_parameters[i], self.estimator_memory[i]
+        return Controller(self.data[i : i + 1], *own, self.tables)
 
 
 def controller(

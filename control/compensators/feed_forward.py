@@ -94,17 +94,10 @@ def fill_feed_forward(
         Control period, and the delay that the law receives.
     """
     due, fraction = split_delay(delay_s, period_s)
-    put(
-        rows,
-        on=section.on,
-        share=section.inertia,
-        inertia=rotor.inertia,
-        coulomb_Nm=np.multiply(section.friction, rotor.coulomb_Nm),
-        viscous_Nm_s=np.multiply(section.friction, rotor.viscous_Nm_s),
-        smoothing_rad_s=section.smoothing_rad_s,
-        due=due,
-        fraction=fraction,
-    )
+    put(rows, on=section.on, share=section.inertia, inertia=rotor.inertia, due=due, fraction=fraction)
+    put(rows, coulomb_Nm=np.multiply(section.friction, rotor.coulomb_Nm))
+    put(rows, viscous_Nm_s=np.multiply(section.friction, rotor.viscous_Nm_s))
+    put(rows, smoothing_rad_s=section.smoothing_rad_s)
 
 
 @allocation_free

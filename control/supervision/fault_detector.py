@@ -126,15 +126,11 @@ def fill_detector(rows: Rows, section: DetectorSection, on: bool, nominal: Nomin
     """Fill detectors before the first measurement, for the nominal currents of healthy groups."""
     resistance_ohm = np.asarray(nominal.resistance_ohm)
     periods = np.asarray(nominal.period_s * resistance_ohm / nominal.inductance_H)
-    put(
-        rows,
-        on=on,
-        threshold_A=derived_threshold_A(nominal) if section.threshold_A is None else section.threshold_A,
-        ticks=derived_ticks(nominal) if section.ticks is None else section.ticks,
-        decay=np.reshape([exp(-rate) for rate in periods.ravel()], periods.shape),
-        resistance_ohm=resistance_ohm,
-        reach_A=nominal.swing_V / resistance_ohm,
-    )
+    threshold_A, ticks = section.threshold_A, section.ticks
+    put(rows, on=on, resistance_ohm=resistance_ohm, reach_A=nominal.swing_V / resistance_ohm)
+    put(rows, decay=np.reshape([exp(-rate) for rate in periods.ravel()], periods.shape))
+    put(rows, threshold_A=derived_threshold_A(nominal) if threshold_A is None else threshold_A)
+    put(rows, ticks=derived_ticks(nominal) if ticks is None else ticks)
 
 
 @allocation_free

@@ -122,19 +122,13 @@ class MeasurementLimits(NamedTuple):
 
 def fill_watchdog(rows: Rows, section: WatchdogSection, limits: MeasurementLimits) -> None:
     """Fill watchdogs before the first measurement."""
-    put(
-        rows,
-        on=section.on,
-        action=SHORT if section.action == "short" else RELEASE,
-        rundown_ticks=np.rint(section.rundown_s / limits.period_s),
-        stale_ticks=section.stale_ticks,
-        largest_rate_rad_s=section.largest_rate_rad_s,
-        step_rad=section.largest_rate_rad_s * limits.period_s,
-        noise_rad=np.multiply(DEVIATIONS * sqrt(2), limits.noise_rad) + limits.quantum_rad,
-        lowest_rad=limits.hinge_range_rad[..., 0] + section.edge_margin_rad,
-        highest_rad=limits.hinge_range_rad[..., 1] - section.edge_margin_rad,
-        last_rad=np.nan,
-    )
+    rate_rad_s, margin_rad = section.largest_rate_rad_s, section.edge_margin_rad
+    low_rad, high_rad = limits.hinge_range_rad[..., 0], limits.hinge_range_rad[..., 1]
+    put(rows, on=section.on, action=SHORT if section.action == "short" else RELEASE, last_rad=np.nan)
+    put(rows, rundown_ticks=np.rint(section.rundown_s / limits.period_s), stale_ticks=section.stale_ticks)
+    put(rows, largest_rate_rad_s=rate_rad_s, step_rad=rate_rad_s * limits.period_s)
+    put(rows, noise_rad=np.multiply(DEVIATIONS * sqrt(2), limits.noise_rad) + limits.quantum_rad)
+    put(rows, lowest_rad=low_rad + margin_rad, highest_rad=high_rad - margin_rad)
 
 
 @allocation_free
