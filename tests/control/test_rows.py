@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 from pydantic import BaseModel
 
-from spheretwin.control.applied_torque import AppliedTorque, fill_applied_torque
 from spheretwin.control.compensators.feed_forward import (
     FeedForward,
     FeedForwardSection,
@@ -81,7 +80,8 @@ def governor(draw):
 
 
 def prediction(draw):
-    model = DelayModel(1e-3, 2.3e-3, 1e-3, np.array(draw.axes(1e-4)))
+    delay_s = draw.number(2e-3) * draw.flag()
+    model = DelayModel(draw.period_s, delay_s, draw.groups(1e-3), np.array(draw.axes(1e-4)))
     return PredictionSection(on=draw.flag()), model
 
 
@@ -89,7 +89,7 @@ def feed_forward(draw):
     shares = [draw.axes(1.0) if draw.flag() else (0.0,) * 3 for _ in range(2)]
     section = FeedForwardSection(friction=shares[0], inertia=shares[1], smoothing_rad_s=draw.number(0.01))
     rotor = NominalRotor(np.array(draw.axes(1e-4)), draw.axes(1e-3), draw.axes(1e-3))
-    return section, rotor, 1e-3, 2.3e-3
+    return section, rotor, draw.period_s, draw.number(2e-3) * draw.flag()
 
 
 def detector(draw):
@@ -114,12 +114,7 @@ def watchdog(draw):
     return section, MeasurementLimits(draw.period_s, draw.axes(1e-3), draw.axes(1e-3), ranges)
 
 
-def applied_torque(draw):
-    return True, 1e-3, 2.3e-3, (1e-3, 2e-3, 3e-3, 0.0)
-
-
 CASES = [
-    (AppliedTorque, fill_applied_torque, applied_torque),
     (Governor, fill_governor, governor),
     (Prediction, fill_prediction, prediction),
     (FeedForward, fill_feed_forward, feed_forward),
