@@ -281,8 +281,8 @@ class GearSection(SensorStage):
         return self.ratio_error == 0
 
     def fill(self, rows, setup):
-        rows["on"] = not self.ideal or setup.faults
-        rows["ratio"] = 1 + self.ratio_error * errors(setup.seed, setup.name, 3, 1)[..., 0]
+        shares = errors(setup.seed, setup.name, 3, 1)[..., 0]
+        put(rows, on=np.logical_not(self.ideal) | setup.faults, ratio=1 + self.ratio_error * shares)
         fill_fault_line(rows["line"])
 
     @classmethod

@@ -140,7 +140,10 @@ class SensorStage(BaseModel):
 
     @abstractmethod
     def fill(self, rows: Rows, setup: SensorSetup) -> None:
-        """Fill the records, in which every number is 0; they are on if not ideal or if a fault may occur."""
+        """Fill the records, in which every number is 0; they are on if not ideal or if a fault may occur.
+
+        `self` and the section and seed of the set-up are those of one run, or columns of many.
+        """
 
     @classmethod
     @abstractmethod

@@ -320,7 +320,7 @@ class EncoderSection(SensorStage):
         if np.count_nonzero(draws):
             shares = np.where(draws, errors(setup.seed, setup.name, 1, 2)[..., 0, :], 0.0)
         phase, start = shares[..., :1], shares[..., 1:]
-        put(rows, on=~np.asarray(self.ideal) | setup.faults, counts_per_turn=self.counts, turns=nan)
+        put(rows, on=np.logical_not(self.ideal) | setup.faults, counts_per_turn=self.counts, turns=nan)
         put(rows, eccentricity_rad=self.eccentricity_rad, phase_rad=pi * phase)
         put(rows, starts_with_error=np.greater(self.start_error_rad, 0))
         put(rows, index_count=np.rint(self.index_rad * self.counts / (2 * pi)))
