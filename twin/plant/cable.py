@@ -44,9 +44,8 @@ class CableSection(BaseModel):
 
 def acts(section: CableSection) -> Any:
     """True if there is a cable: one entry, or (n, 1) for many sections."""
-    torques_Nm = section.torque_Nm, section.torque_error_Nm, section.hysteresis_Nm
-    values = np.broadcast_arrays(section.stiffness_Nm_rad, *torques_Nm)
-    return np.any(np.any(values, axis=0), axis=-1, keepdims=True)
+    sizes = np.abs(section.torque_Nm) + section.torque_error_Nm + section.hysteresis_Nm
+    return np.any(sizes + section.stiffness_Nm_rad, axis=-1, keepdims=True)
 
 
 def constant_torque_Nm(section: CableSection, seed: Seed) -> NDArray[np.float64]:

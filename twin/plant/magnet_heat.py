@@ -139,18 +139,17 @@ def fill_heat(
         return
     put(heats, on=section.on, winding_J_K=winding_J_K)
     _check_stator(heats, section.stator_heat_capacity_J_K, settled)
-    capacity = _of_both(section.stator_heat_capacity_J_K, section.rotor_heat_capacity_J_K) / period_s
-    outer = 1 / _of_both(section.stator_to_ambient_K_W, section.rotor_to_ambient_K_W)
-    gap = 1 / np.asarray(section.air_gap_K_W)[..., None]
-    diagonal = (capacity + outer + gap[..., 0])[..., None] * np.eye(2)
+    matrix, capacity, outer = heats["matrix_W_K"], heats["capacity_W_K"], heats["to_ambient_W_K"]
+    capacity[:, :1] = section.stator_heat_capacity_J_K / period_s
+    capacity[:, 1:] = section.rotor_heat_capacity_J_K / period_s
+    outer[:, :1], outer[:, 1:] = 1 / section.stator_to_ambient_K_W, 1 / section.rotor_to_ambient_K_W
+    gap = 1 / section.air_gap_K_W
+    matrix[:, [0, 1], [0, 1]], matrix[:, [0, 1], [1, 0]] = capacity + outer + gap, -gap
     put(
         heats,
         remanence_per_K=section.remanence_per_K,
         ambient_degC=ambient_degC,
         period_s=period_s,
-        matrix_W_K=diagonal + gap * np.array([[0.0, -1.0], [-1.0, 0.0]]),
-        capacity_W_K=capacity,
-        to_ambient_W_K=outer,
         stator_degC=ambient_degC,
         last_degC=ambient_degC,
         rotor_degC=initial_degC(section, ambient_degC),
@@ -167,11 +166,6 @@ def _check_stator(heats: Rows, stator_J_K: ArrayLike, settled: Array) -> None:
             f" {exchanged_J_K[row]:g} J/K, which the windings exchange with the stator in a control period,"
             f" received {stator_J_K[row]:g} J/K"
         )
-
-
-def _of_both(stator: ArrayLike, rotor: ArrayLike) -> Array:
-    """Return numbers of stator and rotor, (2,) or (n, 2)."""
-    return np.concatenate(np.broadcast_arrays(np.atleast_1d(stator), np.atleast_1d(rotor)), axis=-1)
 
 
 def initial_degC(section: ThermalSection, ambient_degC: Any) -> Any:

@@ -172,16 +172,7 @@ def step(rotor: RotorData) -> None:
 
 
 def _set_up(settings: RotorSettings) -> MujocoRotor:
-    rotor = MujocoRotor(
-        settings.model,
-        settings.step_s,
-        settings.integrator,
-        settings.modelling_error,
-        settings.payload_kg,
-        settings.gravity_m_s2,
-        settings.mass,
-        settings.rows,
-    )
+    rotor = MujocoRotor(settings.model, *settings[2:])
     settings.fill_joint(rotor.rows["joint"])
     return rotor
 
