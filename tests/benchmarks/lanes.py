@@ -13,6 +13,7 @@ from spheretwin import plant
 from spheretwin.envs import TwinVectorEnv
 from spheretwin.models import actuator as actuators
 from spheretwin.models.base.compiled import allocation_free, compiled
+from spheretwin.models.joint_chain import JointChain, fill_ideal
 from spheretwin.plant.friction import Friction, fill_friction, slow_down
 from spheretwin.plant.lagrangian_rotor import LagrangianRotor
 from spheretwin.plant.lagrangian_rotor import step as step_rotor
@@ -39,7 +40,7 @@ def lockstep(changes):
 def single_without_field():
     """Time of a step of rotor and friction of one plant, s."""
     parameters, steps = plant.parameters("nutation", FRICTION), PLANTS * STEPS * CALLS
-    rotor = LagrangianRotor(actuators.load(), dt)
+    rotor = LagrangianRotor(JointChain.filled(fill_ideal, actuators.load().inertia), dt)
     coefficients = parameters.coulomb_Nm, parameters.viscous_Nm_s, parameters.friction_smoothing_rad_s
     resistance = Friction.filled(fill_friction, *coefficients, dt)[0]
 

@@ -28,6 +28,7 @@ from spheretwin.models import mjcf
 from spheretwin.models.base.compiled import compiled
 from spheretwin.models.magnetics import fill_torque_matrix, scratch_of, torque_matrix, torque_model
 from spheretwin.models.telemetry.signals import width
+from spheretwin.plant.mass_properties import true_model
 from spheretwin.plant.mujoco_rotor import MujocoRotor
 from spheretwin.plant.plant_step import step
 from spheretwin.provenance import facts_of
@@ -203,13 +204,8 @@ def process_seconds(*command: str) -> Callable[[], float]:
 
 def _rotor() -> MujocoRotor:
     plant = scenarios.load(SCENARIO).plant
-    rotor = MujocoRotor(
-        mjcf.read(actuators.MJCF_PATH),
-        plant.step_s,
-        plant.integrator,
-        plant.modelling_error,
-        plant.payload_kg,
-    )
+    model = true_model(mjcf.read(actuators.MJCF_PATH), plant.modelling_error, plant.payload_kg)
+    rotor = MujocoRotor([model], plant.step_s, plant.integrator)
     rotor.start(np.zeros(3), np.array([0.2 * np.pi, 0.2, 2 * np.pi]))
     return rotor
 

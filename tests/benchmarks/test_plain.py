@@ -8,6 +8,7 @@ import numpy as np
 from spheretwin import scenario as scenarios
 from spheretwin.models import actuator as actuators
 from spheretwin.models import mjcf
+from spheretwin.plant.mass_properties import true_model
 from spheretwin.plant.mujoco_rotor import MujocoRotor
 from spheretwin.simulation import simulate
 
@@ -22,9 +23,8 @@ def test_plain_loop_runs_the_same_physics():
     table = simulate(scenario).telemetry
     reference = scenario.trajectory.sample(table["t_s"])
     section = scenario.plant
-    rotor = MujocoRotor(
-        mjcf.read(actuators.MJCF_PATH), section.step_s, section.integrator, section.modelling_error, 0.0
-    )
+    model = true_model(mjcf.read(actuators.MJCF_PATH), section.modelling_error)
+    rotor = MujocoRotor([model], section.step_s, section.integrator)
     rotor.start(np.zeros(3), np.zeros(3))
     actuator = actuators.load()
     law = plain.PlainAfsm(actuator.inertia, scenario.controller.period_s)

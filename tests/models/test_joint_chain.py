@@ -142,7 +142,7 @@ def test_energy_of_the_free_chain_is_kept_to_the_order_of_the_step(actuator):
 
     drifts = []
     for step_s in steps:
-        plant = LagrangianRotor(actuator, step_s, joint=joint).start(q0, rates0)
+        plant = LagrangianRotor(joint, step_s).start(q0, rates0)
         for _ in range(round(0.8 / step_s)):
             lagrangian_rotor.step(plant)
         drifts.append(abs(energy(plant.q, plant.qdot) - energy(q0, rates0)))

@@ -12,6 +12,7 @@ from spheretwin import scenario as scenarios
 from spheretwin.models import actuator as actuators
 from spheretwin.models import mjcf
 from spheretwin.models.base.errors import InputError
+from spheretwin.plant.mass_properties import true_model
 from spheretwin.plant.mujoco_rotor import MujocoRotor
 from spheretwin.simulation import simulate
 
@@ -173,7 +174,7 @@ def test_a_run_does_not_change_what_is_kept():
 
     before = numbers()
     for payload_kg in (0.0, 0.05):
-        MujocoRotor(original, 1e-3, "Euler", 0.2, payload_kg, 1.62)
+        MujocoRotor([true_model(original, 0.2, payload_kg, 1.62)], 1e-3, "Euler")
     for ours, theirs in zip(before, numbers(), strict=True):
         np.testing.assert_equal(ours, theirs)
 

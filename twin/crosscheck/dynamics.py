@@ -23,11 +23,10 @@ from spheretwin.crosscheck.pinocchio_models import model_of_bodies, model_of_fil
 from spheretwin.crosscheck.scale import scale_of
 from spheretwin.models.actuator import Actuator
 from spheretwin.models.base.checks import Check
-from spheretwin.models.joint_chain import JointChain, chain_at, equations, fill_chain
+from spheretwin.models.joint_chain import JointChain, chain_at, equations, fill_chain, fill_ideal
 from spheretwin.models.kinematics import Triple, rate_jacobian, rotation, triple
-from spheretwin.models.lagrangian import coriolis_matrix, gravity_torque, inertia_matrix
+from spheretwin.models.lagrangian import coriolis_matrix, gravity_torque, inertia_matrix, loaded_inertia
 from spheretwin.models.mjcf import gravity, read
-from spheretwin.plant.lagrangian_rotor import LagrangianRotor
 from spheretwin.plant.mass_properties import MassErrors, MassSection, mass_errors, true_model
 from spheretwin.plant.mujoco_rotor import MujocoRotor
 
@@ -200,7 +199,7 @@ def random_states(count: int) -> States:
 
 def ask_mujoco(mjcf: Path, case: PlantCase, states: States) -> Answers:
     """Answers of MuJoCo, from its public functions."""
-    rotor = MujocoRotor(read(mjcf), STEP_S, "RK4", case.modelling_error, case.payload_kg, mass=case.mass)
+    rotor = MujocoRotor([_compiled(mjcf, case)], STEP_S, "RK4")
     model, data, body = rotor.model, rotor.data, rotor.model.body("rotor").id
     answers = _empty(len(states.q))
     axes = np.eye(3)
@@ -281,10 +280,9 @@ def _differences(
 def _closed_terms(mjcf: Path, actuator: Actuator, case: PlantCase, states: States) -> _Terms:
     """Return the terms of an ideal joint, in closed form."""
     gravity_m_s2 = -gravity(read(mjcf).described.opt)[2]
-    rotor = LagrangianRotor(
-        actuator, STEP_S, "RK4", case.modelling_error, case.payload_kg, gravity_m_s2=gravity_m_s2
-    )
-    joint = rotor.joint[0]
+    height_m = float(actuator.payload_mount_m[2])
+    inertia = loaded_inertia((1 + case.modelling_error) * actuator.inertia, case.payload_kg, height_m)
+    joint = JointChain.filled(fill_ideal, inertia, case.payload_kg * gravity_m_s2 * height_m)[0]
     pairs = list(zip(states.q, states.qdot, strict=True))
     E = np.array([rate_jacobian(q) for q, _ in pairs])
     C = np.array([coriolis_matrix(q, qdot, joint.inertia) for q, qdot in pairs])

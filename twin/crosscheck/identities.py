@@ -17,6 +17,7 @@ from spheretwin.models.base.checks import Check
 from spheretwin.models.kinematics import rotation, rotor_rate_jacobian
 from spheretwin.models.lagrangian import coriolis_matrix, coupling_torques, inertia_matrix
 from spheretwin.models.mjcf import read
+from spheretwin.plant.mass_properties import true_model
 from spheretwin.plant.mujoco_rotor import MujocoRotor
 
 Array = NDArray[np.float64]
@@ -202,7 +203,7 @@ def fly(mjcf: Path, inertia: Array, spin_rad_s: float) -> FreeMotion:
     InputError
         The model cannot be read.
     """
-    rotor = MujocoRotor(read(mjcf), STEP_s, "RK4", 0.0, 0.0)
+    rotor = MujocoRotor([true_model(read(mjcf))], STEP_s, "RK4")
     rotor.model.body("rotor").inertia = inertia
     mujoco.mj_setConst(rotor.model, rotor.data)
     rotor.start(START_rad, spin_rad_s * NODDING)

@@ -28,6 +28,7 @@ from spheretwin.models.mjcf import read
 from spheretwin.models.telemetry.table import Table
 from spheretwin.plant import lagrangian_rotor
 from spheretwin.plant.lagrangian_rotor import LagrangianRotor
+from spheretwin.plant.mass_properties import true_model
 from spheretwin.plant.mujoco_rotor import MujocoRotor
 from spheretwin.scenario.changes import with_change
 from spheretwin.simulation import simulate
@@ -91,7 +92,7 @@ def compare_trajectories(mjcf: Path, actuator: Actuator) -> Trajectories:
     methods: dict[str, Callable[[float], Array]] = {
         f"MuJoCo {name}": partial(by_mujoco, mjcf, pieces, name) for name in ORDERS
     }
-    methods[OWN] = partial(by_own_steps, actuator, motion, pieces)
+    methods[OWN] = partial(by_own_steps, motion, pieces)
     measured = {name: convergence(method, reference) for name, method in methods.items()}
     orders = {f"MuJoCo {name}": order for name, order in ORDERS.items()} | {OWN: 4}
     return Trajectories(
@@ -152,7 +153,7 @@ def integrate(pieces: HeldTorques, motion: Equations) -> Array:
 
 def by_mujoco(mjcf: Path, pieces: HeldTorques, integrator: str, step_s: float) -> Array:
     """States at the ends of the pieces by MuJoCo."""
-    rotor = MujocoRotor(read(mjcf), step_s, integrator, 0.0, 0.0, gravity_m_s2=0.0)
+    rotor = MujocoRotor([true_model(read(mjcf), gravity_m_s2=0.0)], step_s, integrator)
     rotor.start(pieces.start[:3], pieces.start[3:])
     states = [pieces.start]
     for torque in pieces.torque:
@@ -162,9 +163,9 @@ def by_mujoco(mjcf: Path, pieces: HeldTorques, integrator: str, step_s: float) -
     return np.array(states)
 
 
-def by_own_steps(actuator: Actuator, motion: Equations, pieces: HeldTorques, step_s: float) -> Array:
+def by_own_steps(motion: Equations, pieces: HeldTorques, step_s: float) -> Array:
     """States at the ends of the pieces by the Lagrangian plant."""
-    plant = LagrangianRotor(actuator, step_s, joint=motion.joint).start(pieces.start[:3], pieces.start[3:])
+    plant = LagrangianRotor(motion.joint, step_s).start(pieces.start[:3], pieces.start[3:])
     states = [pieces.start]
     for torque in pieces.torque:
         plant.torque_q[:] = torque

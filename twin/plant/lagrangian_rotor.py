@@ -12,13 +12,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from spheretwin.models import mjcf
-from spheretwin.models.actuator import Actuator
 from spheretwin.models.base.compiled import allocation_free, inlined
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.base.record import Rows, put
-from spheretwin.models.joint_chain import JointChain, acceleration_at, fill_ideal
+from spheretwin.models.joint_chain import JointChain, acceleration_at
 from spheretwin.models.kinematics import Triple, triple
-from spheretwin.models.lagrangian import GRAVITY_m_s2, loaded_inertia
 from spheretwin.plant.rotor import EngineKind, RotorData, RotorSettings
 
 Array = NDArray[np.float64]
@@ -29,52 +27,16 @@ class LagrangianRotor:
 
     Parameters
     ----------
-    actuator : Actuator
-        Inertia and mount of the payload.
+    joint : array of JointChain, one for each row
     step_s : float or (n, 1) array, s
         Physics step.
-    integrator : str
-        Only ``RK4``.
-    modelling_error : float
-        m: the rotor's inertia is (1 + m) times that of the actuator (11), (54).
-    payload_kg : float, kg
-        Point mass at the payload mount; 0 for none.
-    gravity_m_s2 : float, m/s²
-        Gravity on the payload along -z of the stator frame.
-    joint : array of JointChain, one for each row
-        Replaces all of the above but the step and the integrator; default: an ideal joint.
 
     Attributes
     ----------
     rows : array of RotorData
-
-    Raises
-    ------
-    InputError
-        Another integrator, or a payload whose mount is not on the third axis of an ideal joint.
     """
 
-    def __init__(
-        self,
-        actuator: Actuator,
-        step_s: ArrayLike,
-        integrator: str = "RK4",
-        modelling_error: float = 0.0,
-        payload_kg: float = 0.0,
-        gravity_m_s2: float = GRAVITY_m_s2,
-        joint: Rows | None = None,
-    ) -> None:
-        x, y, height = (float(length) for length in actuator.payload_mount_m)
-        if integrator != "RK4":
-            raise InputError(f"Lagrangian plant: expected the integrator RK4, received {integrator}")
-        if payload_kg and (x or y) and joint is None:
-            raise InputError(
-                "Lagrangian plant: expected a payload mount on the rotor's third axis,"
-                f" received one at ({x:g}, {y:g}, {height:g}) m"
-            )
-        if joint is None:
-            inertia = loaded_inertia((1 + modelling_error) * actuator.inertia, payload_kg, height)
-            joint = JointChain.filled(fill_ideal, inertia, payload_kg * gravity_m_s2 * height)
+    def __init__(self, joint: Rows, step_s: ArrayLike) -> None:
         self.rows = RotorData.zeros(len(joint))
         put(self.rows, step_s=step_s)
         self.rows["joint"] = joint
@@ -149,9 +111,11 @@ def _set_up(settings: RotorSettings) -> LagrangianRotor:
             "Lagrangian plant: expected rigid bodies on three hinges, received a model with"
             f" {', '.join(unsupported)}; plant.engine mujoco computes it"
         )
+    if settings.integrator != "RK4":
+        raise InputError(f"Lagrangian plant: expected the integrator RK4, received {settings.integrator}")
     joint = JointChain.zeros(settings.rows)
     settings.fill_joint(joint)
-    return LagrangianRotor(settings.actuator, settings.step_s, settings.integrator, joint=joint)
+    return LagrangianRotor(joint, settings.step_s)
 
 
 LAGRANGIAN = EngineKind("lagrangian", _set_up, step)

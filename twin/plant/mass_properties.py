@@ -94,7 +94,7 @@ def row_of(value: Any, row: int) -> Any:
     return list(value)[row] if isinstance(value, Columns | list) else value
 
 
-def mass_errors(section: MassSection, seed: Seed) -> MassErrors | list[Any] | None:
+def mass_errors(section: MassSection, seed: Seed) -> Any:
     """Return the differences of a machine from its model file, or a list of those of n machines.
 
     They are None for a machine without differences, and for all machines of an ideal section.
@@ -125,7 +125,11 @@ def mass_errors(section: MassSection, seed: Seed) -> MassErrors | list[Any] | No
 
 
 def true_model(
-    mjcf: Mjcf, modelling_error: float, payload_kg: float, gravity_m_s2: float | None, mass: MassErrors | None
+    mjcf: Mjcf,
+    modelling_error: float = 0.0,
+    payload_kg: float = 0.0,
+    gravity_m_s2: float | None = None,
+    mass: MassErrors | None = None,
 ) -> mujoco.MjModel:
     """Return a copy of a compiled model with the mass properties and the gravity of a run.
 

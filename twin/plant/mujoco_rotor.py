@@ -16,8 +16,8 @@ from spheretwin.models.base.compiled import COMPILES, allocation_free
 from spheretwin.models.base.memory import read_integer, read_number, write_number
 from spheretwin.models.base.mujoco_library import addresses, step_address
 from spheretwin.models.base.record import put
-from spheretwin.models.mjcf import Mjcf, idle_stages
-from spheretwin.plant.mass_properties import MassErrors, row_of, true_model
+from spheretwin.models.mjcf import idle_stages
+from spheretwin.plant.mass_properties import row_of
 from spheretwin.plant.rotor import EngineKind, Number, RotorData, RotorSettings
 
 Array = NDArray[np.float64]
@@ -36,26 +36,16 @@ def integrator_name(number: int) -> str:
 
 
 class MujocoRotor:
-    """Rotor of a run, or of n rows, in MuJoCo: numbers may be arrays (n, 1).
+    """Rotor of a run, or of n rows, in MuJoCo.
 
     Parameters
     ----------
-    mjcf : Mjcf
-        Model file; not changed.
-    step_s : float, s
+    models : sequence of MjModel, one for each row
+        Of `true_model`; step, integrator and flags are changed.
+    step_s : float or (n, 1) array, s
         Physics step.
     integrator : str
         One of `INTEGRATORS`.
-    modelling_error : float
-        m: the rotor's inertia is (1 + m) times that of the MJCF (11), (54).
-    payload_kg : float, kg
-        Point mass at the payload mount; 0 for none.
-    gravity_m_s2 : float, m/s²
-        Gravity along -z; default: that of the model.
-    mass : MassErrors, or list of MassErrors or None
-        Differences from the model file; default: none.
-    rows : int
-        n.
 
     Attributes
     ----------
@@ -64,20 +54,9 @@ class MujocoRotor:
     rows : array of RotorData
     """
 
-    def __init__(
-        self,
-        mjcf: Mjcf,
-        step_s: Number,
-        integrator: str,
-        modelling_error: Number,
-        payload_kg: Number,
-        gravity_m_s2: Number | None = None,
-        mass: MassErrors | list[Any] | None = None,
-        rows: int = 1,
-    ) -> None:
-        values = mjcf, step_s, integrator, modelling_error, payload_kg, gravity_m_s2, mass
-        self.machines = [_machine(*(row_of(value, row) for value in values)) for row in range(rows)]
-        self.rows = RotorData.zeros(rows)
+    def __init__(self, models: Sequence[mujoco.MjModel], step_s: Number, integrator: str) -> None:
+        self.machines = [_machine(model, row_of(step_s, row), integrator) for row, model in enumerate(models)]
+        self.rows = RotorData.zeros(len(models))
 
     @property
     def model(self) -> mujoco.MjModel:
@@ -127,10 +106,7 @@ class MujocoRotor:
             data.qpos[:], data.qvel[:] = row["q"], row["qdot"]
 
 
-def _machine(
-    mjcf: Mjcf, step_s: float, integrator: str, *differences: Any
-) -> tuple[mujoco.MjModel, mujoco.MjData]:
-    model = true_model(mjcf, *differences)
+def _machine(model: mujoco.MjModel, step_s: float, integrator: str) -> tuple[mujoco.MjModel, mujoco.MjData]:
     model.opt.timestep, model.opt.integrator = step_s, INTEGRATORS[integrator]
     # A diverged state must stay visible: the automatic reset would replace it by zeros.
     model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET) | idle_stages(model)
@@ -172,7 +148,8 @@ def step(rotor: RotorData) -> None:
 
 
 def _set_up(settings: RotorSettings) -> MujocoRotor:
-    rotor = MujocoRotor(settings.model, *settings[2:])
+    models = [settings.true_model(row) for row in range(settings.rows)]
+    rotor = MujocoRotor(models, settings.step_s, settings.integrator)
     settings.fill_joint(rotor.rows["joint"])
     return rotor
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple, Protocol
 
+import mujoco
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -47,11 +48,15 @@ class RotorSettings(NamedTuple):
         inertia = loaded_inertia((1 + self.modelling_error) * self.actuator.inertia, self.payload_kg, height)
         gravity_m_s2 = 0.0 if self.gravity_m_s2 is None else self.gravity_m_s2
         fill_ideal(joints, inertia, self.payload_kg * gravity_m_s2 * height)
-        settings = self.model, self.modelling_error, self.payload_kg, self.gravity_m_s2, self.mass
         for row in range(self.rows):
-            model, error, payload_kg, gravity, mass = (row_of(value, row) for value in settings)
-            if mass is not None or not model.has_ideal_joint or (payload_kg and (x or y)):
-                fill_chain(joints[row : row + 1], true_model(model, error, payload_kg, gravity, mass))
+            payload_kg, mass = row_of(self.payload_kg, row), row_of(self.mass, row)
+            if mass is not None or not self.model.has_ideal_joint or (payload_kg and (x or y)):
+                fill_chain(joints[row : row + 1], self.true_model(row))
+
+    def true_model(self, row: int) -> mujoco.MjModel:
+        """Return the compiled model of the true rotor of a row."""
+        differences = self.modelling_error, self.payload_kg, self.gravity_m_s2, self.mass
+        return true_model(self.model, *(row_of(value, row) for value in differences))
 
 
 class RotorData(Record):

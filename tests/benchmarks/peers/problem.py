@@ -10,6 +10,7 @@ from spheretwin.models import actuator as actuators
 from spheretwin.models import mjcf
 from spheretwin.models.actuator import Actuator
 from spheretwin.models.magnetics import TorqueModel, torque_model
+from spheretwin.plant.mass_properties import true_model
 from spheretwin.plant.mujoco_rotor import MujocoRotor
 from spheretwin.scenario.sections import Scenario
 
@@ -68,4 +69,4 @@ def problem(scenario: Scenario) -> Problem:
 def bare_rotor(problem: Problem) -> MujocoRotor:
     """Return the rotor in MuJoCo as the product sets it up."""
     modelling_error = problem.inertia[0] / problem.nominal_inertia[0] - 1
-    return MujocoRotor(mjcf.read(actuators.MJCF_PATH), problem.step_s, "RK4", modelling_error, 0.0)
+    return MujocoRotor([true_model(mjcf.read(actuators.MJCF_PATH), modelling_error)], problem.step_s, "RK4")

@@ -33,9 +33,10 @@ from spheretwin.models.base.record import Rows
 from spheretwin.models.mjcf import ROTOR, Mjcf, read
 from spheretwin.plant import lagrangian_rotor, mujoco_rotor
 from spheretwin.plant.friction import Friction, fill_friction, slow_down
-from spheretwin.plant.lagrangian_rotor import LagrangianRotor
+from spheretwin.plant.mass_properties import true_model
 from spheretwin.plant.mujoco_rotor import MujocoRotor
 from spheretwin.plant.rotor import RotorData
+from tests.twin.plant.motions import ideal_rotor
 
 Array = NDArray[np.float64]
 
@@ -165,7 +166,7 @@ def by_stage(actuator: Actuator, hinge: Hinge, rate_rad_s: float, torque_Nm: Arr
     torque_Nm : (n,) array, N·m
         On the hinge, held over each step.
     """
-    rotor = LagrangianRotor(actuator, STEP_s)
+    rotor = ideal_rotor(actuator, STEP_s)
     coulomb, viscous = _on_gamma(hinge.coulomb_Nm), _on_gamma(hinge.viscous_Nm_s)
     bearing = Friction.filled(fill_friction, coulomb, viscous, hinge.smoothing_rad_s, STEP_s)
     plant = rotor.start(np.zeros(3), _on_gamma(rate_rad_s))
@@ -181,7 +182,7 @@ def by_mujoco(mjcf: Path, actuator: Actuator, hinge: Hinge, rate_rad_s: float, t
         The model cannot be read.
     """
     model = _with_bearing(read(ideal_file(mjcf, actuator)), actuator, hinge)
-    rotor = MujocoRotor(model, STEP_s, "RK4", 0.0, 0.0, gravity_m_s2=0.0)
+    rotor = MujocoRotor([true_model(model, gravity_m_s2=0.0)], STEP_s, "RK4")
     plant = rotor.start(np.zeros(3), _on_gamma(rate_rad_s))
     return _motion(mujoco_rotor.step, plant, Friction.zeros(), torque_Nm)
 

@@ -11,6 +11,7 @@ from spheretwin import cli
 from spheretwin.crosscheck import coil_driven, dynamics, identities, prototype, suite, trajectories
 from spheretwin.models import actuator as actuators
 from spheretwin.models.base.errors import InputError
+from spheretwin.models.joint_chain import fill_ideal
 from spheretwin.models.kinematics import rotation
 from spheretwin.models.lagrangian import coriolis_matrix, coupling_torques
 from spheretwin.plant import lagrangian_rotor as plant
@@ -104,11 +105,10 @@ def test_wrong_inertia_breaks_what_depends_on_it(actuator):
 
 
 def test_wrong_gravity_is_seen_under_the_payload_alone(monkeypatch, actuator):
-    def elsewhere(*settings, gravity_m_s2):
-        assert gravity_m_s2 == 9.81  # the model's
-        return LagrangianRotor(*settings, gravity_m_s2=9.80665)
+    def elsewhere(joints, inertia, weight_moment):
+        fill_ideal(joints, inertia, weight_moment * 9.80665 / 9.81)  # the latter is the model's
 
-    monkeypatch.setattr(dynamics, "LagrangianRotor", elsewhere)
+    monkeypatch.setattr(dynamics, "fill_ideal", elsewhere)
     checks = dynamics.compare(actuators.MJCF_PATH, actuator, FEW).checks
     assert broken(checks) == BIASED
     for check in checks:
@@ -178,7 +178,7 @@ def test_another_integrator_breaks_every_row_of_the_free_rotor(monkeypatch, actu
     monkeypatch.setattr(
         identities,
         "MujocoRotor",
-        lambda mjcf, step_s, _, *rest: MujocoRotor(mjcf, step_s, "implicitfast", *rest),
+        lambda models, step_s, _: MujocoRotor(models, step_s, "implicitfast"),
     )
     checks = identities.check_free_rotor(actuators.MJCF_PATH, actuator).checks
     assert broken(checks) == {check.name for check in checks}
@@ -208,9 +208,9 @@ def test_a_rotor_that_is_not_axisymmetric_does_not_move_as_euler_found(monkeypat
     ],
 )
 def test_wrong_plant_breaks_the_closed_loop(monkeypatch, error, rows):
-    def heavier(actuator, step_s, integrator, joint):
+    def heavier(joint, step_s):
         joint["inertia"] *= 1 + error / 1.2  # a share of the nominal inertia
-        return LagrangianRotor(actuator, step_s, integrator, joint=joint)
+        return LagrangianRotor(joint, step_s)
 
     monkeypatch.setattr(plant, "LagrangianRotor", heavier)
     assert broken(trajectories.compare_closed_loop(actuators.MJCF_PATH, actuators.load()).checks) == rows

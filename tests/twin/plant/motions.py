@@ -3,9 +3,12 @@
 import numpy as np
 
 from spheretwin.models.base.compiled import compiled
+from spheretwin.models.joint_chain import JointChain, fill_ideal
 from spheretwin.models.kinematics import rate_jacobian, rotation, rotor_rate_jacobian
+from spheretwin.models.lagrangian import GRAVITY_m_s2, loaded_inertia
 from spheretwin.plant.bristle_friction import BristleFriction, apply_bristles, begin_bristles
 from spheretwin.plant.friction import Friction, fill_friction, slow_down
+from spheretwin.plant.lagrangian_rotor import LagrangianRotor
 from spheretwin.plant.lagrangian_rotor import step as step_rotor
 
 STEP_s = 5e-4
@@ -53,6 +56,13 @@ def steps(rotor, bristles, resistance, torque, start, rates, every=1):
     elements = BristleFriction.zeros()[0] if bristles is None else bristles
     moving(rotor.start(start, rates), elements, resistance, torque, q, qdot, bearing, every)
     return q, qdot, bearing
+
+
+def ideal_rotor(actuator, step_s, modelling_error=0.0, payload_kg=0.0, gravity_m_s2=GRAVITY_m_s2):
+    height_m = actuator.payload_mount_m[2]
+    inertia = loaded_inertia((1 + modelling_error) * actuator.inertia, payload_kg, height_m)
+    joints = JointChain.filled(fill_ideal, inertia, payload_kg * gravity_m_s2 * height_m)
+    return LagrangianRotor(joints, step_s)
 
 
 def kinetic_J(q, qdot, actuator, payload_kg, modelling_error=0.0):

@@ -20,9 +20,8 @@ from spheretwin.plant.bristle_friction import (
     fill_bristles,
 )
 from spheretwin.plant.cable import CableSection, constant_torque_Nm
-from spheretwin.plant.lagrangian_rotor import LagrangianRotor
 from tests.twin.plant.allocations import allocates_nothing
-from tests.twin.plant.motions import UPRIGHT, STEP_s, motion, on_gamma, order
+from tests.twin.plant.motions import UPRIGHT, STEP_s, ideal_rotor, motion, on_gamma, order
 from tests.twin.plant.test_friction import ideal
 
 COULOMB_Nm, RATIO, PRESLIDING_rad = 2e-3, 1.5, 1e-3
@@ -46,7 +45,7 @@ def rows_of(actuator, stiction=STICTION, cable=NO_CABLE, coulomb=COULOMB, step_s
 def spin(actuator, torque, step_s=STEP_s, stiction=STICTION, cable=NO_CABLE, rate=0.0, viscous_Nm_s=0.0):
     """Angles, rates and torque of the bearing of the third hinge alone, upright, with the inertia J3."""
     bristles = elements(actuator, stiction, cable, step_s=step_s)
-    rotor, torque_q, rates = LagrangianRotor(actuator, step_s), on_gamma(torque), on_gamma(rate)
+    rotor, torque_q, rates = ideal_rotor(actuator, step_s), on_gamma(torque), on_gamma(rate)
     result = motion(rotor, bristles, torque_q, UPRIGHT, rates, viscous_Nm_s)
     assert not np.any([part[:, :2] for part in result])
     return [part[:, 2] for part in result]
@@ -121,7 +120,7 @@ def test_presliding_has_a_closed_hysteresis_loop(actuator):
 def test_a_cable_has_hysteresis_of_its_own_level(actuator):
     level, range_rad, amplitude = 1e-3, 0.02, 0.1
     cable = CableSection(hysteresis_Nm=(0.0, 0.0, level), hysteresis_rad=range_rad)
-    plant = LagrangianRotor(actuator, STEP_s)
+    plant = ideal_rotor(actuator, STEP_s)
     bristles = elements(actuator, StictionSection(), cable)
     swing = level * 1.2 * np.sin(2 * np.pi * 0.5 * STEP_s * np.arange(round(6 / STEP_s)))
     q, _, bearing = motion(plant, bristles, on_gamma(swing))
@@ -243,7 +242,7 @@ def test_any_stiffness_is_stable_and_comes_to_rest(actuator, presliding_rad, h):
     stiction = STICTION.model_copy(update={"presliding_rad": presliding_rad})
     bristles = elements(actuator, stiction, step_s=h)
     rates = np.array([0.5, -0.3, 0.4])
-    q, qdot, _ = motion(LagrangianRotor(actuator, h), bristles, np.zeros((round(6 / h), 3)), TILTED, rates)
+    q, qdot, _ = motion(ideal_rotor(actuator, h), bristles, np.zeros((round(6 / h), 3)), TILTED, rates)
     assert np.abs(qdot).max() < 0.8
     assert np.abs(qdot[-100:]).max() < 1e-9
     assert np.ptp(q[-100:], axis=0).max() < 1e-11
@@ -266,7 +265,7 @@ def test_smooth_slip_is_of_second_order(actuator):
         count = round(duration / h)
         t_s = h * (np.arange(count + 1) + 0.5)
         load = np.array([5e-3, -4e-3, 6e-3]) * np.sin(20 * t_s)[:, None]
-        q, qdot, _ = motion(LagrangianRotor(actuator, h), bristles, load, TILTED, rates, 1e-3)
+        q, qdot, _ = motion(ideal_rotor(actuator, h), bristles, load, TILTED, rates, 1e-3)
         assert np.all(qdot * np.sign(rates) > 0.1)
         return np.concatenate([q[-1], qdot[-1]])
 

@@ -18,10 +18,9 @@ from spheretwin.plant.bristle_friction import (
 )
 from spheretwin.plant.cable import CableSection
 from spheretwin.plant.end_stops import EndStops, EndStopsSection, fill_end_stops
-from spheretwin.plant.lagrangian_rotor import LagrangianRotor
 from spheretwin.session import Session
 from tests.twin.passive_cases import STILL
-from tests.twin.plant.motions import NONE, STEP_s, friction, motion, on_gamma, steps
+from tests.twin.plant.motions import NONE, STEP_s, friction, ideal_rotor, motion, on_gamma, steps
 from tests.twin.plant.test_bristle_friction import three
 from tests.twin.plant.test_friction import ideal
 
@@ -45,7 +44,7 @@ def bristles_of(actuator, section, step_s, stiction, coulomb):
 def spin(actuator, duration_s, rate, load=0.0, section=ON, step_s=STEP_s):
     """Angle and rate of hinge γ before each step."""
     torque = np.tile(on_gamma(load), (round(duration_s / step_s), 1))
-    rotor = LagrangianRotor(actuator, step_s)
+    rotor = ideal_rotor(actuator, step_s)
     q, qdot, _ = motion(rotor, stopped(actuator, section, step_s), torque, NONE, on_gamma(rate))
     assert not np.any(q[:, :2])
     return q[:, 2], qdot[:, 2]
@@ -176,7 +175,7 @@ def test_without_stops_the_run_ends_at_the_end_of_the_range():
 
 def test_stops_that_are_not_touched_leave_the_motion(actuator):
     start, rates, torque = np.array([0.1, 0.0, -0.2]), np.array([0.4, -0.3, 0.5]), np.zeros((600, 3))
-    rotor, stops = LagrangianRotor(actuator, STEP_s), stopped(actuator)
+    rotor, stops = ideal_rotor(actuator, STEP_s), stopped(actuator)
     resistance = friction(NONE, NONE, 0.01, STEP_s)
     free, with_stops = (steps(rotor, of, resistance, torque, start, rates) for of in (None, stops))
     # The correction of a step adds and subtracts the pose: one rounding of the angle a step.

@@ -14,9 +14,8 @@ from spheretwin.models.base.compiled import compiled
 from spheretwin.models.joint_chain import JointChain, fill_ideal
 from spheretwin.models.lagrangian import inertia_matrix, loaded_inertia
 from spheretwin.plant.friction import Friction, fill_friction, slow_down
-from spheretwin.plant.lagrangian_rotor import LagrangianRotor
 from tests.twin.plant.allocations import allocates_nothing
-from tests.twin.plant.motions import NONE, STEP_s, friction, on_gamma, order, steps
+from tests.twin.plant.motions import NONE, STEP_s, friction, ideal_rotor, on_gamma, order, steps
 
 COULOMB_Nm, SMOOTHING_rad_s = 5e-3, 1e-3
 START = np.array([0.2, -0.3, 0.5, 3.0, -2.0, 20.0])
@@ -24,7 +23,7 @@ START = np.array([0.2, -0.3, 0.5, 3.0, -2.0, 20.0])
 
 def motion(actuator, resistance, duration, start=START, torque=NONE):
     """Pose and rates at the start of every step of the Lagrangian plant, and at the end of the last."""
-    rotor = LagrangianRotor(actuator, resistance.step_s)
+    rotor = ideal_rotor(actuator, resistance.step_s)
     torques = np.tile(torque, (round(duration / resistance.step_s) + 1, 1))
     return steps(rotor, None, resistance, torques, start[:3], start[3:])[:2]
 

@@ -9,10 +9,10 @@ from spheretwin.models import lagrangian, mjcf
 from spheretwin.models.base.compiled import compiled
 from spheretwin.models.lagrangian import acceleration, coriolis_matrix, gravity_torque, inertia_matrix
 from spheretwin.plant import lagrangian_rotor, mujoco_rotor
-from spheretwin.plant.lagrangian_rotor import LagrangianRotor
+from spheretwin.plant.mass_properties import true_model
 from spheretwin.plant.mujoco_rotor import MujocoRotor
 from tests.twin.plant.allocations import allocates_nothing
-from tests.twin.plant.motions import gradient, kinetic_J, order, potential_J
+from tests.twin.plant.motions import gradient, ideal_rotor, kinetic_J, order, potential_J
 
 STEP_S, PAYLOAD_KG = 5e-4, 0.05
 
@@ -26,7 +26,7 @@ def states(count, seed=1):
 
 def test_the_inertia_matrix_has_the_kinetic_energy_of_rotor_and_payload(actuator):
     """Its Coriolis matrix belongs to it: tests/models/test_lagrangian.py."""
-    rotor = LagrangianRotor(actuator, STEP_S, payload_kg=PAYLOAD_KG)
+    rotor = ideal_rotor(actuator, STEP_S, payload_kg=PAYLOAD_KG)
     for q, qdot, _ in states(20):
         energy = 0.5 * qdot @ inertia_matrix(q, rotor.joint[0].inertia) @ qdot
         assert energy == pytest.approx(kinetic_J(q, qdot, actuator, PAYLOAD_KG), rel=1e-12)
@@ -34,11 +34,11 @@ def test_the_inertia_matrix_has_the_kinetic_energy_of_rotor_and_payload(actuator
 
 @pytest.mark.parametrize("gravity_m_s2", [9.81, 1.62, 0.0, -9.81])
 def test_payload_weighs_what_gravity_makes_of_it(actuator, gravity_m_s2):
-    rotor = LagrangianRotor(actuator, STEP_S, payload_kg=PAYLOAD_KG, gravity_m_s2=gravity_m_s2)
+    rotor = ideal_rotor(actuator, STEP_S, payload_kg=PAYLOAD_KG, gravity_m_s2=gravity_m_s2)
     for q, _, _ in states(20):
         expected = gradient(lambda pose: potential_J(pose, actuator, PAYLOAD_KG, gravity_m_s2), q)
         np.testing.assert_allclose(gravity_torque(q, rotor.joint[0].weight_moment), expected, atol=1e-12)
-    earth = LagrangianRotor(actuator, STEP_S, payload_kg=PAYLOAD_KG)
+    earth = ideal_rotor(actuator, STEP_S, payload_kg=PAYLOAD_KG)
     np.testing.assert_array_equal(rotor.joint["inertia"], earth.joint["inertia"])
     plant = rotor.start(np.array([0.1, 0.0, 0.0]), np.zeros(3))
     lagrangian_rotor.step(plant)
@@ -63,7 +63,7 @@ def test_coupling_torques_are_the_paper_s():
 
 
 def end_of_steps(actuator, step_s, duration, torque_q):
-    plant = LagrangianRotor(actuator, step_s, payload_kg=PAYLOAD_KG).start(START[:3], START[3:])
+    plant = ideal_rotor(actuator, step_s, payload_kg=PAYLOAD_KG).start(START[:3], START[3:])
     plant.torque_q[:] = torque_q
     for _ in range(round(duration / step_s)):
         lagrangian_rotor.step(plant)
@@ -75,7 +75,7 @@ START = np.array([0.2, -0.3, 0.5, 3.0, -2.0, 20.0])
 
 def test_steps_are_of_order_four(actuator):
     duration, torque_q = 0.08, np.array([0.15, -0.1, -0.05])
-    joint = LagrangianRotor(actuator, STEP_S, payload_kg=PAYLOAD_KG).joint[0]
+    joint = ideal_rotor(actuator, STEP_S, payload_kg=PAYLOAD_KG).joint[0]
 
     def flow(_, state):
         q, qdot = state[:3].copy(), state[3:].copy()
@@ -93,15 +93,15 @@ def step_first(rotors):
 
 
 def test_a_step_allocates_nothing(actuator):
-    rotor = LagrangianRotor(actuator, STEP_S, payload_kg=PAYLOAD_KG)
+    rotor = ideal_rotor(actuator, STEP_S, payload_kg=PAYLOAD_KG)
     rotor.start(START[:3], START[3:])
     assert allocates_nothing(step_first, rotor.rows)
 
 
 def test_one_step_is_mujoco_s(actuator):
-    settings = (STEP_S, "RK4", 0.2, PAYLOAD_KG)
-    ours = LagrangianRotor(actuator, *settings).start(START[:3], START[3:])
-    rotor = MujocoRotor(mjcf.read(actuators.MJCF_PATH), *settings)
+    ours = ideal_rotor(actuator, STEP_S, 0.2, PAYLOAD_KG).start(START[:3], START[3:])
+    model = true_model(mjcf.read(actuators.MJCF_PATH), 0.2, PAYLOAD_KG)
+    rotor = MujocoRotor([model], STEP_S, "RK4")
     theirs = rotor.start(START[:3], START[3:])
     for plant, step in ((ours, lagrangian_rotor.step), (theirs, mujoco_rotor.step)):
         plant.torque_q[:] = [0.35, -0.1, -0.1]
@@ -113,6 +113,6 @@ def test_one_step_is_mujoco_s(actuator):
 
 def test_start_does_not_hold_on_to_its_arguments(actuator):
     pose = np.zeros(3)
-    plant = LagrangianRotor(actuator, STEP_S).start(pose, np.array([1.0, 0.0, 0.0]))
+    plant = ideal_rotor(actuator, STEP_S).start(pose, np.array([1.0, 0.0, 0.0]))
     lagrangian_rotor.step(plant)
     np.testing.assert_array_equal(pose, 0)

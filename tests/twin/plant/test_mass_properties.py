@@ -130,8 +130,8 @@ def assert_same_steps(first, second, start):
 @pytest.mark.parametrize("payload_kg", [0.0, 0.05])
 def test_engines_agree_step_by_step(actuator, payload_kg):
     errors = mass_errors(MassSection(**EVERYTHING), 3)
-    engine = MujocoRotor(SHIPPED, STEP_s, "RK4", 0.2, payload_kg, 9.81, errors)
-    equations_of_motion = LagrangianRotor(actuator, STEP_s, joint=JointChain.filled(fill_chain, engine.model))
+    engine = MujocoRotor([true_model(SHIPPED, 0.2, payload_kg, 9.81, errors)], STEP_s, "RK4")
+    equations_of_motion = LagrangianRotor(JointChain.filled(fill_chain, engine.model), STEP_s)
     assert_same_steps(engine, equations_of_motion, ([0.4, -0.3, 0.2], [1.0, 2.0, -3.0]))
 
 

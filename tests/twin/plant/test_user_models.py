@@ -20,6 +20,7 @@ from spheretwin.session import Session
 from spheretwin.simulation import simulate
 from tests.models.model_files import edited
 from tests.twin.plant import user_models as models
+from tests.twin.plant.motions import ideal_rotor
 
 STEP_S = 5e-4
 POSE, RATES = np.array([0.1, -0.05, 0.2]), np.array([0.2, 0.3, -0.5])
@@ -53,7 +54,7 @@ def stock(path, torques, pose=POSE, rates=RATES, integrator="RK4"):
 
 
 def ours(path, torques, pose=POSE, rates=RATES, integrator="RK4", payload_kg=0.0):
-    rotor = MujocoRotor(mjcf.read(path), STEP_S, integrator, 0.0, payload_kg)
+    rotor = MujocoRotor([true_model(mjcf.read(path), payload_kg=payload_kg)], STEP_S, integrator)
     engine = rotor.start(pose, rates)
     poses = np.empty((len(torques), 3))
     for row, torque in enumerate(torques):
@@ -173,7 +174,7 @@ def test_mass_properties_and_hinges_of_a_file_act_in_both_engines(written, actua
     np.testing.assert_array_equal(ours(path, CONSTANT), expected)
     joint = JointChain.filled(fill_chain, true_model(mjcf.read(path), 0.0, 0.0, 9.81, None))
     # Rounding of two engines over 400 steps; without these properties they differ by 1e-6 or more.
-    final = equations_of_motion(LagrangianRotor(actuator, STEP_S, joint=joint))
+    final = equations_of_motion(LagrangianRotor(joint, STEP_S))
     np.testing.assert_allclose(final, expected[-1], rtol=0, atol=1e-10)
     # The closed forms of the cross-check do not describe the model.
     assert any(part.startswith(name) for part in mjcf.beyond_an_ideal_joint(mjcf.read(path).loaded))
@@ -225,7 +226,7 @@ def test_inertia_from_geoms_is_the_rotor_s(written, edits):
     np.testing.assert_allclose(ours(path, CONSTANT), stock(path, CONSTANT), rtol=0, atol=1e-12)
     assert mjcf.beyond_a_free_rotor(mjcf.read(path).loaded) == []
     # Rounding, and the rings that only the engine has: 1e-12 of a move of some radians.
-    final = equations_of_motion(LagrangianRotor(result, STEP_S))
+    final = equations_of_motion(ideal_rotor(result, STEP_S))
     np.testing.assert_allclose(final, ours(path, CONSTANT)[-1], rtol=0, atol=1e-10)
 
 
@@ -249,7 +250,7 @@ def test_a_payload_acts_as_one_in_the_file(written, edits, inside):
 
 def test_a_state_that_is_not_finite_is_counted(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)  # MuJoCo writes its own log into the current folder
-    rotor = MujocoRotor(mjcf.read(actuators.MJCF_PATH), STEP_S, "RK4", 0.0, 0.0)
+    rotor = MujocoRotor([true_model(mjcf.read(actuators.MJCF_PATH))], STEP_S, "RK4")
     engine = rotor.start(np.zeros(3), np.zeros(3))
     assert engine.warnings == 0
     engine.qdot[0] = 1e11
