@@ -21,6 +21,7 @@ from spheretwin.control.law import Law
 from spheretwin.control.supervision.watchdog import GO, Reason, count_rundown, replace_invalid, trip
 from spheretwin.electronics.transducers import sense_currents
 from spheretwin.models.base.addresses import caller_of
+from spheretwin.models.base.callback_errors import report_error
 from spheretwin.models.base.compiled import (
     COMPILES,
     allocation_free,
@@ -32,7 +33,6 @@ from spheretwin.models.base.compiled import (
 )
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.base.function_identity import is_of_package
-from spheretwin.models.base.numba_internals.callbacks import report_error
 from spheretwin.models.base.numba_internals.functions import Dispatcher
 from spheretwin.models.base.vectors import WIDTH, load, total, vector
 from spheretwin.models.telemetry.signals import MOTION_SIGNALS, offsets, width

@@ -20,9 +20,9 @@ from spheretwin.electronics.sensor_chain import fill_sensors, measure_again
 from spheretwin.external import Connection, ExternalController, ExternalPlant
 from spheretwin.hardware_assembly import faults_of
 from spheretwin.loop import dispatch, is_python_law, is_user_law, step_that_writes
+from spheretwin.models.base.callback_errors import callback_errors
 from spheretwin.models.base.compiled import COMPILES, for_types_of
 from spheretwin.models.base.errors import InputError, LawError
-from spheretwin.models.base.numba_internals.callbacks import callback_errors
 from spheretwin.models.base.record import set_states, states_of, transfer_rows
 from spheretwin.models.base.turns import outside_turn
 from spheretwin.models.telemetry.signals import width

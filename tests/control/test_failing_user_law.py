@@ -8,7 +8,7 @@ import pytest
 from spheretwin import cli
 from spheretwin import scenario as scenarios
 from spheretwin.control.law import Law
-from spheretwin.models.base.numba_internals.callbacks import callback_errors
+from spheretwin.models.base.callback_errors import callback_errors
 from spheretwin.models.telemetry.table import read_parquet
 from spheretwin.simulation import simulate
 
