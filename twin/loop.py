@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numba import types
+from numba.extending import is_jitted
 from numpy.typing import NDArray
 
 from spheretwin.control import allocation as allocations
@@ -33,7 +34,6 @@ from spheretwin.models.base.compiled import (
 )
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.base.function_identity import is_of_package
-from spheretwin.models.base.numba_internals.functions import Dispatcher
 from spheretwin.models.base.vectors import WIDTH, load, total, vector
 from spheretwin.models.telemetry.signals import MOTION_SIGNALS, offsets, width
 from spheretwin.plant.plant_tick import (
@@ -311,4 +311,4 @@ def is_user_law(law: Law) -> bool:
 
 def is_python_law(law: Law) -> bool:
     """True if a law is a user law in plain Python."""
-    return is_user_law(law) and not isinstance(law.step, Dispatcher)
+    return is_user_law(law) and not is_jitted(law.step)

@@ -11,16 +11,11 @@ import numba
 import numpy as np
 from llvmlite import ir
 from numba import types
-from numba.extending import lower_builtin, type_callable
+from numba.extending import is_jitted, lower_builtin, type_callable
 from numpy.typing import NDArray
 
-from spheretwin.models.base.numba_internals.callbacks import c_callback
-from spheretwin.models.base.numba_internals.functions import (
-    NO_ALLOCATION,
-    Dispatcher,
-    PartCompiler,
-    compiled_function,
-)
+from spheretwin.models.base.bounds_checks import with_bounds_checks
+from spheretwin.models.base.numba_internals import c_callback, compiled_function
 from spheretwin.models.base.record import Rows
 
 F = TypeVar("F", bound=Callable[..., Any])
@@ -34,7 +29,7 @@ _OPTIONS: dict[str, Any] = {
     "forceinline": False,  # otherwise a function takes the option of the caller that needs it first
     "no_cfunc_wrapper": True,  # a conversion for functions that are passed as values: ours go by address
 }
-_ALLOCATION_FREE = {**NO_ALLOCATION, "pipeline_class": PartCompiler}
+_ALLOCATION_FREE: dict[str, Any] = {"_nrt": False}
 
 # Attribute of a plain function with its compiled callbacks: they refer to it, and must not outlive it.
 _CALLBACKS = "__spheretwin_callbacks__"
@@ -93,7 +88,7 @@ def for_types_of(function: Any, *arguments: Any) -> Callable[..., Any]:
     Numba checks the type of every argument at every call, 8 µs for the many arrays of a loop. The returned
     function does not check: with other types it would read invalid memory.
     """
-    if not isinstance(function, Dispatcher):
+    if not is_jitted(function):
         return uncompiled(function)
     key = function, _kind(arguments)
     if key not in _ENTRIES:
@@ -141,7 +136,11 @@ def compiled_callback(signature: Any, function: Callable[..., Any], *, check_bou
     callbacks = plain.__dict__.setdefault(_CALLBACKS, {})
     key = signature, check_bounds
     if key not in callbacks:
-        callbacks[key] = c_callback(signature, plain, {"nopython": True, **_OPTIONS}, check_bounds)
+        callbacks[key] = (
+            numba.cfunc(signature, boundscheck=True, **_OPTIONS)(with_bounds_checks(plain))
+            if check_bounds
+            else c_callback(plain, signature, _OPTIONS)
+        )
     return callbacks[key]
 
 
@@ -162,8 +161,7 @@ def stage_address(signature: Any, function: Callable[..., Any], *parts: Rows) ->
     if key not in _ENTRIES:
         records = (numba.from_dtype(part.dtype) for part in parts)  # by address
         own = signature.return_type(*records, *signature.args[len(parts) :])
-        options = {"nopython": True, **_OPTIONS, **NO_ALLOCATION}
-        _ENTRIES[key] = c_callback(own, function, options, False, PartCompiler)
+        _ENTRIES[key] = c_callback(function, own, {**_OPTIONS, **_ALLOCATION_FREE})
     return int(_ENTRIES[key].address)
 
 

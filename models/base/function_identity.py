@@ -8,11 +8,12 @@ the function without an identity, and it is compiled in each process.
 
 from __future__ import annotations
 
+import hashlib
+import re
 from types import BuiltinFunctionType, CodeType, FunctionType, ModuleType
 from typing import Any
 
 import numpy as np
-from numba.core.serialize import dumps
 
 _LIBRARIES = {"builtins", "cmath", "math", "numba", "numpy", "spheretwin"}
 """Packages whose versions or sources are in the name of the cache folder, and those of Python itself."""
@@ -25,6 +26,23 @@ class _UnknownError(Exception):
 def is_of_package(function: Any) -> bool:
     """True if a function is one of this package."""
     return (function.__module__ or "").startswith("spheretwin.")
+
+
+def name_of(function: Any) -> str:
+    """Return the name of a function with that of its module."""
+    return f"{function.__module__}.{function.__qualname__}"
+
+
+def entry_name(function: Any, *others: object) -> str | None:
+    """Return the name of a cache entry: the function, then a digest of its identity and of other texts.
+
+    None for a function without an identity: its entry would become stale.
+    """
+    if (identity := function_identity(function)) is None:
+        return None
+    key = repr((name_of(function), identity, *map(str, others)))
+    readable = re.sub(r"\W+", "-", name_of(function).removeprefix("spheretwin."))[:60]
+    return f"{readable}-{hashlib.sha256(key.encode()).hexdigest()[:24]}"
 
 
 def function_identity(function: Any) -> list[Any] | None:
@@ -43,7 +61,7 @@ def _function(function: Any, outer: list[Any]) -> list[Any]:
     cells = [cell.cell_contents for cell in function.__closure__ or ()]
     if is_of_package(function):
         place = [function.__module__, function.__qualname__, code.co_firstlineno]
-        return [place, [_enclosed(value, callers) for value in cells]]
+        return [place, [_value(value, callers) for value in cells]]
     values = [
         function.__globals__[name] for name in sorted(_names(code)) if name in function.__globals__
     ]  # any other name is an attribute, or one of Python's own functions
@@ -69,16 +87,8 @@ def _code(code: CodeType) -> list[Any]:
     return [code.co_code, code.co_flags, code.co_argcount, constants, names, place]
 
 
-def _enclosed(value: Any, callers: list[Any]) -> Any:
-    """Return the identity of a value that a function of this package encloses."""
-    plain = getattr(value, "py_func", None)
-    if plain is not None and is_of_package(plain):
-        return _function(plain, callers)
-    return dumps(value)
-
-
 def _value(value: Any, callers: list[Any]) -> Any:
-    """Return the identity of a value that a user's function names."""
+    """Return the identity of a value that a function names or encloses."""
     if isinstance(value, np.ndarray) and value.dtype.kind in "biufc":
         return [value.dtype.str, value.shape, value.strides, value.tobytes()]
     if value is None or isinstance(value, bool | int | float | complex | str | bytes | np.number | np.bool_):

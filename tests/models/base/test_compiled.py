@@ -82,10 +82,10 @@ def write_package(root):
     base.mkdir()
     for folder in (models, base):
         (folder / "__init__.py").write_text("")
-    names = ("cache", "compiled", "compilation", "errors", "files", "function_identity", "record")
+    names = ("bounds_checks", "cache", "compiled", "compilation", "errors", "files", "function_identity")
+    names += ("numba_internals", "record")
     for name in (f"{name}.py" for name in names):
         shutil.copy(SOURCE / name, base)
-    shutil.copytree(SOURCE / "numba_internals", base / "numba_internals")
     (models / "callee.py").write_text(
         "from spheretwin.models.base.compiled import compiled\n@compiled\ndef answer():\n    return 41\n"
     )

@@ -12,7 +12,6 @@ import pytest
 from spheretwin.models.base import cache, mujoco_library
 from spheretwin.models.base.compiled import allocation_free, compiled, inlined
 from spheretwin.models.base.errors import EngineError
-from spheretwin.models.base.numba_internals import functions
 from tests.requirements import needs_compiled_functions
 
 MODEL = "<mujoco><worldbody><body><joint/><geom size='1'/></body></worldbody></mujoco>"
@@ -45,8 +44,12 @@ def test_a_compiled_function_reads_the_cache_of_this_package(monkeypatch):
     assert len(signatures) == 1, f"numba {numba.__version__} does not ask Dispatcher._cache for machine code"
 
 
+def has_machine_code(result):
+    return result.library._codegen._engine.is_symbol_defined(result.fndesc.llvm_func_name)
+
+
 @needs_compiled_functions
-def test_a_function_for_compiled_callers_is_compiled_again_for_python(monkeypatch):
+def test_a_function_has_machine_code_only_for_calls_from_python(monkeypatch):
     monkeypatch.setattr(cache, "cache_folder", lambda: None)  # every function is compiled
 
     @allocation_free
@@ -58,15 +61,15 @@ def test_a_function_for_compiled_callers_is_compiled_again_for_python(monkeypatc
         return half(x) - half(y)
 
     assert of_both(3.0, 1.0) == 1.0
-    (part,) = half.overloads.values()
-    assert not functions._is_callable(part), (
-        f"numba {numba.__version__} compiles the conversion of arguments in spite of no_cpython_wrapper"
-    )
+    assert not half.overloads
+    (part,) = half.part.overloads.values()
+    assert not has_machine_code(part), f"numba {numba.__version__} makes machine code in spite of no_compile"
+    assert has_machine_code(*of_both.overloads.values())
     assert half(3.0) == 1.5
-    (complete,) = half.overloads.values()
-    assert functions._is_callable(complete)
-    assert half(np.float32(2.0)) == 1.0  # other types are compiled for Python at once
+    assert half(np.float32(2.0)) == 1.0
+    assert len(half.overloads) == 2
     assert of_both(5.0, 1.0) == 2.0
+    assert len(half.part.overloads) == 1
 
 
 @needs_compiled_functions
@@ -87,32 +90,10 @@ def test_a_function_does_not_take_the_inlining_of_its_first_caller(monkeypatch):
 
     assert eighth(16.0) == 2.0
     is_inlined = {
-        function.py_func.__name__: [part.fndesc.inline for part in function.overloads.values()]
-        for function in (half, quarter, eighth)
+        function.py_func.__name__: [part.fndesc.inline for part in function.part.overloads.values()]
+        for function in (half, quarter)
     }
-    assert is_inlined == {"half": [False], "quarter": [True], "eighth": [False]}
-
-
-@needs_compiled_functions
-def test_a_stored_function_for_compiled_callers_is_not_taken_for_python(monkeypatch, tmp_path):
-    monkeypatch.setattr(cache, "cache_folder", lambda: tmp_path)
-
-    def build(factor):
-        @allocation_free
-        def third(x):
-            return x / 3.0
-
-        @allocation_free
-        def of_sum(x, y):  # each factor is another caller, which is compiled
-            return factor * third(x + y)
-
-        return third, of_sum
-
-    for factor, hits in ((1.0, 0), (2.0, 1)):  # callers include it: only that for Python is stored
-        third, of_sum = build(factor)
-        assert of_sum(2.0, 4.0) == 2.0 * factor
-        assert third(3.0) == 1.0
-        assert sum(third.stats.cache_hits.values()) == hits
+    assert is_inlined == {"half": [False], "quarter": [True]}
 
 
 def test_the_addresses_of_mujoco_are_those_that_mj_step_takes():
@@ -164,7 +145,7 @@ NAMES = """
 import numpy as np
 from numba import from_dtype
 from numba.core.itanium_mangler import mangle
-from spheretwin.models.base.numba_internals import machine_code
+from spheretwin.models.base import numba_internals
 
 for count in range({others}):  # types that a process counts before
     from_dtype(np.dtype([("x", "f8", (9 + count,))]))
