@@ -90,7 +90,7 @@ _SPARE_MARKS: tuple[tuple[str, Dash], ...] = (
     ("H", "--"),
 )
 
-_STEADY, _VARYING = (96, 96, 96), (230, 190, 40)
+_NO_CURRENT, _FULL_CURRENT = (96, 96, 96), (230, 190, 40)
 
 _NEGATIVE, _ZERO, _POSITIVE = (48, 112, 224), (128, 128, 128), (230, 76, 24)
 
@@ -191,20 +191,20 @@ def current_colours(current: NDArray[np.float64], limit: float) -> NDArray[np.ui
     return colours
 
 
-def variation_colours(deviation: NDArray[np.float64], limit: float) -> NDArray[np.uint8]:
-    """Colour of the variation of currents: neutral where they are steady, yellow at half of the limit.
+def magnitude_colours(magnitude: NDArray[np.float64], limit: float) -> NDArray[np.uint8]:
+    """Return the colours of magnitudes of currents on a linear scale: grey zero, yellow the limit.
 
     Parameters
     ----------
-    deviation : (...) array, A
-        Standard deviation.
+    magnitude : (...) array, A
+        Any shape.
     limit : float, A
-        Current limit.
+        Current of the full colour.
 
     Returns
     -------
     (..., 3) uint8 array
         Red, green, blue.
     """
-    share = np.clip(2 * deviation / limit, 0, 1)[..., None]
-    return np.round((1 - share) * np.array(_STEADY) + share * np.array(_VARYING)).astype(np.uint8)
+    share = np.clip(magnitude / limit, 0, 1)[..., None]
+    return np.round((1 - share) * np.array(_NO_CURRENT) + share * np.array(_FULL_CURRENT)).astype(np.uint8)

@@ -25,7 +25,7 @@ def ranges() -> str:
     values = (1e-4, 0.9, 1.0, 1.01, 1.5, 2.2, 3.99, 4.0, 7.0, 9.99, 10.0, 1234.5, 999_999.0, 2e6)
     lines = [
         f"{number(value)}: {number(extents.nice(value))} {extents.number(value)} {extents.number(-value)}"
-        f" {extents.nice(value, extents._NICE_ABOVE_ZERO)}"
+        f" {extents.nice(value, extents.NICE_ABOVE_ZERO)}"
         for value in values
     ]
     for low, high, least in product((-3.0, -0.2, 0.0, 0.31, 7.9), (0.32, 8.0, 8.4, 95.0), (0.01, 2.0)):
@@ -162,7 +162,7 @@ def colours() -> str:
     lines += [f"{theme.rgb('#0a64ff')} {theme.mixed((0, 100, 200), (50, 0, 250), 0.3)}"]
     at = np.linspace(-10.0, 10.0, 41)
     lines.append(f"{theme.current_colours(at, 8.0).tolist()}")
-    lines.append(f"{theme.variation_colours(np.linspace(0.0, 10.0, 21), 8.0).tolist()}")
+    lines.append(f"{theme.magnitude_colours(np.linspace(0.0, 10.0, 21), 8.0).tolist()}")
     plain = view.View(1.0, 8.0, 18, (), False)
     changes = {
         "duration_s": 2.0, "current_limit_A": 4.0, "groups": 12, "own": common_signals(18)[:2], "live": True,

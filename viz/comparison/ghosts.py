@@ -10,6 +10,7 @@ import rerun as rr
 from numpy.typing import NDArray
 from rerun.chunk import Chunk
 
+from spheretwin.models.telemetry.status import Status
 from spheretwin.models.telemetry.table import Table
 from spheretwin.viz import theme
 from spheretwin.viz.recording.part import RecordingPart, RecordingSubject, scalars, time_index
@@ -79,12 +80,17 @@ class PartBelow(RecordingPart):
         """Log the rows of one chunk."""
         self._part.write(below(recording, self._path), rows)
 
+    def finish(self, recording: rr.RecordingStream, status: Status) -> None:
+        """Log how the run ended."""
+        self._part.finish(below(recording, self._path), status)
+
 
 def write_part(recording: rr.RecordingStream, table: Table, part: RecordingPart) -> None:
     """Write a part of the recording of a table, in chunks."""
     part.begin(recording)
     for first in range(0, len(table), MOST_ROWS):
         part.write(recording, table.rows(first, first + MOST_ROWS))
+    part.finish(recording, Status.COMPLETED)
 
 
 class Line(NamedTuple):

@@ -28,7 +28,7 @@ LABELLED = 8
 
 # Halves and ends of ranges with such steps.
 _NICE = (1.0, 1.5, 2.0, 3.0, 4.0, 10.0)
-_NICE_ABOVE_ZERO = (1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 10.0)
+NICE_ABOVE_ZERO = (1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 10.0)
 
 # Share of a range beyond the greatest labelled number: otherwise half of its height would be cut.
 ROOM = 0.06
@@ -45,6 +45,13 @@ class PlotChannel(NamedTuple):
     place: int | None = None
 
 
+class CurrentRanges(NamedTuple):
+    """Ranges of the colours of maps of the currents, A."""
+
+    mean_A: float
+    rms_A: float
+
+
 class Extents:
     """Bounds of every channel over spans of a run.
 
@@ -56,12 +63,19 @@ class Extents:
         Least and greatest value within each; NaN if there is none.
     ended_s : float, optional
         When the run ended before its time.
+    currents : CurrentRanges, optional
+        Ranges of the maps of the currents.
     """
 
     def __init__(
-        self, t_s: Array, low: Mapping[str, Array], high: Mapping[str, Array], ended_s: float | None
+        self,
+        t_s: Array,
+        low: Mapping[str, Array],
+        high: Mapping[str, Array],
+        ended_s: float | None,
+        currents: CurrentRanges | None = None,
     ) -> None:
-        self.t_s, self._low, self._high, self.ended_s = t_s, low, high, ended_s
+        self.t_s, self._low, self._high, self.ended_s, self.currents = t_s, low, high, ended_s, currents
 
     def limit(self, *channels: PlotChannel, least: float, above_zero: bool = False) -> float:
         """Return half of a range about 0, or its end, in which the settled run can be read.
@@ -82,7 +96,7 @@ class Extents:
         usual = max(least, float(np.max(second_half)), float(np.quantile(size, USUAL)))
         whole = float(np.max(size))
         shown = whole if least < whole <= CLIPPED_FROM * usual else usual
-        return nice(MARGIN * shown, _NICE_ABOVE_ZERO if above_zero else _NICE)
+        return nice(MARGIN * shown, NICE_ABOVE_ZERO if above_zero else _NICE)
 
     def bounds(self, *channels: PlotChannel) -> tuple[float, float]:
         """Return the least and greatest value of some channels."""
@@ -213,11 +227,11 @@ class ExtentTracker:
             self._low = np.fmin.reduceat(self._low, pairs, axis=0)
             self._high = np.fmax.reduceat(self._high, pairs, axis=0)
 
-    def extents(self, ended_s: float | None) -> Extents | None:
+    def extents(self, ended_s: float | None, currents: CurrentRanges | None = None) -> Extents | None:
         """Return the extents, if there are rows."""
         if not len(self._t_s):
             return None
-        return Extents(self._t_s, self._split(self._low), self._split(self._high), ended_s)
+        return Extents(self._t_s, self._split(self._low), self._split(self._high), ended_s, currents)
 
     def _split(self, bounds: Array) -> dict[str, Array]:
         ends = np.cumsum(list(self._sizes.values()))[:-1]

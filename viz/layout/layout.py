@@ -11,15 +11,13 @@ from spheretwin.models.telemetry.signals import ANGLES, Signal
 from spheretwin.viz.layout.extents import Extents, PlotChannel
 from spheretwin.viz.layout.plots import PlotLine, Plots, quantity, time_range
 from spheretwin.viz.layout.view import (
-    CURRENT_LIMITS,
     CURRENT_MAP,
-    CURRENT_VARIATION,
+    CURRENT_RMS,
     EVENTS,
     PHASE_PLANE,
     SCENARIO,
     SUMMARY,
     TIMELINE,
-    VARIATION_LANE,
     View,
 )
 from spheretwin.viz.quantities import (
@@ -86,20 +84,23 @@ def run_line() -> rrb.TextDocumentView:
     return rrb.TextDocumentView(origin=f"/{SUMMARY}", name="run", titlebar=False)
 
 
-def current_map(plots: Plots) -> rrb.TimeSeriesView:
-    """Currents as colours: a row for each group, time along it."""
-    limit, groups = plots.view.current_limit_A, plots.view.groups
-    title = f"mean currents, -{limit:g} A blue, +{limit:g} A red; top: variation"
-    lines = PlotLine(CURRENT_MAP, ""), PlotLine(CURRENT_VARIATION, "")
-    return plots.fixed(title, *lines, low=-0.7, high=groups + VARIATION_LANE)
+def current_maps(plots: Plots) -> tuple[rrb.TimeSeriesView, rrb.TimeSeriesView]:
+    """Mean and RMS currents as colours: a row for each group, time along it.
+
+    An alternating current vanishes in the mean.
+    """
+    return (
+        plots.current_map(CURRENT_MAP, "mean currents", lambda ranges: f"±{ranges.mean_A:g} A"),
+        plots.current_map(CURRENT_RMS, "RMS currents", lambda ranges: f"0 to {ranges.rms_A:g} A"),
+    )
 
 
 def current_bars(plots: Plots) -> rrb.BarChartView:
-    """Currents of the row at the cursor, one bar a group, between the limits."""
+    """Currents of the row at the cursor, one bar a group."""
     return rrb.BarChartView(
         origin="/",
-        contents=[f"/{scene.COILS}", f"/{CURRENT_LIMITS}"],
-        name=f"currents at the cursor [A], by group, ±{plots.view.current_limit_A:g} A",
+        contents=[f"/{scene.COILS}", f"/{scene.CURRENT_SCALE}"],
+        name=f"currents at the cursor [A]; limit {plots.view.current_limit_A:g} A",
         plot_legend=rrb.PlotLegend(visible=False),
     )
 
@@ -124,7 +125,7 @@ def coils(plots: Plots) -> rrb.Container:
     """Currents over time; below, those at the cursor, and the copper loss of all coils."""
     heat = plots.above_zero("heat of all coils", "W", quantity(COPPER_LOSS), least=COPPER_LOSS.floor)
     below = rrb.Horizontal(current_bars(plots), heat)
-    return rrb.Vertical(current_map(plots), below, row_shares=[1, 1], name="coils")
+    return rrb.Vertical(*current_maps(plots), below, name="coils")
 
 
 SLIDING = "sliding_s"
@@ -273,7 +274,8 @@ def actuator_view(size: float) -> rrb.Spatial3DView:
 
 def overview(plots: Plots) -> rrb.Container:
     """Actuator and currents; next to them errors, torque margin, states and events."""
-    left = rrb.Vertical(actuator_view(plots.view.size), current_map(plots), row_shares=[3, 2])
+    maps = rrb.Tabs(*current_maps(plots), active_tab=0)
+    left = rrb.Vertical(actuator_view(plots.view.size), maps, row_shares=[3, 2])
     right = rrb.Vertical(
         plots.above_zero("error as one angle", "°", quantity(ERROR_ANGLE), least=ERROR_ANGLE.floor),
         error_of_each_axis(plots),

@@ -13,7 +13,7 @@ from rerun.blueprint.archetypes import ViewBlueprint, ViewContents
 from rerun.blueprint.encodings import ComponentSourceKind, VisualizerComponentMapping
 
 from spheretwin.models.telemetry.signals import ANGLES, common_signals
-from spheretwin.viz.layout.extents import ROOM, Extents, PlotChannel, number, span_text
+from spheretwin.viz.layout.extents import ROOM, CurrentRanges, Extents, PlotChannel, number, span_text
 from spheretwin.viz.layout.styles import LINE_LOOKS, MOST_MARKED
 from spheretwin.viz.layout.view import (
     DERIVED,
@@ -57,7 +57,8 @@ class Fit(NamedTuple):
     """Properties of a plot that follow from the extents of a run."""
 
     title: str
-    band: Range
+    band: Range | None = None
+    """None for the range that is known before the run."""
 
 
 class _Plot(NamedTuple):
@@ -157,6 +158,17 @@ class Plots:
 
         return self._plot(f"{what} [{unit}]", lines, axis, fit)
 
+    def current_map(self, entity: str, what: str, span: Callable[[CurrentRanges], str]) -> rrb.TimeSeriesView:
+        """Make a map of the currents, a row for each group; its title states the range of its colours."""
+        band, limit_A = (-0.7, self.view.groups - 0.3), self.view.current_limit_A
+        at_limit = CurrentRanges(limit_A, limit_A)
+
+        def fit(extents: Extents) -> Fit:
+            return Fit(f"{what}, {span(extents.currents or at_limit)}; limit {limit_A:g} A")
+
+        axis_y = rrb.ScalarAxis(range=band)
+        return self._plot(f"{what}, {span(at_limit)}", (PlotLine(entity, ""),), None, fit, axis_y)
+
     def fixed(self, title: str, *lines: PlotLine, low: float, high: float) -> rrb.TimeSeriesView:
         """Make a plot with a range that is known before the run."""
         return self._plot(title, lines, None, None, rrb.ScalarAxis(range=(low, high)))
@@ -187,8 +199,9 @@ class Plots:
             if fit:
                 title, band = fit(extents)
                 changes[path] = ViewBlueprint.from_fields(display_name=title)
-                changes[f"{path}/ScalarAxis"] = rrb.ScalarAxis(range=band)
-                if legend:
+                if band:
+                    changes[f"{path}/ScalarAxis"] = rrb.ScalarAxis(range=band)
+                if band and legend:
                     changes[f"{path}/PlotLegend"] = rrb.PlotLegend(extents.emptiest_corner(band, *legend))
             if axis:
                 changes[f"{path}/TimeAxis"] = axis

@@ -87,8 +87,7 @@ EVENTS = "events"
 RUN, LIMITS = "run", "limits"
 """Lanes of states; those of a signal of states have its name. The viewer shows paths: these are names."""
 CURRENT_MAP = "currents/map"
-CURRENT_VARIATION = "currents/variation"
-CURRENT_LIMITS = "currents/limits"
+CURRENT_RMS = "currents/rms"
 PHASE_PLANE = "phase_plane"
 ENDED = "ended"
 
@@ -114,7 +113,3 @@ def component(kind: str, arrival: int) -> str:
     They have separate components: viewers draw nothing of a component whose fields change.
     """
     return f"{kind}_{arrival}"
-
-
-VARIATION_LANE = 1.4
-"""Place of the variation of the currents in their map, in rows above the last group."""

@@ -1,4 +1,8 @@
-"""Currents of the coil groups: colours of the coils, bars, and a map over time."""
+"""Currents of the coil groups: colours of the coils, bars, and maps over time.
+
+Colours have the range of the run, which is known at its end: those of a file are recorded then. In a live
+view they have the range of the current limit.
+"""
 
 from __future__ import annotations
 
@@ -11,15 +15,30 @@ from spheretwin.models.telemetry.status import Status
 from spheretwin.models.telemetry.table import Table
 from spheretwin.viz import theme
 from spheretwin.viz.decimation import CompletedBins, FirstRows, TimeBins
-from spheretwin.viz.layout.view import CURRENT_LIMITS, CURRENT_MAP, CURRENT_VARIATION, VARIATION_LANE
+from spheretwin.viz.layout.extents import MARGIN, NICE_ABOVE_ZERO, CurrentRanges, nice
+from spheretwin.viz.layout.view import CURRENT_MAP, CURRENT_RMS
 from spheretwin.viz.recording.part import RecordingPart, RecordingSubject, scalars, time_index
 from spheretwin.viz.rerun_internals import ArrowComponent
-from spheretwin.viz.scene.entities import FRAME_RATE_Hz
-from spheretwin.viz.scene.meshes import COILS
+from spheretwin.viz.scene.entities import FRAME_RATE_Hz, current_scale_labels
+from spheretwin.viz.scene.meshes import COILS, CURRENT_SCALE
 
 Array = NDArray[np.float64]
 
 BAR_WIDTH = 0.8
+
+LEAST_A = 0.01
+"""Least range: smaller currents must not look large."""
+
+WITHIN_RANGE = 0.98
+"""Share of the values that a range of colours contains; larger ones have the full colour."""
+
+
+def colour_range(current_A: Array, limit_A: float) -> float:
+    """Return the range of the colours of some currents: at most the current limit."""
+    size_A = np.abs(current_A[np.isfinite(current_A)])
+    usual_A = float(np.quantile(size_A, WITHIN_RANGE)) if len(size_A) else 0.0
+    return min(limit_A, nice(max(MARGIN * usual_A, LEAST_A), NICE_ABOVE_ZERO))
+
 
 _VALUES = next(iter(rr.BarChart.columns(values=np.zeros((1, 1))))).component_descriptor()
 _TEXTURE = next(
@@ -27,37 +46,90 @@ _TEXTURE = next(
 ).component_descriptor()
 
 
+class CoilColours:
+    """Colours of the coils in every frame, and the range of bars and colours.
+
+    Parameters
+    ----------
+    limit_A : float
+        Current limit: the greatest range.
+    live : bool
+        Record the colours at once, in the range of the limit.
+    """
+
+    def __init__(self, limit_A: float, *, live: bool = False) -> None:
+        self._limit_A, self._live = limit_A, live
+        self._frames = FirstRows(FRAME_RATE_Hz)
+        self._t_s: list[Array] = []
+        self._current_A: list[Array] = []
+
+    def begin(self, recording: rr.RecordingStream) -> None:
+        """State the range of a live view."""
+        if self._live:
+            self._state_range(recording, self._limit_A)
+
+    def add(self, recording: rr.RecordingStream, rows: Table) -> None:
+        """Add the rows of a chunk."""
+        places = self._frames.first_places(rows["t_s"])
+        if not len(places):
+            return
+        self._t_s.append(rows["t_s"][places])
+        self._current_A.append(rows["current_A"][places])
+        if self._live:
+            self._send(recording, self._limit_A)
+
+    def finish(self, recording: rr.RecordingStream) -> None:
+        """Record the colours of a file, and their range."""
+        if self._live or not self._t_s:
+            return
+        range_A = colour_range(np.concatenate(self._current_A), self._limit_A)
+        self._send(recording, range_A)
+        self._state_range(recording, range_A)
+
+    def _send(self, recording: rr.RecordingStream, range_A: float) -> None:
+        t_s, current_A = np.concatenate(self._t_s), np.concatenate(self._current_A)
+        colours = theme.current_colours(current_A, range_A).reshape(len(t_s), -1)  # (n, 3 * groups)
+        column = rr.ComponentColumn(_TEXTURE, ArrowComponent(_lists(colours)))
+        recording.send_columns(COILS, time_index(t_s), [column])
+        self._t_s, self._current_A = [], []
+
+    def _state_range(self, recording: rr.RecordingStream, range_A: float) -> None:
+        """Label the scale of the colours, and log bars without width that fix the scale of the bars."""
+        ends = rr.BarChart(np.array([range_A, -range_A]), widths=[0.0, 0.0])
+        recording.log(CURRENT_SCALE, ends, current_scale_labels(range_A, self._limit_A), static=True)
+
+
 class CoilCurrents(RecordingPart):
-    """Colours of the coils and bars of the groups, of every row; if rows are decimated, of every frame."""
+    """Colours of the coils, and bars of the groups of every row; if rows are decimated, of every frame."""
 
     def __init__(self, subject: RecordingSubject) -> None:
         super().__init__(subject)
         self._frames = FirstRows(FRAME_RATE_Hz) if subject.view.decimated else None
+        self._colours = CoilColours(subject.facts.current_limit_A, live=subject.live)
 
     def begin(self, recording: rr.RecordingStream) -> None:
-        """Log the places of the bars, and bars without width that fix the scale at the limit."""
-        limit_A, groups = self.subject.facts.current_limit_A, len(self.subject.actuator.groups)
+        """Log the places of the bars."""
+        groups = len(self.subject.actuator.groups)
         places = np.arange(groups) - BAR_WIDTH / 2
         bars = rr.BarChart(places, abscissa=places, widths=[BAR_WIDTH] * groups, color=theme.GROUP)
         look = [batch for batch in bars.as_component_batches() if batch.component_descriptor() != _VALUES]
         recording.log(COILS, look, static=True)
-        limits = rr.BarChart(np.array([limit_A, -limit_A]), widths=[0.0, 0.0])
-        recording.log(CURRENT_LIMITS, limits, static=True)
+        self._colours.begin(recording)
 
     def write(self, recording: rr.RecordingStream, rows: Table) -> None:
         """Record the currents of the rows of a chunk."""
+        self._colours.add(recording, rows)
         t_s, current_A = rows["t_s"], rows["current_A"]
         if self._frames:
             places = self._frames.first_places(t_s)
             t_s, current_A = t_s[places], current_A[places]
-        if not len(t_s):
-            return
-        colours = theme.current_colours(current_A, self.subject.facts.current_limit_A)  # (n, groups, 3)
-        columns = [
-            rr.ComponentColumn(_TEXTURE, ArrowComponent(_lists(colours.reshape(len(colours), -1)))),
-            rr.ComponentColumn(_VALUES, ArrowComponent(_tensors(current_A))),
-        ]
-        recording.send_columns(COILS, time_index(t_s), columns)
+        if len(t_s):
+            bars = rr.ComponentColumn(_VALUES, ArrowComponent(_tensors(current_A)))
+            recording.send_columns(COILS, time_index(t_s), [bars])
+
+    def finish(self, recording: rr.RecordingStream, status: Status) -> None:
+        """Record the colours of a file."""
+        self._colours.finish(recording)
 
 
 _TEXTURES = rr.components.ImageBufferBatch([np.zeros(1, np.uint8)]).as_arrow_array().type
@@ -101,67 +173,73 @@ def _tensors(values: Array) -> pa.Array:
 
 CURRENT_MAP_RATE_Hz = 12.5
 
-# Heights of a row of the map and of the lane, in points of the screen: rows of 18 groups touch in a panel of
-# some 230 of them.
-ROW_HEIGHT = 12.0
+# Height of a row of a map, in points of the screen: rows of 18 groups touch in a panel of some 230.
+ROW_HEIGHT = 13.0
 
 
-class CurrentMap(RecordingPart):
-    """Mean current of each group in each bin of time, and how much the currents vary within it."""
+class CurrentMap:
+    """Mean and root mean square of each group's current in each bin of time.
 
-    def __init__(self, subject: RecordingSubject) -> None:
-        super().__init__(subject)
-        self._groups = len(subject.actuator.groups)
-        self._bins = TimeBins(CURRENT_MAP_RATE_Hz, immediate=subject.live)
+    Parameters
+    ----------
+    groups : int
+    limit_A : float
+        Current limit: the greatest range.
+    live : bool
+        Record every bin at once, in the range of the limit.
+    """
+
+    def __init__(self, groups: int, limit_A: float, *, live: bool = False) -> None:
+        self._groups, self._limit_A, self._live = groups, limit_A, live
+        self._bins = TimeBins(CURRENT_MAP_RATE_Hz, immediate=live)
+        self._cells: list[tuple[Array, Array, Array]] = []
 
     def begin(self, recording: rr.RecordingStream) -> None:
         """Log the names of the rows."""
-        for entity, names in (
-            (CURRENT_MAP, [f"group {group}" for group in range(self._groups)]),
-            (CURRENT_VARIATION, ["standard deviation within a cell, RMS of all groups"]),
-        ):
-            style = rr.SeriesLines(names=names, widths=[ROW_HEIGHT] * len(names), aggregation_policy="Off")
+        names = [f"group {group}" for group in range(self._groups)]
+        style = rr.SeriesLines(names=names, widths=[ROW_HEIGHT] * len(names), aggregation_policy="Off")
+        for entity in (CURRENT_MAP, CURRENT_RMS):
             recording.log(entity, style, static=True)
 
-    def write(self, recording: rr.RecordingStream, rows: Table) -> None:
-        """Record what bins the rows of a chunk have completed."""
+    def add(self, recording: rr.RecordingStream, rows: Table) -> None:
+        """Add the rows of a chunk."""
         current_A = rows["current_A"]
-        self._record(
-            recording, self._bins.add(rows["t_s"], np.concatenate([current_A, current_A**2], axis=1))
-        )
+        self._add(self._bins.add(rows["t_s"], np.concatenate([current_A, current_A**2], axis=1)))
+        if self._live:
+            self._send(recording)
 
-    def finish(self, recording: rr.RecordingStream, status: Status) -> None:
-        """Record the last bin, up to its end."""
+    def finish(self, recording: rr.RecordingStream) -> CurrentRanges:
+        """Record what is left, up to the end of the last bin; return the ranges of the colours."""
         binned = self._bins.flush()
-        self._record(recording, binned)
+        self._add(binned)
         if binned and binned.last_s[-1] > binned.t_s[-1]:
             end = CompletedBins(*(column[-1:] for column in binned))
-            self._record(recording, end._replace(t_s=end.last_s))
+            self._add(end._replace(t_s=end.last_s))
+        return self._send(recording)
 
-    def _record(self, recording: rr.RecordingStream, binned: CompletedBins | None) -> None:
+    def _add(self, binned: CompletedBins | None) -> None:
         if binned is None:
             return
         mean_A, mean_square_A2 = np.split(binned.mean, 2, axis=1)
-        variance_A2 = np.maximum(mean_square_A2 - mean_A**2, 0.0)
-        deviation_A = np.sqrt(np.mean(variance_A2, axis=1, keepdims=True))
-        limit_A, index = self.subject.facts.current_limit_A, time_index(binned.t_s)
-        places = np.arange(self._groups, dtype=np.float64)
-        _send_row(recording, CURRENT_MAP, index, places, theme.current_colours(mean_A, limit_A))
-        lane = places[-1:] + VARIATION_LANE
-        _send_row(recording, CURRENT_VARIATION, index, lane, theme.variation_colours(deviation_A, limit_A))
+        self._cells.append((binned.t_s, mean_A, np.sqrt(mean_square_A2)))
 
-
-def _send_row(
-    recording: rr.RecordingStream,
-    entity: str,
-    index: list[rr.TimeColumn],
-    places: Array,
-    colours: NDArray[np.uint8],
-) -> None:
-    """Send the colours (n, lines, 3) of lines at constant places."""
-    count, lines = colours.shape[:2]
-    packed = rr.SeriesLines.columns(colors=_packed(colours)).partition([lines] * count)
-    recording.send_columns(entity, index, [scalars(np.tile(places, (count, 1)), lines), *packed])
+    def _send(self, recording: rr.RecordingStream) -> CurrentRanges:
+        """Record the cells so far; return the ranges of their colours."""
+        ranges = CurrentRanges(self._limit_A, self._limit_A)
+        if not self._cells:
+            return ranges
+        t_s, mean_A, rms_A = (np.concatenate(parts) for parts in zip(*self._cells, strict=True))
+        self._cells = []
+        if not self._live:
+            ranges = CurrentRanges(*(colour_range(of, self._limit_A) for of in (mean_A, rms_A)))
+        places = np.tile(np.arange(self._groups, dtype=np.float64), (len(t_s), 1))
+        for entity, colours in (
+            (CURRENT_MAP, theme.current_colours(mean_A, ranges.mean_A)),
+            (CURRENT_RMS, theme.magnitude_colours(rms_A, ranges.rms_A)),
+        ):
+            packed = rr.SeriesLines.columns(colors=_packed(colours)).partition([self._groups] * len(t_s))
+            recording.send_columns(entity, time_index(t_s), [scalars(places, self._groups), *packed])
+        return ranges
 
 
 def _packed(colours: NDArray[np.uint8]) -> NDArray[np.uint32]:

@@ -34,6 +34,7 @@ from spheretwin.viz.layout.view import (
     component,
 )
 from spheretwin.viz.quantities import ERROR_ANGLE, QuantityRows, quantities_of
+from spheretwin.viz.recording.currents import CurrentMap
 from spheretwin.viz.recording.part import (
     RecordingPart,
     RecordingSubject,
@@ -129,6 +130,8 @@ class PlotData(RecordingPart):
         self._extent_tracker = ExtentTracker(self._columns.sizes)
         self._bins = TimeBins(ENVELOPE_RATE_Hz, immediate=subject.live)
         self._marks = Marks(subject.view, self._columns)
+        groups, limit_A = len(subject.actuator.groups), subject.facts.current_limit_A
+        self._current_map = CurrentMap(groups, limit_A, live=subject.live)
         self._summary = Summary(subject.facts)
         self._before: Table | None = None
         self._begun_s: float | None = None  # clock at the first rows: all is compiled then
@@ -137,6 +140,7 @@ class PlotData(RecordingPart):
     def begin(self, recording: rr.RecordingStream) -> None:
         """Log the styles of lines and markers and, in a live view, the facts of the run."""
         self._marks.begin(recording)
+        self._current_map.begin(recording)
         if self.subject.view.decimated:
             envelopes = {name: style.of_envelope() for name, style in self._columns.styles.items()}
             _log_styles(recording, ENVELOPE, envelopes)
@@ -162,6 +166,7 @@ class PlotData(RecordingPart):
         columns = np.concatenate([*values.values(), self._column_selector.of(rows)], axis=1)
         self._record(recording, self._bins.add(rows["t_s"], columns))
         self._marks.add(recording, rows["t_s"], columns)
+        self._current_map.add(recording, rows)
 
     def finish(self, recording: rr.RecordingStream, status: Status) -> None:
         """Record the last bin, and lay the recording out for what the run has shown."""
@@ -175,7 +180,8 @@ class PlotData(RecordingPart):
         ended_s = None if status in _AS_PLANNED else self._summary.last_s
         if ended_s is not None:
             log_end(recording, ended_s)
-        recording.send_blueprint(layout(self.subject.view, self._extent_tracker.extents(ended_s)))
+        currents = self._current_map.finish(recording)
+        recording.send_blueprint(layout(self.subject.view, self._extent_tracker.extents(ended_s, currents)))
 
     def _open(self, recording: rr.RecordingStream) -> None:
         """Send a layout in case the process is killed; most runs end before that is necessary."""

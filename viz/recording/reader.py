@@ -39,6 +39,7 @@ from spheretwin.viz.layout.view import (
 )
 from spheretwin.viz.quantities import angle_between
 from spheretwin.viz.recording.contents import Contents
+from spheretwin.viz.recording.currents import CoilColours, CurrentMap
 from spheretwin.viz.recording.part import log_markdown, total
 from spheretwin.viz.recording.plots import ENVELOPE_RATE_Hz, Marks, PlottedColumns, log_end
 from spheretwin.viz.recording.signals import RATE
@@ -225,7 +226,16 @@ class RecoveredPlots:
         summary.add(table, error_deg)
         log_markdown(recording, SUMMARY, summary.cut_off())
         log_end(recording, summary.last_s)
-        recording.send_blueprint(layout(view, tracker.extents(summary.last_s)))
+        current_map, colours = (
+            CurrentMap(view.groups, view.current_limit_A),
+            CoilColours(view.current_limit_A),
+        )
+        for rows in [table] if len(table) else []:
+            current_map.add(recording, rows)
+            colours.add(recording, rows)
+        colours.finish(recording)
+        currents = current_map.finish(recording)
+        recording.send_blueprint(layout(view, tracker.extents(summary.last_s, currents)))
 
     def _rows(self, sizes: Mapping[str, int], table: Table) -> tuple[Array, Array]:
         """Return times and columns of the rows that have derived quantities."""

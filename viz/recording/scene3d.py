@@ -69,8 +69,7 @@ class MovingActuator(RecordingPart):
 
     def begin(self, recording: rr.RecordingStream) -> None:
         """Log the static parts."""
-        facts, payload = self.subject.facts, self.subject.facts.payload_kg > 0
-        scene = static_scene(self.subject.meshes, self.subject.actuator, facts.current_limit_A, payload)
+        scene = static_scene(self.subject.meshes, self.subject.actuator, self.subject.facts.payload_kg > 0)
         recording.send_chunks(scene)
 
     def write(self, recording: rr.RecordingStream, rows: Table) -> None:

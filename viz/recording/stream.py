@@ -17,7 +17,7 @@ from spheretwin.models.base.errors import without_breaks
 from spheretwin.models.telemetry.status import Event, Level, Status, named
 from spheretwin.models.telemetry.table import Table
 from spheretwin.viz.decimation import RowSelection
-from spheretwin.viz.recording.currents import CoilCurrents, CurrentMap
+from spheretwin.viz.recording.currents import CoilCurrents
 from spheretwin.viz.recording.part import RecordingPart, RecordingSubject, RowSet
 from spheretwin.viz.recording.plots import PhasePlane, PlotData
 from spheretwin.viz.recording.scene3d import Ending, MovingActuator, Torques, Traces
@@ -35,7 +35,6 @@ PARTS: tuple[type[RecordingPart], ...] = (
     LimitLanes,
     Log,
     CoilCurrents,
-    CurrentMap,
     PhasePlane,
     PlotData,  # the last: when a run has ended it sends the layout
 )

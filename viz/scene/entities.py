@@ -14,7 +14,15 @@ from rerun.chunk import Chunk
 from spheretwin.models.actuator import Actuator
 from spheretwin.viz import theme
 from spheretwin.viz.rerun_internals import LogEncoder
-from spheretwin.viz.scene.meshes import AXES, COILS, CURRENT_SCALE, PAYLOAD, ROTOR_AXES, WORLD, Meshes
+from spheretwin.viz.scene.meshes import (
+    AXES,
+    COILS,
+    CURRENT_SCALE,
+    PAYLOAD,
+    ROTOR_AXES,
+    WORLD,
+    Meshes,
+)
 
 Array = NDArray[np.float64]
 
@@ -24,7 +32,7 @@ AXES_LENGTH_m = 0.05
 REACH_m = 0.12
 """Reach from the joint of an actuator for which the lengths here are right."""
 
-# A bar before the foot, square to the eye of the layout; its ends are the current limit.
+# A bar before the foot, square to the eye of the layout.
 MIDDLE_m = np.array([0.064, -0.064, -0.078])
 ALONG = np.array([1.0, 1.0, 0.0]) / np.sqrt(2)
 UP = np.array([-0.4, 0.4, 0.82])
@@ -71,16 +79,19 @@ def current_scale(size: float) -> rr.Mesh3D:
     )
 
 
-def current_scale_labels(limit_A: float, size: float) -> rr.Points3D:
-    """Currents along the bar."""
+def current_scale_places(size: float) -> rr.Points3D:
+    """Places of the labels of the bar."""
     at = np.array(TICKS)
-    return rr.Points3D(
-        size * (MIDDLE_m + LENGTH_m / 2 * at[:, None] * ALONG - 0.3 * HEIGHT_m * UP),
-        labels=[f"{share * limit_A:+g} A" if share else "0" for share in at.tolist()],
-        colors=theme.current_colours(at, 1.0),
-        radii=rr.Radius.ui_points(1.0),
-        show_labels=True,
-    )
+    places = size * (MIDDLE_m + LENGTH_m / 2 * at[:, None] * ALONG - 0.3 * HEIGHT_m * UP)
+    return rr.Points3D(places, radii=rr.Radius.ui_points(1.0), show_labels=True)
+
+
+def current_scale_labels(range_A: float, limit_A: float) -> rr.Points3D:
+    """Currents along the bar, whose ends are a range within the current limit."""
+    zero = "0" if range_A == limit_A else f"0, limit {limit_A:g} A"
+    suffix = " (limit)" if range_A == limit_A else ""
+    texts = [f"{share * range_A:+g} A{suffix}" if share else zero for share in TICKS]
+    return rr.Points3D.from_fields(labels=texts, colors=theme.current_colours(np.array(TICKS), 1.0))
 
 
 PAYLOAD_LENGTH_m, PAYLOAD_RADIUS_m = 0.014, 0.011
@@ -92,7 +103,7 @@ ROTOR_AXES_HEIGHT, ROTOR_AXES_LENGTH_m = 0.6, 0.025
 
 
 @lru_cache(maxsize=4)
-def static_scene(meshes: Meshes, actuator: Actuator, current_limit_A: float, payload: bool) -> list[Chunk]:
+def static_scene(meshes: Meshes, actuator: Actuator, payload: bool) -> list[Chunk]:
     """Return the static parts, encoded: meshes, axes of both frames, the scale of the coils' colours."""
     recording = LogEncoder()
     recording.log(WORLD, rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
@@ -109,9 +120,7 @@ def static_scene(meshes: Meshes, actuator: Actuator, current_limit_A: float, pay
     recording.log(AXES, axes(at, length_m), names, ends, static=True)
     rotor_axes = axes(ROTOR_AXES_HEIGHT * actuator.shaft_tip_m, size * ROTOR_AXES_LENGTH_m)
     recording.log(ROTOR_AXES, rotor_axes, static=True)
-    recording.log(CURRENT_SCALE, current_scale(size), static=True)
-    currents = current_scale_labels(current_limit_A, size)
-    recording.log(f"{CURRENT_SCALE}/labels", currents, static=True)
+    recording.log(CURRENT_SCALE, current_scale(size), current_scale_places(size), static=True)
     return list(recording.chunks().values())
 
 

@@ -138,6 +138,7 @@ AXES = f"{WORLD}/axes"
 ROTOR_AXES = f"{WORLD}/rotor/axes"
 PAYLOAD = f"{WORLD}/rotor/payload"
 CURRENT_SCALE = f"{WORLD}/current_scale"
+"""Scale of the colours with its labels, and the range of the bars."""
 
 
 Array = NDArray[np.float64]
