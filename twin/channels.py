@@ -17,7 +17,7 @@ from spheretwin.electronics.drive_chain import write_telemetry as write_drive_te
 from spheretwin.electronics.sensor_chain import write_telemetry as write_sensor_telemetry
 from spheretwin.faults.fault import MODES
 from spheretwin.faults.schedule import part_names
-from spheretwin.models.base.compiled import part_of_its_caller, uncompiled
+from spheretwin.models.base.compiled import inlined, uncompiled
 from spheretwin.models.telemetry.signals import ANGLES, Signal
 from spheretwin.plant.bristle_friction import log_cable, log_end_stops, log_presliding
 from spheretwin.plant.cable import acts
@@ -62,7 +62,7 @@ def channel(logged: Callable[[Scenario], bool], *columns: Column) -> Callable[[A
     def signals(groups: int) -> tuple[Signal, ...]:
         return tuple(column(groups) for column in columns)
 
-    return lambda write: Channel(signals, logged, part_of_its_caller(write))
+    return lambda write: Channel(signals, logged, inlined(write))
 
 
 def single(name: str, unit: str, meaning: str, states: tuple[str, ...] = ()) -> Column:

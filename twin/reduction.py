@@ -15,7 +15,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from spheretwin.models.actuator import Actuator
-from spheretwin.models.base.compiled import for_types_of, part_of_its_caller, rounding_each
+from spheretwin.models.base.compiled import for_types_of, inlined, rounding_each
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.telemetry.signals import Signal, common_signals, offsets
 from spheretwin.models.telemetry.table import Table
@@ -157,7 +157,7 @@ def _chain(kinds: tuple[type[Metric], ...], place: int = 0) -> Any:
         return _add_nothing
     add, others = kinds[0].add, _chain(kinds[1:], place + 1)
 
-    @part_of_its_caller
+    @inlined
     def add_and_continue(rows: Any, first: Any, columns: Any, states: Any) -> None:
         add(rows, first, columns[place], states[place])
         others(rows, first, columns, states)
@@ -165,6 +165,6 @@ def _chain(kinds: tuple[type[Metric], ...], place: int = 0) -> Any:
     return add_and_continue
 
 
-@part_of_its_caller
+@inlined
 def _add_nothing(rows: Any, first: Any, columns: Any, states: Any) -> None:
     pass

@@ -1,5 +1,6 @@
-"""Report of functions that are about to be compiled, to whoever listens."""
+"""Compilation: reports of functions that are about to be compiled, and a pause of Python's collector."""
 
+import gc
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
@@ -20,3 +21,15 @@ def listening(listener: Callable[[str], None]) -> Iterator[None]:
         yield
     finally:
         _LISTENERS.remove(listener)
+
+
+@contextmanager
+def collector_paused() -> Iterator[None]:
+    """Pause the collection of garbage in cycles: it takes a seventh of the time in which a loop compiles."""
+    was_enabled = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if was_enabled:
+            gc.enable()

@@ -38,12 +38,14 @@ from spheretwin.models.base.function_identity import entry_name, is_of_package, 
 def compiled_function(function: Callable[..., Any], **options: Any) -> Any:
     """Return a function compiled with options of `numba.jit`, with a cache for calls from Python."""
     own: Any = jit(function, **options)
+    own.compile = compilation.collector_paused()(own.compile)
     own._cache = MachineCode(function, "function")
     own.part = _Part(function, {}, {**own.targetoptions, "no_cpython_wrapper": True}, _PartCompiler)
     own.get_call_template, own.get_overload = own.part.get_call_template, own.part.get_overload
     return own
 
 
+@compilation.collector_paused()
 def c_callback(function: Callable[..., Any], signature: Any, options: dict[str, Any]) -> Any:
     """Return a function compiled as a C callback, as `numba.cfunc` does, with a cache."""
     callback: Any = CFunc(function, (signature.args, signature.return_type), {}, options)

@@ -9,7 +9,7 @@ import pytest
 from spheretwin.models.base import cache
 
 ROOT = Path(__file__).parents[3]
-DECORATORS = "compiled|njit|allocation_free|inlined|part_of_its_caller|rounding_each|overload"
+DECORATORS = "compiled|njit|allocation_free|inlined|rounding_each|overload"
 COMPILES = re.compile(rf"^\s*@.*({DECORATORS})|import numba", re.M)
 
 
