@@ -73,6 +73,7 @@ def parameters_of(scenario: ResolvedScenario, files: Files) -> Parameters:
         weight_moment_Nm=float(joint["weight_moment"][0]),
         joint=joint,
         coulomb_Nm=np.array(section.coulomb_Nm),
+        coulomb_asymmetry=np.array(section.coulomb_asymmetry),
         viscous_Nm_s=np.array(section.viscous_Nm_s),
         friction_smoothing_rad_s=section.friction_smoothing_rad_s,
         constant_torque_Nm=np.array(section.modelling_torque_Nm) - cable_Nm,

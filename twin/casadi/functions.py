@@ -26,6 +26,7 @@ NAMES = (
     *(f"coulomb_{hinge}_Nm" for hinge in ("alpha", "beta", "gamma")),
     *(f"spring_{hinge}_Nm_rad" for hinge in ("alpha", "beta", "gamma")),
     *(f"disturbance_{hinge}_Nm" for hinge in ("alpha", "beta", "gamma")),
+    *(f"coulomb_asymmetry_{hinge}" for hinge in ("alpha", "beta", "gamma")),
 )
 """Entries of p; a disturbance is subtracted, as in (1)."""
 
@@ -61,6 +62,7 @@ def parameter_vector(parameters: Parameters) -> Array:
             parameters.coulomb_Nm,
             parameters.spring_Nm_rad,
             parameters.constant_torque_Nm,
+            parameters.coulomb_asymmetry,
         ]
     )
 
@@ -77,7 +79,7 @@ def dynamics(parameters: Parameters) -> Any:
     Returns
     -------
     casadi.Function
-        ``f(x, u, p) -> xdot``: x and xdot (6,) of angles (rad) and rates, u (n,) currents in A, p (16,).
+        ``f(x, u, p) -> xdot``: x and xdot (6,) of angles (rad) and rates, u (n,) currents in A, p (19,).
 
     Raises
     ------
@@ -92,7 +94,8 @@ def dynamics(parameters: Parameters) -> Any:
     on_hinges: list[Any] = [None] * 3
     torque_S = ca.vertsplit(torque_matrix(parameters)(q) @ u)
     _symbolic(ca, generalised_torque)(ca.vertsplit(q), torque_S, on_hinges)
-    friction = p[4:7] + p[7:10] / ca.sqrt(qdot**2 + parameters.friction_smoothing_rad_s**2)
+    coulomb = p[7:10] * (1 + ca.sign(qdot) * p[16:19])
+    friction = p[4:7] + coulomb / ca.sqrt(qdot**2 + parameters.friction_smoothing_rad_s**2)
     net = ca.vertcat(*on_hinges) - friction * qdot - p[10:13] * q - p[13:16]
     acceleration = rigid_body()(q, qdot, net, p[:4])
     return ca.Function("f", [x, u, p], [ca.vertcat(qdot, acceleration)], ["x", "u", "p"], ["xdot"])

@@ -237,6 +237,7 @@ def _parameters(scenario: ResolvedScenario, step: Parameters, inputs: Inputs, gr
         (is_ideal, hinges, step, "inertia_kg_m2", "kg.m2", "principal moments, with the payload"),
         (is_ideal, one, step, "weight_moment_Nm", "N.m", "weight of the payload times height", 0),
         (True, hinges, step, "coulomb_Nm", "N.m", "Coulomb friction of each hinge", 0),
+        (True, hinges, step, "coulomb_asymmetry", "1", "its excess towards positive angles", -1, 1),
         (True, hinges, step, "viscous_Nm_s", "N.m.s", "viscous friction of each hinge", 0),
         (True, one, step, "friction_smoothing_rad_s", "rad/s",
          "rate over which Coulomb friction changes sign"),

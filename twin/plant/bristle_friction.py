@@ -97,6 +97,7 @@ class BristleFriction(Record):
     stiffness_Nm_rad: Array = field("stiffness", "N·m/rad", (3, 3))
     damping_Nm_s: Array = field("damping, only as long as an element does not slip", "N·m·s", (3, 3))
     slip_rad: Array = field("largest deflection", "rad", 3)
+    asymmetry: Array = field("relative excess of the slip of a bearing towards positive angles", "", 3)
     coulomb_share: float = field("Coulomb level over break-away torque")
     stribeck_rad_s: float = field("rate of slip with 1/e of the excess", "rad/s")
     spring: Array = field("stiffness of the cable, its neutral pose, its constant torque", "", (3, 3))
@@ -119,6 +120,7 @@ def fill_bristles(
     inertia: Array,
     step_s: ArrayLike,
     seed: Seed = 0,
+    asymmetry: ArrayLike = (0.0, 0.0, 0.0),
 ) -> None:
     """Fill the elements of the hinges (alpha, beta, gamma), all without deflection.
 
@@ -136,6 +138,8 @@ def fill_bristles(
         Physics step.
     seed : int or (n, 1) array
         Seed of the run, for the constant torque of the cable.
+    asymmetry : (3,) or (n, 3) array
+        Relative excess of break-away and Coulomb torque towards positive angles.
     """
     slip, stiffness = bristles["slip_rad"], bristles["stiffness_Nm_rad"]
     damping, spring = bristles["damping_Nm_s"], bristles["spring"]
@@ -157,6 +161,7 @@ def fill_bristles(
     put(
         bristles,
         on=stiction.on | acts(cable) | bristles["stops"]["on"][:, None],
+        asymmetry=asymmetry,
         coulomb_share=1.0 / stiction.break_away,
         stribeck_rad_s=stiction.stribeck_rad_s,
         implicitness=0.5 + 0.5 * stiff / (stiff + 4.0),
@@ -310,10 +315,17 @@ def _stribeck_factor(bristles: BristleFriction, hinge: int, rate: float) -> floa
     """Return the factor of the slip deflections of a bearing at the end of the step; 1 unless it slips."""
     deflection = bristles.deflection_rad[LAST, hinge]
     slip = bristles.slip_rad[LAST] * bristles.stribeck_factor[hinge]
+    slip *= _excess(bristles, hinge, deflection)
     if abs(deflection) < _SLIPS * slip or deflection * rate <= 0.0:
         return 1.0
     share, ratio = bristles.coulomb_share, rate / bristles.stribeck_rad_s
     return share + (1.0 - share) * exp(-ratio * ratio)
+
+
+@inlined
+def _excess(bristles: BristleFriction, hinge: int, direction: float) -> float:
+    """Return the slip of a bearing in a direction over the mean of both directions."""
+    return 1.0 + bristles.asymmetry[hinge] if direction > 0.0 else 1.0 - bristles.asymmetry[hinge]
 
 
 @inlined
@@ -339,11 +351,13 @@ def _element(
     if stiffness == 0.0:
         return 0.0, 0.0, 0.0
     damping = bristles.damping_Nm_s[element, hinge] / bristles.step_s
-    slip = last_slip = bristles.slip_rad[element]
-    if element < CABLE:
-        slip, last_slip = factor * slip, bristles.stribeck_factor[hinge] * slip
     sign = 1.0 if travel >= 0.0 else -1.0
-    start, length = max(sign * bristles.deflection_rad[element, hinge], -slip), abs(travel)
+    slip = last_slip = other_slip = bristles.slip_rad[element]
+    if element < CABLE:
+        excess = _excess(bristles, hinge, sign)
+        slip, last_slip = factor * slip * excess, bristles.stribeck_factor[hinge] * slip * excess
+        other_slip *= factor * _excess(bristles, hinge, -sign)
+    start, length = max(sign * bristles.deflection_rad[element, hinge], -other_slip), abs(travel)
     free = slip - start
     if length <= free:  # it sticks
         torque, slope, end = (
@@ -385,7 +399,8 @@ def _fill(rows: Rows, setup: PlantSetup) -> None:
     inertia, step_s = setup.rotor["joint"]["inertia"], section.step_s
     fill_end_stops(rows["stops"], section.end_stops, range_rad, inertia, step_s)
     seed = setup.scenario.seed
-    fill_bristles(rows, section.stiction, section.coulomb_Nm, section.cable, inertia, step_s, seed)
+    coulomb_Nm, asymmetry = section.coulomb_Nm, section.coulomb_asymmetry
+    fill_bristles(rows, section.stiction, coulomb_Nm, section.cable, inertia, step_s, seed, asymmetry)
 
 
 BRISTLES = PlantPart(BristleFriction, _fill, load=_load, after=_correct)

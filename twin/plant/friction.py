@@ -4,7 +4,8 @@ On hinge i friction opposes the rate v with ``(viscous + coulomb / sqrt(v**2 + s
 jump at rest is thus smoothed over a stated rate: the term is odd and grows with v up to the Coulomb level,
 of which it has 71 % at the smoothing rate and 99.5 % at ten times that. A hyperbolic tangent comes
 closer to the level, but as a factor k(v) of the rate it is 0/0 at rest; the root is defined at rest and needs
-no exponential. The damping k(0) = viscous + coulomb / smoothing keeps the rotor at rest. It is stiff: as an
+no exponential. The level may depend on the direction of
+the motion. The damping k(0) = viscous + coulomb / smoothing keeps the rotor at rest. It is stiff: as an
 explicit torque it would reverse the motion as soon as the step times k exceeds the inertia, and the rotor
 would never rest. Instead `slow_down` advances the rates under friction alone, by half a physics step before
 the step of the rotor and by half a step after it: this splitting is symmetric (Strang) and of second order.
@@ -27,6 +28,8 @@ from spheretwin.models.lagrangian import InertiaEntries, inertia_entries, solve_
 from spheretwin.plant.plant_part import PlantPart, PlantSetup
 
 Array = NDArray[np.float64]
+Levels = tuple[Triple, Triple]
+"""Coulomb friction of the hinges towards positive and towards negative angles, N·m."""
 
 # Far below any motion; its square is far above the smallest number, so that k(0) is finite.
 SLOWEST_SMOOTHING_rad_s = 1e-12
@@ -40,7 +43,8 @@ class Friction(Record):
     """Friction of the hinges."""
 
     on: bool = field("whether there is friction")
-    coulomb_Nm: Array = field("friction well above the smoothing rate", "N·m", 3)
+    coulomb_Nm: Array = field("friction well above the smoothing rate, towards positive angles", "N·m", 3)
+    reverse_Nm: Array = field("the same towards negative angles", "N·m", 3)
     viscous_Nm_s: Array = field("friction per unit of rate", "N·m·s", 3)
     smoothing_rate_rad_s: float = field("rate over which the Coulomb term changes sign", "rad/s")
     step_s: float = field("physics step, of which `slow_down` advances half", "s")
@@ -52,6 +56,7 @@ def fill_friction(
     viscous_Nm_s: ArrayLike,
     smoothing_rate_rad_s: ArrayLike,
     step_s: ArrayLike,
+    asymmetry: ArrayLike = (0.0, 0.0, 0.0),
 ) -> None:
     """Fill the friction on the hinges (alpha, beta, gamma) of rotors.
 
@@ -62,6 +67,9 @@ def fill_friction(
     viscous_Nm_s : (3,) or (n, 3) array, N·m·s
     smoothing_rate_rad_s : float or (n, 1) array, rad/s
     step_s : float or (n, 1) array, s
+    asymmetry : (3,) or (n, 3) array
+        -1 to 1: Coulomb friction is (1 + asymmetry) times its level towards positive angles, and (1 -
+        asymmetry) times towards negative ones.
 
     Raises
     ------
@@ -77,9 +85,15 @@ def fill_friction(
             f"friction: expected a finite smoothing_rate_rad_s of at least {SLOWEST_SMOOTHING_rad_s:g},"
             f" received {rates[~valid][0]:g}"
         )
-    put(frictions, coulomb_Nm=coulomb_Nm, viscous_Nm_s=viscous_Nm_s)
+    forward_Nm, reverse_Nm = levels(np.asarray(coulomb_Nm), np.asarray(asymmetry))
+    put(frictions, coulomb_Nm=forward_Nm, reverse_Nm=reverse_Nm, viscous_Nm_s=viscous_Nm_s)
     put(frictions, smoothing_rate_rad_s=smoothing_rate_rad_s, step_s=step_s)
-    frictions["on"] = np.any(frictions["coulomb_Nm"] + frictions["viscous_Nm_s"], axis=1)
+    frictions["on"] = np.any(forward_Nm + reverse_Nm + frictions["viscous_Nm_s"], axis=1)
+
+
+def levels(coulomb_Nm: Array, asymmetry: Array) -> tuple[Array, Array]:
+    """Return the Coulomb levels towards positive and negative angles."""
+    return coulomb_Nm * (1.0 + asymmetry), coulomb_Nm * (1.0 - asymmetry)
 
 
 @inlined
@@ -99,7 +113,10 @@ def slow_down(friction: Friction, joint: JointChain, q: Array, qdot: Array, mean
         Friction on (alpha, beta, gamma), mean over a complete physics step: this half is added.
     """
     if friction.on:
-        viscous, coulomb = triple(friction.viscous_Nm_s), triple(friction.coulomb_Nm)
+        viscous, coulomb = (
+            triple(friction.viscous_Nm_s),
+            (triple(friction.coulomb_Nm), triple(friction.reverse_Nm)),
+        )
         smoothing, step_s = friction.smoothing_rate_rad_s, friction.step_s
         slow_hinges(joint, triple(joint.inertia), viscous, coulomb, smoothing, step_s, q, qdot, mean_torque_q)
 
@@ -109,7 +126,7 @@ def slow_hinges(
     joint: JointChain,
     inertia: Triple,
     viscous: Triple,
-    coulomb: Triple,
+    coulomb: Levels,
     smoothing: float,
     step_s: float,
     q: Array,
@@ -146,7 +163,7 @@ def slow_hinges(
 def _slow_general(
     joint: JointChain,
     viscous: Triple,
-    coulomb: Triple,
+    coulomb: Levels,
     smoothing: float,
     step_s: float,
     q: Array,
@@ -162,7 +179,7 @@ def _slow(
     M: InertiaEntries,
     general: bool,
     viscous: Triple,
-    coulomb: Triple,
+    coulomb: Levels,
     smoothing: float,
     step_s: float,
     qdot: Array,
@@ -180,7 +197,7 @@ def slowed(
     M: InertiaEntries,
     v: Triple,
     viscous: Triple,
-    coulomb: Triple,
+    coulomb: Levels,
     smoothing: float,
     t: float,
     general: bool,
@@ -207,13 +224,13 @@ def momentum(M: InertiaEntries, v: Triple, general: bool) -> Triple:
 
 
 @inlined
-def _factors(viscous: Triple, coulomb: Triple, smoothing: float, rates: Triple) -> Triple:
+def _factors(viscous: Triple, coulomb: Levels, smoothing: float, rates: Triple) -> Triple:
     """Return the friction of each hinge divided by its rate, N·m·s."""
-    square = smoothing**2
+    square, (forward, reverse) = smoothing**2, coulomb
     return (
-        viscous[0] + coulomb[0] / sqrt(rates[0] ** 2 + square),
-        viscous[1] + coulomb[1] / sqrt(rates[1] ** 2 + square),
-        viscous[2] + coulomb[2] / sqrt(rates[2] ** 2 + square),
+        viscous[0] + (forward[0] if rates[0] > 0.0 else reverse[0]) / sqrt(rates[0] ** 2 + square),
+        viscous[1] + (forward[1] if rates[1] > 0.0 else reverse[1]) / sqrt(rates[1] ** 2 + square),
+        viscous[2] + (forward[2] if rates[2] > 0.0 else reverse[2]) / sqrt(rates[2] ** 2 + square),
     )
 
 
@@ -277,7 +294,9 @@ def _slow_rotor(friction: Friction, plant: Any, substep: int) -> None:
 def _fill(rows: Rows, setup: PlantSetup) -> None:
     section = setup.scenario.plant
     coulomb_Nm = np.where(section.stiction.on, 0.0, section.coulomb_Nm)
-    fill_friction(rows, coulomb_Nm, section.viscous_Nm_s, section.friction_smoothing_rad_s, section.step_s)
+    smoothing_rad_s, step_s = section.friction_smoothing_rad_s, section.step_s
+    asymmetry = section.coulomb_asymmetry
+    fill_friction(rows, coulomb_Nm, section.viscous_Nm_s, smoothing_rad_s, step_s, asymmetry)
 
 
 FRICTION = PlantPart(Friction, _fill, before=_slow_rotor, after=_slow_rotor)

@@ -30,8 +30,8 @@ _TRIPLE = 3 * LANES
 Q, QDOT, TORQUE, HELD, INERTIA, COULOMB = (_TRIPLE * place for place in range(6))
 VISCOUS, SPRING, MIDDLE_Q, TORQUE_S, ACCELERATION = (_TRIPLE * place for place in range(6, 11))
 STAGE_Q, STAGE_QDOT, SUM_Q, SUM_QDOT = (_TRIPLE * place for place in range(11, 15))
-COSINE, SINE = (_TRIPLE * place for place in range(15, 17))
-WEIGHT, SMOOTHING, ROWS = 51 * LANES, 52 * LANES, 53
+COSINE, SINE, REVERSE = (_TRIPLE * place for place in range(15, 18))
+WEIGHT, SMOOTHING, ROWS = 54 * LANES, 55 * LANES, 56
 
 
 class LaneField(NamedTuple):
@@ -193,7 +193,8 @@ def _slow_down(block: Array, dt: float) -> None:
     for lane in range(LANES):
         M = inertia_entries(_turns(block, lane), _triple(block, INERTIA, lane))
         rates = _triple(block, QDOT, lane)
-        viscous, coulomb = _triple(block, VISCOUS, lane), _triple(block, COULOMB, lane)
+        viscous = _triple(block, VISCOUS, lane)
+        coulomb = _triple(block, COULOMB, lane), _triple(block, REVERSE, lane)
         alpha, beta, gamma = slowed(M, rates, viscous, coulomb, block[SMOOTHING + lane], t, False)
         block[QDOT + lane], block[QDOT + LANES + lane] = alpha, beta
         block[QDOT + 2 * LANES + lane] = gamma

@@ -24,7 +24,7 @@ from spheretwin.models.magnetics import (
     fill_torque_matrix,
     rotor_torque,
 )
-from spheretwin.plant.friction import slow_hinges
+from spheretwin.plant.friction import Levels, slow_hinges
 from spheretwin.plant.lagrangian_rotor import runge_kutta
 
 Array = NDArray[np.float64]
@@ -49,7 +49,9 @@ class Parameters(NamedTuple):
     joint: Rows
     """Array of one `JointChain`: if it is on, its hinges, masses and gravity replace the two fields above."""
     coulomb_Nm: Array
-    """Coulomb friction of each hinge (3,)."""
+    """Coulomb friction of each hinge (3,), mean of both directions."""
+    coulomb_asymmetry: Array
+    """Its relative excess towards positive angles (3,), -1 to 1."""
     viscous_Nm_s: Array
     """Viscous friction of each hinge (3,)."""
     friction_smoothing_rad_s: float
@@ -121,8 +123,12 @@ def check_parameters(parameters: Parameters) -> None:
     groups, inertia = _groups(parameters), parameters.inertia_kg_m2
     if not (_has(inertia, 3) and inertia[0] > 0 and inertia[1] > 0 and inertia[2] > 0):
         raise InputError("plant: expected inertia_kg_m2 of 3 finite numbers above 0, received others")
-    if not (_has(parameters.coulomb_Nm, 3) and _has(parameters.viscous_Nm_s, 3)):
-        raise InputError("plant: expected coulomb_Nm and viscous_Nm_s of 3 finite numbers, received others")
+    asymmetry = parameters.coulomb_asymmetry
+    if not (_has(parameters.coulomb_Nm, 3) and _has(asymmetry, 3) and _has(parameters.viscous_Nm_s, 3)):
+        raise InputError(
+            "plant: expected coulomb_Nm, coulomb_asymmetry and viscous_Nm_s of 3 finite numbers, received"
+            " others"
+        )
     if not (_has(parameters.constant_torque_Nm, 3) and _has(parameters.spring_Nm_rad, 3)):
         raise InputError(
             "plant: expected constant_torque_Nm and spring_Nm_rad of 3 finite numbers, received others"
@@ -285,6 +291,13 @@ def roll_out(
     return State(present, qdot)
 
 
+@inlined
+def _levels(parameters: Parameters) -> Levels:
+    C, a = triple(parameters.coulomb_Nm), triple(parameters.coulomb_asymmetry)
+    forward = C[0] * (1.0 + a[0]), C[1] * (1.0 + a[1]), C[2] * (1.0 + a[2])
+    return forward, (C[0] * (1.0 - a[0]), C[1] * (1.0 - a[1]), C[2] * (1.0 - a[2]))
+
+
 @allocation_free
 def _advance(
     q: Array,
@@ -300,14 +313,14 @@ def _advance(
     """Advance angles and rates in place; `vectors` (8, n), `G` and `scratch` are working space."""
     joint, friction_q, middle_q, torque_S = parameters.joint[0], vectors[3], vectors[4], vectors[5]
     torque_q, effective = vectors[6], vectors[7]
-    inertia, coulomb = triple(parameters.inertia_kg_m2), triple(parameters.coulomb_Nm)
+    inertia, (forward, reverse) = triple(parameters.inertia_kg_m2), _levels(parameters)
     viscous, smoothing = triple(parameters.viscous_Nm_s), parameters.friction_smoothing_rad_s
     acts = False
     for i in range(3):
         middle_q[i], friction_q[i] = q[i] + 0.5 * dt * qdot[i], 0.0
-        acts = acts or coulomb[i] > 0 or viscous[i] > 0
+        acts = acts or forward[i] > 0 or reverse[i] > 0 or viscous[i] > 0
     if acts:
-        slow_hinges(joint, inertia, viscous, coulomb, smoothing, dt, q, qdot, friction_q)
+        slow_hinges(joint, inertia, viscous, (forward, reverse), smoothing, dt, q, qdot, friction_q)
     _fill(middle_q, parameters, vectors, G, scratch)
     for j in range(G.shape[1]):
         effective[j] = parameters.torque_gain[j] * currents[j]
@@ -319,7 +332,7 @@ def _advance(
         )
     runge_kutta(dt, joint, inertia, parameters.weight_moment_Nm, triple(torque_q), q, qdot)
     if acts:
-        slow_hinges(joint, inertia, viscous, coulomb, smoothing, dt, q, qdot, friction_q)
+        slow_hinges(joint, inertia, viscous, (forward, reverse), smoothing, dt, q, qdot, friction_q)
 
 
 @allocation_free

@@ -12,6 +12,7 @@ from spheretwin.models.base.errors import InputError, shown
 from spheretwin.models.base.record import Rows
 from spheretwin.models.magnetics import Tables, scratch_of
 from spheretwin.plant import lanes
+from spheretwin.plant.friction import levels
 from spheretwin.plant.lanes import LANES, LaneField
 from spheretwin.plant.plant_step import LONGEST_STEP_s, Parameters, State, check_parameters, roll_out
 
@@ -243,9 +244,11 @@ class Plants:
         self._parameters[number] = parameters
         block, lane = divmod(number, LANES)
         column = self.blocks[block].reshape(lanes.ROWS, LANES)[:, lane]
+        forward_Nm, reverse_Nm = levels(parameters.coulomb_Nm, parameters.coulomb_asymmetry)
         for first, values in (
             (lanes.INERTIA, parameters.inertia_kg_m2),
-            (lanes.COULOMB, parameters.coulomb_Nm),
+            (lanes.COULOMB, forward_Nm),
+            (lanes.REVERSE, reverse_Nm),
             (lanes.VISCOUS, parameters.viscous_Nm_s),
             (lanes.SPRING, parameters.spring_Nm_rad),
         ):
@@ -259,7 +262,8 @@ class Plants:
 
     @property
     def _slows(self) -> bool:
-        return bool(np.any(self._read(lanes.COULOMB)) or np.any(self._read(lanes.VISCOUS)))
+        coefficients = lanes.COULOMB, lanes.REVERSE, lanes.VISCOUS
+        return any(np.any(self._read(first)) for first in coefficients)
 
     def _place_of(self, tables: Tables) -> int:
         """Return the number of a curve and field among those of all plants, after adding it if it is new."""

@@ -21,6 +21,7 @@ from spheretwin.scenario.fields import SHIPPED
 from spheretwin.trajectories.rounding import Bounded, Triple
 
 NonNegativeTriple = tuple[NonNegative, NonNegative, NonNegative]
+Share = Annotated[float, Field(ge=-1, le=1)]
 
 # A torque matrix near zero needs infinite currents.
 LEAST_SCALE = 1e-3
@@ -58,6 +59,11 @@ class PlantSection(PartSections, Section):
     )
     coulomb_Nm: NonNegativeTriple = Field(
         (0.0, 0.0, 0.0), description="Coulomb friction of each hinge, N·m, in addition to that of the model"
+    )
+    coulomb_asymmetry: tuple[Share, Share, Share] = Field(
+        (0.0, 0.0, 0.0),
+        description="relative excess of the Coulomb friction of each hinge towards positive angles, -1 to 1;"
+        " as much is missing towards negative angles",
     )
     viscous_Nm_s: NonNegativeTriple = Field(
         (0.0, 0.0, 0.0), description="viscous friction of each hinge, N·m·s, in addition to that of the model"

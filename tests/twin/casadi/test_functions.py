@@ -14,7 +14,11 @@ from spheretwin.models.kinematics import rate_jacobian
 from tests.requirements import C_COMPILER, needs_c_compiler
 
 STATES = 60
-LOADED = {"plant.coulomb_Nm": [0.01, 0.02, 0.03], "plant.viscous_Nm_s": [0.001, 0.002, 0.003]}
+LOADED = {
+    "plant.coulomb_Nm": [0.01, 0.02, 0.03],
+    "plant.coulomb_asymmetry": [0.2, -0.5, 0.0],
+    "plant.viscous_Nm_s": [0.001, 0.002, 0.003],
+}
 SCATTERED = {
     "plant.poles.gain_error": 0.03,
     "plant.coils.angle_error_rad": 0.01,
@@ -37,7 +41,8 @@ def acceleration(parameters, q, qdot, current):
     """Closed-form equations of motion under the torque of the compiled torque matrix."""
     smooth = np.sqrt(qdot**2 + parameters.friction_smoothing_rad_s**2)
     torque = rate_jacobian(q).T @ (plant.torque_matrix(q, parameters) @ current)
-    torque -= (parameters.viscous_Nm_s + parameters.coulomb_Nm / smooth) * qdot
+    levels = parameters.coulomb_Nm * (1 + np.sign(qdot) * parameters.coulomb_asymmetry)
+    torque -= (parameters.viscous_Nm_s + levels / smooth) * qdot
     torque -= parameters.spring_Nm_rad * q + parameters.constant_torque_Nm
     return lagrangian.acceleration(q, qdot, torque, parameters.inertia_kg_m2, parameters.weight_moment_Nm)
 

@@ -15,7 +15,12 @@ from spheretwin.models.base.errors import InputError
 from tests.requirements import needs_c_compiler
 from tests.twin.export.generated import SANITIZERS, CPlant, compiled
 
-FRICTION = {"plant.coulomb_Nm": [2e-3] * 3, "plant.viscous_Nm_s": [1e-4] * 3, "plant.payload_kg": 0.05}
+FRICTION = {
+    "plant.coulomb_Nm": [2e-3] * 3,
+    "plant.coulomb_asymmetry": [0.3, -0.5, 0.1],
+    "plant.viscous_Nm_s": [1e-4] * 3,
+    "plant.payload_kg": 0.05,
+}
 PROTOTYPE = {
     "hardware": "prototype",
     "plant.stiction.on": False,

@@ -34,12 +34,18 @@ NO_CABLE = CableSection()
 TILTED = np.array([0.3, -0.4, 0.2])
 
 
-def elements(actuator, stiction=STICTION, cable=NO_CABLE, coulomb=COULOMB, step_s=STEP_s):
-    return rows_of(actuator, stiction, cable, coulomb, step_s)[0]
+def elements(
+    actuator, stiction=STICTION, cable=NO_CABLE, coulomb=COULOMB, step_s=STEP_s, asymmetry=(0.0, 0.0, 0.0)
+):
+    return rows_of(actuator, stiction, cable, coulomb, step_s, asymmetry)[0]
 
 
-def rows_of(actuator, stiction=STICTION, cable=NO_CABLE, coulomb=COULOMB, step_s=STEP_s):
-    return BristleFriction.filled(fill_bristles, stiction, coulomb, cable, actuator.inertia, step_s)
+def rows_of(
+    actuator, stiction=STICTION, cable=NO_CABLE, coulomb=COULOMB, step_s=STEP_s, asymmetry=(0.0, 0.0, 0.0)
+):
+    return BristleFriction.filled(
+        fill_bristles, stiction, coulomb, cable, actuator.inertia, step_s, 0, asymmetry
+    )
 
 
 def spin(actuator, torque, step_s=STEP_s, stiction=STICTION, cable=NO_CABLE, rate=0.0, viscous_Nm_s=0.0):
@@ -84,6 +90,17 @@ def test_the_break_away_torque_does_not_depend_on_the_rate_of_loading(actuator, 
     assert abs(load[peak] / BREAK_AWAY_Nm - 1) < (0.01 if loading_s > 0.5 else 0.02)
     # In sliding the Stribeck effect leaves the Coulomb level.
     assert bearing[qdot > 0.2] == pytest.approx(COULOMB_Nm, rel=1e-5)
+
+
+def test_each_direction_breaks_away_at_its_own_torque(actuator):
+    load = BREAK_AWAY_Nm * STEP_s / 5.0 * np.arange(6.5 / STEP_s)
+    for sign, level in ((1.0, 1.25), (-1.0, 0.75)):
+        bristles = elements(actuator, asymmetry=(0.0, 0.0, 0.25))
+        torque = on_gamma(sign * load)
+        _, qdot, bearing = motion(LagrangianRotor(actuator, STEP_s), bristles, torque, UPRIGHT, on_gamma(0.0))
+        slides = sign * qdot[:, 2] > 0.2
+        assert np.abs(bearing[:, 2]).max() == pytest.approx(level * BREAK_AWAY_Nm, rel=1e-12)
+        assert sign * bearing[slides, 2] == pytest.approx(level * COULOMB_Nm, rel=1e-5)
 
 
 # Hysteresis

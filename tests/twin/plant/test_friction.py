@@ -45,6 +45,16 @@ def test_viscous_friction_is_an_exponential_decay(actuator):
     assert 1.98 < order(step_sizes, errors) < 2.02, errors
 
 
+@pytest.mark.parametrize("direction", [1, -1])
+def test_coulomb_friction_has_a_level_for_each_direction(actuator, direction):
+    asymmetry, duration = 0.4, 0.5
+    resistance = friction(on_gamma(COULOMB_Nm), NONE, SMOOTHING_rad_s, STEP_s, on_gamma(asymmetry))
+    _, qdot = motion(actuator, resistance, duration, np.array([0, 0, 0, 0, 0, 5.0 * direction]))
+    # Far above the smoothing rate the hinge loses the level times the time; the root is 1 within 1e-7.
+    lost = COULOMB_Nm * (1 + direction * asymmetry) * duration / actuator.inertia[2]
+    assert abs(qdot[-1, 2]) == pytest.approx(5.0 - lost, rel=1e-6)
+
+
 def decades(lowest, highest):
     return st.floats(lowest, highest).map(lambda exponent: 10.0**exponent)
 

@@ -7,7 +7,11 @@ from spheretwin import plant
 from spheretwin.plant.plant_step import step
 from tests.twin.plant.test_plant_step import LOADED
 
-FRICTION = {"plant.coulomb_Nm": [2e-3, 5e-3, 0.0], "plant.viscous_Nm_s": [1e-4, 0.0, 2e-4]}
+FRICTION = {
+    "plant.coulomb_Nm": [2e-3, 5e-3, 0.0],
+    "plant.coulomb_asymmetry": [0.3, -1.0, 0.5],
+    "plant.viscous_Nm_s": [1e-4, 0.0, 2e-4],
+}
 SCATTER = {"plant.poles.gain_error": 0.05, "plant.coils.angle_error_rad": 5e-3}
 TILTED = {"plant.mass.axis_tilt_rad": [[0.02, 0.0], [0.0, 0.01], [0.0, 0.0]]}
 KINDS = {"ideal": {}, "friction": FRICTION, "loaded": FRICTION | LOADED, "scatter": LOADED | SCATTER}

@@ -41,7 +41,8 @@ static inline void NAME(coil_torque)(
 static inline T NAME(friction_factor)(const st_parameters *p, int hinge, T rate)
 {
     const double smoothing = p->friction_smoothing_rad_s;
-    return p->viscous_Nm_s[hinge] + p->coulomb_Nm[hinge] / ROOT(rate * rate + smoothing * smoothing);
+    const double excess = RE(rate) > 0 ? p->coulomb_asymmetry[hinge] : -p->coulomb_asymmetry[hinge];
+    return p->viscous_Nm_s[hinge] + p->coulomb_Nm[hinge] * (1 + excess) / ROOT(rate * rate + smoothing * smoothing);
 }
 
 /* Resistance of a group at a temperature of its winding, ohm. */
