@@ -216,6 +216,7 @@ def fill_plant(
     """
     section = scenario.plant
     rows["rotor"], rows["arrangement"], rows["last_qdot"] = rotor, magnetics.arrangement, rotor["qdot"]
+    rows["joint_q"] = rotor["q"]
     fill_drive_of(rows["drive"], scenario, actuator)
     rows["current_sensors"]["on"] = scenario.senses_currents
     rows["current_sensors"]["noise_A"] = scenario.sensors.current.noise_A

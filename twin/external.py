@@ -139,7 +139,7 @@ class Connection:
         if result is None:
             return INTERRUPTED
         measurement, reason = result
-        plant.rotor.q[:] = measurement.angle_rad
+        plant.rotor.q[:] = plant.joint_q[:] = measurement.angle_rad
         if measurement.rate_rad_s is not None:
             plant.rotor.qdot[:] = measurement.rate_rad_s
         plant.current[:] = external.command if measurement.current_A is None else measurement.current_A

@@ -139,7 +139,7 @@ def loop(
         row, t, disturbance = log[tick], inputs.t[tick], inputs.disturbance[tick]
         draws = inputs.fault_noise[tick]
         is_finite = call_sense(
-            stages.sense, stages.sensors, stages.q, stages.qdot, inputs.noise[tick], draws, measurement
+            stages.sense, stages.sensors, stages.joint_q, stages.qdot, inputs.noise[tick], draws, measurement
         )
         copy_rows(inputs.reference[tick], reference)
         # Logged before the law is called, because the law may overwrite its arguments.

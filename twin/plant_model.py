@@ -37,8 +37,8 @@ def parameters(scenario: Scenario | str, changes: Mapping[str, Any] | None = Non
     Raises
     ------
     InputError
-        A field is unknown or out of range, changes of a built scenario, static friction, hysteresis of a
-        cable, end stops, or a model with physics that the equations of motion do not have.
+        A field is unknown or out of range, changes of a built scenario, static friction, backlash, hysteresis
+        of a cable, end stops, or a model with physics that the equations of motion do not have.
     """
     if isinstance(scenario, str):
         scenario = scenarios.load(scenario, changes)
@@ -46,16 +46,17 @@ def parameters(scenario: Scenario | str, changes: Mapping[str, Any] | None = Non
         raise InputError("plant parameters: expected changes with the name or file of a scenario alone")
     config = initial_config(scenario, None, None)
     section = config.scenario.plant
-    if section.stiction.on or any(section.cable.hysteresis_Nm) or section.end_stops.on:
+    if section.stiction.on or any(section.cable.hysteresis_Nm + section.backlash_rad) or section.end_stops.on:
         raise InputError(
-            "plant parameters: expected smoothed friction, no hysteresis of a cable and no end stops, which"
-            " the step does not have, received plant.stiction, plant.cable.hysteresis_Nm or plant.end_stops"
+            "plant parameters: expected smoothed friction, no backlash, no hysteresis of a cable and no end"
+            " stops, which the step does not have, received plant.stiction, plant.backlash_rad,"
+            " plant.cable.hysteresis_Nm or plant.end_stops"
         )
     return parameters_of(config.scenario, config.files)
 
 
 def parameters_of(scenario: ResolvedScenario, files: Files) -> Parameters:
-    """Return the parameters of a resolved scenario; static friction, hysteresis and end stops are left out.
+    """Return the parameters of a resolved scenario, without what `parameters` refuses for its states.
 
     Raises
     ------

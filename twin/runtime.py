@@ -290,6 +290,7 @@ class Runtime:
         plant = self._plant
         for part, given in (
             (plant.rotor.q, change.q_rad),
+            (plant.joint_q, change.q_rad),
             (plant.rotor.qdot, change.qdot_rad_s),
             (plant.last_qdot, change.qdot_rad_s),
             (plant.current, change.current_A),

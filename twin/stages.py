@@ -52,6 +52,7 @@ class Stages(NamedTuple):
     parts: Any  # data of the writers
     second_parts: Any
     columns: NDArray[np.intp]  # first columns of these channels
+    joint_q: Array  # (3,) rad, which the sensors measure
     q: Array  # (3,) rad
     qdot: Array  # (3,) rad/s
     current: Array  # (n,) A
@@ -112,6 +113,7 @@ def compiled_stages(parts: Mapping[str, Rows], plant: PlantStage, signals: tuple
         sequence([_data(parts[names[0]]) for names in reads]),
         sequence([_data(parts[names[-1]]) for names in reads]),
         np.array([first[name] for name in logged.values()], np.intp),
+        true["joint_q"][0],
         true["rotor"]["q"][0],
         true["rotor"]["qdot"][0],
         true["current"][0],

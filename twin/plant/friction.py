@@ -113,10 +113,8 @@ def slow_down(friction: Friction, joint: JointChain, q: Array, qdot: Array, mean
         Friction on (alpha, beta, gamma), mean over a complete physics step: this half is added.
     """
     if friction.on:
-        viscous, coulomb = (
-            triple(friction.viscous_Nm_s),
-            (triple(friction.coulomb_Nm), triple(friction.reverse_Nm)),
-        )
+        viscous = triple(friction.viscous_Nm_s)
+        coulomb = triple(friction.coulomb_Nm), triple(friction.reverse_Nm)
         smoothing, step_s = friction.smoothing_rate_rad_s, friction.step_s
         slow_hinges(joint, triple(joint.inertia), viscous, coulomb, smoothing, step_s, q, qdot, mean_torque_q)
 

@@ -8,12 +8,14 @@ from pydantic import BaseModel, create_model
 
 from spheretwin.electronics.stages import chained
 from spheretwin.models.base.record import record_of
+from spheretwin.plant.backlash import BACKLASH
 from spheretwin.plant.bristle_friction import BRISTLES
 from spheretwin.plant.friction import FRICTION
 from spheretwin.plant.magnet_heat import HEAT
 from spheretwin.plant.plant_part import PlantPart
 
 PARTS: dict[str, PlantPart] = {
+    "backlash": BACKLASH,
     "friction": FRICTION,
     "bristles": BRISTLES,
     "heat": HEAT,

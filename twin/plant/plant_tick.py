@@ -82,6 +82,9 @@ class Plant(Record):
     middle_qdot: Array = field("predicted rates there", "rad/s", 3)
     coil_q: Array = field("ideal hinges with the same orientation", "rad", 3)
     coil_qdot: Array = field("their rates with the same angular velocity", "rad/s", 3)
+    joint_q: Array = field(
+        "angles of the measured shafts, behind the play of the hinges", "rad", 3, state=True
+    )
     last_qdot: Array = field("rates at the start of the last physics step", "rad/s", 3, state=True)
     current: Array = field("present", "A", "groups", state=True)
     mean_current: Array = field("over the physics step", "A", "groups")
@@ -186,6 +189,8 @@ def plant_tick(plant: Plant, tables: Tables, step: Any, given: TickInput, output
         for i in range(3):  # at every step: the stop of a hinge at the end of its range is not simulated
             if not hinge_range[i, 0] <= q[i] <= hinge_range[i, 1]:
                 return LEFT_WORKSPACE
+    if not parts.backlash.on:
+        copy_into(plant.joint_q[:], 0, q, 3)
     is_cool = end(drive)
     end_parts(parts, plant, 0)
     if not is_cool:

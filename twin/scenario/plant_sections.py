@@ -21,6 +21,7 @@ from spheretwin.scenario.fields import SHIPPED
 from spheretwin.trajectories.rounding import Bounded, Triple
 
 NonNegativeTriple = tuple[NonNegative, NonNegative, NonNegative]
+Play = Annotated[float, Field(ge=0, le=0.5)]
 Share = Annotated[float, Field(ge=-1, le=1)]
 
 # A torque matrix near zero needs infinite currents.
@@ -71,6 +72,10 @@ class PlantSection(PartSections, Section):
     friction_smoothing_rad_s: Annotated[float, Field(ge=1e-9, le=1e3)] = Field(
         0.01,
         description="rate over which Coulomb friction changes sign, rad/s; not used with plant.stiction.on",
+    )
+    backlash_rad: tuple[Play, Play, Play] = Field(
+        (0.0, 0.0, 0.0),
+        description="play between the rotor and the shaft of each hinge whose angle is measured, rad",
     )
     stiction: StictionSection = StictionSection()
     cable: CableSection = CableSection()

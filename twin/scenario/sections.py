@@ -176,7 +176,8 @@ class Scenario(Section):
     def measures_truth(self) -> bool:
         """True if the controller receives the true angles and rates, also during faults."""
         faulty = any(fault.kind.measured for fault in self.fault)
-        return self.sensors.ideal and not faulty and self.estimator.kind == "ideal"
+        ideal = self.sensors.ideal and not any(self.plant.backlash_rad)
+        return ideal and not faulty and self.estimator.kind == "ideal"
 
     @property
     def supervises_groups(self) -> bool:

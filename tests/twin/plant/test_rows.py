@@ -60,6 +60,7 @@ RANGES = {
 }
 TRIPLES = {
     "plant.coulomb_Nm": (0.0, 0.01),
+    "plant.backlash_rad": (0.0, 0.02),
     "plant.coulomb_asymmetry": (-1.0, 1.0),
     "plant.viscous_Nm_s": (0.0, 0.01),
     "plant.cable.stiffness_Nm_rad": (0.0, 0.1),
