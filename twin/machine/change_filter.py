@@ -174,7 +174,8 @@ class Linearisation:
             np.stack(currents_A, axis=1), np.zeros(3), window.period_s / steps, steps
         )
         path = np.concatenate([starts[None, :, :3], angles_rad])
-        reported = [sensor_angles(setup, path[:, lane]) for lane, setup in enumerate(self._setups)]
+        first = window.log.angle_rad[window.first]
+        reported = [sensor_angles(setup, path[:, lane], first) for lane, setup in enumerate(self._setups)]
         return np.stack(reported, axis=1), np.hstack([self._plants.q_rad, self._plants.qdot_rad_s])
 
 

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from spheretwin.machine.parameters import KINDS, Kind, Parameter, members
 from spheretwin.machine.windows import Shooting
+from spheretwin.models.base.errors import InputError
 
 if TYPE_CHECKING:
     from spheretwin.machine.identification import Problem
@@ -144,9 +145,14 @@ def suggestions(problem: Problem, values: Array, found: Sequence[Component]) -> 
     for one in found:
         kind, largest = one.parameters[0].kind, int(np.argmax(np.abs(one.departures)))
         varied = Shooting(problem.held_out.windows, [*problem.parameters, *one.parameters])
-        least = np.append(problem.least, [kind.least] * len(one.parameters))
+        count = len(one.parameters)
+        least = np.append(problem.least, [kind.least] * count)
+        most = np.append(problem.most, [kind.most] * count)
         moved = np.append(values + one.slopes @ one.departures, one.values + one.departures)
-        parts = varied.parts(np.maximum(moved, least), slopes=False)
+        try:
+            parts = varied.parts(np.clip(moved, least, most), slopes=False)
+        except InputError:  # no machine has these departures
+            continue
         squares = sum(part.squares for part in parts)
         if (gain := 0.5 * (before - squares)) >= CREDIBLE:
             chi2 = squares / sum(part.used for part in parts)

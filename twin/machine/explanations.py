@@ -8,7 +8,6 @@ possible. Explanations have equal priors by kind; a kind's is shared by its memb
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import inf
 from typing import NamedTuple
 
 import numpy as np
@@ -97,7 +96,7 @@ def candidates_of(
         if kind.name in _TOGETHER and len(places) == 3:
             directions[f"{kind.name} of all hinges"] = np.sum(list(directions.values()), axis=0)
         log_prior = float(np.log(weights[kind] / sum(weights.values()) / len(directions)))
-        low, high = RANGES.get(kind.name, (kind.least, inf))
+        low, high = RANGES.get(kind.name, (kind.least, kind.most))
         for name, direction in directions.items():
             own = values[direction > 0]
             named = any(

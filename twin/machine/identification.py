@@ -205,6 +205,7 @@ class Problem:
         # A requested parameter has no prior: its interval comes from the data alone.
         self.deviations = np.array([*[np.inf] * len(self.requested), *[prior[one] for one in nuisance]])
         self.least = np.array([parameter.kind.least for parameter in self.parameters])
+        self.most = np.array([parameter.kind.most for parameter in self.parameters])
         self.sizes = np.array([parameter.kind.size for parameter in self.parameters])
         train, held_out = _split(logs, machines, settings)
         self.train = Shooting(train, self.parameters)
@@ -265,7 +266,7 @@ class Problem:
             lambda scaled: evaluated(scaled)[0],
             np.zeros(len(self.initial)),
             jac=lambda scaled: evaluated(scaled)[1],
-            bounds=((self.least - self.initial) / self.sizes, np.inf),
+            bounds=((self.least - self.initial) / self.sizes, (self.most - self.initial) / self.sizes),
             ftol=1e-10,
             xtol=1e-6,
             max_nfev=_MOST_EVALUATIONS,
@@ -302,7 +303,7 @@ class Problem:
         curvature, covariance = covariance, covariance * np.outer(widened, widened)
         is_right = self._is_right(after, values, covariance)
         reasons = [] if is_right else self._reasons(after, improvement)
-        cost = Cost(self._cost, self.normal, values, self._cost(values), self.least)
+        cost = Cost(self._cost, self.normal, values, self._cost(values), self.least, self.most)
         fields = self.machine.fields(self.requested, values[: len(self.requested)].tolist())
         estimates = {
             one.name: Estimate(

@@ -45,6 +45,8 @@ class Cost(NamedTuple):
     """Cost of the best values."""
     least: Array
     """Lower bounds."""
+    most: Array
+    """Upper bounds."""
 
 
 def interval(cost: Cost, covariance: Array, place: int, wider: float = 1.0) -> tuple[float, float]:
@@ -62,7 +64,7 @@ def interval(cost: Cost, covariance: Array, place: int, wider: float = 1.0) -> t
     """
     half = Z95 * wider
     low, high = (_end(cost, covariance, place, half, sign) for sign in (-1.0, 1.0))
-    return float(max(low, cost.least[place])), float(high)
+    return float(max(low, cost.least[place])), float(min(high, cost.most[place]))
 
 
 def _end(cost: Cost, covariance: Array, place: int, half: float, sign: float) -> float:
@@ -71,14 +73,14 @@ def _end(cost: Cost, covariance: Array, place: int, half: float, sign: float) ->
     # Along it the other parameters stay at their best, as far as the cost is quadratic.
     direction = sign * covariance[:, place] / deviation
     end = cost.best + half * direction
-    if np.any(end < cost.least):
+    if np.any((end < cost.least) | (end > cost.most)):
         return float(end[place])
     rise = 0.5 * half**2
     if abs(cost.at(end) - cost.lowest - rise) <= _DIFFERENT * rise:
         return float(end[place])
 
     def excess(distance: float) -> float:
-        values = np.maximum(cost.best + distance * direction, cost.least)
+        values = np.clip(cost.best + distance * direction, cost.least, cost.most)
         information, gradient = cost.normal(values)
         others = np.arange(len(values)) != place
         step = np.linalg.solve(information[np.ix_(others, others)], gradient[others])

@@ -36,6 +36,7 @@ class Kind(NamedTuple):
     """Owner: ``one``, ``hinges``, ``groups``, ``poles``, or ``harmonics`` of a residual."""
     meaning: str
     least: float = -inf
+    most: float = inf
 
 
 _WHOLE = "one"
@@ -50,9 +51,21 @@ KINDS = {
         Kind("torque_scale", "1", 0.05, _WHOLE, "torque of all groups over that of the torque curve"),
         Kind("plant.modelling_error", "1", 0.1, _WHOLE, "relative error of the inertia", -0.9),
         Kind("plant.coulomb_Nm", "N·m", 2e-3, _PER_HINGE, "Coulomb friction", 0.0),
+        Kind(
+            "plant.coulomb_asymmetry",
+            "1",
+            0.1,
+            _PER_HINGE,
+            "excess of Coulomb friction to one side",
+            -1.0,
+            1.0,
+        ),
         Kind("plant.viscous_Nm_s", "N·m·s", 2e-4, _PER_HINGE, "viscous friction", 0.0),
         Kind("plant.modelling_torque_Nm", "N·m", 2e-3, _PER_HINGE, "constant torque"),
         Kind("plant.cable.stiffness_Nm_rad", "N·m/rad", 5e-3, _PER_HINGE, "stiffness of the cable", 0.0),
+        Kind(
+            "plant.backlash_rad", "rad", 1e-3, _PER_HINGE, "play between rotor and measured shaft", 0.0, 0.5
+        ),
         Kind("plant.mass.centre_m", "m", 2e-4, _PER_HINGE, "centre of mass of the rotor"),
         Kind("plant.mass.products_kg_m2", "kg·m²", 5e-5, _PER_HINGE, "products of inertia xy, xz, yz"),
         Kind("plant.payload_kg", "kg", 0.02, _WHOLE, "payload", 0.0),
@@ -143,6 +156,7 @@ class Setup(NamedTuple):
     delay_s: float
     lag_s: PerGroup
     current_offset_A: Array  # (groups,)
+    backlash_rad: Array  # (3,)
     offset_rad: Array  # (3,)
     gain_error: Array  # (3,)
     cosine_rad: Array  # (3, HARMONICS) of the residual; that of the encoder is 0
@@ -200,6 +214,7 @@ class Machine:
             delay_s=float(given[KINDS["delay_s"]][0]),
             lag_s=float(given[lag][0]) if any(one.kind == lag for one in parameters) else model.lag_s,
             current_offset_A=given[KINDS["current_offset_A"]],
+            backlash_rad=given[KINDS["plant.backlash_rad"]],
             offset_rad=given[KINDS["sensors.angle_offset_rad"]],
             gain_error=given[KINDS["sensor_gain_error"]],
             cosine_rad=np.vstack([residual[:, :, 0], np.zeros(HARMONICS)]),
@@ -253,14 +268,34 @@ def _as_fields(given: Mapping[Kind, Array]) -> dict[str, Any]:
 _MOST_PLANTS = 200
 
 
-def sensor_angles(setup: Setup, q: Array) -> Array:
-    """Return what the sensors report at some angles, (..., 3), without noise and counts."""
+def sensor_angles(setup: Setup, q: Array, start_rad: Array | None = None) -> Array:
+    """Return what the sensors report at the angles of a motion, (rows, 3), without noise and counts.
+
+    Parameters
+    ----------
+    setup : Setup
+    q : (rows, 3) array, rad
+        Angles of the rotor.
+    start_rad : (3,) array, rad, optional
+        Measured angles at the start: a joint with play is there; in the middle of its play by default.
+    """
+    if setup.backlash_rad.any():
+        measured = None if start_rad is None else (start_rad - setup.offset_rad) / (1 + setup.gain_error)
+        q = joint_angles(q, setup.backlash_rad, q[0] if measured is None else measured)
     reported = (1 + setup.gain_error) * q + setup.offset_rad
     harmonics = HARMONICS if setup.cosine_rad.any() or setup.sine_rad.any() else 0
     for k in range(harmonics):
         phase = (k + 1) * setup.turns * q
         reported = reported + setup.cosine_rad[:, k] * np.cos(phase) + setup.sine_rad[:, k] * np.sin(phase)
     return reported
+
+
+def joint_angles(q: Array, backlash_rad: Array, start_rad: Array) -> Array:
+    """Return the angles of joints behind their play, from given ones at the start, (rows, 3)."""
+    low, high, joint = q - 0.5 * backlash_rad, q + 0.5 * backlash_rad, np.empty_like(q)
+    for row in range(len(q)):
+        joint[row] = start_rad = np.clip(start_rad, low[row], high[row])
+    return joint
 
 
 def priors(machine: Machine, log: Log) -> dict[Parameter, float]:

@@ -135,7 +135,8 @@ def draw_fields(path: Path, count: int, seed: int = 0) -> dict[str, list[Any]]:
         fields["plant.group_gain"] = [gain / scale for gain in fields["plant.group_gain"]]
     machine = Machine(scenario, fields)
     parameters = selected(names, machine.model.actuator)
-    drawn = np.maximum(drawn, [one.kind.least for one in parameters])
+    bounds = [[getattr(one.kind, end) for one in parameters] for end in ("least", "most")]
+    drawn = np.clip(drawn, *bounds)
     machines = [machine.fields(parameters, row.tolist()) for row in drawn]
     return {name: [one[name] for one in machines] for name in machines[0]}
 

@@ -260,7 +260,8 @@ class Shooting:
         steps = ceil(window.period_s / LONGEST_STEP_s - 0.05)
         angles_rad = plants.roll_out(currents, np.zeros(3), window.period_s / steps, steps)
         reached = np.concatenate([starts[None, :, :3], angles_rad])
-        return np.stack([sensor_angles(setup, reached[:, lane]) for lane, setup in enumerate(setups)])
+        first = window.log.angle_rad[window.first]
+        return np.stack([sensor_angles(setup, reached[:, lane], first) for lane, setup in enumerate(setups)])
 
     def _residuals(self, number: int, angles: Array) -> Array:
         measured, deviation = self.observed[number]

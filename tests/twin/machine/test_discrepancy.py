@@ -61,3 +61,25 @@ def test_a_scatter_of_the_groups_widens_the_intervals_and_is_suggested():
     # In one short motion a scatter of the poles looks alike.
     assert "plant.group_gain" in [one.what for one in result.suggestions[:2]]
     assert result.suggestions[0].chi2 < result.held_out.chi2
+
+
+@pytest.mark.release("3 s each; the parameters have tests of their own")
+@pytest.mark.parametrize(
+    ("field", "value", "place"),
+    [("plant.coulomb_asymmetry", 0.3, 0), ("plant.backlash_rad", 6e-3, 1)],
+)
+def test_what_a_hinge_has_besides_friction_is_suggested_and_then_found(field, value, place):
+    true = {"plant.coulomb_Nm": [3e-3, 2e-3, 1.5e-3], field: (value * np.eye(3)[place]).tolist()}
+    conditions = {"plant.payload_kg": 0.1}
+    known = {**CALIBRATED, "controller.law": "pid", "duration": 2.0}
+    run = spheretwin.simulate("sinusoid", {**known, **true, **conditions, "seed": 1}).telemetry
+    columns = (run[name] for name in ("t_s", "current_command_A", "q_measured_rad"))
+    log, wanted = Log(*columns, conditions=conditions), ["torque_scale", "plant.coulomb_Nm"]
+    lacking = identify(log, "sinusoid", wanted, known, IdentifySettings(suggest=True))
+    assert not lacking.accepted
+    assert lacking.suggestions[0].member == f"{field}.{place}"
+    result = identify(log, "sinusoid", [*wanted, field], known)
+    assert result.accepted, result.reasons
+    low, high = result.parameters[f"{field}.{place}"].interval
+    assert low <= value <= high
+    assert high - low < 0.2 * value

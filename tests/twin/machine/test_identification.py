@@ -251,6 +251,26 @@ def test_sensor_parameters_are_what_the_sensors_report():
     assert np.allclose(sensor_angles(setup, q), expected, rtol=1e-14)
 
 
+def test_a_play_is_what_remains_of_a_motion_between_its_ends():
+    machine = Machine(SCENARIO, KNOWN)
+    setup = machine.setup(selected(["plant.backlash_rad.1"], machine.model.actuator), [0.2])
+    q = np.zeros((6, 3))
+    q[:, 1] = [
+        0.0,
+        0.3,
+        0.5,
+        0.4,
+        0.25,
+        0.4,
+    ]  # pushed up, back within the play, pushed down, and up within it
+    for start, expected in (
+        (None, [0.0, 0.2, 0.4, 0.4, 0.35, 0.35]),
+        (np.full(3, -0.05), [-0.05, 0.2, 0.4, 0.4, 0.35, 0.35]),
+    ):
+        assert np.allclose(sensor_angles(setup, q, start)[:, 1], expected, rtol=1e-14)
+    assert not sensor_angles(setup, q)[:, [0, 2]].any()
+
+
 def test_a_gap_ends_a_window(empty):
     rows = np.r_[0:500, 520:1600]
     log = Log(empty.t_s[rows], empty.current_A[rows], empty.angle_rad[rows])

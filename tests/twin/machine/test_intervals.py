@@ -18,6 +18,7 @@ def quadratic():
         best,
         0.0,
         FREE,
+        -FREE,
     ), np.linalg.inv(information)
 
 
@@ -33,8 +34,8 @@ def test_a_quadratic_cost_has_the_interval_of_its_curvature():
 
 def test_a_bound_ends_an_interval():
     cost, covariance = quadratic()
-    bounded = cost._replace(least=np.array([0.25, -np.inf]))
-    assert interval(bounded, covariance, 0)[0] == 0.25
+    bounded = cost._replace(least=np.array([0.25, -np.inf]), most=np.array([0.31, np.inf]))
+    assert interval(bounded, covariance, 0) == (0.25, 0.31)
 
 
 def test_another_cost_has_the_interval_of_its_profile():
@@ -47,7 +48,7 @@ def test_another_cost_has_the_interval_of_its_profile():
         slopes = np.array([[3 * np.exp(v[0]), 0.0], [1.0, 1.0]])
         return slopes.T @ slopes, slopes.T @ residuals(v)
 
-    cost = Cost(lambda v: 0.5 * residuals(v) @ residuals(v), normal, np.zeros(2), 0.0, FREE)
+    cost = Cost(lambda v: 0.5 * residuals(v) @ residuals(v), normal, np.zeros(2), 0.0, FREE, -FREE)
     low, high = interval(cost, np.linalg.inv(normal(np.zeros(2))[0]), 0)
     ends = [brentq(lambda x: 3 * abs(np.expm1(x)) - Z95, *sorted([0.0, far])) for far in (-2.0, 2.0)]
     # The search stops within 2 % of a deviation.
