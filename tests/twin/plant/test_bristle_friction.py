@@ -97,7 +97,7 @@ def test_each_direction_breaks_away_at_its_own_torque(actuator):
     for sign, level in ((1.0, 1.25), (-1.0, 0.75)):
         bristles = elements(actuator, asymmetry=(0.0, 0.0, 0.25))
         torque = on_gamma(sign * load)
-        _, qdot, bearing = motion(LagrangianRotor(actuator, STEP_s), bristles, torque, UPRIGHT, on_gamma(0.0))
+        _, qdot, bearing = motion(ideal_rotor(actuator, STEP_s), bristles, torque)
         slides = sign * qdot[:, 2] > 0.2
         assert np.abs(bearing[:, 2]).max() == pytest.approx(level * BREAK_AWAY_Nm, rel=1e-12)
         assert sign * bearing[slides, 2] == pytest.approx(level * COULOMB_Nm, rel=1e-5)
