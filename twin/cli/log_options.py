@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 from spheretwin.cli.common import keep_viewer, print_message
 from spheretwin.machine.files import read
 from spheretwin.machine.link import frame_format
+from spheretwin.machine.link.admission import read_key
 from spheretwin.machine.link.frame_format import DEFAULT_FRAME, shipped
 from spheretwin.machine.link.stream import is_address, played, streamed
 from spheretwin.machine.log import COMMANDED, MEASURED, Log
@@ -49,6 +50,7 @@ STREAM = f"""{LOG}
         of LOG names: {", ".join(shipped())}, or a .toml file (default: {DEFAULT_FRAME})
     --currents  currents of a stream: sent to the amplifiers and held, or measured in the coils (default:
         as the frames state)
+    --key FILE  frames of a stream are authenticated by the key in a file, as those of `drive` and `machine`
     --live      follow the data in a viewer on 127.0.0.1; a file is played at the pace of its times
 """
 """One log, or the address of a stream."""
@@ -71,8 +73,9 @@ def file_log(options: argparse.Namespace) -> Log | None:
         The log cannot be read, or a flag does not belong to a file or a stream.
     """
     if not is_address(options.logs):
-        if options.currents:
-            raise InputError("command line: expected --currents with a stream, received a file")
+        if options.currents or options.key:
+            flag = "--currents" if options.currents else "--key"
+            raise InputError(f"command line: expected {flag} with a stream, received a file")
         return read_logs(options)[0]
     if not (options.currents or frame_format.load(options.frame).currents):
         print_message(
@@ -92,7 +95,8 @@ def blocks(
 ) -> Iterator[Log]:
     """Return the blocks of a stream, or the log of a file: with a live view as time goes by, else at once."""
     if log is None:
-        return streamed(options.logs, groups, options.frame, options.currents, stop_requested=stop_requested)
+        address, frame, key = options.logs, options.frame, read_key(options.key)
+        return streamed(address, groups, frame, options.currents, key, stop_requested=stop_requested)
     return played(log, stop_requested=stop_requested) if options.live else iter([log])
 
 

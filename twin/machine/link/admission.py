@@ -130,6 +130,19 @@ class ControllerAdmission:
         return Admission.REFUSED
 
 
+class StreamAdmission:
+    """Session of a listener: that of the first frame, so that frames of an earlier one are refused later."""
+
+    def __init__(self) -> None:
+        self._session: int | None = None
+
+    def __call__(self, frame: Values) -> Admission:
+        """Return the place of a frame."""
+        if self._session is None:
+            self._session = frame["session"]
+        return Admission.IN_ORDER if frame["session"] == self._session else Admission.REFUSED
+
+
 def read_key(path: Path | None) -> bytes:
     """Return the key in a file, without the line break at its end; no bytes without a file.
 

@@ -11,7 +11,6 @@ from spheretwin.machine.link.codec import Codec, Values
 from spheretwin.machine.link.decoder import Counts, Decoder
 from spheretwin.machine.link.frame_format import Flags, FrameFormat
 from spheretwin.machine.link.transports import StandIn, Transport
-from spheretwin.models.base.errors import InputError
 
 SHOWN_FRAMES = 3
 """Frames of each direction that a channel reports."""
@@ -56,8 +55,6 @@ class Channel:
         report: Callable[[str], None] | None = None,
         key: bytes = b"",
     ) -> None:
-        if key and not (sends.has("session") and receives.has("session")):
-            raise InputError("link: expected frames with the field session to authenticate, received others")
         self.transport, self.groups = transport, groups
         self._formats, self._key = (sends, receives), key
         self._encoder = Codec(sends, groups, key)

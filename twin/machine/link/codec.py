@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spheretwin.machine.link.frame_format import QUANTITIES, TYPE_CODES, FieldFormat, FrameFormat
+from spheretwin.models.base.errors import InputError
 
 Array = NDArray[np.float64]
 Values = dict[str, Any]
@@ -99,6 +100,8 @@ class Codec:
     """
 
     def __init__(self, frame: FrameFormat, groups: int, key: bytes = b"") -> None:
+        if key and not frame.has("session"):
+            raise InputError("link: expected frames with the field session to authenticate, received others")
         self.frame, self._key = frame, key
         self._fields = [_Field(field, groups) for field in frame.field]
         order = "<" if frame.byte_order == "little" else ">"

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spheretwin.machine.link import frame_format
+from spheretwin.machine.link.admission import StreamAdmission
 from spheretwin.machine.link.codec import Codec, Values
 from spheretwin.machine.link.decoder import Decoder
 from spheretwin.machine.link.frame_format import DEFAULT_FRAME, Flags
@@ -42,6 +43,7 @@ def streamed(
     groups: int,
     frame: str = DEFAULT_FRAME,
     currents: Literal["commanded", "measured"] | None = None,
+    key: bytes = b"",
     *,
     stop_requested: Callable[[], bool] = lambda: False,
     now: Callable[[], float] = time.monotonic,
@@ -58,6 +60,8 @@ def streamed(
         Shipped name or TOML file of the frames.
     currents : str, optional
         Kind of the currents: default that of the frames, ``measured`` if they state none.
+    key : bytes
+        Authenticates the frames; no bytes for none.
 
     Raises
     ------
@@ -70,8 +74,11 @@ def streamed(
     format_, kind = description.measurement, currents or description.currents or MEASURED
     if lacking := [name for name in ("time", "angle", "current") if not format_.has(name)]:
         raise InputError(f"frame {frame}: expected measurements with {', '.join(lacking)}, received none")
+    codec = Codec(format_, groups, key)
     transport = open_transport(address, listening=True)
-    decoder = Decoder(Codec(format_, groups), datagrams=transport.datagrams)
+    decoder = Decoder(codec, datagrams=transport.datagrams)
+    if key:
+        decoder.admission = StreamAdmission()
     frames: list[Values] = []
     yielded, heard_s, ended = 0, None, False
     try:

@@ -27,23 +27,23 @@ def model():
     return model_of(SCENARIO, KNOWN)
 
 
-def frames_of(log, *, end=True):
-    codec = Codec(frame_format.load("spheretwin").measurement, 18)
+def frames_of(log, *, end=True, key=b"", session=0):
+    codec = Codec(frame_format.load("spheretwin").measurement, 18, key)
     for row in range(len(log)):
         last = end and row == len(log) - 1
         values = {"sequence": row, "echo": 0, "flags": int(Flags.END) if last else 0, "time": log.t_s[row]}
         values |= {"angle": log.angle_rad[row], "rate": np.zeros(3), "current": log.current_A[row]}
-        yield codec.encode({**values, "temperature": 20.0})
+        yield codec.encode({**values, "temperature": 20.0, "session": session})
 
 
-def received(script, *contents, closed=False, currents=None):
+def received(script, *contents, closed=False, currents=None, key=b""):
     """Blocks of a stream of bytes, which its sender may close."""
     script.datagrams, script.is_closed = False, closed
     for content in contents:
         script.plan(content)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("spheretwin.machine.link.stream.open_transport", lambda *_, **__: script)
-        return list(streamed("-", 18, currents=currents, now=script.now))
+        return list(streamed("-", 18, currents=currents, key=key, now=script.now))
 
 
 def test_a_stream_is_the_log_of_its_frames(log, model):
@@ -75,6 +75,18 @@ def test_a_stream_ends_with_its_sender(log):
     assert script.t_s < 0.3  # no silence is waited for
     with pytest.raises(SpheretwinError, match="expected frames, received 1 texts"):
         received(Script(), b"no frame at all", closed=True)
+
+
+def test_a_stream_with_a_key_takes_the_frames_of_one_session_with_that_key(log):
+    key, rest = b"0123456789abcdef", log.rows(100, len(log))
+    own = list(frames_of(log.rows(0, 100), end=False, key=key, session=7))
+    forged = frames_of(log, key=b"another key of 26 letters!", session=7)
+    replayed = frames_of(log, key=key, session=6)
+    content = b"".join([*own, *forged, *replayed, *own, b"".join(frames_of(log))])
+    blocks = received(Script(), content, closed=True, key=key)
+    assert joined(blocks).digest == log.rows(0, 100).digest
+    with pytest.raises(SpheretwinError, match="expected frames"):
+        received(Script(), *frames_of(rest), closed=True, key=key)
 
 
 def test_a_stream_ends_after_a_silence(log):
