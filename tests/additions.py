@@ -151,10 +151,10 @@ DASHPOT = PlantPart(Dashpot, fill, DashpotSection, begin=follow, load=load)
         "twin/metrics/effort.py",
         '''
 @rounding_each
-def _add_load(rows, first, columns, total):
+def _add_load(rows, first, columns, total, run):
     for i in range(rows.shape[0]):
         for j in range(3):
-            total[j] += rows[i, columns[0] + j]
+            total[run, j] += rows[i, columns[0] + j]
 
 
 class MeanLoad(Metric):
@@ -165,11 +165,11 @@ class MeanLoad(Metric):
 
     def start(self, planned):
         """Return the sums."""
-        return np.zeros(3)
+        return np.zeros((planned.runs, 3))
 
-    def result(self):
+    def result(self, run, rows):
         """Return [3] in N·m."""
-        return (self.state / self._rows).tolist()
+        return (self.state[run] / rows).tolist()
 ''',
         "twin/metrics/__init__.py",
         (

@@ -1,7 +1,7 @@
-"""Reduction of rows to metrics: chunk by chunk, in compiled code, without storing the rows of a run.
+"""Reduction of telemetry to metrics: chunk by chunk, in compiled code, without storing it.
 
-All metrics of a run are one compiled call for each chunk, which releases the interpreter lock. Each sum adds
-tick after tick, rounded at each: no figure depends on the chunks.
+A metric holds the states of all runs of a block. All metrics are one compiled call for each chunk of a run.
+Each sum adds tick after tick, rounded at each: no figure depends on the chunks, or on the other runs.
 """
 
 from __future__ import annotations
@@ -24,21 +24,24 @@ from spheretwin.scenario.sections import ResolvedScenario
 
 @dataclass(frozen=True)
 class PlannedRun:
-    """Facts about a run that a metric knows before the first row.
+    """Facts about a run, or a block of runs, that a metric knows before the first row.
 
     Attributes
     ----------
     scenario : ResolvedScenario
-        Scenario at the start.
+        Scenario at the start; of a block, its columns (`models.base.columns`).
     actuator : Actuator
         Simulated actuator.
     ticks : int
-        Planned control ticks; the run may end earlier.
+        Planned control ticks; a run may end earlier.
+    runs : int
+        Of the block.
     """
 
     scenario: ResolvedScenario
     actuator: Actuator
     ticks: int
+    runs: int = 1
 
     @property
     def period_s(self) -> float:
@@ -47,28 +50,28 @@ class PlannedRun:
 
 
 class Metric(ABC):
-    """Metric of a run; the result is bit-identical for any chunks.
+    """Metric of the runs of a block; the result is bit-identical for any chunks.
 
     Parameters
     ----------
     planned : PlannedRun
-        Facts about the run.
+        Facts about the runs.
 
     Attributes
     ----------
-    state : array or named tuple
-        Numbers that `add` reads and changes.
+    state : array or named tuple of arrays
+        Numbers that `add` reads and changes; the first index is that of the run.
     """
 
     labels: ClassVar[tuple[str, ...]] = ()
     """Names of the entries, if the value is a list."""
 
     reads: ClassVar[tuple[str, ...]]
-    """Signals whose first columns `add` receives; -1 for one that the run does not log."""
+    """Signals whose first columns `add` receives; -1 for one that the runs do not log."""
 
     add: ClassVar[Any]
-    """``add(rows, first, columns, state)``: compiled, processes the rows (n, width) of one chunk, the first
-    of which is that of a tick of the run."""
+    """``add(rows, first, columns, state, run)``: compiled, processes the rows (n, width) of one chunk of a
+    run, the first of which is that of a tick of the run."""
 
     least_rows: ClassVar[int] = 1
     """Rows below which the metric has no value."""
@@ -76,48 +79,72 @@ class Metric(ABC):
     state: Any
 
     def __init__(self, planned: PlannedRun) -> None:
-        self.planned, self._rows = planned, 0
+        self.planned, self.rows = planned, np.zeros(planned.runs, np.int64)
         self.state = self.start(planned)
 
     @abstractmethod
     def start(self, planned: PlannedRun) -> Any:
-        """Return the state before the first row."""
+        """Return the states before the first row."""
 
     def write(self, rows: Table) -> None:
-        """Process the rows of one chunk, at least one."""
+        """Process the rows of one chunk of the only run, at least one."""
         write_all([self], rows)
 
-    def begin(self, rows: int) -> int:
-        """Prepare the state for a chunk of some rows; return the tick of its first row."""
-        first, self._rows = self._rows, self._rows + rows
-        return first
+    def reserve(self, ticks: int) -> None:  # noqa: B027  # most states have one size
+        """Extend the states to a number of ticks, if their size depends on it."""
 
-    def value(self) -> Any:
+    def value(self, run: int = 0) -> Any:
         """Return the value of the metric in JSON types; None if there are too few rows."""
-        return self.result() if self._rows >= self.least_rows else None
+        rows = int(self.rows[run])
+        return self.result(run, rows) if rows >= self.least_rows else None
 
     @abstractmethod
-    def result(self) -> Any:
-        """Return the value of at least `least_rows` rows."""
+    def result(self, run: int, rows: int) -> Any:
+        """Return the value of a run of at least `least_rows` rows."""
 
     def warnings(self) -> list[str]:
-        """Return warnings that concern the validity of the figures, one line each."""
+        """Return warnings that concern the validity of the figures of the first run, one line each."""
         return []
 
 
 def write_all(metrics: Sequence[Metric], rows: Table) -> None:
-    """Process the rows of one chunk, at least one, by metrics that have processed the same rows before."""
-    kinds, planned = tuple(map(type, metrics)), metrics[0].planned
-    columns = _columns_of(kinds, rows.signals, len(planned.actuator.groups))
-    (first,) = {metric.begin(len(rows)) for metric in metrics}
-    arguments = np.ascontiguousarray(rows.values), first, columns, tuple(metric.state for metric in metrics)
-    if kinds not in _REDUCERS:  # all states of a kind of metric have the same types
-        _REDUCERS[kinds] = for_types_of(_reducer_of(kinds), *arguments)
-    _REDUCERS[kinds](*arguments)
+    """Process the rows of one chunk of the only run by metrics that have processed the same rows before."""
+    reduction = Reduction(metrics, rows.signals, len(rows) + int(metrics[0].rows[0]))
+    values = np.ascontiguousarray(rows.values)
+    reduction.entry(values, int(metrics[0].rows[0]), *reduction.arguments, 0)
+    reduction.count([len(rows)])
 
 
-_REDUCERS: dict[tuple[type[Metric], ...], Any] = {}
-"""Machine code by the kinds of the metrics."""
+class Reduction:
+    """Compiled reduction of the telemetry of some runs to all metrics.
+
+    Parameters
+    ----------
+    metrics : sequence of Metric
+    signals : tuple of Signal
+        Columns of the telemetry.
+    ticks : int
+        To which it is used.
+    """
+
+    def __init__(self, metrics: Sequence[Metric], signals: tuple[Signal, ...], ticks: int) -> None:
+        self._metrics, kinds = metrics, tuple(map(type, metrics))
+        for metric in metrics:
+            metric.reserve(ticks)
+        columns = _columns_of(kinds, signals, len(metrics[0].planned.actuator.groups))
+        self.arguments = columns, tuple(metric.state for metric in metrics)
+        self.function = _reducer_of(kinds)
+        """Compiled ``(rows, first, columns, states, run)``; the arguments in the middle are `arguments`."""
+
+    @property
+    def entry(self) -> Any:
+        """Machine code of `function`."""
+        return for_types_of(self.function, np.empty((0, 0)), 0, *self.arguments, 0)
+
+    def count(self, rows: Any) -> None:
+        """Count the rows that each run has gained."""
+        for metric in self._metrics:
+            metric.rows += rows
 
 
 @cache
@@ -140,13 +167,14 @@ def _columns_of(kinds: tuple[type[Metric], ...], signals: tuple[Signal, ...], gr
     return tuple(tuple(first.get(name, -1) for name in kind.reads) for kind in kinds)
 
 
+@cache
 def _reducer_of(kinds: tuple[type[Metric], ...]) -> Any:
-    """Return the compiled function ``(rows, first, columns, states)`` that calls `add` of each metric."""
+    """Return the compiled function that calls `add` of each metric."""
     add_all = _chain(kinds)
 
     @rounding_each
-    def reduce_rows(rows: Any, first: Any, columns: Any, states: Any) -> None:
-        add_all(rows, first, columns, states)
+    def reduce_rows(rows: Any, first: Any, columns: Any, states: Any, run: Any) -> None:
+        add_all(rows, first, columns, states, run)
 
     return reduce_rows
 
@@ -158,13 +186,13 @@ def _chain(kinds: tuple[type[Metric], ...], place: int = 0) -> Any:
     add, others = kinds[0].add, _chain(kinds[1:], place + 1)
 
     @inlined
-    def add_and_continue(rows: Any, first: Any, columns: Any, states: Any) -> None:
-        add(rows, first, columns[place], states[place])
-        others(rows, first, columns, states)
+    def add_and_continue(rows: Any, first: Any, columns: Any, states: Any, run: Any) -> None:
+        add(rows, first, columns[place], states[place], run)
+        others(rows, first, columns, states, run)
 
     return add_and_continue
 
 
 @inlined
-def _add_nothing(rows: Any, first: Any, columns: Any, states: Any) -> None:
+def _add_nothing(rows: Any, first: Any, columns: Any, states: Any, run: Any) -> None:
     pass

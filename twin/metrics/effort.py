@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 from spheretwin.control.applied_torque import lag_step
 from spheretwin.metrics.tracking import add_largest
 from spheretwin.models.base.compiled import rounding_each
-from spheretwin.models.coil_group import of_each_group
 from spheretwin.reduction import Metric, PlannedRun
 
 Array = NDArray[np.float64]
@@ -19,32 +18,33 @@ Array = NDArray[np.float64]
 class CopperState(NamedTuple):
     """State of `CopperLoss`."""
 
-    first_step: Array  # (n,) mean remaining share of the distance to the command over the first physics step
-    tick: Array  # (n,) the same over the tick
-    tick_squared: Array  # (n,) of its square, which decays twice as fast, over the tick
-    limit_A: float
+    first_step: Array  # (runs, n) mean share of the distance to the command over the first physics step
+    tick: Array  # (runs, n) the same over the tick
+    tick_squared: Array  # (runs, n) of its square, which decays twice as fast, over the tick
+    limit_A: Array  # (runs,)
     follows: bool  # true if the currents relax towards the commands
-    squares: Array  # (n,) A²
-    logged_W: Array  # (n,)
+    squares: Array  # (runs, n) A²
+    logged_W: Array  # (runs, n)
 
 
 @rounding_each
-def _add_copper_loss(rows: Array, first: int, columns: tuple[int, ...], state: CopperState) -> None:
+def _add_copper_loss(rows: Array, first: int, columns: tuple[int, ...], state: CopperState, run: int) -> None:
     logged, current, command = columns
+    limit_A, squares = state.limit_A[run], state.squares
     for i in range(rows.shape[0]):
-        for j in range(state.squares.shape[0]):
+        for j in range(squares.shape[1]):
             if logged >= 0:
-                state.logged_W[j] += rows[i, logged + j]
+                state.logged_W[run, j] += rows[i, logged + j]
             elif not state.follows:
-                state.squares[j] += rows[i, current + j] * rows[i, current + j]
+                squares[run, j] += rows[i, current + j] * rows[i, current + j]
             else:
-                target = min(max(rows[i, command + j], -state.limit_A), state.limit_A)
+                target = min(max(rows[i, command + j], -limit_A), limit_A)
                 distance = 0.0  # at the start of the tick; 0 without a lag
-                if state.first_step[j] > 0.0:
-                    distance = (rows[i, current + j] - target) / state.first_step[j]
-                crossed = 2.0 * state.tick[j] * target * distance
-                decayed = state.tick_squared[j] * (distance * distance)
-                state.squares[j] += target * target + crossed + decayed
+                if state.first_step[run, j] > 0.0:
+                    distance = (rows[i, current + j] - target) / state.first_step[run, j]
+                crossed = 2.0 * state.tick[run, j] * target * distance
+                decayed = state.tick_squared[run, j] * (distance * distance)
+                squares[run, j] += target * target + crossed + decayed
 
 
 class CopperLoss(Metric):
@@ -65,29 +65,32 @@ class CopperLoss(Metric):
 
     def start(self, planned: PlannedRun) -> CopperState:
         """Return shares of the lag, and no loss."""
-        section, groups = planned.scenario.drive, len(planned.actuator.groups)
-        lag_s, period_s = of_each_group(section.lag_s, groups), planned.period_s
+        section, runs, groups = planned.scenario.drive, planned.runs, len(planned.actuator.groups)
+        lag_s, period_s = np.broadcast_to(section.lag_s, (runs, groups)), planned.period_s
         spans = (lag_s, planned.scenario.plant.step_s), (lag_s, period_s), (0.5 * lag_s, period_s)
-        step, tick, tick_squared = (lag_step(span_s, lag)[1] for lag, span_s in spans)
-        squares, logged_W = np.zeros((2, groups))
-        limit_A, follows = float(section.current_limit_A), not section.converts
-        return CopperState(step, tick, tick_squared, limit_A, follows, squares, logged_W)
+        step, tick, tick_squared = (lag_step(span_s, lag)[1].reshape(runs, groups) for lag, span_s in spans)
+        squares, logged_W = np.zeros((2, runs, groups))
+        limit_A = np.array(np.broadcast_to(section.current_limit_A, (runs, 1))[:, 0], float)
+        return CopperState(step, tick, tick_squared, limit_A, not section.converts, squares, logged_W)
 
-    def result(self) -> float:
+    def result(self, run: int, rows: int) -> float:
         """Return the loss in J."""
-        resistance_ohm = self.planned.scenario.drive.resistance_ohm
-        heat_W = np.sum(np.multiply(resistance_ohm, self.state.squares)) + np.sum(self.state.logged_W)
+        shape = self.state.squares.shape
+        resistance_ohm = np.broadcast_to(self.planned.scenario.drive.resistance_ohm, shape)[run]
+        heat_W = np.sum(np.multiply(resistance_ohm, self.state.squares[run])) + np.sum(
+            self.state.logged_W[run]
+        )
         return float(heat_W * self.planned.period_s)
 
 
 @rounding_each
-def _add_variation(rows: Array, first: int, columns: tuple[int, ...], state: Array) -> None:
+def _add_variation(rows: Array, first: int, columns: tuple[int, ...], state: Array, run: int) -> None:
     (command,) = columns
     for i in range(rows.shape[0]):
-        for j in range(state.shape[1]):
+        for j in range(state.shape[2]):
             if first + i > 0:
-                state[0, j] += abs(rows[i, command + j] - state[1, j])
-            state[1, j] = rows[i, command + j]
+                state[run, 0, j] += abs(rows[i, command + j] - state[run, 1, j])
+            state[run, 1, j] = rows[i, command + j]
 
 
 class CurrentVariation(Metric):
@@ -103,12 +106,12 @@ class CurrentVariation(Metric):
     least_rows = 2
 
     def start(self, planned: PlannedRun) -> Array:
-        """Return the variation and the last command of each group, (2, n) in A."""
-        return np.zeros((2, len(planned.actuator.groups)))
+        """Return the variation and the last command of each group, (runs, 2, n) in A."""
+        return np.zeros((planned.runs, 2, len(planned.actuator.groups)))
 
-    def result(self) -> float:
+    def result(self, run: int, rows: int) -> float:
         """Return the variation in A/s."""
-        return float(self.state[0].mean() / ((self._rows - 1) * self.planned.period_s))
+        return float(self.state[run, 0].mean() / ((rows - 1) * self.planned.period_s))
 
 
 class MaxAbsCurrent(Metric):
@@ -118,20 +121,20 @@ class MaxAbsCurrent(Metric):
     add = staticmethod(add_largest)
 
     def start(self, planned: PlannedRun) -> Array:
-        """Return the largest magnitudes (n,), minus infinity before the first row."""
-        return np.full(len(planned.actuator.groups), -np.inf)
+        """Return the largest magnitudes (runs, n), minus infinity before the first row."""
+        return np.full((planned.runs, len(planned.actuator.groups)), -np.inf)
 
-    def result(self) -> float:
+    def result(self, run: int, rows: int) -> float:
         """Return the current in A."""
-        return float(self.state.max())
+        return float(self.state[run].max())
 
 
 @rounding_each
-def _add_torque(rows: Array, first: int, columns: tuple[int, ...], squares: Array) -> None:
+def _add_torque(rows: Array, first: int, columns: tuple[int, ...], squares: Array, run: int) -> None:
     (torque,) = columns
     for i in range(rows.shape[0]):
         for j in range(3):
-            squares[j] += rows[i, torque + j] * rows[i, torque + j]
+            squares[run, j] += rows[i, torque + j] * rows[i, torque + j]
 
 
 class RmsTorque(Metric):
@@ -145,23 +148,25 @@ class RmsTorque(Metric):
     add = staticmethod(_add_torque)
 
     def start(self, planned: PlannedRun) -> Array:
-        """Return the sums of squares (3,)."""
-        return np.zeros(3)
+        """Return the sums of squares (runs, 3)."""
+        return np.zeros((planned.runs, 3))
 
-    def result(self) -> float:
+    def result(self, run: int, rows: int) -> float:
         """Return the torque in N·m."""
-        return float(np.sqrt(self.state.sum() / self._rows))
+        return float(np.sqrt(self.state[run].sum() / rows))
 
 
 SATURATED_SHARE = 0.05
 
 
 @rounding_each
-def _add_shares(rows: Array, first: int, columns: tuple[int, ...], ticks: NDArray[np.int64]) -> None:
+def _add_shares(
+    rows: Array, first: int, columns: tuple[int, ...], ticks: NDArray[np.int64], run: int
+) -> None:
     (scale,) = columns
     for i in range(rows.shape[0]):
-        ticks[0] += 0.0 < rows[i, scale] < 1.0
-        ticks[1] += rows[i, scale] == 0.0
+        ticks[run, 0] += 0.0 < rows[i, scale] < 1.0
+        ticks[run, 1] += rows[i, scale] == 0.0
 
 
 class SaturatedFraction(Metric):
@@ -171,20 +176,20 @@ class SaturatedFraction(Metric):
     add = staticmethod(_add_shares)
 
     def start(self, planned: PlannedRun) -> NDArray[np.int64]:
-        """Return the ticks with reduced torque, and with a torque matrix of less than rank 3."""
-        return np.zeros(2, dtype=np.int64)
+        """Return the ticks with reduced torque, and with a torque matrix of less than rank 3, (runs, 2)."""
+        return np.zeros((planned.runs, 2), dtype=np.int64)
 
-    def result(self) -> float:
+    def result(self, run: int, rows: int) -> float:
         """Return the share, 0 to 1."""
-        return int(self.state[0]) / self._rows
+        return int(self.state[run, 0]) / rows
 
     def warnings(self) -> list[str]:
         """Return warnings if the limit, or a torque matrix without full rank, determines the figures."""
         warnings = []
-        if rank_lost := int(self.state[1]):
+        if rank_lost := int(self.state[0, 1]):
             warnings.append(
                 "the torque matrix of the groups in use has less than rank 3 at"
-                f" {rank_lost} of {self._rows} ticks: no currents are commanded there"
+                f" {rank_lost} of {self.rows[0]} ticks: no currents are commanded there"
             )
         share = self.value() or 0.0
         if share > SATURATED_SHARE:
@@ -196,11 +201,11 @@ class SaturatedFraction(Metric):
 
 
 @rounding_each
-def _add_temperature(rows: Array, first: int, columns: tuple[int, ...], largest: Array) -> None:
+def _add_temperature(rows: Array, first: int, columns: tuple[int, ...], largest: Array, run: int) -> None:
     (temperature,) = columns
     if temperature >= 0:
         for i in range(rows.shape[0]):
-            largest[0] = max(largest[0], rows[i, temperature])
+            largest[run] = max(largest[run], rows[i, temperature])
 
 
 class RotorTemperature(Metric):
@@ -210,12 +215,12 @@ class RotorTemperature(Metric):
     add = staticmethod(_add_temperature)
 
     def start(self, planned: PlannedRun) -> Array:
-        """Return the temperature (1,), minus infinity before the first one."""
-        return np.full(1, -np.inf)
+        """Return the temperatures (runs,), minus infinity before the first one."""
+        return np.full(planned.runs, -np.inf)
 
-    def result(self) -> float | None:
+    def result(self, run: int, rows: int) -> float | None:
         """Return the temperature in °C; None without one."""
-        return float(self.state[0]) if self.state[0] > -np.inf else None
+        return float(self.state[run]) if self.state[run] > -np.inf else None
 
     def warnings(self) -> list[str]:
         """Return a warning if magnets may have been demagnetised, which the model does not contain."""

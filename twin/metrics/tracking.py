@@ -15,12 +15,12 @@ Array = NDArray[np.float64]
 
 
 @rounding_each
-def add_largest(rows: Array, first: int, columns: tuple[int, ...], largest: Array) -> None:
-    """Update the largest magnitudes (n,) of a signal."""
+def add_largest(rows: Array, first: int, columns: tuple[int, ...], largest: Array, run: int) -> None:
+    """Update the largest magnitudes (runs, n) of a signal."""
     (signal,) = columns
     for i in range(rows.shape[0]):
-        for j in range(largest.shape[0]):
-            largest[j] = max(largest[j], abs(rows[i, signal + j]))
+        for j in range(largest.shape[1]):
+            largest[run, j] = max(largest[run, j], abs(rows[i, signal + j]))
 
 
 class MaxAbsError(Metric):
@@ -31,12 +31,12 @@ class MaxAbsError(Metric):
     add = staticmethod(add_largest)
 
     def start(self, planned: PlannedRun) -> Array:
-        """Return the largest magnitudes (3,), minus infinity before the first row."""
-        return np.full(3, -np.inf)
+        """Return the largest magnitudes (runs, 3), minus infinity before the first row."""
+        return np.full((planned.runs, 3), -np.inf)
 
-    def result(self) -> list[float]:
+    def result(self, run: int, rows: int) -> list[float]:
         """Return [3] in rad."""
-        return self.state.tolist()
+        return self.state[run].tolist()
 
 
 PIECE_TICKS = 256
@@ -49,16 +49,16 @@ class PieceSums(NamedTuple):
     """
 
     offset: int  # ticks of the first piece, which may be shorter
-    sums: Array  # (pieces, 3) rad²
+    sums: Array  # (runs, pieces, 3) rad²
 
 
 @rounding_each
-def _add_pieces(rows: Array, first: int, columns: tuple[int, ...], state: PieceSums) -> None:
+def _add_pieces(rows: Array, first: int, columns: tuple[int, ...], state: PieceSums, run: int) -> None:
     (error,) = columns
     for i in range(rows.shape[0]):
         piece = (first + i - state.offset) // PIECE_TICKS + 1
         for j in range(3):
-            state.sums[piece, j] += rows[i, error + j] * rows[i, error + j]
+            state.sums[run, piece, j] += rows[i, error + j] * rows[i, error + j]
 
 
 class RmsError(Metric):
@@ -71,23 +71,22 @@ class RmsError(Metric):
 
     def start(self, planned: PlannedRun) -> PieceSums:
         """Return the first piece."""
-        return PieceSums(planned.ticks // 2 % PIECE_TICKS, np.zeros((1, 3)))
+        return PieceSums(planned.ticks // 2 % PIECE_TICKS, np.zeros((planned.runs, 1, 3)))
 
-    def begin(self, rows: int) -> int:
-        """Prepare the state for a chunk of some rows; return the tick of its first row."""
-        first = super().begin(rows)
-        if (missing := self._piece(self._rows - 1) + 1 - len(self.state.sums)) > 0:
-            self.state = self.state._replace(sums=np.concatenate([self.state.sums, np.zeros((missing, 3))]))
-        return first
+    def reserve(self, ticks: int) -> None:
+        """Extend the states to a number of ticks."""
+        if (missing := self._piece(ticks - 1) + 1 - self.state.sums.shape[1]) > 0:
+            more = np.zeros((len(self.rows), missing, 3))
+            self.state = self.state._replace(sums=np.concatenate([self.state.sums, more], axis=1))
 
-    def result(self) -> list[float]:
+    def result(self, run: int, rows: int) -> list[float]:
         """Return [3] in rad."""
-        return self._rms(0)
+        return self._rms(run, rows, 0)
 
-    def _rms(self, piece: int) -> list[float]:
+    def _rms(self, run: int, rows: int, piece: int) -> list[float]:
         """Return the root mean square from the first tick of a piece on."""
         begins = max(0, (piece - 1) * PIECE_TICKS + self.state.offset)
-        return np.sqrt(self.state.sums[piece:].sum(axis=0) / (self._rows - begins)).tolist()
+        return np.sqrt(self.state.sums[run, piece:].sum(axis=0) / (rows - begins)).tolist()
 
     def _piece(self, tick: int) -> int:
         """Return the piece that contains a tick."""
@@ -101,9 +100,9 @@ class TailRmsError(RmsError):
     ticks before its half.
     """
 
-    def result(self) -> list[float]:
+    def result(self, run: int, rows: int) -> list[float]:
         """Return [3] in rad."""
-        return self._rms(self._piece(self._rows // 2))
+        return self._rms(run, rows, self._piece(rows // 2))
 
 
 BAND_rad = 0.01
@@ -111,12 +110,14 @@ BAND_rad = 0.01
 
 
 @rounding_each
-def _add_outside(rows: Array, first: int, columns: tuple[int, ...], last: NDArray[np.int64]) -> None:
+def _add_outside(
+    rows: Array, first: int, columns: tuple[int, ...], last: NDArray[np.int64], run: int
+) -> None:
     (error,) = columns
     for i in range(rows.shape[0]):
         for j in range(3):
             if abs(rows[i, error + j]) > BAND_rad:
-                last[j] = first + i
+                last[run, j] = first + i
 
 
 class SettlingTime(Metric):
@@ -131,24 +132,24 @@ class SettlingTime(Metric):
     add = staticmethod(_add_outside)
 
     def start(self, planned: PlannedRun) -> NDArray[np.int64]:
-        """Return the last tick of each hinge outside the band (3,); -1 for none."""
-        return np.full(3, -1)
+        """Return the last tick of each hinge outside the band (runs, 3); -1 for none."""
+        return np.full((planned.runs, 3), -1)
 
-    def result(self) -> list[float | None]:
+    def result(self, run: int, rows: int) -> list[float | None]:
         """Return [3] in s."""
-        settled = (self.state + 1).tolist()
-        return [tick * self.planned.period_s if tick < self._rows else None for tick in settled]
+        settled = (self.state[run] + 1).tolist()
+        return [tick * self.planned.period_s if tick < rows else None for tick in settled]
 
 
 @rounding_each
-def _add_crossing(rows: Array, first: int, columns: tuple[int, ...], state: Array) -> None:
+def _add_crossing(rows: Array, first: int, columns: tuple[int, ...], state: Array, run: int) -> None:
     (error,) = columns
     for i in range(rows.shape[0]):
         for j in range(3):
             if first + i == 0:
-                state[0, j] = rows[i, error + j]
-            beyond = -rows[i, error + j] if state[0, j] > 0.0 else rows[i, error + j]
-            state[1, j] = max(state[1, j], beyond)
+                state[run, 0, j] = rows[i, error + j]
+            beyond = -rows[i, error + j] if state[run, 0, j] > 0.0 else rows[i, error + j]
+            state[run, 1, j] = max(state[run, 1, j], beyond)
 
 
 class Overshoot(Metric):
@@ -163,11 +164,11 @@ class Overshoot(Metric):
     add = staticmethod(_add_crossing)
 
     def start(self, planned: PlannedRun) -> Array:
-        """Return the error at the first tick and the largest one beyond the reference, (2, 3) in rad."""
-        return np.zeros((2, 3))
+        """Return the error at the first tick and the largest beyond the reference, (runs, 2, 3) in rad."""
+        return np.zeros((planned.runs, 2, 3))
 
-    def result(self) -> list[float | None]:
+    def result(self, run: int, rows: int) -> list[float | None]:
         """Return [3] in rad."""
-        start, largest = self.state
+        start, largest = self.state[run]
         steps = np.abs(start) > BAND_rad
         return [float(beyond) if step else None for beyond, step in zip(largest, steps, strict=True)]
