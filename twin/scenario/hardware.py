@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import lru_cache
 from math import inf, radians
 from typing import Any, NamedTuple
 
@@ -226,7 +227,8 @@ def stated_value(actuator: Actuator, dotted: str) -> Any:
     return actuator.heat.get(number) if name == number else getattr(actuator.group, name)
 
 
-def machine_values(actuator: Actuator, hardware: str, section: str) -> dict[str, Any]:
+@lru_cache(maxsize=64)
+def machine_values(actuator: Actuator, hardware: str, section: str) -> Mapping[str, Any]:
     """Return the values of the machine in a section, by field: those of its model file, or assumed ones."""
     values = {}
     for dotted in MODEL_FILE:
