@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, PrivateAttr, model_validator
 
+from spheretwin.models.base.reuse import reused
 from spheretwin.models.telemetry.csv_series import TIME, LONGEST_s, TimeSeries, check_rising, read
 
 Array = NDArray[np.float64]
@@ -23,7 +24,7 @@ NUMBERS_PER_COUNT = 4
 class Draws(NamedTuple):
     """Uniform numbers from 0 to 1 at some control ticks, (n,) each."""
 
-    paper: Array
+    paper: Callable[[], Array]
     """Numbers for the factor r of the paper."""
     of_term: Callable[[int], Array]
     """Numbers of a term, by its index among the terms."""
@@ -142,10 +143,17 @@ def random_torque(t: Array, draws: Array, bound_Nm: Array, gamma_envelope: Envel
         Not finite if the growing envelope overflows.
     """
     r = -bound_Nm + 2 * bound_Nm * draws[:, None]  # (n, 3)
+    factors = _factors(t, gamma_envelope if bound_Nm[2] else "none")
+    with np.errstate(invalid="ignore"):  # infinity times a factor of 0
+        return r * factors
+
+
+@reused  # the rows of a study share their times
+def _factors(t: Array, gamma_envelope: str) -> Array:
     growth = np.pi if gamma_envelope == "growing" else -np.pi
-    with np.errstate(over="ignore", invalid="ignore"):  # infinity, and its product with a factor of 0
-        third = np.exp(growth * t) if bound_Nm[2] else np.zeros_like(t)
-        return r * np.stack([np.cos(np.pi * t), np.sin(-np.pi * t), third], axis=1)
+    with np.errstate(over="ignore"):
+        third = np.zeros_like(t) if gamma_envelope == "none" else np.exp(growth * t)
+    return np.stack([np.cos(np.pi * t), np.sin(-np.pi * t), third], axis=1)
 
 
 # Far above the bandwidth of a control period.
@@ -273,6 +281,11 @@ class Disturbance(BaseModel):
         (), description="terms to be added: constant, steps, sinusoidal, table, random"
     )
 
+    @property
+    def is_random(self) -> bool:
+        """True if the disturbance depends on the seed."""
+        return self.random_bound_Nm > 0 or any(isinstance(term, RandomDisturbance) for term in self.terms)
+
     def sample(self, t: NDArray[np.float64], draws: Draws) -> NDArray[np.float64]:
         """Return the disturbance at the control ticks, each held for a control period.
 
@@ -291,7 +304,7 @@ class Disturbance(BaseModel):
         torque = np.full((len(t), 3), self.load * LOAD_UNIT_Nm)
         if self.random_bound_Nm:
             bound = np.full(3, self.random_bound_Nm)
-            torque += random_torque(t, draws.paper, bound, self.gamma_envelope)
+            torque += random_torque(t, draws.paper(), bound, self.gamma_envelope)
         for place, term in enumerate(self.terms):
             torque += term.sample(t, partial(draws.of_term, place))
         return torque

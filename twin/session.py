@@ -282,7 +282,6 @@ class Session:
                 self.tick,
                 self._status,
                 self._runtime.state(),
-                self._inputs.state(),
                 self.journal,
                 self.events,
             )
@@ -460,7 +459,6 @@ class Session:
         self.tick, self._status = snapshot.tick, snapshot.status
         self.journal, self.events = snapshot.journal, snapshot.events
         self._inputs = self._input_generator()
-        self._inputs.restore(snapshot.inputs)
 
 
 def _plain(values: Any) -> Any:

@@ -15,7 +15,7 @@ from spheretwin.runtime import RuntimeState
 from spheretwin.scenario.files import Files, digest
 from spheretwin.scenario.sections import ResolvedScenario
 
-VERSION = 5
+VERSION = 6
 """Version of the content of a snapshot; it increases with each change of the state or of its classes."""
 
 
@@ -72,7 +72,6 @@ class Snapshot:
     tick: int
     status: Status
     runtime: RuntimeState
-    inputs: dict[str, Any]
     journal: tuple[Change, ...]
     events: tuple[Change, ...]
 

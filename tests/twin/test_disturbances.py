@@ -17,7 +17,7 @@ def test_random_torque_is_equation_56(envelope, sign):
     shape = np.stack([np.cos(np.pi * t), -np.sin(np.pi * t), np.exp(sign * np.pi * t)], axis=1)
     expected = (2 * draws[:, None] - 1) * shape
     paper = disturbances.Disturbance(random_bound_Nm=0.05, gamma_envelope=envelope)
-    paper = paper.sample(t, disturbances.Draws(draws, None))
+    paper = paper.sample(t, disturbances.Draws(lambda: draws, None))
     np.testing.assert_allclose(paper, 0.05 * expected, rtol=1e-12, atol=1e-16)
     term = disturbances.RandomDisturbance(bound_Nm=(0.05, 0.02, 0.01), gamma_envelope=envelope)
     np.testing.assert_allclose(sampled(term, 0, 2000), [0.05, 0.02, 0.01] * expected, rtol=1e-12, atol=1e-16)
@@ -44,7 +44,7 @@ def test_draws_count_by_tick_for_any_seed():
 def test_growing_random_torque_of_bound_zero_is_none():
     """At 300 s the envelope is infinite."""
     growing = disturbances.Disturbance(load=1.0, gamma_envelope="growing")
-    torque = growing.sample(np.array([300.0]), disturbances.Draws(np.ones(1), None))
+    torque = growing.sample(np.array([300.0]), disturbances.Draws(lambda: np.ones(1), None))
     np.testing.assert_array_equal(torque, [[0.05, 0.05, 0.05]])
 
 
@@ -113,7 +113,7 @@ def test_terms_of_a_scenario_file_add(tmp_path):
     rows = Session(scenarios.load(str(tmp_path / "mine.toml"))).advance(100)
     t = rows["t_s"]
     paper = np.random.default_rng(5).random(1000)[:100]  # the stream of a whole block
-    draws = disturbances.Draws(paper, lambda place: paper)
+    draws = disturbances.Draws(lambda: paper, lambda place: paper)
     expected = 0.05 + disturbances.Disturbance(random_bound_Nm=0.01).sample(t, draws)
     expected[:, 0] += np.where((t >= 0.02) & (t < 0.05), 0.01, 0.0)
     expected[:, 1] += np.where(t >= 0.05, 0.02, 0.0)
