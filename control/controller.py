@@ -21,7 +21,7 @@ from spheretwin.control.supervision.fault_detector import Detector, detect_fault
 from spheretwin.control.supervision.watchdog import GO, Reason, Watchdog, trip, watch
 from spheretwin.models.base.addresses import caller_of
 from spheretwin.models.base.columns import MixedRowsError, column_of
-from spheretwin.models.base.compiled import allocation_free
+from spheretwin.models.base.compiled import allocation_free, part_of_its_caller
 from spheretwin.models.base.record import Record, Rows, field, put
 from spheretwin.models.kinematics import cartesian_torque
 from spheretwin.models.magnetics import Arrangement, CachedMatrix, Tables, TorqueModel, update_cached_matrix
@@ -59,6 +59,7 @@ class ControllerData(Record):
     estimator_on: bool = field("whether rates are estimated; otherwise the law receives the measured rates")
     pose: Array = field("pose that the law receives", "rad", 3)
     rates: Array = field("rates that the law receives", "rad/s", 3)
+    fresh: Array = field("1 for a new measurement of an angle, 0 for a repeated one", "", 3)
     matrix: CachedMatrix = field("nominal torque matrix at that pose")
     applied_torque: AppliedTorque = field("estimate of the torque of the law's commands")
     compensators: Compensators = field("governor, prediction and feed-forward")
@@ -74,9 +75,12 @@ class ControllerData(Record):
 
 
 class Controller(NamedTuple):
-    """Controller of a run: data, law and estimator with their own sizes, and the nominal torque."""
+    """Controller of a run: data, law and estimator with their own sizes, and the nominal torque.
 
-    data: Rows  # array of one `ControllerData`
+    That of many runs has arrays with a further first index, of the run.
+    """
+
+    data: ControllerData
     parameters: Array  # of the law
     memory: Array  # state of the law
     estimator_parameters: Array
@@ -84,13 +88,17 @@ class Controller(NamedTuple):
     tables: Tables
 
 
-class ControllerRows(Controller):
-    """Controllers of many runs: the first dimension of each array is that of the runs."""
-
-    def row(self, i: int) -> Controller:
-        """Return the controller of a run, which shares its numbers."""
-        own = self.parameters[i], self.memory[i], self.estimator_parameters[i], self.estimator_memory[i]
-        return Controller(self.data[i : i + 1], *own, self.tables)
+@part_of_its_caller  # a function cannot return a tuple with a record
+def controller_of(controllers: Controller, run: int) -> Controller:
+    """Return the controller of one of many runs, which shares its numbers."""
+    return Controller(
+        controllers.data[run],
+        controllers.parameters[run],
+        controllers.memory[run],
+        controllers.estimator_parameters[run],
+        controllers.estimator_memory[run],
+        controllers.tables,
+    )
 
 
 def controller(
@@ -99,7 +107,7 @@ def controller(
     estimator: Estimator | list[Estimator] | None,
     magnetics: TorqueModel,
     current_limit_A: Any,
-) -> ControllerRows:
+) -> Controller:
     """Return controllers without compensators and supervision.
 
     Parameters
@@ -127,7 +135,7 @@ def controller(
     rows["arrangement"], rows["matrix"]["q"], rows["authority"] = magnetics.arrangement, np.nan, 1.0
     put(rows, current_limit_A=limit_A)
     numbers = *_numbers("law", members), *_numbers("estimator", estimators)
-    return ControllerRows(rows, *numbers, magnetics.tables)
+    return Controller(rows, *numbers, magnetics.tables)
 
 
 def _numbers(part: str, members: list[Any]) -> tuple[Array, Array]:
@@ -149,7 +157,6 @@ def control_tick(
     t: float,
     reference: Array,
     measurement: Array,
-    fresh: Array,
     command: Array,
 ) -> float:
     """Run the law, map its generalised torque to a Cartesian one, and allocate currents.
@@ -171,8 +178,6 @@ def control_tick(
     measurement : (3, 3) or (6, 3) array
         Measured angle (rad) and rate (rad/s); the other rows are filled in. It has six rows if the
         prediction is on. The law may write into it.
-    fresh : (3,) array
-        1 if the measurement of an angle is new, 0 if it repeats the last one.
     command : (n,) array, A
         Result: commanded group currents.
 
@@ -183,7 +188,7 @@ def control_tick(
         the law gave no torque, or one beyond `LARGEST_TORQUE_Nm`, or logs a value that is not finite, and the
         watchdog is off. If the watchdog is on, it trips instead: the currents are 0 and the share is 1.
     """
-    data = controller.data[0]
+    data = controller.data
     watchdog, pose = data.supervision.watchdog, data.pose
     if data.estimator_on:
         call_estimator(
@@ -196,7 +201,7 @@ def control_tick(
     for i in range(3):
         pose[i], data.rates[i] = measurement[0, i], measurement[1, i]
     if watchdog.on:
-        watch(watchdog, fresh, pose, data.rates)
+        watch(watchdog, data.fresh, pose, data.rates)
     update_cached_matrix(pose, data.arrangement, controller.tables, data.matrix)
     if data.supervision.detector.on and watchdog.halt == GO:
         current, detector = data.applied_torque.current, data.supervision.detector
@@ -230,7 +235,7 @@ def _call_law(
     measurement: Array,
 ) -> bool:
     """Call the law; return True if its inputs, its torque and its logged values are finite."""
-    data = controller.data[0]
+    data = controller.data
     torque_q, compensators = data.torque_q, data.compensators
     for i in range(3):
         torque_q[i] = np.nan  # detects a law that writes no torque, or raises

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Callable
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from spheretwin.channels import CHANNELS
+from spheretwin.control.allocation import ALLOCATIONS
 from spheretwin.control.applied_torque import fill_applied_torque
 from spheretwin.control.compensators.feed_forward import NominalRotor, fill_feed_forward
 from spheretwin.control.compensators.prediction import DelayModel, fill_prediction
@@ -16,16 +18,18 @@ from spheretwin.control.controller import Controller, ControllerData, controller
 from spheretwin.control.estimators.estimator import Estimator, Sampling
 from spheretwin.control.law import Law, NominalModel
 from spheretwin.control.laws import LAWS
-from spheretwin.electronics.sensor_chain import SensorChain
+from spheretwin.electronics.sensor_chain import SensorChain, fill_sensors
 from spheretwin.faults.schedule import part_names
 from spheretwin.hardware_assembly import delays_of, fill_drive_of, fill_supervision
+from spheretwin.loop import Functions, dispatch
 from spheretwin.models.actuator import Actuator
+from spheretwin.models.base.columns import Columns
 from spheretwin.models.base.errors import InputError, SpheretwinError, exception_text, shown
 from spheretwin.models.base.record import Record, Rows, field, put
 from spheretwin.models.base.reuse import reused
-from spheretwin.models.magnetics import TorqueModel, scaled, torque_model
+from spheretwin.models.magnetics import Tables, TorqueModel, scaled, torque_model
 from spheretwin.models.scatter import scattered_model
-from spheretwin.models.telemetry.signals import Signal, common_signals
+from spheretwin.models.telemetry.signals import Signal, common_signals, width
 from spheretwin.plant.mass_properties import mass_errors
 from spheretwin.plant.part_scatter import scatter_of
 from spheretwin.plant.parts import PARTS
@@ -35,8 +39,10 @@ from spheretwin.plant.rotor import Rotor, RotorSettings
 from spheretwin.scenario.files import Files
 from spheretwin.scenario.plant_sections import ResolvedNominal, ResolvedPlant
 from spheretwin.scenario.sections import ResolvedScenario
+from spheretwin.stages import Stages, compiled_stages, plant_stage
 
 Array = NDArray[np.float64]
+T = TypeVar("T")
 
 
 def law_of(scenario: ResolvedScenario) -> Law:
@@ -143,43 +149,140 @@ class RunData(Record):
     )
 
 
-def empty_run(scenario: ResolvedScenario, true: TorqueModel, nominal: TorqueModel) -> Rows:
-    """Return an array of one RunData of the sizes of a scenario, in which all numbers are 0."""
+def empty_run(scenario: ResolvedScenario, true: TorqueModel, nominal: TorqueModel, runs: int = 1) -> Rows:
+    """Return an array of RunData of the sizes of a scenario, in which all numbers are 0."""
     sizes = true.sizes | {f"nominal_{name}": size for name, size in nominal.sizes.items()}
     parts = len(part_names(sizes["groups"]))
-    return RunData.zeros(parts=parts, **sizes, **delays_of(scenario))
+    return RunData.zeros(runs, parts=parts, **sizes, **delays_of(scenario))
 
 
-def controller_of(
-    rows: Rows,
+class Assembly(NamedTuple):
+    """Parts of the runs of some scenarios at their start."""
+
+    scenario: ResolvedScenario
+    """Of one run, or the columns of those of many."""
+    rows: Rows
+    """Array of RunData."""
+    rotor: Rotor
+    law: Law
+    """Of the first run; others differ from it in numbers alone."""
+    signals: tuple[Signal, ...]
+    controllers: Controller
+    tables: Tables
+    """Of the true magnetics of all runs."""
+    functions: Functions
+
+    @property
+    def law_signals(self) -> int:
+        """First column of the signals of the law."""
+        return width(self.signals) - width(self.law.signals)
+
+    def stages(self) -> Stages:
+        """Compile the stages of the runs."""
+        parts = {name: self.rows[name] for name in ("controller", "sensors", "plant")}
+        stage = plant_stage(parts["plant"], self.tables, self.scenario.plant.engine)
+        return compiled_stages(parts, stage, self.signals)
+
+
+def assembled(
     scenario: ResolvedScenario,
-    law: Law,
-    magnetics: TorqueModel,
-    estimator: Estimator | None,
-    actuator: Actuator,
-) -> Controller:
-    """Return the controller of a resolved scenario, at the start of a run, for its nominal actuator.
+    files: Files,
+    law: Law | None = None,
+    rotor: Rotor | None = None,
+) -> Assembly:
+    """Return the parts of some runs at their start.
 
     Parameters
     ----------
-    rows : array of one ControllerData
+    scenario : ResolvedScenario, or Columns of them
+    files : Files
+        Model and torque curves of all runs.
+    law : Law, optional
+        Of all runs; default: those of the scenarios.
+    rotor : Rotor, optional
+        Started; default: one that starts at the initial poses and rates of the scenarios.
+
+    Raises
+    ------
+    InputError
+        The engine does not support the model, or a law cannot be used.
+    MixedRowsError
+        The scenarios differ in something else than numbers.
+    """
+    runs = len(_runs(scenario))
+    laws = [law] * runs if law else _of_each(law_of, scenario, scenario.controller, scenario.nominal)
+    sensing = scenario.estimator, scenario.nominal, scenario.controller
+    estimators = _of_each(estimator_of, scenario, *sensing)
+    nominal, true = (
+        nominal_magnetics(scenario, files),
+        true_magnetics(scenario.plant, scenario.seed, files.actuator),
+    )
+    rotor = rotor or started_rotor(scenario, files)
+    rows = empty_run(scenario, true, nominal, runs)
+    controllers = controllers_of(rows["controller"], scenario, laws, nominal, estimators, files.nominal)
+    fill_sensors(rows["sensors"], scenario.sensors, scenario.seed, bool(scenario.fault))
+    fill_plant(rows["plant"], scenario, files.actuator, true, rotor.rows)
+    estimate = estimators[0].step if estimators[0] else None
+    return Assembly(
+        scenario,
+        rows,
+        rotor,
+        laws[0],
+        signals_of(_runs(scenario)[0], files.actuator, laws[0]),
+        controllers,
+        true.tables,
+        dispatch(
+            laws[0],
+            ALLOCATIONS[scenario.allocation],
+            estimate,
+            check_bounds=scenario.controller.check_bounds,
+        ),
+    )
+
+
+def _of_each(build: Callable[[ResolvedScenario], T], scenario: ResolvedScenario, *sections: Any) -> list[T]:
+    """Return what is built from some sections of each run; once if all runs share them."""
+    runs = _runs(scenario)
+    if not any(isinstance(section, Columns) for section in sections):
+        return [build(runs[0])] * len(runs)
+    return [build(run) for run in runs]
+
+
+def _runs(scenario: ResolvedScenario) -> list[ResolvedScenario]:
+    return list(scenario) if isinstance(scenario, Columns) else [scenario]
+
+
+def controllers_of(
+    rows: Rows,
+    scenario: ResolvedScenario,
+    laws: list[Law],
+    magnetics: TorqueModel,
+    estimators: list[Estimator | None],
+    actuator: Actuator,
+) -> Controller:
+    """Return the controllers of some runs at their start.
+
+    Parameters
+    ----------
+    rows : array of ControllerData
         Filled.
-    scenario : ResolvedScenario
-    law : Law
+    scenario : ResolvedScenario, or Columns of them
+    laws : list of Law
+        One for each run.
     magnetics : TorqueModel
         Nominal.
-    estimator : Estimator or None
+    estimators : list of Estimator or None
     actuator : Actuator
         Nominal.
     """
     nominal, period_s = scenario.nominal, scenario.controller.period_s
-    made = controller(rows, law, estimator, magnetics, nominal.current_limit_A)
-    on = law.asks_torque or scenario.detects or scenario.controller.prediction.on
+    made = controller(rows, laws, estimators, magnetics, nominal.current_limit_A)
+    on = laws[0].asks_torque | scenario.detects | scenario.controller.prediction.on
     fill_applied_torque(rows["applied_torque"], on, period_s, nominal.delay_s, nominal.time_constant_s)
     _fill_compensators(rows["compensators"], scenario)
     fill_supervision(rows["supervision"], scenario, actuator)
     put(rows["manual"], on=scenario.manual.on)
-    return made.row(0)
+    return made
 
 
 def _fill_compensators(rows: Rows, scenario: ResolvedScenario) -> None:
@@ -205,28 +308,33 @@ def fill_plant(
 
     Parameters
     ----------
-    rows : array of one Plant
+    rows : array of Plant
         In which all numbers are 0.
     scenario : ResolvedScenario
     actuator : Actuator
     magnetics : TorqueModel
         Of `true_magnetics`.
-    rotor : array of one RotorData
+    rotor : array of RotorData
         Started.
     """
     section = scenario.plant
     rows["rotor"], rows["arrangement"], rows["last_qdot"] = rotor, magnetics.arrangement, rotor["qdot"]
     rows["joint_q"] = rotor["q"]
     fill_drive_of(rows["drive"], scenario, actuator)
-    rows["current_sensors"]["on"] = scenario.senses_currents
-    rows["current_sensors"]["noise_A"] = scenario.sensors.current.noise_A
+    put(rows["current_sensors"], on=scenario.senses_currents, noise_A=scenario.sensors.current.noise_A)
     setup = PlantSetup(scenario, actuator, rotor, rows["drive"])
     for name, part in PARTS.items():
         part.fill(rows["parts"][name], setup)
-    rows["group_gain"], rows["unmodelled_torque"] = section.group_gain, section.modelling_torque_Nm
-    rows["hinge_range"] = actuator.hinge_range_rad
-    rows["substeps"], rows["step_s"] = scenario.substeps, section.step_s
-    rows["fault_start_s"] = -1.0
+    put(rows, group_gain=section.group_gain, unmodelled_torque=section.modelling_torque_Nm)
+    put(rows, substeps=scenario.substeps, step_s=section.step_s)
+    rows["hinge_range"], rows["fault_start_s"] = actuator.hinge_range_rad, -1.0
+
+
+def started_rotor(scenario: ResolvedScenario, files: Files) -> Rotor:
+    """Return the rotor of a resolved scenario at its initial pose and rates; errors as `rotor_of`."""
+    rotor, section = rotor_of(scenario, files), scenario.plant
+    rotor.start(np.array(section.initial_rad), np.array(section.initial_rad_s))
+    return rotor
 
 
 def rotor_of(scenario: ResolvedScenario, files: Files) -> Rotor:
@@ -251,4 +359,5 @@ def _rotor_settings(scenario: ResolvedScenario, files: Files) -> RotorSettings:
         payload_kg=section.payload_kg,
         gravity_m_s2=section.gravity_m_s2,
         mass=mass_errors(section.mass, scenario.seed),
+        rows=len(_runs(scenario)),
     )

@@ -25,18 +25,23 @@ Array = NDArray[np.float64]
 
 def fault_streams(scenario: Scenario, groups: int) -> Streams:
     """Return the random streams of the noise of faults and, as the last one, of the current sensors."""
-    sensors = (("sensors.current noise", groups),) if scenario.sensors.current.noise_A > 0 else ()
+    sensors = (
+        (("sensors.current noise", groups),)
+        if np.any(np.greater(scenario.sensors.current.noise_A, 0))
+        else ()
+    )
     return (*noise_streams(scenario.fault, groups), *sensors)
 
 
 def delays_of(scenario: ResolvedScenario) -> dict[str, int]:
-    """Return the sizes of the histories of sensors, drive and controller of a scenario."""
+    """Return the sizes of the histories of sensors, drive and controller: those of many runs, the largest."""
     nominal, period_s = scenario.nominal, scenario.controller.period_s
-    in_sensors, in_drive = (sum(_delays_s(scenario, target)) for target in ("adc", "controller"))
+    in_sensors, in_drive = (np.max(sum(_delays_s(scenario, target))) for target in ("adc", "controller"))
     step_s = scenario.plant.step_s
+    in_drive_steps = round(float(in_drive / step_s))
     return {
-        "sensor_delays": capacity(round(in_sensors / period_s) + 1),
-        "drive_delays": stored_delays(scenario.drive, step_s, scenario.substeps, round(in_drive / step_s)),
+        "sensor_delays": capacity(round(float(in_sensors / period_s)) + 1),
+        "drive_delays": stored_delays(scenario.drive, step_s, scenario.substeps, in_drive_steps),
         "command_delays": delay_capacity(nominal.delay_s, period_s),
     }
 
@@ -55,7 +60,7 @@ def fill_drive_of(rows: Rows, scenario: ResolvedScenario, actuator: Actuator) ->
 
     A watchdog acts on the drive itself, so that it does not wait for delayed commands.
     """
-    mutual_H = mutual_inductance(actuator) if scenario.drive.coil_coupling else None
+    mutual_H = mutual_inductance(actuator) if np.any(scenario.drive.coil_coupling) else None
     step_s, faulty, halts = scenario.plant.step_s, bool(scenario.fault), scenario.watchdog.on
     fill_drive(rows, scenario.drive, step_s, scenario.substeps, scenario.seed, faulty, halts, mutual_H)
 

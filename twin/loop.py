@@ -20,7 +20,6 @@ from spheretwin.control.controller import NO_TORQUE, Controller, ControllerData,
 from spheretwin.control.estimators import estimator as estimators
 from spheretwin.control.law import Law
 from spheretwin.control.supervision.watchdog import GO, Reason, count_rundown, replace_invalid, trip
-from spheretwin.electronics.transducers import sense_currents
 from spheretwin.models.base.addresses import caller_of
 from spheretwin.models.base.callback_errors import report_error
 from spheretwin.models.base.compiled import (
@@ -30,6 +29,7 @@ from spheretwin.models.base.compiled import (
     compiled_callback,
     copy_into,
     copy_rows,
+    part_of_its_caller,
     uncompiled,
 )
 from spheretwin.models.base.errors import InputError
@@ -58,7 +58,11 @@ DISTURBANCE, CURRENT_COMMAND = _OFFSETS["disturbance_Nm"], width(MOTION_SIGNALS)
 
 
 class Inputs(NamedTuple):
-    """External inputs of the loop, one row for each tick."""
+    """External inputs of the loop, one row for each tick.
+
+    Those of many runs have a further first index, of a run, in all but the times: of length 1 if all runs
+    share an input.
+    """
 
     t: NDArray[np.float64]  # (n,) s
     reference: NDArray[np.float64]  # (n, 3, 3) angle, rate, acceleration as rows
@@ -66,6 +70,19 @@ class Inputs(NamedTuple):
     noise: NDArray[np.float64]  # (n, k) standard normal numbers of the sensors
     fault_noise: NDArray[np.float64]  # (n, m) of faults, and of the sensors of currents
     manual_A: NDArray[np.float64]  # (n, groups) manual currents; (n, 0) without
+
+
+@part_of_its_caller  # a function cannot return a tuple with a record
+def inputs_of(inputs: Inputs, run: int, row: int) -> Inputs:
+    """Return the inputs of one of many runs, from a row on."""
+    return Inputs(
+        inputs.t[row:],
+        inputs.reference[min(run, inputs.reference.shape[0] - 1), row:],
+        inputs.disturbance[min(run, inputs.disturbance.shape[0] - 1), row:],
+        inputs.noise[min(run, inputs.noise.shape[0] - 1), row:],
+        inputs.fault_noise[min(run, inputs.fault_noise.shape[0] - 1), row:],
+        inputs.manual_A[min(run, inputs.manual_A.shape[0] - 1), row:],
+    )
 
 
 EXTERNAL_SIGNATURE = types.int64(types.float64)
@@ -98,7 +115,6 @@ def loop(
     controller: Controller,
     stages: Stages,
     law_signals: int,
-    fresh: Array,
     external: External,
     log: Array,
 ) -> tuple[int, int]:
@@ -117,8 +133,6 @@ def loop(
         Sensors, plant and channels.
     law_signals : int
         First column of the law's signals.
-    fresh : (3,) array
-        1 if the measurement of an angle is new, 0 if it repeats the last one: the sensors write it.
     external : External
         Parts outside of this process.
     log : (ticks, width) array
@@ -129,35 +143,37 @@ def loop(
     tuple of int
         Rows written, and `GOING`, `LEFT_WORKSPACE`, `DIVERGED`, `FAILSAFE` or `INTERRUPTED`.
     """
-    data, manual_currents = controller.data[0], inputs.manual_A.shape[1]
+    data, rotor, manual_currents = controller.data, stages.rotor, inputs.manual_A.shape[1]
     reference, measurement = data.reference[:], data.measurement[: measured_rows(data)]
-    watchdog, detector = data.supervision.watchdog, data.supervision.detector
-    groups = stages.current.shape[0]
+    watchdog, measured_A = data.supervision.watchdog, data.supervision.detector.measured_A[:]
+    groups, fresh = measured_A.shape[0], data.fresh[:]
     first_current, scale = CURRENT_COMMAND + groups, CURRENT_COMMAND + 3 * groups
     first_mean = first_current + groups
     for tick in range(log.shape[0]):
         row, t, disturbance = log[tick], inputs.t[tick], inputs.disturbance[tick]
         draws = inputs.fault_noise[tick]
         is_finite = call_sense(
-            stages.sense, stages.sensors, stages.joint_q, stages.qdot, inputs.noise[tick], draws, measurement
+            stages.sense,
+            stages.sensors,
+            stages.plant,
+            inputs.noise[tick],
+            draws,
+            measurement,
+            fresh,
+            measured_A,
         )
         copy_rows(inputs.reference[tick], reference)
         # Logged before the law is called, because the law may overwrite its arguments.
-        write_motion(row, t, reference, stages.q, stages.qdot, disturbance)
+        write_motion(row, t, reference, rotor.q, rotor.qdot, disturbance)
         if not (is_finite or replace_invalid(watchdog, measurement)):
             return tick, DIVERGED
-        current_sensors = stages.current_sensors[0]
-        if current_sensors.on:
-            sense_currents(current_sensors, stages.current, draws)
-            if detector.on:
-                copy_into(detector.measured_A, 0, current_sensors.measured_A, groups)
         copy_into(data.manual.current_A, 0, inputs.manual_A[tick], manual_currents)
         if external.controller != 0:
             code = call_external(external.controller, t)
             if code != GOING:
                 return tick, code
         command = row[CURRENT_COMMAND:first_current]
-        share = control_tick(controller, law, allocate, estimate, t, reference, measurement, fresh, command)
+        share = control_tick(controller, law, allocate, estimate, t, reference, measurement, command)
         if share == NO_TORQUE:
             return tick, DIVERGED
         row[scale] = share

@@ -10,18 +10,18 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from spheretwin import assembly
 from spheretwin import loop as loops
-from spheretwin.control.allocation import ALLOCATIONS
+from spheretwin.assembly import assembled, law_of, rotor_of, same_nominal_model
+from spheretwin.control.controller import controller_of
 from spheretwin.control.law import Law
 from spheretwin.control.supervision.watchdog import REASONS, Reason, transfer_trip
 from spheretwin.electronics.drive_chain import transfer_drive
-from spheretwin.electronics.sensor_chain import fill_sensors, measure_again
+from spheretwin.electronics.sensor_chain import measure_again
 from spheretwin.external import Connection, ExternalController, ExternalPlant
 from spheretwin.hardware_assembly import faults_of
-from spheretwin.loop import dispatch, is_python_law, is_user_law, step_that_writes
+from spheretwin.loop import is_python_law, is_user_law, step_that_writes
 from spheretwin.models.base.callback_errors import callback_errors
-from spheretwin.models.base.compiled import COMPILES, for_types_of
+from spheretwin.models.base.compiled import COMPILES, for_types_of, uncompiled
 from spheretwin.models.base.errors import InputError, LawError
 from spheretwin.models.base.record import set_states, states_of, transfer_rows
 from spheretwin.models.base.turns import outside_turn
@@ -30,7 +30,7 @@ from spheretwin.plant.rotor import Rotor
 from spheretwin.scenario.changes import StateChange
 from spheretwin.scenario.files import Files
 from spheretwin.scenario.sections import ResolvedScenario
-from spheretwin.stages import compiled_stages, plant_stage
+from spheretwin.stages import stages_of
 
 # Only for the types.
 NO_INPUTS = loops.Inputs(
@@ -103,40 +103,25 @@ class Runtime:
         external: ExternalController | ExternalPlant | None = None,
     ) -> None:
         self._scenario, self._external = scenario, external
-        self._rotor = rotor or _start_rotor(scenario, files)
         self._groups = len(files.actuator.groups)
         self._last = LastTick(np.empty(0), np.empty(0), np.zeros(self._groups))
         self.law = law
         self.law_error: LawError | None = None
-        self.signals = assembly.signals_of(scenario, files.actuator, self.law)
-        self.row_width = width(self.signals)
-        nominal = assembly.nominal_magnetics(scenario, files)
-        true = assembly.true_magnetics(scenario.plant, scenario.seed, files.actuator)
-        estimator = assembly.estimator_of(scenario)
-        self.rows = rows = assembly.empty_run(scenario, true, nominal)
-        self._tables, self._data = true.tables, rows["controller"]
-        self._controller = assembly.controller_of(
-            self._data, scenario, self.law, nominal, estimator, files.nominal
-        )
-        fill_sensors(rows["sensors"], scenario.sensors, scenario.seed, bool(scenario.fault))
-        assembly.fill_plant(rows["plant"], scenario, files.actuator, true, self._rotor.rows)
+        self._assembly = assembly = assembled(scenario, files, law, rotor)
+        self.signals, self.row_width = assembly.signals, width(assembly.signals)
+        self.rows, self._rotor = assembly.rows, assembly.rotor
+        self._data = self.rows["controller"]
+        self._controller = uncompiled(controller_of)(assembly.controllers, 0)
         if hasattr(external, "command"):
             self._data["manual"]["on"] = True
-        self._faults = faults_of(scenario, rows)
-        # The loop holds only addresses of its functions: this object keeps the functions alive.
-        self._functions = dispatch(
-            self.law,
-            ALLOCATIONS[scenario.allocation],
-            estimator.step if estimator else None,
-            check_bounds=scenario.controller.check_bounds,
-        )
+        self._faults = faults_of(scenario, self.rows)
         self._may_raise = is_user_law(law) or scenario.controller.check_bounds
         if COMPILES and is_python_law(law):
             self._python_law = _PYTHON_LAW(self._call_law(step_that_writes(law)))
             self._data["python_law"] = ctypes.cast(self._python_law, ctypes.c_void_p).value or 0
-        self._connection = Connection(external, rows)
+        self._connection = Connection(external, self.rows)
         # Last: the rotor belongs to another runtime if this one is refused.
-        self._rotor.rows = rows["plant"]["rotor"]
+        self._rotor.rows = self.rows["plant"]["rotor"]
 
     def _call_law(self, step: Callable[..., None]) -> Callable[[float], None]:
         """Return a function of the time of a tick that calls a law in plain Python."""
@@ -175,18 +160,12 @@ class Runtime:
     @cached_property
     def loop(self) -> Callable[[loops.Inputs, NDArray[np.float64]], tuple[int, int]]:
         """Loop of the components, a function of inputs and rows; the first access compiles it."""
-        plant, sensors = self.rows["plant"], self.rows["sensors"]
-        stage = plant_stage(plant, self._tables, self._scenario.plant.engine)
-        data = {"controller": self._data, "sensors": sensors, "plant": plant}
-        stages = compiled_stages(data, stage, self.signals)
+        assembly = self._assembly
         parts = (
-            self._functions.law,
-            self._functions.allocate,
-            self._functions.estimate,
+            *assembly.functions[:3],
             self._controller,
-            stages,
-            self.row_width - width(self.law.signals),
-            sensors["fresh"][0],
+            uncompiled(stages_of)(assembly.stages(), 0),
+            assembly.law_signals,
             self._connection.external,
         )
         entry = for_types_of(loops.loop, NO_INPUTS, *parts, np.empty((0, self.row_width)))
@@ -250,7 +229,7 @@ class Runtime:
         same = scenario.plant == self._scenario.plant
         rotor = self._rotor if same else _transfer_rotor(self._rotor, scenario, files)
         law = user_law or self._law_for(scenario) or (trial and trial._law_for(scenario))
-        law = law or assembly.law_of(scenario)
+        law = law or law_of(scenario)
         other = Runtime(scenario, files, law, rotor, self._external)
         other._last = self._last
         self._transfer_state(other, user_law)
@@ -282,7 +261,7 @@ class Runtime:
         """Return the active law if nothing that it is built from differs in a scenario."""
         before = self._scenario
         same = before.controller.without_compensators() == scenario.controller.without_compensators()
-        same = same and assembly.same_nominal_model(before, scenario)
+        same = same and same_nominal_model(before, scenario)
         return self.law if same else None
 
     def set_state(self, change: StateChange) -> None:
@@ -332,15 +311,9 @@ def _check_length(name: str, numbers: Any, expected: int) -> None:
         )
 
 
-def _start_rotor(scenario: ResolvedScenario, files: Files) -> Rotor:
-    rotor, section = assembly.rotor_of(scenario, files), scenario.plant
-    rotor.start(np.array(section.initial_rad), np.array(section.initial_rad_s))
-    return rotor
-
-
 def _transfer_rotor(rotor: Rotor, scenario: ResolvedScenario, files: Files) -> Rotor:
     """Return the rotor of another scenario in the state of a started one."""
-    other, state = assembly.rotor_of(scenario, files), rotor.state()
+    other, state = rotor_of(scenario, files), rotor.state()
     other.start(rotor.rows["q"][0], rotor.rows["qdot"][0])
     if len(other.state()[0]) == len(state[0]):  # otherwise another number of bodies: pose and rates remain
         other.restore(state)

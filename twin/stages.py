@@ -1,11 +1,12 @@
 """Stages of a tick that are compiled alone: the loop calls them by address, with the addresses of their data.
 
 The loop is compiled once for a controller; another engine, drive, sensor or channel compiles only its stage.
+The stages of many runs have the same functions, and addresses for each run.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from functools import cache
 from typing import Any, NamedTuple
 
@@ -15,8 +16,9 @@ from numpy.typing import NDArray
 
 from spheretwin.channels import CHANNELS, Channel
 from spheretwin.electronics.sensor_chain import sense
+from spheretwin.electronics.transducers import sense_currents
 from spheretwin.models.base.addresses import caller_of
-from spheretwin.models.base.compiled import COMPILES, stage_address
+from spheretwin.models.base.compiled import COMPILES, copy_into, part_of_its_caller, stage_address
 from spheretwin.models.base.record import Rows
 from spheretwin.models.magnetics import Tables
 from spheretwin.models.telemetry.signals import Signal, offsets
@@ -28,7 +30,7 @@ _ROW, _ROWS, _FIELD = types.float64[::1], types.float64[:, ::1], types.float64[:
 _TABLES = types.NamedTuple((_ROWS, _FIELD), Tables)
 _GIVEN = types.NamedTuple((_ROW, _ROW, _ROW, types.int64), TickInput)
 _OUTPUT = types.NamedUniTuple(_ROW, 3, PlantOutput)
-_SENSE = types.boolean(types.intp, _ROW, _ROW, _ROW, _ROW, _ROWS)
+_SENSE = types.boolean(types.intp, types.intp, _ROW, _ROW, _ROWS, _ROW, _ROW)
 _ADVANCE = types.int64(types.intp, _TABLES, types.intp, _GIVEN, _OUTPUT)
 _WRITE = types.void(types.intp, types.intp, _ROW)
 
@@ -36,13 +38,13 @@ call_sense, call_advance, call_write = caller_of(_SENSE), caller_of(_ADVANCE), c
 
 
 class Stages(NamedTuple):
-    """Stages as the loop calls them, and the parts of the plant that the loop itself reads.
+    """Stages as the loop calls them, and the part of the plant that the loop itself reads.
 
     Functions and their data, which are the first arguments, are addresses in compiled code. In Python they
-    are functions and records.
+    are functions and records. Those of many runs have arrays with an entry for each run in place of the data.
     """
 
-    sense: Any  # (sensors, q, qdot, noise, draws, measurement): true if the measurement is finite
+    sense: Any  # (sensors, plant, noise, draws, measurement, fresh, measured_A): true if it is finite
     sensors: Any
     advance: Any  # (plant, tables, step, given, output): code of a status
     plant: Any
@@ -52,15 +54,29 @@ class Stages(NamedTuple):
     parts: Any  # data of the writers
     second_parts: Any
     columns: NDArray[np.intp]  # first columns of these channels
-    joint_q: Array  # (3,) rad, which the sensors measure
-    q: Array  # (3,) rad
-    qdot: Array  # (3,) rad/s
-    current: Array  # (n,) A
-    current_sensors: Rows  # array of one CurrentSensors
+    rotor: Any  # RotorData
+
+
+@part_of_its_caller  # a function cannot return a tuple with a record
+def stages_of(stages: Stages, run: int) -> Stages:
+    """Return the stages of one of many runs."""
+    return Stages(
+        stages.sense,
+        stages.sensors[run],
+        stages.advance,
+        stages.plant[run],
+        stages.tables,
+        stages.step,
+        stages.writers,
+        stages.parts[run],
+        stages.second_parts[run],
+        stages.columns,
+        stages.rotor[run],
+    )
 
 
 class PlantStage(NamedTuple):
-    """Stage of a plant: function and first three arguments of `call_advance`."""
+    """Stage of a plant: function and first three arguments of `call_advance`; data as in `Stages`."""
 
     advance: Any
     plant: Any
@@ -73,12 +89,12 @@ def plant_stage(plant: Rows, tables: Tables, engine: str) -> PlantStage:
 
     Parameters
     ----------
-    plant : array of one Plant
+    plant : array of Plant
         It must exist as long as the stage is called.
     tables : Tables
-        Of its magnetics.
+        Of the magnetics of all of them.
     engine : str
-        Name of its engine.
+        Name of their engine.
     """
     step = engine_step(engine)
     return PlantStage(
@@ -87,15 +103,15 @@ def plant_stage(plant: Rows, tables: Tables, engine: str) -> PlantStage:
 
 
 def compiled_stages(parts: Mapping[str, Rows], plant: PlantStage, signals: tuple[Signal, ...]) -> Stages:
-    """Compile the stages of a run.
+    """Compile the stages of some runs.
 
     Parameters
     ----------
-    parts : mapping of str to array of one record
+    parts : mapping of str to array of records
         `controller`, `sensors` and `plant`; they must exist as long as the stages are called.
     plant : PlantStage
     signals : tuple of Signal
-        Columns of the run: its channels are among them.
+        Columns of the runs: their channels are among them.
     """
     first = offsets(signals)
     logged = {channel: name for channel in CHANNELS if (name := channel.signals(1)[0].name) in first}
@@ -103,21 +119,16 @@ def compiled_stages(parts: Mapping[str, Rows], plant: PlantStage, signals: tuple
     writers = [
         _function(_WRITE, _writer(channel), *(parts[name] for name in channel.parts)) for channel in logged
     ]
-    sequence: Callable[[list[Any]], Any] = (lambda values: np.array(values, np.intp)) if COMPILES else list
-    true = parts["plant"]
+    runs = len(parts["plant"])
     return Stages(
-        _function(_SENSE, _sense, parts["sensors"]),
+        _function(_SENSE, _sense, parts["sensors"], parts["plant"]),
         _data(parts["sensors"]),
         *plant,
-        sequence(writers),
-        sequence([_data(parts[names[0]]) for names in reads]),
-        sequence([_data(parts[names[-1]]) for names in reads]),
+        np.array(writers, np.intp) if COMPILES else writers,
+        _table([_data(parts[names[0]]) for names in reads], runs),
+        _table([_data(parts[names[-1]]) for names in reads], runs),
         np.array([first[name] for name in logged.values()], np.intp),
-        true["joint_q"][0],
-        true["rotor"]["q"][0],
-        true["rotor"]["qdot"][0],
-        true["current"][0],
-        true["current_sensors"],
+        parts["plant"]["rotor"],
     )
 
 
@@ -126,12 +137,29 @@ def _function(signature: Any, function: Callable[..., Any], *parts: Any) -> Any:
 
 
 def _data(rows: Rows) -> Any:
-    """Return what a stage gets of an array of one record."""
-    return rows.ctypes.data if COMPILES else rows[0]
+    """Return what a stage gets of the record of each run."""
+    return rows.ctypes.data + rows.strides[0] * np.arange(len(rows)) if COMPILES else rows
 
 
-def _sense(sensors: Any, q: Array, qdot: Array, noise: Array, draws: Array, measurement: Array) -> bool:
-    return bool(sense(sensors, q, qdot, noise, draws, measurement))
+def _table(columns: Sequence[Any], runs: int) -> Any:
+    """Return the data of all channels for each run."""
+    if COMPILES:
+        return np.array(columns, np.intp).reshape(-1, runs).T.copy()
+    return [[column[run] for column in columns] for run in range(runs)]
+
+
+def _sense(
+    sensors: Any, plant: Any, noise: Array, draws: Array, measurement: Array, fresh: Array, measured_A: Array
+) -> bool:
+    is_finite, currents = (
+        sense(sensors, plant.joint_q, plant.rotor.qdot, noise, draws, measurement),
+        plant.current_sensors,
+    )
+    copy_into(fresh, 0, sensors.fresh, fresh.shape[0])
+    if currents.on:
+        sense_currents(currents, plant.current, draws)
+        copy_into(measured_A, 0, currents.measured_A, measured_A.shape[0])
+    return bool(is_finite)
 
 
 def _advance(plant: Any, tables: Tables, step: Any, given: TickInput, output: PlantOutput) -> int:

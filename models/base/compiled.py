@@ -92,6 +92,8 @@ def _kind(value: Any) -> Any:
         return type(value), *map(_kind, value)
     if isinstance(value, np.ndarray):
         return value.dtype, value.ndim, value.flags.c_contiguous
+    if isinstance(value, np.void):
+        return value.dtype
     return type(value)
 
 

@@ -6,6 +6,8 @@ from collections.abc import Callable
 from functools import wraps
 from typing import Any, TypeVar, cast
 
+from spheretwin.models.base.columns import Columns
+
 F = TypeVar("F", bound=Callable[..., Any])
 
 MOST_RESULTS = 64
@@ -20,6 +22,8 @@ def reused(function: F) -> F:
 
     @wraps(function)
     def call(*arguments: Any) -> Any:
+        if any(isinstance(argument, Columns) for argument in arguments):
+            return function(*arguments)  # of one block alone
         key = tuple(map(id, arguments))
         stored = results.get(key)
         if stored is None:

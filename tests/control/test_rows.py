@@ -17,7 +17,7 @@ from spheretwin.control.compensators.prediction import (
     fill_prediction,
 )
 from spheretwin.control.compensators.reference_governor import Governor, GovernorSection, fill_governor
-from spheretwin.control.controller import ControllerData, controller
+from spheretwin.control.controller import ControllerData, controller, controller_of
 from spheretwin.control.estimators import ESTIMATORS
 from spheretwin.control.estimators.estimator import Sampling
 from spheretwin.control.law import NominalModel
@@ -37,6 +37,7 @@ from spheretwin.control.supervision.watchdog import (
     fill_watchdog,
 )
 from spheretwin.models.base.columns import MixedRowsError, column_of, together
+from spheretwin.models.base.compiled import uncompiled
 from spheretwin.models.magnetics import torque_model
 
 pytestmark = pytest.mark.uncompiled
@@ -161,10 +162,11 @@ def test_every_controller_of_a_block_has_its_law_and_its_estimator(magnetics, na
     estimators = [ESTIMATORS["kalman"](bandwidth_rad_s=100.0 + row).build(sampling) for row in range(ROWS)]
     block = rows_of(magnetics, laws, estimators)
     for row in range(ROWS):
-        one, single = rows_of(magnetics, laws[row], estimators[row], rows=1).row(0), block.row(row)
+        alone = rows_of(magnetics, laws[row], estimators[row], rows=1)
+        one, single = (uncompiled(controller_of)(*own) for own in ((alone, 0), (block, row)))
         for first, second in zip(one[:-1], single[:-1], strict=True):
             assert first.tobytes() == second.tobytes()
-        assert all(array.flags.c_contiguous and array.ndim == 1 for array in single[:-1])
+        assert all(array.flags.c_contiguous and array.ndim == 1 for array in single[1:-1])
     single.memory[:] = 7.0
     assert np.all(block.memory[-1] == 7.0)
     assert not np.any(laws[-1].state == 7.0)

@@ -242,6 +242,7 @@ def drive_plant(
     states = np.full((len(disturbance) // every + 1, 6), np.nan)
     states[0] = [*section.initial_rad, *section.initial_rad_s]
     stage = plant_stage(plant, true.tables, section.engine)
+    stage = stage._replace(plant=stage.plant[0])
     output = PlantOutput(np.empty(groups), np.empty(groups), np.empty(3))
     motion = plant["rotor"]["q"][0], plant["rotor"]["qdot"][0]
     _drive(stage, motion, commands(groups), disturbance, output, every, states)

@@ -90,7 +90,7 @@ def controller_code(scenario: str, changes: Mapping[str, Any] | None = None) -> 
     _check(resolved, law)
     magnetics = assembly.nominal_magnetics(resolved, config.files)
     rows = assembly.empty_run(resolved, magnetics, magnetics)["controller"]
-    controller = assembly.controller_of(rows, resolved, law, magnetics, estimator, config.files.nominal)
+    controller = assembly.controllers_of(rows, resolved, [law], magnetics, [estimator], config.files.nominal)
     law_files, estimator_file = LAWS[law.step], ESTIMATORS[estimator.step if estimator else None]
     names = ["st_controller.h", "st_controller.c", "st_numbers.h", "st_equations.h"]
     names += [*law_files, estimator_file, *_ALLOCATIONS[resolved.allocation]]
