@@ -21,11 +21,11 @@ from spheretwin.models.base.errors import InputError, LawError, exception_text, 
 from spheretwin.models.base.extras import missing
 from spheretwin.models.base.user_code import load_function
 from spheretwin.models.telemetry.run_record import RunRecord, versions
-from spheretwin.models.telemetry.signals import ANGLES
+from spheretwin.models.telemetry.signals import ANGLES, Signal
 from spheretwin.models.telemetry.status import Status
 from spheretwin.models.telemetry.table import Table
 from spheretwin.provenance import change_text, facts_of
-from spheretwin.reduction import PlannedRun, write_all
+from spheretwin.reduction import PlannedRun, Reduction, write_all
 from spheretwin.scenario.changes import scheduled_changes
 from spheretwin.scenario.sections import ResolvedScenario
 from spheretwin.session import Session
@@ -264,12 +264,12 @@ OTHER_KEYS = (
 
 
 class Figures:
-    """Sink that computes metrics of a run.
+    """Sink that computes metrics of a run; those of the runs of a block by its `reduction`.
 
     Parameters
     ----------
     planned : PlannedRun
-        Facts about the run before its first row.
+        Facts about the runs before their first row.
     names : iterable of str
         Metrics; all unless given.
     """
@@ -291,9 +291,13 @@ class Figures:
     def finish(self, status: str) -> None:
         """Ignore the end of the run: it changes no figure."""
 
-    def values(self) -> dict[str, Any]:
-        """Return the figures by name; None for a figure with too few rows."""
-        return {name: metric.value() for name, metric in self._metrics.items()}
+    def reduction(self, signals: tuple[Signal, ...], ticks: int) -> Reduction:
+        """Return the compiled reduction of the telemetry of all runs up to a tick."""
+        return Reduction(self._all, signals, ticks)
+
+    def values(self, run: int = 0) -> dict[str, Any]:
+        """Return the figures of a run by name; None for a figure with too few rows."""
+        return {name: metric.value(run) for name, metric in self._metrics.items()}
 
     def warnings(self) -> list[str]:
         """Return warnings that concern the validity of the figures, one line each."""

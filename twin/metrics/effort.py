@@ -66,9 +66,10 @@ class CopperLoss(Metric):
     def start(self, planned: PlannedRun) -> CopperState:
         """Return shares of the lag, and no loss."""
         section, runs, groups = planned.scenario.drive, planned.runs, len(planned.actuator.groups)
-        lag_s, period_s = np.broadcast_to(section.lag_s, (runs, groups)), planned.period_s
+        lag_s, period_s = np.asarray(section.lag_s, float), planned.period_s
         spans = (lag_s, planned.scenario.plant.step_s), (lag_s, period_s), (0.5 * lag_s, period_s)
-        step, tick, tick_squared = (lag_step(span_s, lag)[1].reshape(runs, groups) for lag, span_s in spans)
+        shares = (np.broadcast_to(lag_step(span_s, lag)[1], (runs, groups)) for lag, span_s in spans)
+        step, tick, tick_squared = map(np.ascontiguousarray, shares)
         squares, logged_W = np.zeros((2, runs, groups))
         limit_A = np.array(np.broadcast_to(section.current_limit_A, (runs, 1))[:, 0], float)
         return CopperState(step, tick, tick_squared, limit_A, not section.converts, squares, logged_W)
