@@ -232,7 +232,7 @@ def _one(study: Study, key: str, as_json: bool) -> bool:
     """Run one row, and print its values and its figures."""
     with contextlib.redirect_stdout(sys.stderr), timers_stopped():
         rows, row = Rows(study), Grid(study).of(key)
-        result = rows.run(row)
+        (result,) = rows.run([row])
     printed = {
         "row": row.number,
         "key": row.key,

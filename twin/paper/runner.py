@@ -286,7 +286,8 @@ def _run(
 
     def work(i: int) -> Result:
         case, plant, seed = jobs[i]
-        return rows_of(experiment, case.scenario).run(_row(case, seed), _engine(case, plant))
+        (result,) = rows_of(experiment, case.scenario).run([_row(case, seed)], _engine(case, plant))
+        return result
 
     with closing(run_each(missing, work, threads)) as running:
         for i, result in running:

@@ -7,13 +7,12 @@ thousandths; where a run is lost, both lose it, but not at the same tick.
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
+
 import numpy as np
 
 from spheretwin.models.base.errors import SpheretwinError
 from spheretwin.models.telemetry.status import Status
-from spheretwin.reduction import PlannedRun
-from spheretwin.run import Figures
-from spheretwin.simulation import follow
 from spheretwin.study.grid import Row
 from spheretwin.study.row import Rows
 from spheretwin.study.study import FAST, FULL
@@ -35,22 +34,24 @@ def is_checked(row: Row) -> bool:
     return row.number == 0 or int(row.key, 16) % EVERY == 0
 
 
-def check(rows: Rows, row: Row) -> None:
-    """Run a row on both plants and compare.
+def has_both(rows: Rows, row: Row) -> bool:
+    """True if a row runs on the fast plant and could run on the other one."""
+    return rows.chooses_plant and rows.scenario(row).plant.engine == FAST
+
+
+def check(rows: Rows, checked: Sequence[Row]) -> Iterator[Row]:
+    """Run rows that have both plants on both and compare; yield each row that agrees.
 
     Raises
     ------
     SpheretwinError
-        Their statuses differ, or their errors by more than `BOUND`.
+        The statuses of a row differ, or its errors by more than `BOUND`.
     """
-    if rows.scenario(row).plant.engine != FAST or not rows.chooses_plant:
-        return
-    compare(
-        f"study {rows.study.name}: expected row {row.number}",
-        _rms(rows, row, FAST),
-        _rms(rows, row, FULL),
-        "fast = false runs it on MuJoCo alone",
-    )
+    ours, theirs = (_endings(rows, checked, engine) for engine in (FAST, FULL))
+    for row, fast, full in zip(checked, ours, theirs, strict=True):
+        expected = f"study {rows.study.name}: expected row {row.number}"
+        compare(expected, fast, full, "fast = false runs it on MuJoCo alone")
+        yield row
 
 
 def compare(expected: str, ours: Ending, theirs: Ending, way_out: str) -> float:
@@ -78,13 +79,12 @@ def compare(expected: str, ours: Ending, theirs: Ending, way_out: str) -> float:
     return difference
 
 
-def _rms(rows: Rows, row: Row, engine: str) -> Ending:
-    scenario = rows.scenario(row, engine)
-    with rows.session(scenario) as session:
-        planned = PlannedRun(session.initial_scenario, session.actuator, scenario.ticks)
-        figures = Figures(planned, [RMS_ERROR])
-        status = follow(session, scenario.ticks, [figures])
-        return status, figures.values()[RMS_ERROR] or []
+def _endings(rows: Rows, checked: Sequence[Row], engine: str) -> list[Ending]:
+    results = rows.with_metrics((RMS_ERROR,)).run(checked, engine)
+    for result in results:
+        if result.error is not None:
+            raise SpheretwinError(result.error)
+    return [(Status(result.status), result.figures[RMS_ERROR] or []) for result in results]
 
 
 def _difference(ours: list[float], theirs: list[float]) -> float:

@@ -5,11 +5,16 @@ from __future__ import annotations
 import copy
 import json
 import shlex
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from spheretwin.active_config import fill_defaults
+from spheretwin.block import RunBlock
+from spheretwin.channels import CHANNELS
 from spheretwin.metrics import METRICS
+from spheretwin.models.base.columns import MixedRowsError
 from spheretwin.models.base.errors import (
     InputError,
     LawError,
@@ -100,6 +105,12 @@ class Rows:
         """Names of the user metrics."""
         return tuple(self._own)
 
+    def with_metrics(self, names: Sequence[str]) -> Rows:
+        """These rows with other figures, without metrics of the user and without telemetry."""
+        other = copy.copy(self)
+        other.metrics, other._own, other._telemetry = tuple(names), {}, None
+        return other
+
     def scenario(self, row: Row, engine: str | None = None) -> Scenario:
         """Scenario of a row.
 
@@ -115,8 +126,7 @@ class Rows:
             Its values are out of range, or do not fit each other.
         """
         numbers = {name: value for name, value in row.values.items() if is_number(value)}
-        others = {name: value for name, value in row.values.items() if name not in numbers}
-        shape = json.dumps([row.law, others]), tuple(numbers), engine
+        shape = *self._shape(row), engine
         if shape not in self._templates:
             if len(self._templates) >= MOST_TEMPLATES:
                 self._templates.clear()
@@ -126,8 +136,62 @@ class Rows:
             return template.scenario((row.seed, *numbers.values()))
         return self._validated(self._fields_of(row, engine))
 
-    def run(self, row: Row, engine: str | None = None) -> Result:
-        """Run a row; an error of the row is its result."""
+    def _shape(self, row: Row) -> tuple[Any, ...]:
+        """Return what rows that differ in numbers alone have in common."""
+        others = {name: value for name, value in row.values.items() if not is_number(value)}
+        numbers = tuple(name for name in row.values if name not in others)
+        return json.dumps([row.law, others]), numbers
+
+    def run(self, rows: Sequence[Row], engine: str | None = None) -> list[Result]:
+        """Run rows; an error of a row is its result.
+
+        Rows that differ in numbers run as a block. A row with events, a law, metric or trajectory of the
+        user, or telemetry to be stored, runs alone.
+        """
+        results: dict[int, Result] = {}
+        for places, block in self._blocks(rows, engine):
+            results |= zip(places, block, strict=True)
+        return [results.get(place) or self._alone(row, engine) for place, row in enumerate(rows)]
+
+    def _blocks(
+        self, rows: Sequence[Row], engine: str | None
+    ) -> Iterator[tuple[list[int], list[Result | None]]]:
+        """Yield the places of rows that run together with their results, None for a row that runs alone."""
+        if self._own:
+            return
+        together: dict[Any, list[tuple[int, Scenario]]] = {}
+        for place, row in enumerate(rows):
+            with suppress(InputError):  # the row alone is refused with its reason
+                scenario = self._without_unread(self.scenario(row, engine))
+                if kind := self._kind_of_block(row, scenario):
+                    together.setdefault(kind, []).append((place, scenario))
+        for members in together.values():
+            places, scenarios = zip(*members, strict=True)
+            with suppress(InputError, MixedRowsError):  # of one row or another: each runs alone
+                yield list(places), self._run_block(scenarios)
+
+    def _kind_of_block(self, row: Row, scenario: Scenario) -> Any:
+        """Return what the scenarios of a block have in common; None for a row that runs alone."""
+        stored = self._telemetry is not None and row.number in self.study.telemetry
+        if stored or scenario.event or is_reference(scenario.controller.law):
+            return None
+        clocks = scenario.controller.period_s, scenario.plant.step_s, scenario.ticks
+        logged = tuple(bool(channel.logged(scenario)) for channel in CHANNELS)
+        return *self._shape(row), scenario.plant.engine, clocks, logged, id(self._files.files_of(scenario))
+
+    def _run_block(self, scenarios: Sequence[Scenario]) -> list[Result | None]:
+        files = self._files.files_of(scenarios[0])
+        resolved = [fill_defaults(scenario, files, None, None) for scenario in scenarios]
+        endings = RunBlock(resolved, files, self.metrics).run()
+        return [
+            ending
+            and Result(
+                str(ending.status), ending.reason.text if ending.reason else None, None, ending.figures
+            )
+            for ending in endings
+        ]
+
+    def _alone(self, row: Row, engine: str | None) -> Result:
         try:
             scenario = self.scenario(row, engine)
             with self.session(scenario) as session:

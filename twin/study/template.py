@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import chain
-from math import isfinite
 from typing import Any
+
+from pydantic_core import to_json
 
 from spheretwin.scenario import reading
 from spheretwin.scenario.changes import check_events
@@ -14,7 +15,7 @@ from spheretwin.scenario.sections import Scenario
 # Character that no text of a scenario contains.
 MARK = "\x01"
 
-MOST_USUAL = 2**63
+MOST_USUAL = 2.0**63
 
 
 class Template:
@@ -53,7 +54,8 @@ class Template:
         InputError
             They are out of range, or do not fit each other.
         """
-        filled = (self._text(values[place]) for place in self._order)
+        numbers = self._texts(values)
+        filled = [numbers[place] for place in self._order]
         text = self._first + "".join(chain.from_iterable(zip(filled, self._parts, strict=True)))
         scenario = reading.from_json(text, self._source, self._kind)
         if self._shared is None:
@@ -61,10 +63,11 @@ class Template:
             self._shared = {name: section for name, section in scenario if name not in self._own}
         return check_events(scenario.model_copy(update=self._shared), self._source)
 
-    def _text(self, value: float) -> str:
-        """Number as JSON text, which is almost always its Python text."""
-        is_usual = isfinite(value) if isinstance(value, float) else abs(value) < MOST_USUAL
-        return repr(value) if is_usual else reading.as_json(self._source, value).decode()
+    def _texts(self, values: Sequence[Any]) -> list[str]:
+        """Return the numbers as JSON texts."""
+        if all(abs(value) < MOST_USUAL for value in values):  # neither NaN nor infinity
+            return to_json(values).decode()[1:-1].split(",")
+        return [reading.as_json(self._source, value).decode() for value in values]
 
 
 def template_of(fields: dict[str, Any], gaps: Sequence[str], source: str) -> Template | None:

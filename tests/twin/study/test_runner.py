@@ -65,7 +65,7 @@ def test_a_study_over_laws_and_hardware_is_the_same_in_pieces(tmp_path, threads)
     assert with_telemetry == rows_of(tmp_path / "whole")
     alone = Rows(kinds)
     for row, of_table in zip(Grid(kinds), rows_of(tmp_path / "whole"), strict=True):
-        figures = alone.run(row).figures
+        ((_, _, _, figures),) = alone.run([row])
         assert figures == {name: of_table[name] for name in figures}
 
 
@@ -110,14 +110,16 @@ def test_a_run_that_ends_early_is_a_row_with_what_it_gave(tmp_path):
 
 def test_plants_that_differ_end_the_study_and_keep_its_rows(tmp_path, monkeypatch):
     checked = []
-    real = agreement._rms
+    real = agreement._endings
 
-    def elsewhere(rows, row, engine):
-        checked.append((row.number, engine))
-        status, rms = real(rows, row, engine)
-        return status, [(1 + 0.03 * (engine == "mujoco" and row.number > 0)) * each for each in rms]
+    def elsewhere(rows, every, engine):
+        checked.extend((row.number, engine) for row in every)
+        return [
+            (status, [(1 + 0.03 * (engine == "mujoco" and row.number > 0)) * each for each in rms])
+            for row, (status, rms) in zip(every, real(rows, every, engine), strict=True)
+        ]
 
-    monkeypatch.setattr(agreement, "_rms", elsewhere)
+    monkeypatch.setattr(agreement, "_endings", elsewhere)
     monkeypatch.setattr(agreement, "EVERY", 5)
     monkeypatch.setattr("spheretwin.study.engines.threads.AHEAD", 4)  # fewer than the rows behind the fault
     with pytest.raises(SpheretwinError) as failure:
@@ -137,14 +139,14 @@ def test_plants_that_differ_end_the_study_and_keep_its_rows(tmp_path, monkeypatc
 
 @pytest.mark.parametrize("share", [0.019, 0.021])
 def test_the_bound_of_the_plants_is_a_bound(tmp_path, monkeypatch, share):
-    real = agreement._rms
+    real = agreement._endings
 
-    def shifted(rows, row, engine):
+    def shifted(rows, every, engine):
         # One and the same plant, so that the shift is all there is between them.
-        status, rms = real(rows, row, "lagrangian")
-        return status, [(1.0 - share * (engine == "lagrangian")) * each for each in rms]
+        shift = 1.0 - share * (engine == "lagrangian")
+        return [(status, [shift * each for each in rms]) for status, rms in real(rows, every, "lagrangian")]
 
-    monkeypatch.setattr(agreement, "_rms", shifted)
+    monkeypatch.setattr(agreement, "_endings", shifted)
     is_within = share < agreement.BOUND
     with nullcontext() if is_within else pytest.raises(SpheretwinError, match="both plants"):
         assert run(study(), tmp_path).checked == 1
@@ -170,10 +172,11 @@ def test_the_rows_are_the_same_on_both_plants_within_the_bound(tmp_path):
 def test_a_row_with_one_possible_plant_is_not_compared(tmp_path, chosen, monkeypatch):
     base = 'name = "b"\nduration = 0.02\nplant.engine = "mujoco"\ntrajectory.shape = "hold"\n'
     (tmp_path / "base.toml").write_text(base)
-    monkeypatch.setattr(agreement, "_rms", lambda *_: pytest.fail("a row was run for a comparison"))
+    monkeypatch.setattr(agreement, "_endings", lambda *_: pytest.fail("a row was run for a comparison"))
+    monkeypatch.setattr(agreement, "check", lambda rows, checked: agreement._endings() if checked else ())
     chosen = chosen.model_copy(update={"folder": str(tmp_path)})
-    agreement.check(Rows(chosen), Grid(chosen)[0])
-    assert run(chosen, tmp_path / "out").checked == 0 or "plant.integrator" in chosen.fields
+    assert not agreement.has_both(Rows(chosen), Grid(chosen)[0])
+    assert run(chosen, tmp_path / "out").checked == 0
 
 
 def test_a_folder_that_cannot_be_had_is_refused(tmp_path):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 from collections import Counter, deque
-from collections.abc import Callable, Generator, Iterator
+from collections.abc import Callable, Generator, Iterator, Sequence
 from typing import NamedTuple
 
 from spheretwin.models.base.errors import SpheretwinError
@@ -14,7 +14,7 @@ from spheretwin.study.row import Result, Rows
 
 
 class Work:
-    """Runs a row; some of them on both plants.
+    """Runs rows; some of them on both plants.
 
     Attributes
     ----------
@@ -30,17 +30,22 @@ class Work:
         self.faults: list[SpheretwinError] = []
         self.checked: list[int] = []
 
-    def __call__(self, row: Row) -> Result | None:
-        """Result of a row; None after a fault."""
+    def __call__(self, rows: Sequence[Row]) -> list[Result | None]:
+        """Results of rows; None for a row with a fault, and for the checked ones behind it."""
+        results: dict[int, Result] = {}
         try:
-            result = self.rows.run(row)
-            if result.error is None and self.rows.chooses_plant and agreement.is_checked(row):
-                agreement.check(self.rows, row)
+            found = dict(zip((row.number for row in rows), self.rows.run(rows), strict=True))
+            checked = [row for row in rows if self._is_checked(row, found[row.number])]
+            results = {row.number: found[row.number] for row in rows if row not in checked}
+            for row in agreement.check(self.rows, checked):
                 self.checked.append(row.number)
+                results[row.number] = found[row.number]
         except SpheretwinError as error:
             self.faults.append(error)
-            return None
-        return result
+        return [results.get(row.number) for row in rows]
+
+    def _is_checked(self, row: Row, result: Result) -> bool:
+        return result.error is None and agreement.is_checked(row) and agreement.has_both(self.rows, row)
 
 
 class Order(NamedTuple):
@@ -88,9 +93,11 @@ class Engine(NamedTuple):
     takes_address: bool = False
 
 
-TASK_S = 1.0
+TASK_S = 0.5
+"""Duration of a batch: an interruption waits for it, and a batch is stored as a whole."""
 
-MOST_ROWS = 10_000
+MOST_ROWS = 256
+"""Largest batch: its rows are set up together, and larger blocks are no faster."""
 
 # Losses of a batch of one row: a node may be lost by chance, but hardly as often as this.
 MOST_LOSSES = 4

@@ -1,7 +1,7 @@
 """Ray: rows in batches over all cores of a cluster, a process a core.
 
-A process a core, and not threads within fewer: a third of a short row is Python, which threads run one at a
-time. Only numbers of rows travel to the nodes, and only results back, into the same journal. Files that a
+A process a core, and not threads within fewer: laws and metrics in plain Python run in all of them at a time.
+Only numbers of rows travel to the nodes, and only results back, into the same journal. Files that a
 study names must be on every node, under the same paths, and so must the same sources and versions: a node
 that has others is refused by `spheretwin.study.engines.ray_worker`. The driver runs the rows whose telemetry
 is stored, as it belongs next to the journal.
@@ -76,9 +76,7 @@ def run(order: Order) -> Generator[tuple[Row, Result | None]]:
     here: list[int] = []
     with _connected(ray, order):
         yield from _Cluster(ray, order, here).results()
-    yield from threads.run_each(
-        (order.grid[number] for number in here), order.work, order.threads, order.stop_requested
-    )
+    yield from threads.run(order._replace(numbers=iter(here), rows=len(here)))
 
 
 class _Cluster:

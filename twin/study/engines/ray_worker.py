@@ -77,13 +77,10 @@ def run_batch(job: Job, numbers: list[int]) -> BatchResult:
     except SpheretwinError as error:
         return BatchResult([], [], str(error), 0.0)
     started = time.perf_counter()
-    work, results = Work(rows), []
+    work = Work(rows)
     with timers_stopped():
-        for number in numbers:
-            result = work(grid[number])
-            if result is None:
-                break
-            results.append((number, result))
+        every = zip(numbers, work([grid[number] for number in numbers]), strict=True)
+        results = [(number, result) for number, result in every if result is not None]
     fault = str(work.faults[0]) if work.faults else None
     return BatchResult(results, work.checked, fault, time.perf_counter() - started)
 

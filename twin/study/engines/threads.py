@@ -10,7 +10,7 @@ from queue import SimpleQueue
 from typing import TypeVar
 
 from spheretwin.models.base.turns import outside_turn, turn
-from spheretwin.study.engines.engine import Engine, Order
+from spheretwin.study.engines.engine import Batches, Engine, Order
 from spheretwin.study.grid import Row
 from spheretwin.study.row import Result
 
@@ -97,8 +97,17 @@ def run_each(
 
 def run(order: Order) -> Generator[tuple[Row, Result | None]]:
     """Yield the rows of an order with their results."""
-    rows = (order.grid[number] for number in order.numbers)
-    return run_each(rows, order.work, order.threads, order.stop_requested)
+    threads = order.threads or os.cpu_count() or 1
+    batches = Batches(order.numbers, order.rows)
+    timed = iter(lambda: [order.grid[number] for number in batches.next(threads)], [])
+
+    def work(rows: list[Row]) -> tuple[list[Result | None], float]:
+        started = time.perf_counter()
+        return order.work(rows), time.perf_counter() - started
+
+    for rows, (results, wall_s) in run_each(timed, work, threads, order.stop_requested):
+        batches.landed(len(rows), wall_s)
+        yield from zip(rows, results, strict=True)
 
 
 ENGINE = Engine(run)

@@ -78,7 +78,7 @@ def run_trial(
     for row in conditions:
         if stop_requested():
             return None
-        result = rows.run(with_fields(row, fields))
+        (result,) = rows.run([with_fields(row, fields)])
         numbers = [
             optimise.of_row(objective, result.figures.get(objective.metric)) for objective in objectives
         ]

@@ -371,7 +371,8 @@ class _Law:
         """Compare the fast plant with MuJoCo on the first row with the gains of the start."""
         middle = gains.middle(self.gains)
         row = trial.with_fields(self.conditions[0], gains.values(self.gains, middle))
-        agreement.check(self._rows, row)
+        if agreement.has_both(self._rows, row):
+            list(agreement.check(self._rows, [row]))
 
 
 def _fill(
