@@ -79,7 +79,7 @@ def test_the_authority_scales_what_is_sent_and_what_is_expected():
     full = session(Plant(at_rest), **{"detector.detect": True})
     rows = reduced.advance(3)["current_command_A"]
     np.testing.assert_allclose(rows[0], 0.25 * full.advance(3)["current_command_A"][0], rtol=1e-15)
-    expected = reduced._runtime._controller.data[0].applied_torque.current
+    expected = reduced._runtime._controller.data.applied_torque.current
     # After three ticks with L/R = 0.69 ms; the bound is that of the last change of the command.
     np.testing.assert_allclose(expected, rows[-1], atol=0.3 * np.abs(np.diff(rows[-2:], axis=0)).max() + 1e-3)
 

@@ -96,7 +96,7 @@ def test_no_healthy_group_is_ever_found(label, name, hardware, ticks, changes):
         while session.tick < ticks and session.status == "running":
             table = session.advance(min(2000, ticks - session.tick))
             assert not table["group_out"].any(), f"{label} at {session.t_s:g} s"
-            threshold_A = session._runtime._controller.data[0].supervision.detector.threshold_A
+            threshold_A = session._runtime._controller.data.supervision.detector.threshold_A
             busy += np.count_nonzero(np.abs(table["current_command_A"]) > 2 * threshold_A)
             if hardware == "electronics":
                 limited += np.count_nonzero(table["voltage_limited"])
@@ -113,7 +113,7 @@ def test_a_supply_that_the_controller_does_not_know_leaves_its_thresholds():
     figures = []
     for each in (nominal, weak, scenario(duration=0.1, **supply(8.0))):
         with Session(each) as session:
-            detector = session._runtime._controller.data[0].supervision.detector
+            detector = session._runtime._controller.data.supervision.detector
             limits = detector.threshold_A, detector.ticks, detector.reach_A
             figures.append([np.asarray(numbers).tolist() for numbers in limits])
     assert figures[0] == figures[1] != figures[2]

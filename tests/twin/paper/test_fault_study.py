@@ -148,7 +148,7 @@ def test_an_idle_group_is_not_detected_until_it_is_driven():
     threshold_A = LEAST_SHARE * healthy.actuator.group.current_limit_A
     with Session(scenarios.load("nutation", {**fault_cases.BASE, "detector.detect": True})) as session:
         # What the study takes for the threshold of the detector.
-        assert threshold_A == session._runtime._controller.data[0].supervision.detector.threshold_A
+        assert threshold_A == session._runtime._controller.data.supervision.detector.threshold_A
     idle = np.abs(healthy.telemetry["current_command_A"]) <= threshold_A
     length, end, group = max((*each, group) for group in range(18) for each in stretches(idle[:, group]))
     assert length >= 50
