@@ -101,7 +101,7 @@ def numbers(part, path=""):
 
 def controller(changes):
     with Session(scenarios.load("tilt", changes)) as session:
-        return numbers(session._runtime._controller)
+        return numbers(session._runtime._assembly.controllers)
 
 
 @pytest.fixture(scope="module")
