@@ -89,7 +89,10 @@ class RunBlock:
             self._advance(block.inputs, tick - block.first, tick, until - tick)
             tick = until
         self._reduction.count(self._done)
-        return [self._ending(run) if finite[run] else None for run in range(len(finite))]
+        reasons = self._assembly.rows["controller"]["supervision"]["watchdog"]["reason"].tolist()
+        return [
+            self._ending(run, REASONS[reasons[run]]) if finite[run] else None for run in range(len(finite))
+        ]
 
     def _advance(self, inputs: Inputs, row: int, tick: int, ticks: int) -> None:
         own = self._assembly
@@ -108,8 +111,7 @@ class RunBlock:
         with outside_turn:
             run_rows(inputs, row, tick, *parts)
 
-    def _ending(self, run: int) -> Ending:
-        reason = REASONS[self._assembly.rows[run].controller.supervision.watchdog.reason]
+    def _ending(self, run: int, reason: Reason) -> Ending:
         status = Status.FAILSAFE if reason else BY_CODE[self._codes[run]]
         status = Status.COMPLETED if status == Status.RUNNING else status
         return Ending(status, reason, self._figures.values(run))

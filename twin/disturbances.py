@@ -286,6 +286,12 @@ class Disturbance(BaseModel):
         """True if the disturbance depends on the seed."""
         return self.random_bound_Nm > 0 or any(isinstance(term, RandomDisturbance) for term in self.terms)
 
+    @property
+    def grows(self) -> bool:
+        """True if the disturbance may overflow in a long run."""
+        terms = [term.gamma_envelope for term in self.terms if isinstance(term, RandomDisturbance)]
+        return "growing" in (self.gamma_envelope if self.random_bound_Nm else "", *terms)
+
     def sample(self, t: NDArray[np.float64], draws: Draws) -> NDArray[np.float64]:
         """Return the disturbance at the control ticks, each held for a control period.
 

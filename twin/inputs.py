@@ -108,6 +108,10 @@ class InputGenerator:
 
     def stays_finite(self, tick: int) -> NDArray[np.bool_]:
         """Return whether reference and disturbance of each run, or of all of them, are finite at a tick."""
+        if not np.any(self._scenario.disturbance.grows):
+            period_s = self._scenario.controller.period_s
+            trajectories = _each(self._scenario.trajectory)
+            return np.array([self._reference(own, period_s, tick, 1).finite[0] for own in trajectories])
         return self._end(tick).finite[:, 0]
 
     def check_horizon(self, tick: int) -> None:

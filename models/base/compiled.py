@@ -82,8 +82,17 @@ def for_types_of(function: Any, *arguments: Any) -> Callable[..., Any]:
         return uncompiled(function)
     key = function, _kind(arguments)
     if key not in _ENTRIES:
-        _ENTRIES[key] = function.compile(tuple(map(numba.typeof, arguments)))
+        _ENTRIES[key] = function.compile(tuple(map(_type_of, arguments)))
     return _ENTRIES[key]
+
+
+def _type_of(value: Any) -> Any:
+    """Return the type of an argument; of arrays of records one for any distance between the records."""
+    if isinstance(value, tuple) and hasattr(value, "_fields"):
+        return types.NamedTuple(tuple(map(_type_of, value)), type(value))
+    if isinstance(value, np.ndarray) and value.dtype.names:
+        return types.Array(numba.from_dtype(value.dtype), value.ndim, "A")
+    return numba.typeof(value)
 
 
 def _kind(value: Any) -> Any:
@@ -91,7 +100,7 @@ def _kind(value: Any) -> Any:
     if isinstance(value, tuple):
         return type(value), *map(_kind, value)
     if isinstance(value, np.ndarray):
-        return value.dtype, value.ndim, value.flags.c_contiguous
+        return value.dtype, value.ndim, value.flags.c_contiguous or value.dtype.names is not None
     if isinstance(value, np.void):
         return value.dtype
     return type(value)

@@ -125,22 +125,23 @@ class Rows:
         InputError
             Its values are out of range, or do not fit each other.
         """
-        numbers = {name: value for name, value in row.values.items() if is_number(value)}
-        shape = *self._shape(row), engine
+        return self._scenario(row, self._shape(row, engine), engine)
+
+    def _scenario(self, row: Row, shape: tuple[Any, ...], engine: str | None) -> Scenario:
         if shape not in self._templates:
             if len(self._templates) >= MOST_TEMPLATES:
                 self._templates.clear()
             fields = self._whole(self._fields_of(row, engine))
-            self._templates[shape] = template_of(fields, ("seed", *numbers), self.study.scenario)
+            self._templates[shape] = template_of(fields, ("seed", *shape[1]), self.study.scenario)
         if template := self._templates[shape]:
-            return template.scenario((row.seed, *numbers.values()))
+            return template.scenario((row.seed, *(row.values[name] for name in shape[1])))
         return self._validated(self._fields_of(row, engine))
 
-    def _shape(self, row: Row) -> tuple[Any, ...]:
-        """Return what rows that differ in numbers alone have in common."""
+    def _shape(self, row: Row, engine: str | None) -> tuple[Any, ...]:
+        """Return what rows that differ in numbers alone have in common: texts, names of numbers, plant."""
         others = {name: value for name, value in row.values.items() if not is_number(value)}
         numbers = tuple(name for name in row.values if name not in others)
-        return json.dumps([row.law, others]), numbers
+        return json.dumps([row.law, others]), numbers, engine
 
     def run(self, rows: Sequence[Row], engine: str | None = None) -> list[Result]:
         """Run rows; an error of a row is its result.
@@ -162,22 +163,25 @@ class Rows:
         together: dict[Any, list[tuple[int, Scenario]]] = {}
         for place, row in enumerate(rows):
             with suppress(InputError):  # the row alone is refused with its reason
-                scenario = self._without_unread(self.scenario(row, engine))
-                if kind := self._kind_of_block(row, scenario):
+                shape = self._shape(row, engine)
+                scenario = self._without_unread(self._scenario(row, shape, engine))
+                if kind := self._kind_of_block(row, scenario, shape):
                     together.setdefault(kind, []).append((place, scenario))
         for members in together.values():
+            if len(members) == 1:  # its session starts in half of the time
+                continue
             places, scenarios = zip(*members, strict=True)
             with suppress(InputError, MixedRowsError):  # of one row or another: each runs alone
                 yield list(places), self._run_block(scenarios)
 
-    def _kind_of_block(self, row: Row, scenario: Scenario) -> Any:
+    def _kind_of_block(self, row: Row, scenario: Scenario, shape: tuple[Any, ...]) -> Any:
         """Return what the scenarios of a block have in common; None for a row that runs alone."""
         stored = self._telemetry is not None and row.number in self.study.telemetry
         if stored or scenario.event or is_reference(scenario.controller.law):
             return None
         clocks = scenario.controller.period_s, scenario.plant.step_s, scenario.ticks
         logged = tuple(bool(channel.logged(scenario)) for channel in CHANNELS)
-        return *self._shape(row), scenario.plant.engine, clocks, logged, id(self._files.files_of(scenario))
+        return *shape, scenario.plant.engine, clocks, logged, id(self._files.files_of(scenario))
 
     def _run_block(self, scenarios: Sequence[Scenario]) -> list[Result | None]:
         files = self._files.files_of(scenarios[0])

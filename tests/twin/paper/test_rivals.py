@@ -86,10 +86,10 @@ def test_frozen_gains_give_what_the_search_recorded(hardware, law):
     searched = Rows(tuning_gains.judged(study))
     rows_of_law = [row for row in Grid(searched.study) if row.law == {"law": law}]
     assert frozen(hardware)[law]
-    for each in frozen(hardware)[law]:
-        tried = trials.run_trial(
-            searched, rows_of_law, each["fields"], study.optimise.objective, lambda _: False, lambda: False
-        )
+    recorded = frozen(hardware)[law]
+    fields, objectives = [each["fields"] for each in recorded], study.optimise.objective
+    ends = trials.run_trials(searched, rows_of_law, fields, objectives, lambda _: False, lambda: False)
+    for each, tried in zip(recorded, ends, strict=True):
         # The same scenario and seed; another processor rounds otherwise, which a loop of high gain amplifies.
         assert tried.values == pytest.approx(list(each["values"].values()), rel=1e-3)
 

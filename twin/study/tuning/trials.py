@@ -1,4 +1,4 @@
-"""One trial: the rows of a law under some gains, one after the other, until it is complete or has lost."""
+"""Trials: the rows of a law under some gains, one after the other, until they are complete or have lost."""
 
 from __future__ import annotations
 
@@ -52,43 +52,57 @@ class FinishedTrial(NamedTuple):
     tried: Tried
 
 
-def run_trial(
+def run_trials(
     rows: Rows,
     conditions: Sequence[Row],
-    fields: Mapping[str, float],
+    fields: Sequence[Mapping[str, float]],
     objectives: Sequence[Objective],
     has_lost: Callable[[Sequence[float]], bool],
     stop_requested: Callable[[], bool],
-) -> Tried | None:
-    """Run a trial; None if it was stopped.
+) -> list[Tried | None]:
+    """Run trials together, row by row; None for those that were stopped.
 
     Parameters
     ----------
     rows : Rows
     conditions : sequence of Row
-        Rows of its law.
-    fields : mapping
-        Value of each field that its gains set.
+        Rows of their law.
+    fields : sequence of mapping
+        For each trial, the value of each field that its gains set.
     objectives : sequence of Objective
     has_lost : callable
         Whether a trial whose objectives are at least these has lost.
     stop_requested : callable
     """
-    by_row: list[list[float]] = []
+    by_row: list[list[list[float]]] = [[] for _ in fields]
+    tried: list[Tried | None] = [None] * len(fields)
     for row in conditions:
-        if stop_requested():
-            return None
-        (result,) = rows.run([with_fields(row, fields)])
-        numbers = [
-            optimise.of_row(objective, result.figures.get(objective.metric)) for objective in objectives
-        ]
-        if reason := _reason_of_loss(row, result, objectives, numbers):
-            return Tried(Ended.LOST, reason, values_of(objectives, by_row, len(conditions)), by_row)
-        by_row.append([number for number in numbers if number is not None])
-        values = values_of(objectives, by_row, len(conditions))
-        if len(by_row) < len(conditions) and has_lost(values):
-            return Tried(Ended.PRUNED, "", values, by_row)
-    return Tried(Ended.COMPLETED, "", values, by_row)
+        going = [trial for trial in range(len(fields)) if tried[trial] is None]
+        if not going or stop_requested():
+            break
+        results = rows.run([with_fields(row, fields[trial]) for trial in going])
+        for trial, result in zip(going, results, strict=True):
+            tried[trial] = _ended(row, result, by_row[trial], len(conditions), objectives, has_lost)
+    return tried
+
+
+def _ended(
+    row: Row,
+    result: Result,
+    by_row: list[list[float]],
+    of: int,
+    objectives: Sequence[Objective],
+    has_lost: Callable[[Sequence[float]], bool],
+) -> Tried | None:
+    """Add the objectives of a row to those of a trial; return its end, if it has ended."""
+    numbers = [optimise.of_row(objective, result.figures.get(objective.metric)) for objective in objectives]
+    if reason := _reason_of_loss(row, result, objectives, numbers):
+        return Tried(Ended.LOST, reason, values_of(objectives, by_row, of), by_row)
+    by_row.append([number for number in numbers if number is not None])
+    values = values_of(objectives, by_row, of)
+    if len(by_row) == of:
+        return Tried(Ended.COMPLETED, "", values, by_row)
+    return Tried(Ended.PRUNED, "", values, by_row) if has_lost(values) else None
 
 
 def with_fields(row: Row, fields: Mapping[str, float]) -> Row:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import os
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import closing
@@ -49,7 +50,6 @@ def hold_out(
     law: Mapping[str, Any] | None,
     optimise: Optimise,
     fields: Mapping[int, Mapping[str, float]],
-    threads: int | None,
     stop_requested: Callable[[], bool],
 ) -> dict[int, Holdout]:
     """Run some trials of a law under as many further seeds as the study says.
@@ -61,7 +61,6 @@ def hold_out(
     optimise : Optimise
     fields : mapping
         Value of each field that its gains set, by trial.
-    threads : int, optional
     stop_requested : callable
 
     Returns
@@ -75,15 +74,13 @@ def hold_out(
     longer = Grid(rows.study.model_copy(update={"seeds": seeds + optimise.fresh}))
     conditions = [row for row in longer if row.law == law and row.repeat >= seeds]
 
-    def run(number: int) -> Tried | None:
-        return trial.run_trial(
-            rows, conditions, fields[number], optimise.objective, lambda _: False, stop_requested
-        )
-
+    tried = trial.run_trials(
+        rows, conditions, list(fields.values()), optimise.objective, lambda _: False, stop_requested
+    )
     return {
-        number: Holdout(tried.reason, tried.values if tried.ended == Ended.COMPLETED else [])
-        for number, tried in run_each(fields, run, threads)
-        if tried is not None
+        number: Holdout(one.reason, one.values if one.ended == Ended.COMPLETED else [])
+        for number, one in zip(fields, tried, strict=True)
+        if one is not None
     }
 
 
@@ -265,7 +262,7 @@ def tune(
         finally:
             trials_of_laws = [(law.called, law.gains, law.trials, law.proposer.best) for law in laws]
             write(folder / NAME, study, rows, trials_of_laws)
-        results = [law.result(threads, stop_requested) for law in laws]
+        results = [law.result(stop_requested) for law in laws]
     finished = sum(len(result.trials) for result in results)
     return TuningResult(
         laws=results,
@@ -334,27 +331,30 @@ class _Law:
             beyond = bool(self._optimise.limits) and values[1] > self._optimise.limits[-1]
             return beyond or any(objectives.dominates(better, values) for better in completed)
 
-        def run(proposal: Trial) -> Tried | None:
-            fields = gains.values(self.gains, proposal.params)
-            return trial.run_trial(
+        def run(share: Sequence[Trial]) -> list[Tried | None]:
+            fields = [gains.values(self.gains, proposal.params) for proposal in share]
+            return trial.run_trials(
                 self._rows, self.conditions, fields, self._optimise.objective, has_lost, stop_requested
             )
 
-        with closing(run_each(proposals, run, threads)) as results:
-            for proposal, tried in results:
-                if tried is not None:
-                    record = [proposal.params, tried.ended, tried.reason, tried.by_row]
-                    self._journal.append(self._laws * proposal.number + self._place, record)
-                    self.proposer.tell(proposal, tried)
-                    report()
+        count = threads or os.cpu_count() or 1
+        shares = [share for first in range(count) if (share := proposals[first::count])]
+        with closing(run_each(shares, run, count)) as results:
+            for share, ends in results:
+                for proposal, tried in zip(share, ends, strict=True):
+                    if tried is not None:
+                        record = [proposal.params, tried.ended, tried.reason, tried.by_row]
+                        self._journal.append(self._laws * proposal.number + self._place, record)
+                        self.proposer.tell(proposal, tried)
+                        report()
 
-    def result(self, threads: int | None, stop_requested: Stop) -> LawResult:
+    def result(self, stop_requested: Stop) -> LawResult:
         """Result of the law: its start and its best, with their holdout."""
         finished = self.proposer.finished
         has_start = gains.start_of(self.gains) is not None and 0 in finished
         numbers = dict.fromkeys([*([0] if has_start else []), *self.proposer.best])
         fields = {number: gains.values(self.gains, finished[number].chosen) for number in numbers}
-        holdouts = hold_out(self._rows, self._law, self._optimise, fields, threads, stop_requested)
+        holdouts = hold_out(self._rows, self._law, self._optimise, fields, stop_requested)
         reported = {
             number: ReportedTrial(
                 finished[number],

@@ -76,7 +76,7 @@ def test_a_killed_process_loses_no_trial_that_it_reported(tmp_path):
 def test_what_is_stopped_goes_on(tmp_path):
     noisy = study(tmp_path, **TWO, fresh=3)
     asked = iter(range(10**9))
-    result = tune(noisy, tmp_path, trials=TRIALS, threads=1, stop_requested=lambda: next(asked) > 20)
+    result = tune(noisy, tmp_path, trials=TRIALS, threads=1, stop_requested=lambda: next(asked) > 8)
     assert 0 < result.trials < result.of == TRIALS
     messages = []
     again = tune(noisy, tmp_path, trials=TRIALS, threads=1, done=lambda done, of: messages.append((done, of)))
@@ -119,7 +119,7 @@ def test_a_damaged_line_is_run_again_and_what_is_finished_is_not(tmp_path, monke
     assert tune(noisy, tmp_path, trials=TRIALS).resumed == TRIALS - 1
     assert table(tmp_path) == whole
     before = (tmp_path / JOURNAL).read_bytes()
-    monkeypatch.setattr("spheretwin.study.tuning.trials.run_trial", None)
+    monkeypatch.setattr("spheretwin.study.tuning.trials.run_trials", None)
     complete = tune(noisy, tmp_path, trials=TRIALS)
     assert (complete.trials, complete.resumed) == (TRIALS, TRIALS)
     assert (tmp_path / JOURNAL).read_bytes() == before

@@ -73,7 +73,7 @@ def test_pruning_loses_nothing(tmp_path, objectives, over):
     for each in pruned:
         fields = gains.values(noisy.optimise.gain, each.chosen)
         objectives = noisy.optimise.objective
-        whole = trial.run_trial(rows, conditions, fields, objectives, lambda _: False, lambda: False)
+        (whole,) = trial.run_trials(rows, conditions, [fields], objectives, lambda _: False, lambda: False)
         assert len(each.tried.by_row) < len(whole.by_row) == 5
         assert whole.by_row[: len(each.tried.by_row)] == each.tried.by_row
         assert dominated(whole.values, completed)
