@@ -84,6 +84,10 @@ class Grid:
         return (self[number] for number in range(len(self)))
 
     def __getitem__(self, number: int) -> Row:
+        return self.row(number)
+
+    def row(self, number: int, key: str | None = None) -> Row:
+        """Row of a number; a known key need not be computed again."""
         if not 0 <= number < self._rows:
             raise IndexError(number)
         *places, point, law, repeat = _mixed(number, self._sizes)
@@ -92,7 +96,7 @@ class Grid:
             values |= {field: listed[place] for field, listed in group.items()}
         values |= zip(self._drawn, self._points[point].tolist(), strict=True)
         ordered = {field: values[field] for field in self._fields}
-        key = _key(ordered, self._laws[law], repeat)
+        key = key or _key(ordered, self._laws[law], repeat)
         drawn_from = f"repeat {repeat}" if self._study.common_seeds else key
         return Row(number, key, _seed(self._study.seed, drawn_from), ordered, self._laws[law], repeat)
 

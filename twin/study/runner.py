@@ -10,7 +10,6 @@ from typing import NamedTuple
 
 from spheretwin.models.base.errors import InputError, SpheretwinError, did_you_mean, shown
 from spheretwin.models.base.files import make_folder
-from spheretwin.models.telemetry.status import Status
 from spheretwin.study import journal, table
 from spheretwin.study.engines import ENGINES
 from spheretwin.study.engines.engine import Engine, Order, Work
@@ -168,15 +167,12 @@ def run(
             with suppress(SpheretwinError):  # the first error is reported, as of a full disk
                 table.write(folder / table.NAME, grid, stored, rows)
             raise
-        table.write(folder / table.NAME, grid, stored, rows)
+        failed = table.write(folder / table.NAME, grid, stored, rows)
         return StudyResult(
             rows=stored.done(),
             of=resumed + missing,
             study_rows=len(grid),
-            failed=sum(
-                result.status != Status.COMPLETED or result.error is not None
-                for _, result in stored.results()
-            ),
+            failed=failed,
             resumed=resumed,
             torn=stored.torn,
             damaged=stored.damaged,

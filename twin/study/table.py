@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 from spheretwin.metrics import METRICS
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.telemetry import checksums
+from spheretwin.models.telemetry.status import Status
 from spheretwin.scenario import reading
 from spheretwin.study.grid import Grid, Row
 from spheretwin.study.journal import Journal
@@ -45,8 +46,8 @@ def check_names(rows: Rows) -> None:
         )
 
 
-def write(path: Path, grid: Grid, journal: Journal, rows: Rows) -> None:
-    """Write all finished rows, in the order of the study, whole or not at all.
+def write(path: Path, grid: Grid, journal: Journal, rows: Rows) -> int:
+    """Write all finished rows, in the order of the study, whole or not at all; return how many have failed.
 
     Raises
     ------
@@ -56,10 +57,19 @@ def write(path: Path, grid: Grid, journal: Journal, rows: Rows) -> None:
     schema = _schema(grid, journal, rows)
     base = _base(rows)
     metadata = {"study": rows.study.model_dump_json(), "scenario": json.dumps(base)}
-    records = (_record(grid[number], result, rows, base) for number, result in journal.results())
+    failed = 0
+
+    def records() -> Iterator[dict[str, Any]]:
+        nonlocal failed
+        for number, (key, *record) in journal.records():
+            result = Result(*record)
+            failed += result.status != Status.COMPLETED or result.error is not None
+            yield _record(grid.row(number, key), result, rows, base)
+
     checksums.write_parquet(
-        path, schema.with_metadata(metadata), _batches(schema, records), compression="zstd"
+        path, schema.with_metadata(metadata), _batches(schema, records()), compression="zstd"
     )
+    return failed
 
 
 def _batches(schema: pa.Schema, records: Iterator[dict[str, Any]]) -> Iterator[pa.Table]:
