@@ -86,7 +86,7 @@ class RunBlock:
             )
             finite &= (self._codes != GOING) | (block.finite_rows >= until - block.first)
             self._codes[~finite] = loops.INTERRUPTED
-            self._advance(block.inputs, tick - block.first, tick, until - tick)
+            self.advance(block.inputs, tick - block.first, tick, until - tick)
             tick = until
         self._reduction.count(self._done)
         reasons = self._assembly.rows["controller"]["supervision"]["watchdog"]["reason"].tolist()
@@ -94,7 +94,8 @@ class RunBlock:
             self._ending(run, REASONS[reasons[run]]) if finite[run] else None for run in range(len(finite))
         ]
 
-    def _advance(self, inputs: Inputs, row: int, tick: int, ticks: int) -> None:
+    def advance(self, inputs: Inputs, row: int, tick: int, ticks: int) -> None:
+        """Run the loops of all runs for some ticks, from a row of their inputs on."""
         own = self._assembly
         parts = (
             *own.functions[:3],

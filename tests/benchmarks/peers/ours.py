@@ -10,10 +10,10 @@ import pyarrow.parquet as parquet
 from problem import Problem, problem
 
 from spheretwin import scenario as scenarios
-from spheretwin.metrics import METRICS
-from spheretwin.reduction import PlannedRun
+from spheretwin.active_config import fill_defaults
+from spheretwin.block import RunBlock
+from spheretwin.scenario.files import files_of
 from spheretwin.scenario.sections import Scenario
-from spheretwin.session import Session
 from spheretwin.study import grid, row, runner
 from spheretwin.study.study import Study, made
 
@@ -62,22 +62,15 @@ class Prepared:
         self._rows, self._grid = row.Rows(chosen), grid.Grid(chosen)
 
     def prepare(self) -> None:
-        """Build the session of every row with its reference and disturbance."""
-        self._sessions = [self._rows.session(self._rows.scenario(each)) for each in self._grid]
-        for session in self._sessions:
-            session.check_horizon(1)
-            session._inputs.rows(0, 1)
+        """Build the blocks of all rows."""
+        scenarios = [self._rows.scenario(each) for each in self._grid]
+        files = files_of(scenarios[0])
+        resolved = [fill_defaults(each, files, None, None) for each in scenarios]
+        share = -(-len(resolved) // (4 * os.cpu_count()))
+        parts = [resolved[first : first + share] for first in range(0, len(resolved), share)]
+        self._blocks = [RunBlock(part, files, FIGURES) for part in parts]
 
     def __call__(self) -> None:
         """Run them on all cores."""
         with ThreadPoolExecutor(os.cpu_count()) as pool:
-            list(pool.map(_figures_of, self._sessions))
-
-
-def _figures_of(session: Session) -> dict[str, object]:
-    planned = PlannedRun(session.initial_scenario, session.actuator, session.initial_scenario.ticks)
-    metrics = {name: METRICS[name](planned) for name in FIGURES}
-    table = session.advance(session.initial_scenario.ticks)
-    for metric in metrics.values():
-        metric.write(table)
-    return {name: metric.value() for name, metric in metrics.items()}
+            list(pool.map(RunBlock.run, self._blocks))
