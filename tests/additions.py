@@ -167,9 +167,9 @@ class MeanLoad(Metric):
         """Return the sums."""
         return np.zeros((planned.runs, 3))
 
-    def result(self, run, rows):
-        """Return [3] in N·m."""
-        return (self.state[run] / rows).tolist()
+    def results(self, rows):
+        """Return [3] in N·m of each run."""
+        return (self.state / rows[:, None]).tolist()
 ''',
         "twin/metrics/__init__.py",
         (

@@ -23,7 +23,6 @@ from spheretwin.inputs import BLOCK_TICKS, InputGenerator
 from spheretwin.loop import Inputs, inputs_of, loop
 from spheretwin.models.base.columns import Columns
 from spheretwin.models.base.compiled import allocation_free, for_types_of
-from spheretwin.models.base.turns import outside_turn
 from spheretwin.models.telemetry.signals import width
 from spheretwin.models.telemetry.status import BY_CODE, Status
 from spheretwin.plant.plant_tick import GOING
@@ -90,8 +89,9 @@ class RunBlock:
             tick = until
         self._reduction.count(self._done)
         reasons = self._assembly.rows["controller"]["supervision"]["watchdog"]["reason"].tolist()
+        ended = zip(self._codes.tolist(), reasons, self._figures.of_each_run(), finite, strict=True)
         return [
-            self._ending(run, REASONS[reasons[run]]) if finite[run] else None for run in range(len(finite))
+            _ending(code, REASONS[reason], figures) if kept else None for code, reason, figures, kept in ended
         ]
 
     def advance(self, inputs: Inputs, row: int, tick: int, ticks: int) -> None:
@@ -109,13 +109,12 @@ class RunBlock:
             self._done,
         )
         run_rows = for_types_of(_runner_of(self._reduction.function), inputs, row, tick, *parts)
-        with outside_turn:
-            run_rows(inputs, row, tick, *parts)
+        run_rows(inputs, row, tick, *parts)
 
-    def _ending(self, run: int, reason: Reason) -> Ending:
-        status = Status.FAILSAFE if reason else BY_CODE[self._codes[run]]
-        status = Status.COMPLETED if status == Status.RUNNING else status
-        return Ending(status, reason, self._figures.values(run))
+
+def _ending(code: int, reason: Reason, figures: dict[str, Any]) -> Ending:
+    status = Status.FAILSAFE if reason else BY_CODE[code]
+    return Ending(Status.COMPLETED if status == Status.RUNNING else status, reason, figures)
 
 
 @cache

@@ -13,6 +13,7 @@ from functools import cache
 from typing import Any, ClassVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from spheretwin.models.actuator import Actuator
 from spheretwin.models.base.compiled import for_types_of, inlined, rounding_each
@@ -93,14 +94,15 @@ class Metric(ABC):
     def reserve(self, ticks: int) -> None:  # noqa: B027  # most states have one size
         """Extend the states to a number of ticks, if their size depends on it."""
 
-    def value(self, run: int = 0) -> Any:
-        """Return the value of the metric in JSON types; None if there are too few rows."""
-        rows = int(self.rows[run])
-        return self.result(run, rows) if rows >= self.least_rows else None
+    def values(self) -> list[Any]:
+        """Return the value of the metric for each run in JSON types; None if there are too few rows."""
+        rows = np.maximum(self.rows, self.least_rows)
+        counted = zip(self.rows.tolist(), self.results(rows), strict=True)
+        return [value if count >= self.least_rows else None for count, value in counted]
 
     @abstractmethod
-    def result(self, run: int, rows: int) -> Any:
-        """Return the value of a run of at least `least_rows` rows."""
+    def results(self, rows: NDArray[np.int64]) -> list[Any]:
+        """Return the value of each run, for its number of rows, at least `least_rows`."""
 
     def warnings(self) -> list[str]:
         """Return warnings that concern the validity of the figures of the first run, one line each."""

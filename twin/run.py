@@ -275,6 +275,7 @@ class Figures:
     """
 
     def __init__(self, planned: PlannedRun, names: Iterable[str] = METRICS) -> None:
+        self._runs = planned.runs
         every = {name: kind(planned) for name, kind in METRICS.items()}
         self._metrics = {name: every[name] for name in names}
         # All of them, whatever the names: one reducer is compiled for all runs.
@@ -295,9 +296,15 @@ class Figures:
         """Return the compiled reduction of the telemetry of all runs up to a tick."""
         return Reduction(self._all, signals, ticks)
 
-    def values(self, run: int = 0) -> dict[str, Any]:
-        """Return the figures of a run by name; None for a figure with too few rows."""
-        return {name: metric.value(run) for name, metric in self._metrics.items()}
+    def values(self) -> dict[str, Any]:
+        """Return the figures of the only run by name; None for a figure with too few rows."""
+        return self.of_each_run()[0]
+
+    def of_each_run(self) -> list[dict[str, Any]]:
+        """Return the figures of each run by name; None for a figure with too few rows."""
+        columns = [metric.values() for metric in self._metrics.values()]
+        runs = zip(*columns, strict=True) if columns else [()] * self._runs
+        return [dict(zip(self._metrics, values, strict=True)) for values in runs]
 
     def warnings(self) -> list[str]:
         """Return warnings that concern the validity of the figures, one line each."""

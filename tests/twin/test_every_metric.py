@@ -31,7 +31,7 @@ def runs():
 def test_every_metric_is_what_json_holds_and_none_without_a_row(runs, name):
     for run in runs:
         empty = METRICS[name](planned_for(run))
-        assert (empty.value(), empty.warnings()) == (None, [])
+        assert (empty.values()[0], empty.warnings()) == (None, [])
         value = figures_of(run)[name]
         assert json.loads(json.dumps(value, allow_nan=False)) == value
 
@@ -46,7 +46,7 @@ def in_chunks(run, name, ends):
     for first, last in zip([0, *ends], [*ends, len(table)], strict=True):
         if last > first:
             metric.write(table.rows(first, last))
-    return metric.value()
+    return metric.values()[0]
 
 
 @pytest.mark.parametrize("name", METRICS)

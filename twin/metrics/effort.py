@@ -13,6 +13,7 @@ from spheretwin.models.base.compiled import rounding_each
 from spheretwin.reduction import Metric, PlannedRun
 
 Array = NDArray[np.float64]
+Integers = NDArray[np.int64]
 
 
 class CopperState(NamedTuple):
@@ -74,14 +75,11 @@ class CopperLoss(Metric):
         limit_A = np.array(np.broadcast_to(section.current_limit_A, (runs, 1))[:, 0], float)
         return CopperState(step, tick, tick_squared, limit_A, not section.converts, squares, logged_W)
 
-    def result(self, run: int, rows: int) -> float:
-        """Return the loss in J."""
-        shape = self.state.squares.shape
-        resistance_ohm = np.broadcast_to(self.planned.scenario.drive.resistance_ohm, shape)[run]
-        heat_W = np.sum(np.multiply(resistance_ohm, self.state.squares[run])) + np.sum(
-            self.state.logged_W[run]
-        )
-        return float(heat_W * self.planned.period_s)
+    def results(self, rows: Integers) -> list[float]:
+        """Return the loss of each run in J."""
+        heated = np.multiply(self.planned.scenario.drive.resistance_ohm, self.state.squares)
+        heat_W = heated.sum(axis=1) + self.state.logged_W.sum(axis=1)
+        return (heat_W * self.planned.period_s).tolist()
 
 
 @rounding_each
@@ -110,9 +108,9 @@ class CurrentVariation(Metric):
         """Return the variation and the last command of each group, (runs, 2, n) in A."""
         return np.zeros((planned.runs, 2, len(planned.actuator.groups)))
 
-    def result(self, run: int, rows: int) -> float:
-        """Return the variation in A/s."""
-        return float(self.state[run, 0].mean() / ((rows - 1) * self.planned.period_s))
+    def results(self, rows: Integers) -> list[float]:
+        """Return the variation of each run in A/s."""
+        return (self.state[:, 0].mean(axis=1) / ((rows - 1) * self.planned.period_s)).tolist()
 
 
 class MaxAbsCurrent(Metric):
@@ -125,9 +123,9 @@ class MaxAbsCurrent(Metric):
         """Return the largest magnitudes (runs, n), minus infinity before the first row."""
         return np.full((planned.runs, len(planned.actuator.groups)), -np.inf)
 
-    def result(self, run: int, rows: int) -> float:
-        """Return the current in A."""
-        return float(self.state[run].max())
+    def results(self, rows: Integers) -> list[float]:
+        """Return the current of each run in A."""
+        return self.state.max(axis=1).tolist()
 
 
 @rounding_each
@@ -152,9 +150,9 @@ class RmsTorque(Metric):
         """Return the sums of squares (runs, 3)."""
         return np.zeros((planned.runs, 3))
 
-    def result(self, run: int, rows: int) -> float:
-        """Return the torque in N·m."""
-        return float(np.sqrt(self.state[run].sum() / rows))
+    def results(self, rows: Integers) -> list[float]:
+        """Return the torque of each run in N·m."""
+        return np.sqrt(self.state.sum(axis=1) / rows).tolist()
 
 
 SATURATED_SHARE = 0.05
@@ -180,9 +178,9 @@ class SaturatedFraction(Metric):
         """Return the ticks with reduced torque, and with a torque matrix of less than rank 3, (runs, 2)."""
         return np.zeros((planned.runs, 2), dtype=np.int64)
 
-    def result(self, run: int, rows: int) -> float:
-        """Return the share, 0 to 1."""
-        return int(self.state[run, 0]) / rows
+    def results(self, rows: Integers) -> list[float]:
+        """Return the share of each run, 0 to 1."""
+        return (self.state[:, 0] / rows).tolist()
 
     def warnings(self) -> list[str]:
         """Return warnings if the limit, or a torque matrix without full rank, determines the figures."""
@@ -192,7 +190,7 @@ class SaturatedFraction(Metric):
                 "the torque matrix of the groups in use has less than rank 3 at"
                 f" {rank_lost} of {self.rows[0]} ticks: no currents are commanded there"
             )
-        share = self.value() or 0.0
+        share = self.values()[0] or 0.0
         if share > SATURATED_SHARE:
             warnings.append(
                 f"the current limit reduced the torque at {100 * share:.0f} % of the ticks: the figures"
@@ -219,9 +217,9 @@ class RotorTemperature(Metric):
         """Return the temperatures (runs,), minus infinity before the first one."""
         return np.full(planned.runs, -np.inf)
 
-    def result(self, run: int, rows: int) -> float | None:
-        """Return the temperature in °C; None without one."""
-        return float(self.state[run]) if self.state[run] > -np.inf else None
+    def results(self, rows: Integers) -> list[float | None]:
+        """Return the temperature of each run in °C; None without one."""
+        return [largest if largest > -np.inf else None for largest in self.state.tolist()]
 
     def warnings(self) -> list[str]:
         """Return a warning if magnets may have been demagnetised, which the model does not contain."""

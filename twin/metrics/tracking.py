@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +12,7 @@ from spheretwin.models.telemetry.signals import ANGLES
 from spheretwin.reduction import Metric, PlannedRun
 
 Array = NDArray[np.float64]
+Integers = NDArray[np.int64]
 
 
 @rounding_each
@@ -34,9 +35,9 @@ class MaxAbsError(Metric):
         """Return the largest magnitudes (runs, 3), minus infinity before the first row."""
         return np.full((planned.runs, 3), -np.inf)
 
-    def result(self, run: int, rows: int) -> list[float]:
-        """Return [3] in rad."""
-        return self.state[run].tolist()
+    def results(self, rows: Integers) -> list[list[float]]:
+        """Return [3] in rad of each run."""
+        return self.state.tolist()
 
 
 PIECE_TICKS = 256
@@ -79,17 +80,20 @@ class RmsError(Metric):
             more = np.zeros((len(self.rows), missing, 3))
             self.state = self.state._replace(sums=np.concatenate([self.state.sums, more], axis=1))
 
-    def result(self, run: int, rows: int) -> list[float]:
-        """Return [3] in rad."""
-        return self._rms(run, rows, 0)
+    def results(self, rows: Integers) -> list[list[float]]:
+        """Return [3] in rad of each run."""
+        return self._rms(rows, np.zeros_like(rows))
 
-    def _rms(self, run: int, rows: int, piece: int) -> list[float]:
-        """Return the root mean square from the first tick of a piece on."""
-        begins = max(0, (piece - 1) * PIECE_TICKS + self.state.offset)
-        return np.sqrt(self.state.sums[run, piece:].sum(axis=0) / (rows - begins)).tolist()
+    def _rms(self, rows: Integers, first: Integers) -> list[list[float]]:
+        """Return the root mean square of each run from the first tick of a piece on."""
+        begins = np.maximum(0, (first - 1) * PIECE_TICKS + self.state.offset)
+        squares = np.empty((len(rows), 3))
+        for piece in set(first.tolist()):
+            squares[first == piece] = self.state.sums[first == piece, piece:].sum(axis=1)
+        return np.sqrt(squares / (rows - begins)[:, None]).tolist()
 
-    def _piece(self, tick: int) -> int:
-        """Return the piece that contains a tick."""
+    def _piece(self, tick: Any) -> Any:
+        """Return the piece that contains a tick, or each of many."""
         return (tick - self.state.offset) // PIECE_TICKS + 1
 
 
@@ -100,9 +104,9 @@ class TailRmsError(RmsError):
     ticks before its half.
     """
 
-    def result(self, run: int, rows: int) -> list[float]:
-        """Return [3] in rad."""
-        return self._rms(run, rows, self._piece(rows // 2))
+    def results(self, rows: Integers) -> list[list[float]]:
+        """Return [3] in rad of each run."""
+        return self._rms(rows, self._piece(rows // 2))
 
 
 BAND_rad = 0.01
@@ -110,9 +114,7 @@ BAND_rad = 0.01
 
 
 @rounding_each
-def _add_outside(
-    rows: Array, first: int, columns: tuple[int, ...], last: NDArray[np.int64], run: int
-) -> None:
+def _add_outside(rows: Array, first: int, columns: tuple[int, ...], last: Integers, run: int) -> None:
     (error,) = columns
     for i in range(rows.shape[0]):
         for j in range(3):
@@ -131,14 +133,17 @@ class SettlingTime(Metric):
     reads = ("error_rad",)
     add = staticmethod(_add_outside)
 
-    def start(self, planned: PlannedRun) -> NDArray[np.int64]:
+    def start(self, planned: PlannedRun) -> Integers:
         """Return the last tick of each hinge outside the band (runs, 3); -1 for none."""
         return np.full((planned.runs, 3), -1)
 
-    def result(self, run: int, rows: int) -> list[float | None]:
-        """Return [3] in s."""
-        settled = (self.state[run] + 1).tolist()
-        return [tick * self.planned.period_s if tick < rows else None for tick in settled]
+    def results(self, rows: Integers) -> list[list[float | None]]:
+        """Return [3] in s of each run."""
+        period_s, settled = self.planned.period_s, (self.state + 1).tolist()
+        return [
+            [tick * period_s if tick < of else None for tick in ticks]
+            for ticks, of in zip(settled, rows.tolist(), strict=True)
+        ]
 
 
 @rounding_each
@@ -167,8 +172,9 @@ class Overshoot(Metric):
         """Return the error at the first tick and the largest beyond the reference, (runs, 2, 3) in rad."""
         return np.zeros((planned.runs, 2, 3))
 
-    def result(self, run: int, rows: int) -> list[float | None]:
-        """Return [3] in rad."""
-        start, largest = self.state[run]
-        steps = np.abs(start) > BAND_rad
-        return [float(beyond) if step else None for beyond, step in zip(largest, steps, strict=True)]
+    def results(self, rows: Integers) -> list[list[float | None]]:
+        """Return [3] in rad of each run."""
+        return [
+            [beyond if abs(error) > BAND_rad else None for error, beyond in zip(start, largest, strict=True)]
+            for start, largest in self.state.tolist()
+        ]

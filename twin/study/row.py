@@ -186,7 +186,9 @@ class Rows:
     def _run_block(self, scenarios: Sequence[Scenario]) -> list[Result | None]:
         files = self._files.files_of(scenarios[0])
         resolved = [fill_defaults(scenario, files, None, None) for scenario in scenarios]
-        endings = RunBlock(resolved, files, self.metrics).run()
+        block = RunBlock(resolved, files, self.metrics)
+        with outside_turn:  # little of it is Python
+            endings = block.run()
         return [
             ending
             and Result(
