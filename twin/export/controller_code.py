@@ -13,7 +13,7 @@ from spheretwin import scenario as scenarios
 from spheretwin.active_config import initial_config
 from spheretwin.control.allocation import ALLOCATIONS
 from spheretwin.control.compensators import Compensators
-from spheretwin.control.controller import Controller
+from spheretwin.control.controller import Controller, controller_of
 from spheretwin.control.estimators import difference, differentiator, kalman
 from spheretwin.control.law import Law
 from spheretwin.control.law_components import feedback
@@ -21,8 +21,8 @@ from spheretwin.control.laws import afsm, afsm_eso, pd
 from spheretwin.export.c_text import constant, definitions, header, source
 from spheretwin.export.motion_code import controller_motion
 from spheretwin.export.plant_code import NUMBERS, magnetic_tables
+from spheretwin.models.base.compiled import uncompiled
 from spheretwin.models.base.errors import InputError
-from spheretwin.models.magnetics import TorqueModel
 from spheretwin.scenario.sections import ResolvedScenario
 
 LAWS: dict[Any, tuple[str, ...]] = {
@@ -90,11 +90,12 @@ def controller_code(scenario: str, changes: Mapping[str, Any] | None = None) -> 
     _check(resolved, law)
     magnetics = assembly.nominal_magnetics(resolved, config.files)
     rows = assembly.empty_run(resolved, magnetics, magnetics)["controller"]
-    controller = assembly.controllers_of(rows, resolved, [law], magnetics, [estimator], config.files.nominal)
+    only = assembly.controllers_of(rows, resolved, [law], magnetics, [estimator], config.files.nominal)
+    controller = uncompiled(controller_of)(only, 0)
     law_files, estimator_file = LAWS[law.step], ESTIMATORS[estimator.step if estimator else None]
     names = ["st_controller.h", "st_controller.c", "st_numbers.h", "st_equations.h"]
     names += [*law_files, estimator_file, *_ALLOCATIONS[resolved.allocation]]
-    compensators = controller.data[0].compensators
+    compensators = controller.data.compensators
     names += ["st_governor.h"] * compensators.governor.on + [
         "st_feed_forward.h"
     ] * compensators.feed_forward.on
@@ -138,7 +139,7 @@ def _check(scenario: ResolvedScenario, law: Law) -> None:
 
 def _model_header(scenario: ResolvedScenario, law: Law, controller: Controller, groups: int) -> str:
     """Return the header of sizes."""
-    compensators, applied = controller.data[0].compensators, controller.data[0].applied_torque
+    compensators, applied = controller.data.compensators, controller.data.applied_torque
     return header(
         definitions(
             {
@@ -164,10 +165,10 @@ def _table_header(
     estimator: str,
 ) -> str:
     """Return the header of parts, bounds, parameters and tables."""
-    applied = controller.data[0].applied_torque
+    applied = controller.data.applied_torque
     angles = hinge_range_rad + MARGIN_rad * np.array([-1.0, 1.0])
     numbers: dict[str, Any] = {
-        "ST_CURRENT_LIMIT_A": controller.data[0].current_limit_A,
+        "ST_CURRENT_LIMIT_A": controller.data.current_limit_A,
         "ST_ANGLE_BOUNDS": np.clip(angles, -LARGEST_ANGLE_rad, LARGEST_ANGLE_rad),
         "ST_LARGEST_ERROR": LARGEST_ERROR_rad,
         "ST_LARGEST_RATE": scenario.watchdog.largest_rate_rad_s,
@@ -184,14 +185,14 @@ def _table_header(
     tables: dict[str, Any] = {"ST_LAW_PARAMETERS": controller.parameters, "ST_LAW_START": controller.memory}
     if scenario.estimator.kind != "ideal":
         tables["ST_ESTIMATOR_PARAMETERS"] = controller.estimator_parameters
-    tables |= _compensator_tables(controller.data[0].compensators)
+    tables |= _compensator_tables(controller.data.compensators)
     files = {"ST_LAW": law, "ST_ESTIMATOR": estimator, "ST_ALLOCATION": _ALLOCATIONS[scenario.allocation][0]}
     return header(
         [
             NUMBERS,
             *(f'#define {name} "{file}"' for name, file in files.items()),
             *(constant(name, value) for name, value in {**numbers, **tables}.items()),
-            *magnetic_tables(TorqueModel(controller.data["arrangement"], controller.tables)),
+            *magnetic_tables(controller.data.arrangement, controller.tables),
         ]
     )
 

@@ -15,7 +15,7 @@ from spheretwin.export.c_text import constant, definitions, header
 from spheretwin.models import magnetics
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.coil_group import of_each_group
-from spheretwin.models.magnetics import TorqueModel
+from spheretwin.models.magnetics import Arrangement, Tables
 from spheretwin.models.mjcf_reader import HINGES
 from spheretwin.plant.magnet_heat import initial_degC, remanence
 from spheretwin.plant.plant_step import Parameters
@@ -124,7 +124,7 @@ class PlantCode(NamedTuple):
         joint = self.step.joint[0]
         lines = [
             NUMBERS,
-            *magnetic_tables(self.step.magnetics),
+            *magnetic_tables(self.step.magnetics.arrangement[0], self.step.magnetics.tables),
             *definitions({"ST_GENERAL_JOINT": bool(joint.on)}),
             constant("ST_HINGE_RANGE", self.hinge_range_rad, "double"),
             constant("ST_INITIAL", [value for one in self.states for value in one.values], "double"),
@@ -139,7 +139,7 @@ NUMBERS = "#define ST_C(number) ((ST_NUMBER)(number))"
 """First line of a header of tables."""
 
 
-def magnetic_tables(model: TorqueModel) -> list[str]:
+def magnetic_tables(of: Arrangement, tables: Tables) -> list[str]:
     """Return the tables of the torque matrix.
 
     Raises
@@ -147,7 +147,7 @@ def magnetic_tables(model: TorqueModel) -> list[str]:
     InputError
         The field is not that of pole lines and a torque curve.
     """
-    of, curve = model.arrangement[0], model.tables.curve
+    curve = tables.curve
     if of.coils.size:
         raise InputError("export: expected an actuator with a torque curve, received one with a torque field")
     lines, groups = len(of.line_axes), of.group_axes.shape[1]
@@ -160,16 +160,16 @@ def magnetic_tables(model: TorqueModel) -> list[str]:
         "ST_WIDE": magnetics.WIDE_PER_UNIT,
         "ST_NARROW": magnetics.NARROW_PER_UNIT,
     }
-    tables = {
+    arrays = {
         "ST_LINE_AXES": of.line_axes,
         "ST_LINE_WEIGHTS": of.line_weights,
         "ST_GROUP_AXES": of.group_axes,
         "ST_TABLE": curve,
     }
     if of.scattered:
-        tables["ST_PAIR_GAIN"] = of.pair_gain.reshape(2, lines, groups)
-        tables["ST_PAIR_STRETCH"] = of.pair_stretch.reshape(2, lines, groups)
-    return [*definitions(place), *(constant(name, table) for name, table in tables.items())]
+        arrays["ST_PAIR_GAIN"] = of.pair_gain.reshape(2, lines, groups)
+        arrays["ST_PAIR_STRETCH"] = of.pair_stretch.reshape(2, lines, groups)
+    return [*definitions(place), *(constant(name, table) for name, table in arrays.items())]
 
 
 def plant_code(
