@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import ctypes
+from abc import ABC, abstractmethod
 from collections.abc import Callable
-from typing import Any, NamedTuple, Protocol
+from functools import partial
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +14,7 @@ from numpy.typing import NDArray
 from spheretwin.control.supervision.watchdog import Reason, trip
 from spheretwin.loop import INTERRUPTED, NO_EXTERNAL, External
 from spheretwin.models.base.compiled import COMPILES, uncompiled
+from spheretwin.models.base.errors import InputError, shown
 from spheretwin.models.base.record import Rows
 from spheretwin.plant.plant_tick import GOING
 
@@ -33,7 +36,7 @@ class Measurement(NamedTuple):
     """Of the hottest coil; None if the machine does not report it."""
 
 
-class ExternalController(Protocol):
+class ExternalController(ABC):
     """Controller that replaces that of the scenario.
 
     Attributes
@@ -44,11 +47,12 @@ class ExternalController(Protocol):
 
     name: str
 
+    @abstractmethod
     def command(self, t_s: float, measurement: Measurement) -> Array | None:
         """Return the group currents (n,), A, for the measurement of a tick; None ends the run."""
 
 
-class ExternalPlant(Protocol):
+class ExternalPlant(ABC):
     """Machine that replaces the plant of the scenario.
 
     Attributes
@@ -62,6 +66,7 @@ class ExternalPlant(Protocol):
     name: str
     authority: float
 
+    @abstractmethod
     def advance(self, t_s: float, current_A: Array) -> tuple[Measurement, Reason] | None:
         """Send the currents (n,) of a tick; return the next measurement, and a reason to remove the currents.
 
@@ -81,24 +86,28 @@ class Connection:
     ----------
     external : External
         Argument of the loop. It has only addresses: this object keeps the functions alive.
+
+    Raises
+    ------
+    InputError
+        The part is neither.
     """
 
-    def __init__(self, part: Any, run: Rows) -> None:
-        self._part, self._run = part, run
+    def __init__(self, part: ExternalController | ExternalPlant | None, run: Rows) -> None:
+        self._run = run
         self._error: BaseException | None = None
         self.external = NO_EXTERNAL
-        if part is None:
-            return
-        is_plant = hasattr(part, "advance")
-        function = self._guarded(self._advance if is_plant else self._command)
-        self._callback = _CALLBACK(function)
-        entry = ctypes.cast(self._callback, ctypes.c_void_p).value if COMPILES else function
-        groups = len(run[0].plant.current)
-        self.external = External(
-            0 if is_plant else entry, entry if is_plant else 0, np.zeros(groups), np.zeros(3)
-        )
-        if is_plant:
+        of_part = np.zeros(len(run[0].plant.current)), np.zeros(3)
+        if isinstance(part, ExternalController):
+            run["controller"]["manual"]["on"] = True
+            self.external = External(self._entry(partial(self._command, part)), 0, *of_part)
+        elif isinstance(part, ExternalPlant):
             run["controller"]["authority"] = part.authority
+            self.external = External(0, self._entry(partial(self._advance, part)), *of_part)
+        elif part is not None:
+            raise InputError(
+                f"session: expected an ExternalController or an ExternalPlant, received {shown(part)}"
+            )
 
     def raise_error(self) -> None:
         """Raise the exception of the part, if there was one: it cannot pass the compiled loop."""
@@ -106,7 +115,9 @@ class Connection:
         if error is not None:
             raise error
 
-    def _guarded(self, function: Callable[[float], int]) -> Callable[[float], int]:
+    def _entry(self, function: Callable[[float], int]) -> Any:
+        """Return what the loop calls: a function whose exceptions end the run."""
+
         def call(t_s: float) -> int:
             try:
                 return function(t_s)
@@ -114,9 +125,10 @@ class Connection:
                 self._error = error
                 return INTERRUPTED
 
-        return call
+        self._callback = _CALLBACK(call)
+        return ctypes.cast(self._callback, ctypes.c_void_p).value if COMPILES else call
 
-    def _command(self, t_s: float) -> int:
+    def _command(self, part: ExternalController, t_s: float) -> int:
         plant, data = self._run[0].plant, self._run[0].controller
         sensors, drive = plant.current_sensors, plant.drive
         measurement = Measurement(
@@ -125,17 +137,17 @@ class Connection:
             sensors.measured_A if sensors.on else plant.current,
             drive.coil.temperature_degC.max() if drive.supplied else None,
         )
-        command = self._part.command(t_s, measurement)
+        command = part.command(t_s, measurement)
         if command is None:
             return INTERRUPTED
         data.manual.current_A[:] = command
         return GOING
 
-    def _advance(self, t_s: float) -> int:
+    def _advance(self, part: ExternalPlant, t_s: float) -> int:
         data, plant, external = self._run[0].controller, self._run[0].plant, self.external
         # Nominal torque of the currents: the true one is not known.
         np.dot(data.matrix.G, external.command, out=external.torque_S)
-        result = self._part.advance(t_s, external.command)
+        result = part.advance(t_s, external.command)
         if result is None:
             return INTERRUPTED
         measurement, reason = result
@@ -145,7 +157,7 @@ class Connection:
         plant.current[:] = external.command if measurement.current_A is None else measurement.current_A
         if reason:
             _trip(data.supervision.watchdog, int(reason))
-        data.authority = self._part.authority
+        data.authority = part.authority
         return GOING
 
 

@@ -112,8 +112,6 @@ class Runtime:
         self.rows, self._rotor = assembly.rows, assembly.rotor
         self._data = self.rows["controller"]
         self._controller = uncompiled(controller_of)(assembly.controllers, 0)
-        if hasattr(external, "command"):
-            self._data["manual"]["on"] = True
         self._faults = faults_of(scenario, self.rows)
         self._may_raise = is_user_law(law) or scenario.controller.check_bounds
         if COMPILES and is_python_law(law):

@@ -6,7 +6,7 @@ import pytest
 from spheretwin import replay
 from spheretwin import scenario as scenarios
 from spheretwin.control.supervision.watchdog import Reason
-from spheretwin.external import Measurement
+from spheretwin.external import ExternalController, ExternalPlant, Measurement
 from spheretwin.models.base.errors import InputError
 from spheretwin.provenance import record_of
 from spheretwin.session import Session
@@ -15,7 +15,7 @@ from spheretwin.simulation import follow
 GROUPS = 18
 
 
-class Controller:
+class Controller(ExternalController):
     name = "a test"
 
     def __init__(self, answer):
@@ -27,7 +27,7 @@ class Controller:
         return self.answer(len(self.times) - 1)
 
 
-class Plant:
+class Plant(ExternalPlant):
     name, authority = "a test", 1.0
 
     def __init__(self, answer):
@@ -133,3 +133,8 @@ def test_the_journal_names_the_part_and_a_replay_is_refused(tmp_path):
     rows.write_parquet(path := tmp_path / "run.parquet", record_of(twin).metadata())
     with pytest.raises(InputError, match="expected a run of the twin alone, received one with a test"):
         replay.read(path)
+
+
+def test_refuses_another_object():
+    with pytest.raises(InputError, match="expected an ExternalController or an ExternalPlant, received 3"):
+        session(3)

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spheretwin.control.supervision.watchdog import Reason
-from spheretwin.external import Measurement
+from spheretwin.external import ExternalPlant, Measurement
 from spheretwin.machine.link import frame_format
 from spheretwin.machine.link.admission import ControllerAdmission
 from spheretwin.machine.link.channel import Channel
@@ -53,7 +53,7 @@ def _rehearsed(session: Session) -> None:
     rehearse(session, ())
 
 
-class Link:
+class Link(ExternalPlant):
     """Machine behind a channel, in place of the plant of a session.
 
     The currents are removed when a measurement, or the answer to a command, is missing for

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from spheretwin.external import Measurement
+from spheretwin.external import ExternalController, Measurement
 from spheretwin.machine.link.admission import MachineAdmission
 from spheretwin.machine.link.channel import Channel
 from spheretwin.machine.link.codec import Values
@@ -23,7 +23,7 @@ POLL_s = 0.1
 """Time between two checks for a stop."""
 
 
-class MachineServer:
+class MachineServer(ExternalController):
     """External controller of a session that plays a machine.
 
     *Lockstep* (default): each command advances the twin by one control period and is answered by the
