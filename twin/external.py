@@ -74,6 +74,21 @@ class ExternalPlant(ABC):
         """
 
 
+def name_of(part: ExternalController | ExternalPlant) -> str:
+    """Return the name of an external part.
+
+    Raises
+    ------
+    InputError
+        It is neither a controller nor a plant.
+    """
+    if not isinstance(part, ExternalController | ExternalPlant):
+        raise InputError(
+            f"session: expected an ExternalController or an ExternalPlant, received {shown(part)}"
+        )
+    return part.name
+
+
 class Connection:
     """Connection of the loop to an external part.
 
@@ -86,11 +101,6 @@ class Connection:
     ----------
     external : External
         Argument of the loop. It has only addresses: this object keeps the functions alive.
-
-    Raises
-    ------
-    InputError
-        The part is neither.
     """
 
     def __init__(self, part: ExternalController | ExternalPlant | None, run: Rows) -> None:
@@ -104,10 +114,6 @@ class Connection:
         elif isinstance(part, ExternalPlant):
             run["controller"]["authority"] = part.authority
             self.external = External(0, self._entry(partial(self._advance, part)), *of_part)
-        elif part is not None:
-            raise InputError(
-                f"session: expected an ExternalController or an ExternalPlant, received {shown(part)}"
-            )
 
     def raise_error(self) -> None:
         """Raise the exception of the part, if there was one: it cannot pass the compiled loop."""

@@ -19,7 +19,7 @@ from spheretwin.active_config import initial_config
 from spheretwin.control.law import Law
 from spheretwin.control.supervision.watchdog import Reason
 from spheretwin.control.user_law import reference_of
-from spheretwin.external import ExternalController, ExternalPlant
+from spheretwin.external import ExternalController, ExternalPlant, name_of
 from spheretwin.inputs import InputGenerator
 from spheretwin.models.actuator import Actuator
 from spheretwin.models.base.arrays import real_array
@@ -96,7 +96,7 @@ class Session:
         self._closed = False
         self.tick, self.loop_s = 0, 0.0
         self._external = external
-        start = [Change(0, EXTERNAL, external.name)] if external else []
+        start = [] if external is None else [Change(0, EXTERNAL, name_of(external))]
         self.journal: tuple[Change, ...] = tuple(start)
         self.events: tuple[Change, ...] = ()
         self._status = Status.RUNNING
