@@ -17,6 +17,7 @@ from spheretwin.cli.options import verb, whole
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.base.extras import install_command
 from spheretwin.models.base.mujoco_library import timers_stopped
+from spheretwin.models.base.user_code import is_reference
 from spheretwin.models.telemetry.run_record import versions
 from spheretwin.models.telemetry.status import Status
 from spheretwin.study import report, statistics
@@ -48,7 +49,8 @@ GO_ON = "sweep: finished rows are stored; the same command continues from there"
     STUDY              {", ".join(shipped())}, or a .toml file
     --out DIR          folder of journal and table; NAME_study unless given
     --threads N        as many as there are cores unless given
-    --engine=local     local, threads on this machine, unless given; the table is the same
+    --engine=local     local, threads of this process, unless given; processes, for rows with Python code of
+        yours; ray, a cluster; the table is the same
     --address HOST     for ray: auto, or HOST[:PORT] of a cluster that this machine is a node of; a
         cluster on this machine alone unless given
     --limit ROWS       run only the first rows; finished later rows stay in the table
@@ -108,6 +110,10 @@ def run(options: argparse.Namespace) -> bool:
         print_message(
             f"sweep: {outcome.damaged} damaged lines of the journal were skipped, and their rows run again"
         )
+    if options.engine == "local" and (own := _own_code(study)):
+        print_message(
+            f"sweep: rows with {own} run one at a time in Python; --engine processes runs them on all cores"
+        )
     is_complete = _is_complete(outcome.rows, outcome.of, "rows")
     failures = rows.failures
     if len(failures):
@@ -117,6 +123,12 @@ def run(options: argparse.Namespace) -> bool:
             f" {rows.keys[first]}: {rows.statuses[first]}, {rows.complaints[first]}"
         )
     return is_complete and not len(failures)
+
+
+def _own_code(study: Study) -> str:
+    """Return the first metric or law of the user in a study; empty without one."""
+    named = [*study.metrics, *(str(law["law"]) for law in study.law)]
+    return next(filter(is_reference, named), "")
 
 
 @contextlib.contextmanager

@@ -13,6 +13,27 @@ from spheretwin.study.grid import Grid, Row
 from spheretwin.study.row import Result, Rows
 
 
+class BatchResult(NamedTuple):
+    """Results of a batch of another process.
+
+    Attributes
+    ----------
+    results : list of (int, Result)
+        Finished rows by number.
+    checked : list of int
+        Rows that were run on both plants.
+    fault : str, optional
+        Reason to stop the study.
+    wall_s : float
+        Duration of the rows.
+    """
+
+    results: list[tuple[int, Result]]
+    checked: list[int]
+    fault: str | None
+    wall_s: float
+
+
 class Work:
     """Runs rows; some of them on both plants.
 
@@ -76,6 +97,23 @@ class Order(NamedTuple):
     threads: int | None
     address: str | None
     stop_requested: Callable[[], bool]
+
+    def elsewhere(self, here: list[int]) -> Iterator[int]:
+        """Yield the numbers that another process may run; the others, with stored telemetry, go to `here`."""
+        local = set(self.work.rows.study.telemetry)
+        for number in self.numbers:
+            if number in local:
+                here.append(number)
+            else:
+                yield number
+
+    def landed(self, result: BatchResult) -> Iterator[tuple[Row, Result]]:
+        """Take over the faults of a batch of another process; yield its rows with their results."""
+        self.work.checked += result.checked
+        for number, of_row in result.results:
+            yield self.grid[number], of_row
+        if result.fault is not None:
+            self.work.faults.append(SpheretwinError(result.fault))
 
 
 class Engine(NamedTuple):

@@ -3,7 +3,7 @@
 A process a core, and not threads within fewer: laws and metrics in plain Python run in all of them at a time.
 Only numbers of rows travel to the nodes, and only results back, into the same journal. Files that a
 study names must be on every node, under the same paths, and so must the same sources and versions: a node
-that has others is refused by `spheretwin.study.engines.ray_worker`. The driver runs the rows whose telemetry
+that has others is refused by `spheretwin.study.engines.worker`. The driver runs the rows whose telemetry
 is stored, as it belongs next to the journal.
 """
 
@@ -24,8 +24,8 @@ from typing import Any
 
 from spheretwin.models.base.errors import InputError, SpheretwinError, shown, without_breaks
 from spheretwin.models.base.extras import missing
-from spheretwin.study.engines import ray_worker, threads
-from spheretwin.study.engines.engine import Batches, Engine, Order
+from spheretwin.study.engines import threads, worker
+from spheretwin.study.engines.engine import Batches, BatchResult, Engine, Order
 from spheretwin.study.grid import Row
 from spheretwin.study.row import Result
 
@@ -84,11 +84,10 @@ class _Cluster:
 
     def __init__(self, ray: Any, order: Order, here: list[int]) -> None:
         self._ray, self._order = ray, order
-        local = set(order.work.rows.study.telemetry)
-        self._batches = Batches(_without(order.numbers, local, here), order.rows)
-        self._job = ray.put(ray_worker.job_of(order.work.rows))
+        self._batches = Batches(order.elsewhere(here), order.rows)
+        self._job = ray.put(worker.job_of(order.work.rows))
         # `Batches` counts and repeats lost batches; Ray itself repeats nothing.
-        self._task = ray.remote(num_cpus=1, max_retries=0)(ray_worker.run_batch)
+        self._task = ray.remote(num_cpus=1, max_retries=0)(worker.run_batch)
         self._running: dict[Any, list[int]] = {}
         self._silences, self._checked_s = 0, time.monotonic()
         self._cores = self._most()
@@ -120,7 +119,7 @@ class _Cluster:
     def _collect(self, task: Any) -> Iterator[tuple[Row, Result | None]]:
         batch, errors = self._running.pop(task), self._ray.exceptions
         try:
-            result: ray_worker.BatchResult = self._ray.get(task)
+            result: BatchResult = self._ray.get(task)
         except errors.RayTaskError as error:  # sources that differ too much to report it
             raise SpheretwinError(
                 f"study {self._order.work.rows.study.name}: expected every node to run its rows,"
@@ -130,11 +129,7 @@ class _Cluster:
             self._lose(batch, error)
             return
         self._batches.landed(len(batch), result.wall_s)
-        self._order.work.checked += result.checked
-        for number, of_row in result.results:
-            yield self._order.grid[number], of_row
-        if result.fault is not None:
-            self._order.work.faults.append(SpheretwinError(result.fault))
+        yield from self._order.landed(result)
 
     def _lose(self, batch: list[int], error: Exception) -> None:
         self._cores = self._most()
@@ -167,14 +162,6 @@ class _Cluster:
         """Rows that may run at a time."""
         cores = int(self._ray.cluster_resources().get("CPU", 0))
         return min(cores, self._order.threads or cores)
-
-
-def _without(numbers: Iterator[int], local: set[int], here: list[int]) -> Iterator[int]:
-    for number in numbers:
-        if number in local:
-            here.append(number)
-        else:
-            yield number
 
 
 def _ray(local: bool) -> Any:

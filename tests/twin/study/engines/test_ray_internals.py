@@ -2,7 +2,7 @@
 
 import sys
 
-from spheretwin.study.engines import ray_cluster, ray_worker
+from spheretwin.study.engines import ray_cluster, worker
 
 
 def test_a_silenced_driver_prints_no_message_of_a_node(monkeypatch, capsys):
@@ -20,6 +20,6 @@ def test_a_silenced_driver_prints_no_message_of_a_node(monkeypatch, capsys):
 
 def test_what_one_node_lacks_is_a_difference():
     version = {"a package": "1"}
-    assert ray_worker._differ("a package", version, {})
-    assert ray_worker._differ("a package", {}, version)
-    assert not ray_worker._differ("a package", version, dict(version))
+    assert worker._differ("a package", version, {})
+    assert worker._differ("a package", {}, version)
+    assert not worker._differ("a package", version, dict(version))

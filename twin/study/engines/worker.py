@@ -1,4 +1,4 @@
-"""Process of a cluster: it creates the rows of the study from its configuration, once, and runs batches.
+"""Process of a cluster or of this machine: it makes the rows of a study, once, and runs batches.
 
 A figure must not depend on the node. A process first compares its sources, files and versions with those of
 the driver, and runs no row if they differ.
@@ -7,7 +7,9 @@ the driver, and runs no row if they differ.
 from __future__ import annotations
 
 import os
+import pickle
 import platform
+import sys
 import time
 from contextlib import suppress
 from functools import lru_cache
@@ -15,10 +17,10 @@ from typing import NamedTuple
 
 from spheretwin.models.base.errors import SpheretwinError
 from spheretwin.models.base.mujoco_library import timers_stopped
-from spheretwin.study.engines.engine import Work
+from spheretwin.study.engines.engine import BatchResult, Work
 from spheretwin.study.grid import Grid
 from spheretwin.study.journal import provenance_of
-from spheretwin.study.row import Result, Rows
+from spheretwin.study.row import Rows
 from spheretwin.study.study import Study
 
 
@@ -41,27 +43,6 @@ class Job(NamedTuple):
     folder: str
     working_folder: str
     provenance: tuple[tuple[str, str], ...]
-
-
-class BatchResult(NamedTuple):
-    """Results of a batch.
-
-    Attributes
-    ----------
-    results : list of (int, Result)
-        Finished rows by number.
-    checked : list of int
-        Rows that were run on both plants.
-    fault : str, optional
-        Reason to stop the study.
-    wall_s : float
-        Duration of the rows.
-    """
-
-    results: list[tuple[int, Result]]
-    checked: list[int]
-    fault: str | None
-    wall_s: float
 
 
 def job_of(rows: Rows) -> Job:
@@ -124,3 +105,17 @@ def _difference_text(name: str, ours: dict[str, str], theirs: dict[str, str]) ->
     if name in ("study", "files", "sources"):
         return name
     return f"{name} ({ours.get(name, 'none')} for {theirs.get(name, 'none')})"
+
+
+def main() -> None:
+    """Run batches of a job from standard input, to standard output, until it ends."""
+    results = os.fdopen(os.dup(1), "wb")
+    os.dup2(2, 1)  # what user code prints is none of the results
+    job = pickle.load(sys.stdin.buffer)
+    while True:
+        try:
+            numbers = pickle.load(sys.stdin.buffer)
+        except EOFError:
+            return
+        pickle.dump(run_batch(job, numbers), results)
+        results.flush()
