@@ -279,7 +279,8 @@ def _slowed_ideal(M: InertiaEntries, damping: Triple, before: Triple) -> Triple:
 def _check_coefficients(name: str, rows: Array) -> None:
     for values in rows[~np.all(np.isfinite(rows) & (rows >= 0), axis=1)] if rows.shape[1] == 3 else rows:
         raise InputError(
-            f"friction: expected {name} of three finite values that are not negative, received {values}"
+            f"friction: expected {name} of three finite values that are not negative,"
+            f" received {values.tolist()}"
         )
 
 

@@ -28,9 +28,9 @@ def ran(monkeypatch, tmp_path):
     real, results = Rows.run, []
     monkeypatch.setattr(earlier_runs, "cache_folder", lambda: tmp_path)
 
-    def run(self, row, engine):
-        results.append(self.scenario(row, engine))
-        return real(self, row, engine)
+    def run(self, rows, engine):
+        results.extend(self.scenario(row, engine) for row in rows)
+        return real(self, rows, engine)
 
     monkeypatch.setattr(Rows, "run", run)
     return results
