@@ -88,7 +88,7 @@ class Controller(NamedTuple):
     tables: Tables
 
 
-@part_of_its_caller  # a function cannot return a tuple with a record
+@part_of_its_caller
 def controller_of(controllers: Controller, run: int) -> Controller:
     """Return the controller of one of many runs, which shares its numbers."""
     return Controller(

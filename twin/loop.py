@@ -29,7 +29,7 @@ from spheretwin.models.base.compiled import (
     compiled_callback,
     copy_into,
     copy_rows,
-    part_of_its_caller,
+    inlined,
     uncompiled,
 )
 from spheretwin.models.base.errors import InputError
@@ -72,7 +72,7 @@ class Inputs(NamedTuple):
     manual_A: NDArray[np.float64]  # (n, groups) manual currents; (n, 0) without
 
 
-@part_of_its_caller  # a function cannot return a tuple with a record
+@inlined
 def inputs_of(inputs: Inputs, run: int, row: int) -> Inputs:
     """Return the inputs of one of many runs, from a row on."""
     return Inputs(

@@ -57,7 +57,7 @@ class Stages(NamedTuple):
     rotor: Any  # RotorData
 
 
-@part_of_its_caller  # a function cannot return a tuple with a record
+@part_of_its_caller
 def stages_of(stages: Stages, run: int) -> Stages:
     """Return the stages of one of many runs."""
     return Stages(

@@ -72,6 +72,11 @@ def inlined(function: F) -> F:
     return _compiled(function, **_ALLOCATION_FREE, forceinline=True)
 
 
+def part_of_its_caller(function: F) -> F:
+    """Copy a function into its caller before the caller is compiled: it may return a tuple with a record."""
+    return _compiled(function, **_ALLOCATION_FREE, inline="always")
+
+
 def for_types_of(function: Any, *arguments: Any) -> Callable[..., Any]:
     """Return the machine code of a compiled function for the types of the given arguments.
 
