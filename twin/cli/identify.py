@@ -12,7 +12,7 @@ from spheretwin.machine import report
 from spheretwin.machine.excitation import DesignSettings, design
 from spheretwin.machine.identification import Identified, IdentifySettings, identify
 from spheretwin.machine.parameters import KINDS
-from spheretwin.machine.twin_file import write_twin
+from spheretwin.machine.twin_file import read_history, write_twin
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.base.files import check_writable
 from spheretwin.models.telemetry.table import Table
@@ -74,13 +74,14 @@ def run(options: argparse.Namespace) -> bool:
     else:
         _print(result, is_suggesting=options.suggest)
     written = []
-    if options.report:
-        command = f"spheretwin identify {' '.join(map(str, options.logs))}"
-        report.write(options.report, result, logs, scenario_of(options), changes, command)
-        written.append(options.report)
     if result.accepted and options.out:
         write_twin(options.out, result, scenario_of(options), changes, logs)
         written.append(options.out)
+    if options.report:
+        command = f"spheretwin identify {' '.join(map(str, options.logs))}"
+        history = read_history(options.out) if options.out else []
+        report.write(options.report, result, logs, scenario_of(options), changes, command, history)
+        written.append(options.report)
     if not options.json:
         runs.print_written(written)
     if result.nothing_to_correct:

@@ -16,6 +16,7 @@ from spheretwin.machine.identification import Identified, correlation_sentences,
 from spheretwin.machine.log import Log
 from spheretwin.machine.residuals import QUANTITIES, Fit
 from spheretwin.machine.state_estimation import HINGE_NAMES, chi2_text
+from spheretwin.machine.twin_history import Identification, history_drawing
 from spheretwin.machine.validation import Structure
 from spheretwin.machine.verdict import Verdict, check
 from spheretwin.models.telemetry.signals import ANGLES
@@ -142,8 +143,9 @@ def write(
     scenario: str,
     changes: Mapping[str, Any],
     command: str,
+    history: Sequence[Identification] = (),
 ) -> None:
-    """Write the page of an identification, one file of HTML; arguments as in `write_twin`.
+    """Write the page of an identification, one file of HTML; arguments as in `write_twin`, and its history.
 
     Raises
     ------
@@ -162,6 +164,7 @@ def write(
         PageSection("Residuals", _residuals(result)),
         PageSection("Refused", [f"- {line}" for line in _refused(result)] or ["Nothing."]),
         PageSection("What the model may lack", _lacking(result)),
+        *([PageSection("History", [history_drawing(history)])] if len(history) > 1 else []),
     ]
     with TemporaryDirectory() as folder:
         _, html = ReportPage("report", "Identification", lead, sections, command).write(Path(folder))

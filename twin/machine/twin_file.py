@@ -7,6 +7,7 @@ import json
 import re
 import tomllib
 from collections.abc import Mapping, Sequence
+from datetime import UTC, datetime
 from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -16,6 +17,7 @@ from numpy.typing import NDArray
 
 from spheretwin.machine.intervals import Uncertainty
 from spheretwin.machine.log import Log
+from spheretwin.machine.twin_history import Drift, Identification, drifts, history_of
 from spheretwin.models.base.errors import InputError, shown, without_breaks
 from spheretwin.models.base.files import regular_file, whole_file
 
@@ -29,9 +31,14 @@ UNSIGNED = f'sha256 = "{UNCHECKED}"'
 
 
 def write_twin(
-    path: Path, result: Identified, scenario: str, changes: Mapping[str, Any], logs: Sequence[Log]
+    path: Path,
+    result: Identified,
+    scenario: str,
+    changes: Mapping[str, Any],
+    logs: Sequence[Log],
+    now: datetime | None = None,
 ) -> None:
-    """Write the file of a twin, completely or not at all.
+    """Write the file of a twin, completely or not at all; the history of a twin in its place goes on.
 
     Parameters
     ----------
@@ -43,6 +50,8 @@ def write_twin(
     changes : mapping
         Its fields that were known.
     logs : sequence of Log
+    now : datetime, optional
+        Date of the identification; the present by default.
 
     Raises
     ------
@@ -51,6 +60,9 @@ def write_twin(
     """
     if not result.accepted or result.covariance is None or result.held_out is None:
         raise InputError(f"twin {path}: expected an accepted identification, received {result.reasons[0]}")
+    date = now or datetime.now(UTC)
+    values = {name: (one.value, *one.interval) for name, one in result.parameters.items()}
+    history = [*read_history(path), Identification(date, values)]
     lines = [
         f"format = {FORMAT}",
         UNSIGNED,
@@ -78,6 +90,12 @@ def write_twin(
             f"conditions = {_text(dict(log.conditions))}\naccepted = {_text(list(log.accepted))}\n"
             for log in logs
         ),
+        "# Value and interval of the parameters at each identification.",
+        *(
+            f"[[history]]\ndate = {_text(one.date.isoformat(timespec='seconds'))}\n"
+            f"values = {_text({name: list(numbers) for name, numbers in one.values.items()})}\n"
+            for one in history
+        ),
     ]
     text = "\n".join(lines)
     with whole_file(path) as temporary:
@@ -94,6 +112,34 @@ def read_twin(path: Path) -> dict[str, Any]:
     """
     fields: dict[str, Any] = _content(path)["fields"]
     return fields
+
+
+def read_history(path: Path) -> list[Identification]:
+    """Return the identifications of a twin in order of time; none if there is no file of a twin.
+
+    Raises
+    ------
+    InputError
+        The history is not one.
+    """
+    try:
+        content = _content(path)
+    except InputError:  # what is no twin has no history, and is overwritten
+        return []
+    return history_of(content, path)
+
+
+def read_drifts(path: Path) -> dict[str, Drift]:
+    """Return the drift of each parameter of a twin that was identified at two times or more.
+
+    Raises
+    ------
+    InputError
+        The file cannot be read or is not that of a twin.
+    """
+    content = _content(path)
+    units = {name: str(one.get("unit", "1")) for name, one in content.get("parameters", {}).items()}
+    return drifts(history_of(content, path), units)
 
 
 def read_uncertainty(path: Path) -> Uncertainty:

@@ -2,14 +2,24 @@
 
 import random
 import re
+from datetime import UTC, datetime, timedelta
 
 import numpy as np
 import pytest
+from scipy.stats import norm
 
 from spheretwin.machine import Log
 from spheretwin.machine.identification import Estimate, Identified
 from spheretwin.machine.residuals import Fit
-from spheretwin.machine.twin_file import UNSIGNED, read_twin, read_uncertainty, write_twin
+from spheretwin.machine.twin_file import (
+    UNSIGNED,
+    read_drifts,
+    read_history,
+    read_twin,
+    read_uncertainty,
+    write_twin,
+)
+from spheretwin.machine.twin_history import history_drawing
 from spheretwin.models.base.errors import InputError
 
 FIELDS = {"plant.coulomb_Nm": [0.003, 0.003, 0.004], "plant.modelling_error": 0.1}
@@ -55,6 +65,29 @@ def test_only_an_accepted_result_is_written_and_only_this_format_is_read(path):
     path.write_text("format = 2")
     with pytest.raises(InputError, match=r"expected format = 1 and a table \[fields\], received format 2"):
         read_twin(path)
+
+
+def test_the_history_of_a_twin_goes_on_and_its_drift_is_the_weighted_slope(tmp_path):
+    path, start = tmp_path / "twin.toml", datetime(2026, 1, 5, tzinfo=UTC)
+    days, values, halves = np.array([0.0, 1.5, 4.0]), [0.97, 0.955, 0.94], np.array([0.01, 0.02, 0.01])
+    path.write_text("format = 2")  # no twin: it is overwritten
+    for day, value, half in zip(days, values, halves, strict=True):
+        parameters = {"torque_scale": Estimate(value, (value - half, value + half), "1")}
+        result = RESULT._replace(parameters=parameters)
+        write_twin(path, result, "hold", {}, [LOG], start + timedelta(days=day))
+    history = read_history(path)
+    assert [one.values["torque_scale"][0] for one in history] == values
+    drift, deviations = read_drifts(path)["torque_scale"], halves / norm.isf(0.025)
+    (slope, _), covariance = np.polyfit(days, values, 1, w=1 / deviations, cov="unscaled")
+    assert drift[:2] == pytest.approx((slope, norm.isf(0.025) * covariance[0, 0] ** 0.5), rel=1e-6)
+    assert drift.is_clear
+    assert drift.text() == "-0.0074 ± 0.0035/day"
+    lines = history_drawing(history).figure.axes[0].lines
+    np.testing.assert_allclose(lines[0].get_xdata(), days)
+    np.testing.assert_allclose(lines[0].get_ydata(), (np.array(values) - 0.97) / halves.mean(), rtol=1e-9)
+    path.write_text(f'format = 1\n{UNSIGNED}\n[fields]\n[[history]]\ndate = "yesterday"')
+    with pytest.raises(InputError, match=r"expected \[\[history\]\] with a date"):
+        read_history(path)
 
 
 def test_line_breaks_of_another_system_are_no_change(path):
