@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import argparse
+from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -12,42 +14,92 @@ from spheretwin.cli.log_options import (
     STREAMED,
     blocks,
     file_log,
+    for_each_log,
     known_fields,
     live_view,
     scenario_of,
 )
 from spheretwin.cli.options import number, verb
+from spheretwin.machine.link.stream import is_address
 from spheretwin.machine.log import Log
 from spheretwin.machine.model import model_of
 from spheretwin.machine.state_estimation import Shadow, signals
+from spheretwin.machine.twin_file import read_drifts
 from spheretwin.machine.watching import WATCHED, Watch, WatchSettings
-from spheretwin.models.base.errors import SpheretwinError
+from spheretwin.models.base.errors import InputError, SpheretwinError
+from spheretwin.viz.terminal import runs
 
 MOST_VARIANCE = 1.5
 """Mean square of the residuals, over that of the noise, above which the twin is not that of the machine."""
 
+_STREAM = STREAM.replace("the log\n", "all logs, or one for each in their order\n", 1).replace(
+    "--twin TWIN.toml      identified parameters of the machine",
+    "--twin TWIN.toml...   identified parameters of all machines, or of each in the order of their logs",
+)
+
 
 @verb(
-    f"""{STREAM}
+    f"""{_STREAM}
     --parameter NAME...      parameter to watch; repeatable (default: {", ".join(WATCHED)})
     --false-alarms RATE=0.1  largest mean rate of alarms without a change, 1/h (default: 0.1)
     --json  print nothing but the lines of JSON, also no summary on stderr
     """,
     has_fields=True,
-    **STREAMED,
+    **{**STREAMED, "logs": {"nargs": "*"}},
     false_alarms=number("a number above 0"),
 )
 def run(options: argparse.Namespace) -> bool:
-    """Watch over a machine: print a line of JSON for each change of its parameters.
+    """Watch over machines: print a line of JSON for each change of their parameters.
 
-    Exit code 1 if there was one.
+    Of several logs, each of a machine, a table follows: state, last alarm, drift. Exit code 1 if anything
+    changed.
     """
+    sources = options.logs
+    if len(sources) > 1 and (options.live or any(is_address(source) for source in sources)):
+        raise InputError(f"watch: expected a stream or --live alone, received {len(sources)} machines")
+    maps = for_each_log(options.columns, len(sources), "--columns")
+    twins = for_each_log(options.twin, len(sources), "--twin")
+    machines = []
+    for source, column_map, twin in zip(sources, maps, twins, strict=True):
+        columns = [column_map] if column_map else []
+        own = {**vars(options), "logs": source, "columns": columns, "twin": twin}
+        machines.append(_watch(argparse.Namespace(**own)))
+    if len(machines) > 1 and not options.json:
+        rows = [(one.name, one.state, str(one.alarms), one.last, one.drift) for one in machines]
+        runs.print_rows("machines", ("machine", "state", "alarms", "last alarm", "drift"), rows, 2, _WORDS)
+    return not any(one.alarms for one in machines)
+
+
+class _Watched(NamedTuple):
+    """Machine after its watch."""
+
+    name: str
+    misfit: float
+    """Mean square of the residuals of the start over that of the noise."""
+    alarms: int
+    last: str
+    """Last alarm."""
+    drift: str
+    """Clear drifts of the parameters in the history of its twin."""
+
+    @property
+    def state(self) -> str:
+        if self.misfit > MOST_VARIANCE:
+            return "unlike its twin"
+        return "changed" if self.alarms else "as its twin"
+
+
+_WORDS = ("last alarm", "drift")
+
+
+def _watch(options: argparse.Namespace) -> _Watched:
+    """Watch over one machine."""
     settings = WatchSettings(false_alarms_per_hour=options.false_alarms)
     scenario, log = scenario_of(options), file_log(options)
     known = known_fields(options, log)
     model = model_of(scenario, known)
     watch = Watch(scenario, known, options.parameter or WATCHED, settings)
-    count, seconds, warned = 0, 0.0, False
+    last, count, seconds, warned = "none", 0, 0.0, False
     with (
         interruptible() as stop_requested,
         live_view(options, model, signals(False), stop_requested, watched=True) as view,
@@ -59,8 +111,9 @@ def run(options: argparse.Namespace) -> bool:
                 warned = True
                 print_message(_warning(watch.misfit, settings, block, is_stream=log is None))
             for alarm in alarms:
-                of_log = {"log_sha256": log and log.digest, "accepted_findings": list(block.accepted)}
-                print_json({**alarm._asdict(), **of_log})
+                of_log = {"log": options.logs, "log_sha256": log and log.digest}
+                print_json({**alarm._asdict(), **of_log, "accepted_findings": list(block.accepted)})
+                last = f"{alarm.onset_s:.2f} s: {alarm.text()}"
             if view and estimator:
                 view.judge(watch.judged, [(alarm.t_s, alarm.text()) for alarm in alarms])
                 view.show(estimator.advance(block), block.current_A)
@@ -76,7 +129,16 @@ def run(options: argparse.Namespace) -> bool:
             f"watch: alarms: {count} in {seconds:.3g} s; without a change, fewer than"
             f" {options.false_alarms:g} in an hour on average"
         )
-    return not count
+    return _Watched(options.logs, watch.misfit, count, last, _drift(options.twin))
+
+
+def _drift(twin: Path | None) -> str:
+    """Return the clear drifts of the parameters of a twin."""
+    found = read_drifts(twin) if twin else {}
+    if not found:
+        return "no history"
+    clear = [f"{name} {one.text()}" for name, one in found.items() if one.is_clear]
+    return ", ".join(clear) or "none"
 
 
 def _warning(variance: float, settings: WatchSettings, block: Log, *, is_stream: bool) -> str:

@@ -3,6 +3,7 @@
 import argparse
 import json
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pyarrow.parquet as pq
@@ -171,7 +172,7 @@ def test_watch_prints_a_line_of_json_for_each_alarm(tmp_path):
     assert alarms[0]["what"] == "sensors.angle_offset_rad.0"
     assert set(alarms[0]) == {
         *("t_s", "what", "size", "unit", "confidence", "onset_s", "lasted_s", "shares"),
-        *("accepted_findings", "log_sha256"),
+        *("accepted_findings", "log", "log_sha256"),
     }
     assert alarms[0]["log_sha256"] == read(path).digest
     assert alarms[0]["accepted_findings"] == ["jitter"]
@@ -203,6 +204,22 @@ def pages(monkeypatch):
 
     monkeypatch.setattr(LiveStream, "close", read_and_close)
     return readers
+
+
+def test_a_watch_of_several_machines_ends_with_a_table(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    healthy, changed = "a.parquet", log_with_offset(Path("b.parquet"), 3.0)
+    write(changing_log(2.5, seed=2), Path(healthy))
+    result = call("watch", healthy, changed, *MACHINE)
+    alarms = [line for line in result.out.splitlines() if line.startswith("{")]
+    assert result.code == 1
+    assert {json.loads(line)["log"] for line in alarms} == {str(changed)}
+    first, second = (line for line in result.out.splitlines() if line.startswith(("| a.p", "| b.p")))
+    assert [cell.strip() for cell in first.split("|")[2:-1]] == ["as its twin", "0", "none", "no history"]
+    assert "changed" in second
+    assert "2.43 s: sensors.angle_offset_rad.0" in second
+    message = refusal("watch", healthy, "udp://:0", *MACHINE)
+    assert "expected a stream or --live alone, received 2 machines" in message
 
 
 @pytest.mark.release("1 s and a viewer's server; tests/twin/machine has the figures")
