@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from spheretwin.session import Session
     from spheretwin.simulation import simulate
     from spheretwin.study.runner import run as sweep
+    from spheretwin.study.sensitivities import sensitivities
 
 # Numba, MuJoCo and the rest are imported with the first name that needs them.
 _MODULES = {
@@ -34,6 +35,7 @@ _MODULES = {
     "Run": ("spheretwin.run", "Run"),
     "linearise": ("spheretwin.linear", "linearise"),
     "sweep": ("spheretwin.study.runner", "run"),
+    "sensitivities": ("spheretwin.study.sensitivities", "sensitivities"),
     "review": ("spheretwin.analysis.review", "review"),
     "read": ("spheretwin.analysis.recorded_run", "open_run"),
     "Bench": ("spheretwin.bench", "Bench"),
@@ -41,7 +43,7 @@ _MODULES = {
 
 __all__ = [
     "Bench", "Law", "Run", "Scenario", "Session", "__version__", "linearise", "load", "read", "review",
-    "simulate", "sweep",
+    "sensitivities", "simulate", "sweep",
 ]  # fmt: skip
 
 
