@@ -59,10 +59,10 @@ def ranges() -> str:
     for chosen in (shown, shown[:2], shown[1:2], shown[2:]):
         columns = [run.table["q_rad"][:, 0] for run in chosen]
         results = [
-            runs.settled_range(chosen, columns, 1e-3),
-            runs.settled_range(chosen, columns, 5.0, [RAMP + 9]),
+            _settled_range(chosen, columns, 1e-3),
+            _settled_range(chosen, columns, 5.0, [RAMP + 9]),
         ]
-        results.append(runs.quantity_range(VALUE, chosen, [0]))
+        results.append(runs.quantity_ranges([VALUE], chosen, [0])[0])
         lines += [
             f"{array(np.array(each[:2]))} {[outside.text() for outside in each.outside]}" for each in results
         ]
@@ -77,13 +77,18 @@ def ranges() -> str:
     for name, columns in of_kinds.items():
         compared = [run_of(each) for each in columns]
         compared[-1:] = [run_of(columns[-1], status="diverged")] if "failed" in name else compared[-1:]
-        low, high, outside = runs.settled_range(compared, columns, 1e-3)
+        low, high, outside = _settled_range(compared, columns, 1e-3)
         lines.append(f"{name}: {array([low, high])} {[each.text() for each in outside]}")
     late = [run_of(np.minimum(T_s, 1.0) + 1e-3), run_of(np.where(T_s < 0.1, 50.0, 1.0))]
     ramp = VALUE._replace(desired=lambda rows: np.minimum(T_s, 1.0))
-    lines.append(f"reference: {runs.quantity_range(ramp, late, [0])}")
+    lines.append(f"reference: {runs.quantity_ranges([ramp], late, [0])[0]}")
     lines.append(f"{runs.leaders([run.table for run in shown])}")
     return "\n".join(lines)
+
+
+def _settled_range(compared, columns, least: float, references=()) -> runs.PlotRange:
+    bounds = runs.settled_bounds(compared, columns, least, references)
+    return runs.PlotRange(*bounds, runs.values_outside(compared, columns, bounds))
 
 
 def decimated() -> str:

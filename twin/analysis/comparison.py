@@ -19,13 +19,15 @@ from spheretwin.models.actuator import MJCF_PATH, Actuator
 from spheretwin.models.base.errors import InputError, shortened, shown, without_breaks
 from spheretwin.models.base.user_code import short_names
 from spheretwin.models.telemetry.run_record import RunFacts
+from spheretwin.models.telemetry.signals import ANGLES
 from spheretwin.models.telemetry.status import Event, Status
 from spheretwin.models.telemetry.table import Table
 from spheretwin.scenario.sections import ResolvedScenario
 from spheretwin.viz.comparison.runs import ComparedRun, EarlyEnd, Spectrum, leaders
+from spheretwin.viz.layout.extents import number
 from spheretwin.viz.pages import markdown
 from spheretwin.viz.pages.markdown import Drawing, PageSection, ReportPage
-from spheretwin.viz.quantities import Quantity, QuantityRows, compared_quantities
+from spheretwin.viz.quantities import Quantity, QuantityRows, angle_between, compared_quantities
 from spheretwin.viz.terminal.reviews import differences as table_rows
 
 MOST_DIFFERENCES, LEGEND_LENGTH = 6, 48
@@ -149,9 +151,21 @@ def compared_runs(runs: Sequence[Reviewed], *, every_tick: bool = False) -> list
             run.metadata,
             tuple(run_events := events(run)),
             _early_end(run, run_events),
+            _error_text(run),
         )
         for run, name, label in run_texts
     ]
+
+
+def _error_text(run: Reviewed) -> str:
+    """Return the largest and the RMS error of a run as one angle, of all ticks."""
+    table = run.every_tick
+    error_deg = np.degrees(angle_between(table["q_rad"], table["q_ref_rad"]))
+    error_deg = error_deg[np.isfinite(error_deg)]
+    if not len(error_deg):
+        return ""
+    rms_deg = float(np.sqrt(np.mean(error_deg**2)))
+    return f"largest {float(np.max(error_deg)):.3g}°, RMS {rms_deg:.3g}°"
 
 
 def _early_end(run: Reviewed, events: Sequence[Event]) -> EarlyEnd | None:
@@ -171,6 +185,17 @@ def _differences(runs: Sequence[Reviewed]) -> markdown.ResultTable | str:
         return "The scenarios of the runs are equal."
     head = ["field", *(f"run {place}" for place in range(1, len(runs) + 1))]
     cells = [[_plain(cell) for cell in (name, *values)] for name, values in rows]
+    return markdown.ResultTable("", head, cells, len(head))
+
+
+def _errors(runs: Sequence[Reviewed]) -> markdown.ResultTable:
+    """Return the largest and the RMS error of each hinge, mrad, a row for each run."""
+    head = ["run", *(f"{kind} {axis}" for kind in ("largest", "RMS") for axis in ANGLES)]
+    cells = []
+    for place, run in enumerate(runs, start=1):
+        error_mrad = 1e3 * run.every_tick["error_rad"]
+        figures = [*np.max(np.abs(error_mrad), axis=0), *np.sqrt(np.mean(error_mrad**2, axis=0))]
+        cells.append([str(place), *map(number, figures)])
     return markdown.ResultTable("", head, cells, len(head))
 
 
@@ -212,6 +237,7 @@ def _runs_text(runs: Sequence[Reviewed], drawn_runs: Sequence[ComparedRun]) -> s
         end = run.early_end
         text = f"**{end.status} at {end.t_s:.3f} s**: {end.reason}" if end else "completed"
         lines.append(f"- {_plain(label)}, {text}")
+    lines += ["", "**Tracking errors, mrad**", "", *_errors(runs).lines()]
     lines += ["", *PageSection("Differences of the scenarios", [_differences(runs)]).lines()]
     lines.append("The thin grey line is the reference. A cross marks the end of a run that is not complete.")
     return "\n".join(lines)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
@@ -16,13 +17,21 @@ from rerun.components import MarkerShape
 from spheretwin.models.base.files import whole_file
 from spheretwin.viz import theme
 from spheretwin.viz.comparison.ghosts import ROTOR, Array, Ghost, Line, Tip, below, send_lines, write_part
-from spheretwin.viz.comparison.runs import ComparedRun, PlotRange, leaders, quantity_range
+from spheretwin.viz.comparison.runs import (
+    ComparedRun,
+    PlotRange,
+    common_rows,
+    leaders,
+    quantity_ranges,
+    settled_bounds,
+    value_bounds,
+)
 from spheretwin.viz.layout.extents import labelled
 from spheretwin.viz.layout.layout import blueprint, eye
 from spheretwin.viz.layout.plots import time_axis, time_range
 from spheretwin.viz.layout.styles import MIDDLE, THICK, THIN
 from spheretwin.viz.layout.view import EVENTS, SCENARIO, application_of
-from spheretwin.viz.quantities import Quantity, compared_quantities
+from spheretwin.viz.quantities import ERROR, Quantity, compared_quantities
 from spheretwin.viz.recording.currents import CoilCurrents
 from spheretwin.viz.recording.part import (
     RecordingPart,
@@ -39,7 +48,7 @@ from spheretwin.viz.recording.status import StateChanges, StateLanes, log_lines
 from spheretwin.viz.scene.entities import TRAIL_S, size_of
 from spheretwin.viz.scene.meshes import WORLD
 
-COMPARE, MARKS, END, TIP = "compare", "marks", "end", "tip"
+COMPARE, MARKS, END, TIP, DIFFERENCE = "compare", "marks", "end", "tip", "difference"
 """Parts of the paths of entities, after the name of a run."""
 
 RUNS, LEGEND = "runs", "legend"
@@ -49,18 +58,34 @@ REFERENCE = "setpoint"
 """Before the name of a run: a viewer draws lines in the order of their paths, these above all others."""
 
 LARGE, BESIDE_TEXTS = "whole", "more"
-"""Groups of the plot that is higher than the others, and of plots in tabs with the texts."""
+"""Groups of the error as one angle, and of plots in tabs with the texts."""
+
+ERRORS = "error"
+"""Group of the errors of the hinges, with their differences to those of the first run."""
+
+SWITCHED = (LARGE, ERRORS)
+"""Groups with tabs, which are higher: one for the settled runs, others for all values and for differences."""
+
+
+Limits = tuple[float, float]
 
 
 class Plot(NamedTuple):
     """Plot of one quantity of all runs."""
 
     name: str
-    title: str
+    heading: str
     group: str
     desired: bool
     """True if the reference is drawn with it."""
-    limits: tuple[float, float]
+    limits: Limits
+    whole: Limits
+    """Limits that contain all values."""
+
+    @property
+    def title(self) -> str:
+        """Heading, and that values are outside of the limits."""
+        return self.heading if self.whole == self.limits else f"{self.heading}, cut"
 
 
 class ComparisonView(NamedTuple):
@@ -71,6 +96,8 @@ class ComparisonView(NamedTuple):
     leaders: tuple[str, ...]
     """Names of the runs that show the reference."""
     plots: tuple[Plot, ...]
+    differences: tuple[Plot, ...]
+    """Plots of the errors minus those of the first run."""
     duration_s: float
     states: tuple[str, ...]
     """Names of the runs with changes of state."""
@@ -90,40 +117,62 @@ def application(view: ComparisonView) -> str:
 def layout(view: ComparisonView) -> rrb.Blueprint:
     """Blueprint of a recording of several runs."""
     groups = dict.fromkeys(plot.group for plot in view.plots if plot.group != BESIDE_TEXTS)
-    rows = [rrb.Horizontal(*_plots(view, group)) for group in groups]
+    rows = [_row(view, group) for group in groups]
     texts = rrb.Tabs(
         rrb.TextDocumentView(origin=f"/{RUNS}", name="runs"),
         rrb.TextLogView(origin="/", contents=[f"/{run}/{EVENTS}" for run in view.logs], name="events"),
         *([_states(view)] if view.states else []),
-        *_plots(view, BESIDE_TEXTS),
+        *(_plot(view, plot, plot.limits) for plot in _plots(view, BESIDE_TEXTS)),
     )
     return blueprint(
         rrb.Horizontal(
             rrb.Vertical(_bodies(view), _legend(view), texts, row_shares=[5, 0.5 + 0.6 * len(view.runs), 3]),
-            rrb.Vertical(*rows, row_shares=[4 if group == LARGE else 3 for group in groups]),
+            rrb.Vertical(*rows, row_shares=[4 if group in SWITCHED else 3 for group in groups]),
             column_shares=[2, 3],
             name="compare",
         )
     )
 
 
-def _plots(view: ComparisonView, group: str) -> list[rrb.TimeSeriesView]:
-    return [_plot(view, plot) for plot in view.plots if plot.group == group]
+def _row(view: ComparisonView, group: str) -> rrb.Container:
+    """Return the plots of a group; in tabs with errors that are cut all values, and differences."""
+    plots = _plots(view, group)
+    tabs = [rrb.Horizontal(*(_plot(view, plot, plot.limits) for plot in plots), name="settled")]
+    if group in SWITCHED and any(plot.whole != plot.limits for plot in plots):
+        tabs.append(rrb.Horizontal(*(_plot(view, plot, plot.whole) for plot in plots), name="all values"))
+    if group == ERRORS and view.differences:
+        tabs.append(rrb.Horizontal(*map(partial(_difference, view), view.differences), name="minus run 1"))
+    return rrb.Tabs(*tabs, active_tab=0) if len(tabs) > 1 else tabs[0]
 
 
-def _plot(view: ComparisonView, plot: Plot) -> rrb.TimeSeriesView:
-    reference_lines = [f"/{REFERENCE}/{run}/{plot.name}" for run in view.leaders] if plot.desired else []
+def _plots(view: ComparisonView, group: str) -> list[Plot]:
+    return [plot for plot in view.plots if plot.group == group]
+
+
+def _plot(view: ComparisonView, plot: Plot, limits: Limits) -> rrb.TimeSeriesView:
+    contents = [
+        *(f"/{REFERENCE}/{run}/{plot.name}" for run in view.leaders if plot.desired),
+        *(f"/{run}/{COMPARE}/{plot.name}" for run in view.runs),
+        *(f"/{run}/{MARKS}/{plot.name}" for run in view.runs),
+        *(f"/{run}/{END}/{plot.name}" for run in view.failed if limits == plot.limits),
+    ]
+    return _time_plot(view, plot.title if limits == plot.limits else plot.heading, contents, limits)
+
+
+def _difference(view: ComparisonView, plot: Plot) -> rrb.TimeSeriesView:
+    contents = [f"/{run}/{DIFFERENCE}/{plot.name}" for run in view.runs[1:]]
+    return _time_plot(view, plot.title, contents, plot.limits)
+
+
+def _time_plot(
+    view: ComparisonView, title: str, contents: Sequence[str], limits: Limits
+) -> rrb.TimeSeriesView:
     return rrb.TimeSeriesView(
         origin="/",
-        contents=[
-            *reference_lines,
-            *(f"/{run}/{COMPARE}/{plot.name}" for run in view.runs),
-            *(f"/{run}/{MARKS}/{plot.name}" for run in view.runs),
-            *(f"/{run}/{END}/{plot.name}" for run in view.failed),
-        ],
-        name=plot.title,
+        contents=contents,
+        name=title,
         axis_x=time_axis(view.duration_s),
-        axis_y=rrb.ScalarAxis(range=plot.limits),
+        axis_y=rrb.ScalarAxis(range=limits),
         plot_legend=rrb.PlotLegend(visible=False),
         interaction=rrb.PlotInteraction(tooltip_mode="All"),
     )
@@ -225,13 +274,17 @@ def write(path: Path, runs: Sequence[ComparedRun], subjects: Sequence[RecordingS
         _ = subject.meshes  # a missing one is reported before there is a file
     tables = [run.table for run in runs]
     quantities, leading = compared_quantities(tables), leaders(tables)
-    ranges = [quantity_range(quantity, runs, leading) for quantity in quantities]
+    ranges = quantity_ranges(quantities, runs, leading)
+    errors = [quantity for quantity in quantities if quantity.group == ERRORS]
+    differences = [_differences(quantity, runs) for quantity in errors]
     view = ComparisonView(
         tuple(run.name for run in runs),
         tuple(runs[place].name for place in leading),
         tuple(
-            _plot_of(quantity, of_quantity) for quantity, of_quantity in zip(quantities, ranges, strict=True)
+            _plot_of(quantity, of_quantity, [quantity.column(run.rows) for run in runs])
+            for quantity, of_quantity in zip(quantities, ranges, strict=True)
         ),
+        _difference_plots(errors, differences, runs),
         max(float(table["t_s"][-1]) for table in tables),
         tuple(run.name for run in runs if StateChanges().of(run.table)),
         tuple(run.name for run in runs if run.events),
@@ -261,6 +314,10 @@ def write(path: Path, runs: Sequence[ComparedRun], subjects: Sequence[RecordingS
                 _send_marks(of_run, f"{MARKS}/{quantity.name}", run, values, colour, (place, len(runs)))
                 if run.early_end:
                     _send_end(of_run, f"{END}/{quantity.name}", run, _visible(values, plot.limits), colour)
+        for quantity, of_runs in zip(errors, differences, strict=True):
+            for run, colour, difference in zip(runs[1:], colours[1:], of_runs, strict=True):
+                line = Line(run.label, difference.values, colour)
+                send_lines(below(recording, run.name), f"{DIFFERENCE}/{quantity.name}", difference.t_s, line)
         for place in leading:
             run, reference = runs[place], below(recording, f"{REFERENCE}/{runs[place].name}")
             _write_reference(reference, run, subjects[place], quantities, alone=len(leading) == 1)
@@ -292,12 +349,42 @@ def _write_reference(
             send_lines(recording, quantity.name, run.table["t_s"], line)
 
 
-def _plot_of(quantity: Quantity, of_quantity: PlotRange) -> Plot:
-    """Return the plot of a quantity; its title states that values are outside of its range."""
+def _plot_of(quantity: Quantity, of_quantity: PlotRange, of_runs: Sequence[Array]) -> Plot:
+    """Return the plot of a quantity, with limits of all values if some are outside of its range."""
     low, high, outside = of_quantity
     limits = quantity.limits or labelled(low, high, quantity.floor, STEPS)
-    title = f"{quantity.heading}, cut" if outside else quantity.heading
-    return Plot(quantity.name, title, quantity.group, quantity.desired is not None, limits)
+    heading, desired = quantity.heading, quantity.desired is not None
+    whole = labelled(*value_bounds(of_runs), quantity.floor, STEPS) if outside else limits
+    return Plot(quantity.name, heading, quantity.group, desired, limits, whole)
+
+
+class Difference(NamedTuple):
+    """Errors of a run minus those of the first one at the ticks of both."""
+
+    t_s: Array
+    values: Array
+
+
+def _difference_plots(
+    errors: Sequence[Quantity], differences: Sequence[Sequence[Difference]], runs: Sequence[ComparedRun]
+) -> tuple[Plot, ...]:
+    """Return the plots of the differences, with one range."""
+    together = [np.concatenate([of.values for of in parts]) for parts in zip(*differences, strict=True)]
+    limits = labelled(*settled_bounds(runs[1:], together, ERROR.floor), ERROR.floor, STEPS)
+    return tuple(
+        Plot(of.name, f"{of.title} - run 1 [{of.unit}]", ERRORS, False, limits, limits) for of in errors
+    )
+
+
+def _differences(quantity: Quantity, runs: Sequence[ComparedRun]) -> list[Difference]:
+    """Return the differences of every run but the first."""
+    first, *others = runs
+    differences = []
+    for run in others:
+        rows, of_first = common_rows(run.table, first.table)
+        values = quantity.column(run.rows)[rows] - quantity.column(first.rows)[of_first]
+        differences.append(Difference(run.table["t_s"][rows], values))
+    return differences
 
 
 def _outside(quantities: Sequence[Quantity], ranges: Sequence[PlotRange]) -> list[str]:
@@ -317,7 +404,7 @@ def _log_legend(
     places = np.arange(len(runs), dtype=np.float64)
     ends = [[[0.0, y], [1.0, y]] for y in places]
     shade, radii = list(colours), rr.Radius.ui_points(2.0)
-    labels = [drawable(run.legend) for run in runs]
+    labels = [drawable(f"{run.legend}; {run.errors}" if run.errors else run.legend) for run in runs]
     recording.log(
         LEGEND, rr.LineStrips2D(ends, colors=shade, radii=radii, labels=labels, show_labels=True), static=True
     )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from itertools import groupby
 from typing import NamedTuple
 
 import numpy as np
@@ -42,6 +43,8 @@ class ComparedRun(NamedTuple):
     """Metadata of its telemetry file."""
     events: Sequence[Event]
     early_end: EarlyEnd | None = None
+    errors: str = ""
+    """Its largest and RMS error, for a legend."""
 
     @property
     def table(self) -> Table:
@@ -74,10 +77,16 @@ def leaders(tables: Sequence[Table]) -> list[int]:
     return sorted(leading)
 
 
-def _same(one: Table, other: Table) -> bool:
-    """True if two runs have the same reference at all common ticks."""
+def common_rows(one: Table, other: Table) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Return the places of the rows of both runs at their common ticks."""
     t_ns, others_ns = (np.round(table["t_s"] * 1e9).astype(np.int64) for table in (one, other))
     _, rows, others = np.intersect1d(t_ns, others_ns, assume_unique=True, return_indices=True)
+    return rows, others
+
+
+def _same(one: Table, other: Table) -> bool:
+    """True if two runs have the same reference at all common ticks."""
+    rows, others = common_rows(one, other)
     apart = np.abs(one["q_ref_rad"][rows] - other["q_ref_rad"][others])
     return bool(apart.max(initial=0.0) <= SAME_rad)
 
@@ -159,36 +168,54 @@ def logarithmic_range(of_runs: Sequence[Array]) -> LogarithmicRange:
     return LogarithmicRange(low, high, least < low)
 
 
-def quantity_range(quantity: Quantity, runs: Sequence[ComparedRun], leading: Sequence[int]) -> PlotRange:
-    """Return the range of a quantity: its own limits, or that of the settled runs and all references.
+LINKED = ("error", "angle", "sliding")
+"""Groups of sibling quantities: their plots have one range, so that magnitudes can be compared."""
+
+OUTLIER, OFF_REFERENCE = 20.0, 3.0
+"""A run is outside of the range if its settled values are so many times larger than those of the next one, or
+than the reference."""
+
+
+def quantity_ranges(
+    quantities: Sequence[Quantity], runs: Sequence[ComparedRun], leading: Sequence[int]
+) -> list[PlotRange]:
+    """Return the range of each quantity: its own limits, or that of the settled runs and all references.
 
     Parameters
     ----------
-    quantity : Quantity
+    quantities : sequence of Quantity
+        Those of a group follow each other.
     runs : sequence of ComparedRun
     leading : sequence of int
         Places of the runs that show the reference.
     """
-    if quantity.limits:
-        return PlotRange(*quantity.limits, ())
-    desired = quantity.desired
-    references = [desired(runs[place].rows) for place in leading] if desired else []
-    return settled_range(runs, [quantity.column(run.rows) for run in runs], quantity.floor, references)
+    ranges: list[PlotRange] = []
+    for _, group in groupby(quantities, key=lambda of: of.group if of.group in LINKED else of.name):
+        siblings = list(group)
+        columns = [[of.column(run.rows) for run in runs] for of in siblings]
+        references = [of.desired(runs[place].rows) for of in siblings if of.desired for place in leading]
+        together = [
+            np.ravel(parts) for parts in (np.stack(of_run, axis=1) for of_run in zip(*columns, strict=True))
+        ]
+        bounds = siblings[0].limits or settled_bounds(runs, together, siblings[0].floor, references)
+        for of, of_runs in zip(siblings, columns, strict=True):
+            ranges.append(PlotRange(*bounds, () if of.limits else values_outside(runs, of_runs, bounds)))
+    return ranges
 
 
-def settled_range(
+def settled_bounds(
     runs: Sequence[ComparedRun], of_runs: Sequence[Array], least: float, references: Sequence[Array] = ()
-) -> PlotRange:
+) -> tuple[float, float]:
     """Return a range that contains every value, or the settled runs if that is much larger.
 
-    A settled run is the second half and 85 % of the values of a complete run: a transient and a run that
-    failed do not flatten the others. If no run is complete, it is 85 % of each.
+    A settled run is the second half and 85 % of the values of a complete run: a transient, a run that failed
+    and a run that is far off do not flatten the others. If no run is complete, it is 85 % of each.
 
     Parameters
     ----------
     runs : sequence of ComparedRun
     of_runs : sequence of (n,) arrays
-        Values of each run; a number that is not finite is no value.
+        Values of each run in the order of time; a number that is not finite is no value.
     least : float
         Half of the least range: smaller values must not look large.
     references : sequence of (n,) arrays
@@ -198,20 +225,41 @@ def settled_range(
     complete = [
         values for run, values in zip(runs, finite, strict=True) if not run.early_end and _has_number(values)
     ]
-    settled = [(_usual(values), values[len(values) // 2 :]) for values in complete] or [
-        (_usual(values), values[:0]) for values in finite if _has_number(values)
+    settled = [np.append(_usual(values), values[len(values) // 2 :]) for values in complete] or [
+        _usual(values) for values in finite if _has_number(values)
     ]
-    everything = _bounds([values for values in finite if _has_number(values)])
-    usual = _bounds([*(np.concatenate(parts) for parts in settled), *references])
+    everything = value_bounds(of_runs)
+    usual = _bounds([*_without_outliers(settled, least, references), *references])
     span = max(usual[1] - usual[0], 2 * least)
     low, high = everything if everything[1] - everything[0] <= CLIPPED_FROM * span else usual
     middle, half = (low + high) / 2, max(least, MARGIN * (high - low) / 2)
-    low, high = middle - half, middle + half
+    return middle - half, middle + half
+
+
+def _without_outliers(settled: Sequence[Array], least: float, references: Sequence[Array]) -> list[Array]:
+    """Return the settled runs, smallest first, up to one that is much larger than the others."""
+    ordered = sorted(settled, key=_size)
+    if references:
+        most = OFF_REFERENCE * max(least, *map(_size, references))
+        return [values for values in ordered if _size(values) <= most]
+    sizes = [max(least, _size(values)) for values in ordered]
+    far = [place for place, size in enumerate(sizes[1:], start=1) if size > OUTLIER * sizes[place - 1]]
+    return ordered[: far[0]] if far else ordered
+
+
+def _size(values: Array) -> float:
+    return float(np.nanmax(np.abs(values)))
+
+
+def values_outside(
+    runs: Sequence[ComparedRun], of_runs: Sequence[Array], bounds: tuple[float, float]
+) -> tuple[Outside, ...]:
+    """Return the farthest value of each run outside of some bounds."""
     outside = (
-        _outside(place, run.table["t_s"], values, low, high)
-        for place, (run, values) in enumerate(zip(runs, finite, strict=True), start=1)
+        _outside(place, run.table["t_s"], np.where(np.isfinite(values), values, np.nan), *bounds)
+        for place, (run, values) in enumerate(zip(runs, of_runs, strict=True), start=1)
     )
-    return PlotRange(low, high, tuple(item for item in outside if item))
+    return tuple(item for item in outside if item)
 
 
 def _has_number(values: Array) -> bool:
@@ -225,6 +273,11 @@ def _usual(values: Array) -> Array:
     lowest, highest = ordered[: len(ordered) - count + 1], ordered[count - 1 :]
     place = int(np.argmin(highest - lowest))
     return np.array([lowest[place], highest[place]])
+
+
+def value_bounds(of_runs: Sequence[Array]) -> tuple[float, float]:
+    """Return the bounds of all values that are finite; 0 if there is none."""
+    return _bounds([values[np.isfinite(values)] for values in of_runs if np.any(np.isfinite(values))])
 
 
 def _bounds(of_runs: Sequence[Array]) -> tuple[float, float]:

@@ -20,7 +20,7 @@ from spheretwin.viz.comparison.runs import (
     PlotRange,
     Spectrum,
     logarithmic_range,
-    quantity_range,
+    quantity_ranges,
 )
 from spheretwin.viz.decimation import mean_and_deviation, octave_maxima
 from spheretwin.viz.figures.style import (
@@ -186,6 +186,7 @@ def over_time(
     height_in = 1.3 + 1.75 * len(panels_of) + LEGEND_ROW_in * len(runs)
     figure, grid = sheet(height_in, len(panels_of), title=title, sharex=True)
     panels = grid[:, 0]
+    ranges = dict(zip(quantities, quantity_ranges(quantities, runs, leading), strict=True))
     for panel, (quantity, logarithmic) in zip(panels, panels_of, strict=True):
         of_runs = [quantity.column(run.rows) for run in runs]
         if logarithmic:
@@ -193,7 +194,7 @@ def over_time(
             of_runs = [np.where(values > 0, values, np.nan) for values in of_runs]
             limits = _stated_range(panel, logarithmic_range(of_runs))
         else:
-            limits = _stated_range(panel, quantity_range(quantity, runs, leading))
+            limits = _stated_range(panel, ranges[quantity])
         for run, of_run, values in zip(runs, run_styles(runs), of_runs, strict=True):
             draw_line(panel, run.table["t_s"], values, *detail, label=run.legend, **of_run.line())
             if run.early_end:

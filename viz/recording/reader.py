@@ -226,13 +226,11 @@ class RecoveredPlots:
         summary.add(table, error_deg)
         log_markdown(recording, SUMMARY, summary.cut_off())
         log_end(recording, summary.last_s)
-        current_map, colours = (
-            CurrentMap(view.groups, view.current_limit_A),
-            CoilColours(view.current_limit_A),
-        )
-        for rows in [table] if len(table) else []:
-            current_map.add(recording, rows)
-            colours.add(recording, rows)
+        current_map = CurrentMap(view.groups, view.current_limit_A)
+        colours = CoilColours(view.current_limit_A)
+        if len(table):
+            current_map.add(recording, table)
+            colours.add(recording, table)
         colours.finish(recording)
         currents = current_map.finish(recording)
         recording.send_blueprint(layout(view, tracker.extents(summary.last_s, currents)))

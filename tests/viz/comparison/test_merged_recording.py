@@ -17,9 +17,11 @@ from spheretwin.models.telemetry.status import Status
 from spheretwin.models.telemetry.table import Table
 from spheretwin.viz.comparison.ghosts import Ghost
 from spheretwin.viz.comparison.merged_recording import EDGE
+from spheretwin.viz.comparison.runs import settled_bounds
 from spheretwin.viz.layout.extents import number
 from spheretwin.viz.quantities import COMPARED_QUANTITIES
 from tests.twin.analysis.runs import written
+from tests.viz.comparison.compared import T_s, run_of
 from tests.viz.recording.panels import columns, layouts, series
 
 
@@ -78,11 +80,12 @@ def test_every_signal_and_line_of_every_run_is_there(files, merged):
 
 
 def limits(merged, entity):
-    """Range of the plot that contains an entity."""
+    """Range of the plot that contains an entity; the narrower one of two."""
     (layout,) = layouts(merged.path)
     queries = {part: rows[0] for (part, name), rows in layout.items() if name == "ViewContents:query"}
-    (view,) = (part.removesuffix("/ViewContents") for part, query in queries.items() if entity in query)
-    return layout[f"{view}/ScalarAxis", "ScalarAxis:range"][0][0]
+    views = (part.removesuffix("/ViewContents") for part, query in queries.items() if entity in query)
+    ranges = [layout[f"{view}/ScalarAxis", "ScalarAxis:range"][0][0] for view in views]
+    return min(ranges, key=lambda bounds: bounds[1] - bounds[0])
 
 
 def test_the_end_of_a_failed_run_is_a_cross_within_every_plot_and_stated(files, merged):
@@ -111,6 +114,52 @@ def test_a_failed_run_does_not_flatten_the_others_and_the_text_states_its_values
     farthest = of_failed[np.argmax(np.abs(of_failed))][0]
     assert abs(farthest) > 2 * max(abs(low), abs(high))
     assert re.search(rf"^- α error \(mrad\): .*run 3 reaches {number(farthest)} \(", merged.text, re.M)
+
+
+def test_sibling_plots_have_one_range_and_another_tab_has_all_values(merged):
+    assert len({tuple(limits(merged, f"/run_2_slow/compare/error_{axis}_mrad")) for axis in "αβγ"}) == 1
+    (layout,) = layouts(merged.path)
+    names = {rows[0][0] for (_, name), rows in layout.items() if name == "ContainerBlueprint:display_name"}
+    assert {"settled", "all values", "minus run 1"} <= names
+
+
+def test_differences_are_those_at_the_ticks_of_both_runs(files, merged):
+    first, slow = (read(files[name]).table for name in ("first", "slow"))
+    t_ns, values = merged.series("/run_2_slow/difference/error_β_mrad")
+    count = len(t_ns)
+    assert count == len(first) // 2  # twice the period, and a longer run
+    expected = 1e3 * (slow["error_rad"][:count, 1] - first["error_rad"][::2, 1])
+    np.testing.assert_allclose(values[:, 0], expected)
+    assert not any(entity.startswith("/run_1_first/difference") for entity in merged.entities)
+
+
+def test_the_largest_and_rms_error_of_each_run_are_next_to_its_name(files, merged):
+    table = read(files["slow"]).table
+    largest, rms = (
+        [number(value) for value in values]
+        for values in (
+            1e3 * np.abs(table["error_rad"]).max(axis=0),
+            1e3 * np.sqrt(np.mean(table["error_rad"] ** 2, axis=0)),
+        )
+    )
+    (row,) = (line for line in merged.text.splitlines() if re.match(r"\| 2 +\|", line))
+    assert [cell.strip() for cell in row.strip("| ").split("|")] == ["2", *largest, *rms]
+
+
+@pytest.mark.parametrize(
+    ("sizes", "most"),
+    [((3.6, 20.6, 1000.0), 20.6), ((3.6, 1000.0), 3.6), ((3.6, 20.6), 20.6), ((100.0, 1000.0), 1000.0)],
+)
+def test_a_run_that_is_far_off_does_not_flatten_the_others(sizes, most):
+    columns = [size * np.sin(40 * T_s) for size in sizes]
+    low, high = settled_bounds([run_of(column) for column in columns], columns, 0.1)
+    assert (-low, high) == pytest.approx((1.1 * most, 1.1 * most), rel=1e-2)
+
+
+def test_a_run_far_from_the_reference_is_outside():
+    columns = [size * np.sin(40 * T_s) for size in (0.2, 0.7)]
+    _, high = settled_bounds([run_of(column) for column in columns], columns, 0.01, columns[:1])
+    assert high == pytest.approx(1.1 * 0.2, rel=1e-2)
 
 
 def test_titles_of_plots_with_values_outside_say_so(merged):
