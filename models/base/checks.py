@@ -73,15 +73,24 @@ class Check:
         """Return the value for a table."""
         if self.value is None:
             return "not taken"
-        return self.reason if self.reason and not isfinite(self.value) else _text(self.value, self.unit)
+        if self.reason and not isfinite(self.value):
+            return self.reason
+        return _text(self.value, self.unit, self._digits)
 
     def bound_text(self) -> str:
         """Return the bound for a table."""
         if self.bound is None:
             return "reported"
         if self.at_least is not None:
-            return f"{self.at_least:g} to {_text(self.bound, self.unit)}"
-        return f"≤ {_text(self.bound, self.unit)}"
+            return (
+                f"{_text(self.at_least, '1', self._digits)} to {_text(self.bound, self.unit, self._digits)}"
+            )
+        return f"≤ {_text(self.bound, self.unit, self._digits)}"
+
+    @property
+    def _digits(self) -> int:
+        """Digits of value and bounds: rounded alike, a value within two bounds is printed within them."""
+        return 3 if self.at_least is None else 6
 
 
 def broken(checks: Iterable[Check]) -> list[str]:
@@ -102,6 +111,6 @@ def _finite(value: float | None) -> float | None:
     return float(value) if value is not None and isfinite(value) else None
 
 
-def _text(value: float, unit: str) -> str:
-    number = f"{value:.2e}" if value and abs(value) < 1e-2 else f"{value:.3g}"
+def _text(value: float, unit: str, digits: int) -> str:
+    number = f"{value:.2e}" if value and abs(value) < 1e-2 else f"{value:.{digits}g}"
     return number if unit == "1" else f"{number} {unit}"

@@ -175,7 +175,7 @@ def _early_end(run: Reviewed, events: Sequence[Event]) -> EarlyEnd | None:
         return None
     if status is None:
         return EarlyEnd(float(run.table["t_s"][-1]), "not closed", "the file was not closed")
-    return EarlyEnd(float(run.table["t_s"][-1]), status.replace("_", " "), events[-1][2])
+    return EarlyEnd(run.simulated_s, status.replace("_", " "), events[-1][2])
 
 
 def _differences(runs: Sequence[Reviewed]) -> markdown.ResultTable | str:

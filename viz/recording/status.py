@@ -134,11 +134,9 @@ def log_lines(recording: rr.RecordingStream, events: list[Event], first: int = 0
 
 WITHIN, VOLTAGE, CURRENT, RANK = LEVELS = (
     "within limits",
-    "voltage at its limit",
-    "saturated",
-    "rank lost",
+    *(f"{state}, pauses < {QUIET_S:g} s" for state in ("voltage at its limit", "saturated", "rank lost")),
 )
-"""From no limit to the most severe one."""
+"""From no limit to the most severe one; shorter pauses are not shown."""
 
 Change = tuple[float, str]
 """Time in s, and the state from then on."""

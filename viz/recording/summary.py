@@ -105,12 +105,13 @@ class Summary:
     def _reason(self, status: Status) -> str:
         if status in (Status.COMPLETED, Status.RUNNING):
             return ""
-        at = f"{status.replace('_', ' ')} at {self.last_s:.3g} s of {self._facts.duration_s:g} s: "
+        ended_s = self.last_s + (self._field("controller", "period_s") or 0.0)  # after the last tick
+        at = f"{status.replace('_', ' ')} at {ended_s:.3f} s of {self._facts.duration_s:g} s: "
         if status == Status.FAILSAFE and self._failsafe:
             return at + self._failsafe
         if status == Status.LEFT_WORKSPACE:
-            angles = ", ".join(f"{name} {deg:.0f}°" for name, deg in zip(ANGLES, self._last_deg, strict=True))
-            return f"{at}a hinge reached the end of its range, {angles}"
+            angles = ", ".join(f"{name} {deg:.1f}°" for name, deg in zip(ANGLES, self._last_deg, strict=True))
+            return f"{at}a hinge reached the end of its range, at the start of this tick {angles}"
         return at + status.text.removesuffix(": the run ends here")
 
     def _figures(self) -> str:

@@ -100,8 +100,8 @@ def test_the_end_of_a_failed_run_is_a_cross_within_every_plot_and_stated(files, 
         low, high = limits(merged, entity)
         edge = EDGE * (high - low)
         assert merged.series(entity)[1][0, 0] == pytest.approx(np.clip(line[-1, 0], low + edge, high - edge))
-    end_s, _, reason = events(run)[-1]
-    assert f"**left workspace at {end_s:.3f} s**: {reason}" in merged.text
+    _, _, reason = events(run)[-1]
+    assert f"**left workspace at {run.simulated_s:.3f} s**: {reason}" in merged.text
 
 
 def test_a_failed_run_does_not_flatten_the_others_and_the_text_states_its_values(merged):

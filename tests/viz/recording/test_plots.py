@@ -130,7 +130,7 @@ def test_the_headline_names_each_fault_its_start_and_its_detection(facts_with_fa
         summary.add(table.rows(first, last), np.zeros(last - first))
     headline, reason, _, faults, chosen = summary.ended(Status.FAILSAFE).split("  \n")
     assert headline.startswith("**✗ FAILSAFE · hold")
-    assert reason == "**failsafe at 0.099 s of 3 s: a coil is too hot**"
+    assert reason == "**failsafe at 0.100 s of 3 s: a coil is too hot**"
     assert faults == (
         "faults: coil.01 shorted from 0.02 s, detected after 5 ms; coil.00 open from 0.04 s to 0.06 s,"
         " not detected;"
