@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from math import inf
 from typing import Any, NamedTuple, TypeVar, cast
 
 import numpy as np
@@ -24,7 +23,6 @@ from spheretwin.models.base.errors import InputError, distinct_texts, shown
 from spheretwin.models.base.reuse import reused
 from spheretwin.models.base.user_code import is_reference
 from spheretwin.models.coil_group import per_group
-from spheretwin.models.curve_origin import disagreements
 from spheretwin.models.inductance import mutual_inductance
 from spheretwin.models.lagrangian import loaded_inertia
 from spheretwin.models.mjcf import Mjcf
@@ -34,8 +32,7 @@ from spheretwin.models.telemetry.signals import Signal, with_more
 from spheretwin.models.torque_field import TorqueField
 from spheretwin.plant.end_stops import EndStopsSection
 from spheretwin.plant.magnet_heat import ResolvedThermal, ThermalSection
-from spheretwin.plant.mujoco_rotor import integrator_name
-from spheretwin.scenario.changes import first_tick, scheduled_changes, with_change
+from spheretwin.scenario.changes import with_change
 from spheretwin.scenario.files import Files, files_of, nominal_curve, reload_files
 from spheretwin.scenario.hardware import (
     HARDWARE,
@@ -105,7 +102,7 @@ def fill_defaults(
 def _applicable(scenario: Scenario, actuator: Actuator) -> PlantSection:
     """Return the plant without the errors of the hardware set that its machine cannot have."""
     plant = scenario.plant
-    for dotted in _inapplicable(scenario, actuator):
+    for dotted in inapplicable(scenario, actuator):
         _, section, name = dotted.split(".")
         scatter = getattr(plant, section)
         if getattr(scatter, name) == HARDWARE[scenario.hardware][dotted]:
@@ -113,7 +110,7 @@ def _applicable(scenario: Scenario, actuator: Actuator) -> PlantSection:
     return plant
 
 
-def _inapplicable(scenario: Scenario, actuator: Actuator) -> list[str]:
+def inapplicable(scenario: Scenario, actuator: Actuator) -> list[str]:
     """Return the fields of the hardware set that the machine cannot have."""
     if not isinstance(actuator.torque_data, TorqueField):
         return []
@@ -207,73 +204,6 @@ def true_sheet(scenario: Scenario, drive: ResolvedDrive, actuator: Actuator) -> 
         **drive_sheet(drive),
         **sensor_sheet(scenario.sensors),
     }
-
-
-def warnings_of(scenario: Scenario, files: Files) -> list[str]:
-    """Return warnings about model and scenario, one line each."""
-    late = [change for change in scheduled_changes(scenario) if change.tick >= scenario.ticks]
-    return [
-        *files.model.warnings,
-        *disagreements(files.actuator),
-        *_overridden(scenario.plant, files.model),
-        *_hardware_warnings(scenario, files.actuator),
-        *(f"the event that sets {change.name} does not occur: the run ends before" for change in late),
-        *_late_faults(scenario),
-    ]
-
-
-def _hardware_warnings(scenario: Scenario, actuator: Actuator) -> list[str]:
-    """Return a warning for what the hardware set states and the machine does not have or allow."""
-    hardware, warnings = scenario.hardware, []
-    if names := _inapplicable(scenario, actuator):
-        warnings.append(
-            f"hardware {hardware} without {', '.join(names)}: the torque field has all poles in one"
-        )
-    model_A, set_A = actuator.group.current_limit_A, amplifier_limit_A(hardware)
-    if isinstance(actuator.group.current_limits_A, tuple):
-        warnings.append(
-            f"the current limit of all groups is {model_A:.10g} A, the smallest that the model file states"
-        )
-    smaller_A = min(model_A, set_A)
-    if set_A not in (inf, model_A) and scenario.drive.current_limit_A in (None, smaller_A):
-        warnings.append(
-            f"the current limit is {smaller_A:.10g} A, the smaller one of {model_A:.10g} A of the model file"
-            f" and {set_A:.10g} A of hardware {hardware}"
-        )
-    return warnings
-
-
-def _late_faults(scenario: Scenario) -> list[str]:
-    """Return a warning for each fault that starts after the last control tick of the run."""
-    period_s = scenario.controller.period_s
-    return [
-        f"the fault {fault.target} {fault.mode} does not occur: it starts at {fault.start_s:g} s,"
-        f" the run ends at {scenario.duration:g} s"
-        for fault in scenario.fault
-        if first_tick(fault.start_s / period_s) >= scenario.ticks
-    ]
-
-
-def _overridden(section: PlantSection, model: Mjcf) -> list[str]:
-    """Return a warning for each value that a model file states and a run does not use."""
-    option, stated, given = model.described.opt, model.stated_options, section.gravity_m_s2
-    warnings = []
-    if "timestep" in stated and option.timestep != section.step_s:
-        own, used = distinct_texts(option.timestep, section.step_s)
-        warnings.append(f"the model's own timestep of {own} s is not used: plant.step_s is {used} s")
-    integrator = integrator_name(option.integrator)
-    if "integrator" in stated and integrator != section.integrator:
-        warnings.append(
-            f"the model's own integrator {integrator} is not used: plant.integrator is {section.integrator}"
-        )
-    gravity = mjcf.gravity(option)
-    states_gravity = "gravity" in stated or not any(gravity)  # its flag can switch it off
-    if given is not None and states_gravity and gravity != (0.0, 0.0, -given):
-        own = " ".join(f"{component:.10g}" for component in gravity)
-        warnings.append(
-            f"the model's own gravity of {own} m/s² is not used: plant.gravity_m_s2 is {given:.10g} m/s²"
-        )
-    return warnings
 
 
 def name_of_user_object(name: str) -> str:

@@ -21,13 +21,13 @@ from spheretwin.control.supervision.watchdog import REASONS, Reason
 from spheretwin.hardware_assembly import faults_of
 from spheretwin.inputs import BLOCK_TICKS, InputGenerator
 from spheretwin.loop import Inputs, inputs_of, loop
+from spheretwin.metrics.figures import Figures
 from spheretwin.models.base.columns import Columns
 from spheretwin.models.base.compiled import allocation_free, for_types_of
 from spheretwin.models.telemetry.signals import width
 from spheretwin.models.telemetry.status import BY_CODE, Status
 from spheretwin.plant.plant_tick import GOING
 from spheretwin.reduction import PlannedRun
-from spheretwin.run import Figures
 from spheretwin.scenario.files import Files
 from spheretwin.scenario.sections import ResolvedScenario
 from spheretwin.stages import stages_of

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import html
-import json
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from importlib import import_module
@@ -15,17 +14,17 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from spheretwin.faults.fault_injector import FaultMessages
-from spheretwin.metrics import CHECKS, METRICS
+from spheretwin.metrics.figures import Figures
+from spheretwin.metrics.user_metrics import UserMetric, check_names, own_value
 from spheretwin.models.actuator import Actuator
-from spheretwin.models.base.errors import InputError, LawError, exception_text, shown
+from spheretwin.models.base.errors import InputError, LawError, shown
 from spheretwin.models.base.extras import missing
-from spheretwin.models.base.user_code import load_function
 from spheretwin.models.telemetry.run_record import RunRecord, versions
-from spheretwin.models.telemetry.signals import ANGLES, Signal
+from spheretwin.models.telemetry.signals import ANGLES
 from spheretwin.models.telemetry.status import Status
 from spheretwin.models.telemetry.table import Table
 from spheretwin.provenance import change_text, facts_of
-from spheretwin.reduction import PlannedRun, Reduction, write_all
+from spheretwin.reduction import PlannedRun
 from spheretwin.scenario.changes import scheduled_changes
 from spheretwin.scenario.sections import ResolvedScenario
 from spheretwin.session import Session
@@ -246,71 +245,6 @@ def _imported(package: str) -> Any:
         raise missing("run", package, "tables") from None
 
 
-UserMetric = Callable[[Run], Any]
-"""User function from a complete run to a value in JSON types."""
-
-# Keys of the JSON of a run that are not metrics.
-OTHER_KEYS = (
-    "scenario",
-    "status",
-    "reason",
-    "simulated_s",
-    "wall_s",
-    "realtime_factor",
-    "versions",
-    "notes",
-    "warnings",
-)
-
-
-class Figures:
-    """Sink that computes metrics of a run; those of the runs of a block by its `reduction`.
-
-    Parameters
-    ----------
-    planned : PlannedRun
-        Facts about the runs before their first row.
-    names : iterable of str
-        Metrics; all unless given.
-    """
-
-    def __init__(self, planned: PlannedRun, names: Iterable[str] = METRICS) -> None:
-        self._runs = planned.runs
-        every = {name: kind(planned) for name, kind in METRICS.items()}
-        self._metrics = {name: every[name] for name in names}
-        # All of them, whatever the names: one reducer is compiled for all runs.
-        self._all = [*every.values(), *(check(planned) for check in CHECKS)]
-
-    def write(self, rows: Table) -> None:
-        """Process the rows of one chunk."""
-        if len(rows):
-            write_all(self._all, rows)
-
-    def note(self, t_s: float, text: str) -> None:
-        """Ignore a message: it changes no figure."""
-
-    def finish(self, status: str) -> None:
-        """Ignore the end of the run: it changes no figure."""
-
-    def reduction(self, signals: tuple[Signal, ...], ticks: int) -> Reduction:
-        """Return the compiled reduction of the telemetry of all runs up to a tick."""
-        return Reduction(self._all, signals, ticks)
-
-    def values(self) -> dict[str, Any]:
-        """Return the figures of the only run by name; None for a figure with too few rows."""
-        return self.of_each_run()[0]
-
-    def of_each_run(self) -> list[dict[str, Any]]:
-        """Return the figures of each run by name; None for a figure with too few rows."""
-        columns = [metric.values() for metric in self._metrics.values()]
-        runs = zip(*columns, strict=True) if columns else [()] * self._runs
-        return [dict(zip(self._metrics, values, strict=True)) for values in runs]
-
-    def warnings(self) -> list[str]:
-        """Return warnings that concern the validity of the figures, one line each."""
-        return [line for metric in self._all for line in metric.warnings()]
-
-
 def figures_of(run: Run, extra: Mapping[str, UserMetric] | None = None) -> dict[str, Any]:
     """Return the figures of a run whose telemetry is in memory.
 
@@ -331,77 +265,6 @@ def figures_of(run: Run, extra: Mapping[str, UserMetric] | None = None) -> dict[
     figures = Figures(PlannedRun(run.scenario, run.actuator, run.scenario.ticks))
     figures.write(run.telemetry)
     return {**figures.values(), **{name: own_value(name, metric, run) for name, metric in own.items()}}
-
-
-def check_names(own: Mapping[str, UserMetric]) -> None:
-    """Check that user functions have new names.
-
-    Raises
-    ------
-    InputError
-        A function has the name of another figure.
-    """
-    for name in own:
-        if name in METRICS or name in OTHER_KEYS:
-            taken = ", ".join([*METRICS, *OTHER_KEYS])
-            raise InputError(f"metric: expected another name than {taken}, received {name}")
-
-
-def load_metrics(references: Sequence[str]) -> dict[str, UserMetric]:
-    """Return user functions by the names of their figures.
-
-    Parameters
-    ----------
-    references : sequence of str
-        Each ``path/to/file.py:name``; the name is also the name of the figure.
-
-    Raises
-    ------
-    InputError
-        A function cannot be loaded, or has the name of another figure.
-    """
-    own: dict[str, UserMetric] = {}
-    for reference in references:
-        name = reference.rpartition(":")[2]
-        if name in own:
-            raise InputError(f"metric: expected a different name for each function, received {name} twice")
-        own[name] = load_function(reference, f"metric {name}")
-    check_names(own)
-    return own
-
-
-def own_values(own: Mapping[str, UserMetric], run: Run) -> tuple[dict[str, Any], list[str]]:
-    """Return the values of user functions, and a line for each that failed; the others are not lost."""
-    values: dict[str, Any] = dict.fromkeys(own)
-    faults: list[str] = []
-    for name, metric in own.items():
-        try:
-            values[name] = own_value(name, metric, run)
-        except InputError as error:
-            faults.append(str(error))
-    return values, faults
-
-
-def own_value(name: str, metric: UserMetric, run: Run) -> Any:
-    """Return the value of a user function for a run, in JSON types.
-
-    Raises
-    ------
-    InputError
-        The function raises, or returns a value that is not in JSON types.
-    """
-    try:
-        value = metric(run)
-    except KeyboardInterrupt:
-        raise
-    except BaseException as error:  # the user's code may raise anything
-        raise InputError(f"metric {name}: expected a figure, it raised {exception_text(error)}") from error
-    try:
-        return json.loads(json.dumps(value, default=_as_plain))
-    except KeyboardInterrupt:
-        raise
-    except BaseException:  # not JSON, or an object of the user that raises when it is read
-        raise InputError(f"metric {name}: expected a value in JSON types, received {shown(value)}") from None
 
 
 def summary(
@@ -434,9 +297,3 @@ def summary(
         "notes": scenario.trajectory.notes(),
         "warnings": list(warnings),
     }
-
-
-def _as_plain(value: object) -> Any:
-    if isinstance(value, np.ndarray | np.generic):
-        return value.tolist()
-    raise TypeError

@@ -16,6 +16,7 @@ from pydantic import ValidationError
 from spheretwin import active_config
 from spheretwin import loop as loops
 from spheretwin.active_config import initial_config
+from spheretwin.config_warnings import warnings_of
 from spheretwin.control.law import Law
 from spheretwin.control.supervision.watchdog import Reason
 from spheretwin.control.user_law import reference_of
@@ -324,7 +325,7 @@ class Session:
 
     def warnings(self) -> list[str]:
         """Return warnings about model and scenario, one line each."""
-        return active_config.warnings_of(self.scenario, self._config.files)
+        return warnings_of(self.scenario, self._config.files)
 
     @contextmanager
     def _alone(self) -> Iterator[None]:

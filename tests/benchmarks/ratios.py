@@ -116,7 +116,9 @@ def plain_seconds() -> float:
     actuator, rotor = actuators.load(), _rotor()
     t = scenario.controller.period_s * np.arange(PLAIN_TICKS)
     reference = scenario.trajectory.sample(t)
-    disturbance = scenario.disturbance.sample(t, Draws(partial(np.random.default_rng(0).random, PLAIN_TICKS), None))
+    disturbance = scenario.disturbance.sample(
+        t, Draws(partial(np.random.default_rng(0).random, PLAIN_TICKS), None)
+    )
     rotor.start(reference[0, 0], np.zeros(3))
     law = plain.PlainAfsm(actuator.inertia, scenario.controller.period_s)
     work = seconds_of(

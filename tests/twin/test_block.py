@@ -9,9 +9,9 @@ from spheretwin import scenario as scenarios
 from spheretwin.active_config import fill_defaults
 from spheretwin.block import RunBlock
 from spheretwin.metrics import METRICS
+from spheretwin.metrics.figures import Figures
 from spheretwin.models.base.columns import MixedRowsError
 from spheretwin.reduction import PlannedRun
-from spheretwin.run import Figures
 from spheretwin.scenario.files import files_of
 from spheretwin.session import Session
 from spheretwin.simulation import follow

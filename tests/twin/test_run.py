@@ -8,9 +8,11 @@ import pytest
 from spheretwin import scenario as scenarios
 from spheretwin.analysis.recorded_run import read
 from spheretwin.metrics import METRICS
+from spheretwin.metrics.figures import Figures
+from spheretwin.metrics.user_metrics import OTHER_KEYS
 from spheretwin.models.base.errors import InputError
 from spheretwin.reduction import PlannedRun
-from spheretwin.run import OTHER_KEYS, Figures, figures_of, summary
+from spheretwin.run import figures_of, summary
 from spheretwin.session import Session
 from spheretwin.simulation import follow, simulate
 

@@ -16,7 +16,9 @@ from spheretwin.cli.common import interruptible, keep_viewer, print_json, print_
 from spheretwin.cli.options import verb
 from spheretwin.machine import export
 from spheretwin.machine.twin_file import read_twin
+from spheretwin.metrics.figures import Figures
 from spheretwin.metrics.tracking import BAND_rad
+from spheretwin.metrics.user_metrics import UserMetric, load_metrics, own_values
 from spheretwin.models.base.errors import InputError, SpheretwinError
 from spheretwin.models.base.mujoco_library import timers_stopped
 from spheretwin.models.telemetry.checksums import NO_CHECKSUMS, has_checksums
@@ -27,7 +29,7 @@ from spheretwin.models.telemetry.table import TelemetryBuffer
 from spheretwin.outputs import Outputs
 from spheretwin.reduction import PlannedRun
 from spheretwin.replay import RunPlan
-from spheretwin.run import Figures, Run, UserMetric, load_metrics, own_values, summary
+from spheretwin.run import Run, summary
 from spheretwin.scenario import reading
 from spheretwin.scenario.reading import shipped
 from spheretwin.session import Session

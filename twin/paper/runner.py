@@ -14,11 +14,12 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import TypeAdapter
 
+from spheretwin.metrics.user_metrics import UserMetric
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.telemetry.status import Status
 from spheretwin.paper.earlier_runs import EarlierRuns, key_of
 from spheretwin.paper.experiment import STATUSES, Case, Experiment, Outcome, Outcomes
-from spheretwin.run import Run, UserMetric
+from spheretwin.run import Run
 from spheretwin.scenario.sections import Scenario
 from spheretwin.scenario.writing import command_words
 from spheretwin.study.agreement import Ending, compare

@@ -14,6 +14,8 @@ from spheretwin.active_config import fill_defaults
 from spheretwin.block import RunBlock
 from spheretwin.channels import CHANNELS
 from spheretwin.metrics import METRICS
+from spheretwin.metrics.figures import Figures
+from spheretwin.metrics.user_metrics import UserMetric, load_metrics, own_values
 from spheretwin.models.base.columns import MixedRowsError
 from spheretwin.models.base.errors import (
     InputError,
@@ -29,7 +31,7 @@ from spheretwin.models.telemetry.parquet import TelemetryFile
 from spheretwin.models.telemetry.table import TelemetryBuffer
 from spheretwin.provenance import record_of
 from spheretwin.reduction import PlannedRun
-from spheretwin.run import Figures, Run, UserMetric, load_metrics, own_values
+from spheretwin.run import Run
 from spheretwin.scenario import reading
 from spheretwin.scenario.changes import check_events, fields_with, is_tag
 from spheretwin.scenario.fields import INDEX, every_field, flat, new_name, without_indices

@@ -37,7 +37,9 @@ def problem(scenario: Scenario) -> Problem:
     actuator, plant, period_s = actuators.load(), scenario.plant, scenario.controller.period_s
     t = period_s * np.arange(scenario.ticks)
     draws = np.random.default_rng(scenario.seed).random(len(t))
-    disturbance = scenario.disturbance.sample(t, Draws(lambda: draws, None)) + np.array(plant.modelling_torque_Nm)
+    disturbance = scenario.disturbance.sample(t, Draws(lambda: draws, None)) + np.array(
+        plant.modelling_torque_Nm
+    )
     group = actuator.group
     gains = {
         name: np.array(value)

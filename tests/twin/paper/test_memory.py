@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from spheretwin.control.supervision.watchdog import Reason
+from spheretwin.metrics.user_metrics import own_value
 from spheretwin.models.telemetry.status import Status
 from spheretwin.paper import earlier_runs, fault_outcomes, nutation, runner, stability, step_size, tilt
 from spheretwin.paper.earlier_runs import key_of
@@ -17,7 +18,6 @@ from spheretwin.paper.runner import (
     scenario_of,
     summarise,
 )
-from spheretwin.run import own_value
 from spheretwin.study.row import Result, Rows
 from tests.twin.paper.cases import IDEAL, NOISY, SHORT, experiment
 
