@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -80,7 +81,7 @@ class Controller(NamedTuple):
     That of many runs has arrays with a further first index, of the run.
     """
 
-    data: ControllerData
+    data: Any  # `ControllerData`
     parameters: Array  # of the law
     memory: Array  # state of the law
     estimator_parameters: Array
@@ -104,7 +105,7 @@ def controller_of(controllers: Controller, run: int) -> Controller:
 def controller(
     rows: Rows,
     law: laws.Law | list[laws.Law],
-    estimator: Estimator | list[Estimator] | None,
+    estimator: Estimator | Sequence[Estimator | None] | None,
     magnetics: TorqueModel,
     current_limit_A: Any,
 ) -> Controller:

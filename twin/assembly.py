@@ -248,7 +248,7 @@ def _of_each(build: Callable[[ResolvedScenario], T], scenario: ResolvedScenario,
     return [build(run) for run in runs]
 
 
-def _runs(scenario: ResolvedScenario) -> list[ResolvedScenario]:
+def _runs(scenario: Any) -> list[ResolvedScenario]:
     return list(scenario) if isinstance(scenario, Columns) else [scenario]
 
 

@@ -159,7 +159,7 @@ class InputGenerator:
             seeds = np.broadcast_to(seeds, len(section)).tolist()
         elif not section.is_random:
             seeds = seeds[:1]
-        sections = section if isinstance(section, Columns) else [section] * len(seeds)
+        sections: Any = section if isinstance(section, Columns) else [section] * len(seeds)
         return _stacked(
             [own.sample(t, draws_of(seed, first)) for own, seed in zip(sections, seeds, strict=True)]
         )

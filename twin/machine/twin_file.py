@@ -182,7 +182,7 @@ def draw_fields(path: Path, count: int, seed: int = 0) -> dict[str, list[Any]]:
     machine = Machine(scenario, fields)
     parameters = selected(names, machine.model.actuator)
     bounds = [[getattr(one.kind, end) for one in parameters] for end in ("least", "most")]
-    drawn = np.clip(drawn, *bounds)
+    drawn = np.clip(drawn, bounds[0], bounds[1])
     machines = [machine.fields(parameters, row.tolist()) for row in drawn]
     return {name: [one[name] for one in machines] for name in machines[0]}
 

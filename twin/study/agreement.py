@@ -12,7 +12,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from spheretwin.models.base.errors import SpheretwinError
-from spheretwin.models.telemetry.status import Status
+from spheretwin.models.telemetry.status import Status, named
 from spheretwin.study.grid import Row
 from spheretwin.study.row import Rows
 from spheretwin.study.study import FAST, FULL
@@ -84,7 +84,7 @@ def _endings(rows: Rows, checked: Sequence[Row], engine: str) -> list[Ending]:
     for result in results:
         if result.error is not None:
             raise SpheretwinError(result.error)
-    return [(Status(result.status), result.figures[RMS_ERROR] or []) for result in results]
+    return [(named(result.status), result.figures[RMS_ERROR] or []) for result in results]
 
 
 def _difference(ours: list[float], theirs: list[float]) -> float:

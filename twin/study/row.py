@@ -151,7 +151,7 @@ class Rows:
         Rows that differ in numbers run as a block. A row with events, a law, metric or trajectory of the
         user, or telemetry to be stored, runs alone.
         """
-        results: dict[int, Result] = {}
+        results: dict[int, Result | None] = {}
         for places, block in self._blocks(rows, engine):
             results |= zip(places, block, strict=True)
         return [results.get(place) or self._alone(row, engine) for place, row in enumerate(rows)]

@@ -88,7 +88,8 @@ def _number(rows: Rows, name: str) -> float:
     listed = known.get(whole)
     if isinstance(listed, list) and place.isdecimal() and int(place) < len(listed):
         known[name] = listed[int(place)]
-    if not is_number(value := known.get(name)):
+    value: Any = known.get(name)
+    if not is_number(value):
         raise InputError(f"sensitivities: expected a field with a number, received {name} = {shown(value)}")
     return float(value)
 
@@ -97,7 +98,8 @@ def _columns(rows: Rows, runs: Sequence[Row], figures: Sequence[str]) -> dict[st
     """Return the figures of all runs, (runs, …)."""
     results = rows.run(runs)
     for run, result in zip(runs, results, strict=True):
-        missing = [figure for figure in figures if None in np.ravel(result.figures.get(figure))]
+        values: dict[str, Any] = {figure: result.figures.get(figure) for figure in figures}
+        missing = [figure for figure, value in values.items() if None in np.ravel(value)]
         if result.status != Status.COMPLETED or missing:
             what = f"no {missing[0]}" if result.status == Status.COMPLETED else result.error or result.status
             raise InputError(f"sensitivities: expected runs that complete, received {what} at {run.values}")

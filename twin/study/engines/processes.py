@@ -13,12 +13,13 @@ import sys
 import threading
 from collections.abc import Generator
 from contextlib import suppress
+from typing import Any, BinaryIO, NamedTuple
 
 from spheretwin.models.base.errors import SpheretwinError
 from spheretwin.models.base.turns import outside_turn
 from spheretwin.study.engines import threads, worker
-from spheretwin.study.engines.engine import Batches, Engine, Order
-from spheretwin.study.engines.worker import BatchResult, Job
+from spheretwin.study.engines.engine import Batches, BatchResult, Engine, Order
+from spheretwin.study.engines.worker import Job
 from spheretwin.study.grid import Row
 from spheretwin.study.row import Result
 
@@ -45,6 +46,12 @@ def run(order: Order) -> Generator[tuple[Row, Result | None]]:
     yield from threads.run(order._replace(numbers=iter(here), rows=len(here)))
 
 
+class _Process(NamedTuple):
+    program: subprocess.Popen[bytes]
+    requests: BinaryIO
+    results: BinaryIO
+
+
 class _Crew:
     """Processes by the threads that use them.
 
@@ -55,7 +62,7 @@ class _Crew:
 
     def __init__(self, job: Job) -> None:
         self._job, self._own = job, threading.local()
-        self._all: list[subprocess.Popen[bytes]] = []
+        self._all: list[_Process] = []
 
     def run(self, numbers: list[int]) -> BatchResult:
         """Return the results of a batch from the process of this thread.
@@ -68,13 +75,13 @@ class _Crew:
         with outside_turn:
             process = self._process()
             try:
-                pickle.dump(numbers, process.stdin)
-                process.stdin.flush()
-                result: BatchResult = pickle.load(process.stdout)
+                pickle.dump(numbers, process.requests)
+                process.requests.flush()
+                result: BatchResult = pickle.load(process.results)
             except (EOFError, OSError, pickle.UnpicklingError):
                 raise SpheretwinError(
                     f"sweep: expected a process to finish rows {numbers[0]} to {numbers[-1]}, received its"
-                    f" end with status {process.wait()}; what is finished is kept"
+                    f" end with status {process.program.wait()}; what is finished is kept"
                 ) from None
         return result
 
@@ -82,22 +89,23 @@ class _Crew:
         """End all processes; each one first finishes its batch."""
         for process in self._all:
             with suppress(OSError):
-                process.stdin.close()
+                process.requests.close()
         for process in self._all:
-            process.wait()
-            process.stdout.close()
+            process.program.wait()
+            process.results.close()
 
-    def _process(self) -> subprocess.Popen[bytes]:
+    def _process(self) -> _Process:
         if not hasattr(self._own, "process"):
-            program = f"from {worker.__name__} import main; main()"
-            command = [sys.executable, "-P", "-c", program]
+            command = [sys.executable, "-P", "-c", f"from {worker.__name__} import main; main()"]
             # Of a session of its own: an interruption of the driver lets it finish its batch.
-            self._own.process = process = subprocess.Popen(
+            program: Any = subprocess.Popen(
                 command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, start_new_session=True
             )
+            process = self._own.process = _Process(program, program.stdin, program.stdout)
             self._all.append(process)
-            pickle.dump(self._job, process.stdin)
-        return self._own.process
+            pickle.dump(self._job, process.requests)
+        own: _Process = self._own.process
+        return own
 
 
 ENGINE = Engine(run)
