@@ -41,6 +41,9 @@ MOST_TRIALS = 15
 DRAWS = 100
 """Machines of a twin unless their number is given."""
 
+MANY_ROWS = 500
+"""Rows whose Python takes longer than the start of a process."""
+
 GO_ON = "sweep: finished rows are stored; the same command continues from there"
 
 
@@ -110,7 +113,8 @@ def run(options: argparse.Namespace) -> bool:
         print_message(
             f"sweep: {outcome.damaged} damaged lines of the journal were skipped, and their rows run again"
         )
-    if options.engine == "local" and (own := _own_code(study)):
+    long = outcome.rows - outcome.resumed > MANY_ROWS and options.threads != 1
+    if long and options.engine == "local" and (own := _own_code(study)):
         print_message(
             f"sweep: rows with {own} run one at a time in Python; --engine processes runs them on all cores"
         )
