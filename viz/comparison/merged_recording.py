@@ -353,9 +353,20 @@ def _plot_of(quantity: Quantity, of_quantity: PlotRange, of_runs: Sequence[Array
     """Return the plot of a quantity, with limits of all values if some are outside of its range."""
     low, high, outside = of_quantity
     limits = quantity.limits or labelled(low, high, quantity.floor, STEPS)
-    heading, desired = quantity.heading, quantity.desired is not None
+    heading, desired = _heading(quantity), quantity.desired is not None
     whole = labelled(*value_bounds(of_runs), quantity.floor, STEPS) if outside else limits
     return Plot(quantity.name, heading, quantity.group, desired, limits, whole)
+
+
+SYMBOLS = {"torque_command_norm_Nm": "τ", "largest_current_A": "i", "torque_margin": "margin"}
+"""Names of quantities above plots of a small window; those of a hinge have the name of the hinge."""
+
+
+def _heading(quantity: Quantity) -> str:
+    """Return symbol and unit of a quantity that stands next to two others, else its title."""
+    if quantity.group in (LARGE, BESIDE_TEXTS):
+        return quantity.heading
+    return f"{SYMBOLS.get(quantity.name, quantity.title.split()[0])} {quantity.unit}".removesuffix(" 1")
 
 
 class Difference(NamedTuple):
@@ -371,9 +382,7 @@ def _difference_plots(
     """Return the plots of the differences, with one range."""
     together = [np.concatenate([of.values for of in parts]) for parts in zip(*differences, strict=True)]
     limits = labelled(*settled_bounds(runs[1:], together, ERROR.floor), ERROR.floor, STEPS)
-    return tuple(
-        Plot(of.name, f"{of.title} - run 1 [{of.unit}]", ERRORS, False, limits, limits) for of in errors
-    )
+    return tuple(Plot(of.name, _heading(of), ERRORS, False, limits, limits) for of in errors)
 
 
 def _differences(quantity: Quantity, runs: Sequence[ComparedRun]) -> list[Difference]:

@@ -17,8 +17,8 @@ Array = NDArray[np.float64]
 # Extents up to this factor beyond the range of the settled run are drawn completely.
 CLIPPED_FROM = 2.5
 
-# Share of the spans of a run that the range always contains.
-USUAL = 0.85
+# Shares of the spans of a run, and of its second half, that the range always contains: a spike is outside.
+USUAL, SETTLED = 0.85, 0.98
 
 # Above and below a curve.
 MARGIN = 1.1
@@ -28,7 +28,7 @@ LABELLED = 8
 
 # Halves and ends of ranges with such steps.
 _NICE = (1.0, 1.5, 2.0, 3.0, 4.0, 10.0)
-NICE_ABOVE_ZERO = (1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 10.0)
+NICE_ABOVE_ZERO = (1.0, 1.5, 2.0, 3.0, 10.0)
 
 # Share of a range beyond the greatest labelled number: otherwise half of its height would be cut.
 ROOM = 0.06
@@ -80,7 +80,7 @@ class Extents:
     def limit(self, *channels: PlotChannel, least: float, above_zero: bool = False) -> float:
         """Return half of a range about 0, or its end, in which the settled run can be read.
 
-        It contains the whole second half and 85 % of all, or everything if that is not much larger.
+        It contains 98 % of the second half and 85 % of all, or everything if that is not much larger.
 
         Parameters
         ----------
@@ -93,7 +93,8 @@ class Extents:
         """
         size = self._largest(*channels)
         second_half = size[self.t_s >= self.t_s[-1] / 2]
-        usual = max(least, float(np.max(second_half)), float(np.quantile(size, USUAL)))
+        settled = float(np.quantile(second_half, SETTLED, method="lower"))
+        usual = max(least, settled, float(np.quantile(size, USUAL)))
         whole = float(np.max(size))
         shown = whole if least < whole <= CLIPPED_FROM * usual else usual
         return nice(MARGIN * shown, NICE_ABOVE_ZERO if above_zero else _NICE)
@@ -108,15 +109,9 @@ class Extents:
         """Return the range of some channels, at least twice `least` wide, with two labels."""
         return labelled(*self.bounds(*channels), least)
 
-    def largest(self, limit: float, *channels: PlotChannel) -> str:
-        """Return the part of a plot's title with the largest magnitude, and the time outside of the range."""
-        size = self._largest(*channels)
-        outside = np.flatnonzero(size > limit)
-        text = f", largest {number(float(np.max(size)))}"
-        if not len(outside):
-            return text
-        until = self.t_s[min(outside[-1] + 1, len(self.t_s) - 1)]
-        return f"{text} in first {until:.2g} s"
+    def is_cut(self, limit: float, *channels: PlotChannel) -> bool:
+        """Return True if magnitudes of some channels are outside of a limit."""
+        return bool(np.any(self._largest(*channels) > limit))
 
     def emptiest_corner(self, band: tuple[float, float], *channels: PlotChannel) -> Corner:
         """Return the corner of a plot with a range into which the lines of some channels reach the least."""
@@ -158,13 +153,6 @@ def nice(value: float, among: Sequence[float] = _NICE) -> float:
 def number(value: float) -> str:
     """Return a number as text: three digits, and thousands without a power of ten."""
     return f"{value:.0f}" if 1e3 <= abs(value) < 1e6 else f"{value:.3g}"
-
-
-def span_text(low: float, high: float, least: float) -> str:
-    """Return a span as text, to a hundredth of its width; one number where it is constant."""
-    digits = 2 - floor(log10(max(high - low, least)))
-    texts = [number(round(bound, digits) + 0.0) for bound in (low, high)]
-    return " to ".join(dict.fromkeys(texts))
 
 
 def labelled(low: float, high: float, least: float, most: int = LABELLED) -> tuple[float, float]:

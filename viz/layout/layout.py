@@ -163,7 +163,7 @@ def _law_plots(plots: Plots) -> list[rrb.Container | rrb.View]:
     if SLIDING in own:
         del own[SLIDING]
         sliding = [
-            plots.about_zero("sliding variables s", "rad/s", plots.signal(SLIDING), least=LEAST["rad/s"]),
+            plots.about_zero("sliding s", "rad/s", plots.signal(SLIDING), least=LEAST["rad/s"]),
             phase_plane(plots),
         ]
     units = dict.fromkeys(own_signal.unit for own_signal in own.values())
@@ -280,7 +280,7 @@ def overview(plots: Plots) -> rrb.Container:
         plots.above_zero("error as one angle", "°", quantity(ERROR_ANGLE), least=ERROR_ANGLE.floor),
         error_of_each_axis(plots),
         plots.fixed(
-            f"torque margin [× command], 0 saturated, to {MOST:g}",
+            "torque margin [× command]",
             quantity(MARGIN),
             low=-0.05 * MOST,
             high=1.05 * MOST,

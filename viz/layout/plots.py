@@ -13,7 +13,7 @@ from rerun.blueprint.archetypes import ViewBlueprint, ViewContents
 from rerun.blueprint.encodings import ComponentSourceKind, VisualizerComponentMapping
 
 from spheretwin.models.telemetry.signals import ANGLES, common_signals
-from spheretwin.viz.layout.extents import ROOM, CurrentRanges, Extents, PlotChannel, number, span_text
+from spheretwin.viz.layout.extents import ROOM, CurrentRanges, Extents, PlotChannel, number
 from spheretwin.viz.layout.styles import LINE_LOOKS, MOST_MARKED
 from spheretwin.viz.layout.view import (
     DERIVED,
@@ -33,6 +33,9 @@ from spheretwin.viz.layout.view import (
 from spheretwin.viz.quantities import Quantity
 
 Range = tuple[float, float]
+
+CUT = ", cut"
+"""End of the title of a plot with values outside of its range."""
 
 KEY = "●"
 """First marker of a key in the title of a plot."""
@@ -104,7 +107,7 @@ class Plots:
         least: float,
         axis: int | None = None,
     ) -> rrb.TimeSeriesView:
-        """Make a plot with the range of the settled run; its title gives the extent outside.
+        """Make a plot with the range of the settled run; its title says that values are outside.
 
         Parameters
         ----------
@@ -125,19 +128,20 @@ class Plots:
 
         def fit(extents: Extents) -> Fit:
             limit = extents.limit(*(PlotChannel(line.name) for line in lines), least=least)
-            suffix = extents.largest(limit, *(PlotChannel(line.name, axis) for line in lines))
+            is_cut = extents.is_cut(limit, *(PlotChannel(line.name, axis) for line in lines))
             reach = (1 + ROOM) * limit
-            return Fit(f"{what} ±{number(limit)} {unit}{suffix}", (-reach, reach))
+            return Fit(f"{name} ±{number(limit)} {unit}{CUT * is_cut}{colon}{key}", (-reach, reach))
 
-        return self._plot(f"{what} [{unit}]", lines, axis, fit)
+        name, colon, key = what.partition(": ")  # the key may be cut in a small window, the range not
+        return self._plot(f"{name} [{unit}]{colon}{key}", lines, axis, fit)
 
     def above_zero(self, what: str, unit: str, line: PlotLine, *, least: float) -> rrb.TimeSeriesView:
         """Make a plot of a quantity that is never negative, with the range of the settled run."""
 
         def fit(extents: Extents) -> Fit:
             limit = extents.limit(PlotChannel(line.name), least=least, above_zero=True)
-            suffix = extents.largest(limit, PlotChannel(line.name))
-            return Fit(f"{what} [{unit}]{suffix}", (-ROOM * limit, (1 + ROOM) * limit))
+            is_cut = extents.is_cut(limit, PlotChannel(line.name))
+            return Fit(f"{what} [{unit}]{CUT * is_cut}", (-ROOM * limit, (1 + ROOM) * limit))
 
         return self._plot(f"{what} [{unit}]", (line,), None, fit)
 
@@ -153,10 +157,11 @@ class Plots:
 
         def fit(extents: Extents) -> Fit:
             channels = [PlotChannel(line.name, axis) for line in lines]
-            title = f"{what} [{unit}], {span_text(*extents.bounds(*channels), least)}"
             return Fit(title, extents.band(*channels, least=least))
 
-        return self._plot(f"{what} [{unit}]", lines, axis, fit)
+        name, colon, key = what.partition(": ")
+        title = f"{name} [{unit}]{colon}{key}"
+        return self._plot(title, lines, axis, fit)
 
     def current_map(self, entity: str, what: str, span: Callable[[CurrentRanges], str]) -> rrb.TimeSeriesView:
         """Make a map of the currents, a row for each group; its title states the range of its colours."""

@@ -15,7 +15,7 @@ from spheretwin.models.telemetry.status import Status
 from spheretwin.models.telemetry.table import Table
 from spheretwin.viz import theme
 from spheretwin.viz.decimation import CompletedBins, FirstRows, TimeBins
-from spheretwin.viz.layout.extents import MARGIN, NICE_ABOVE_ZERO, CurrentRanges, nice
+from spheretwin.viz.layout.extents import MARGIN, CurrentRanges, nice
 from spheretwin.viz.layout.view import CURRENT_MAP, CURRENT_RMS
 from spheretwin.viz.recording.part import RecordingPart, RecordingSubject, scalars, time_index
 from spheretwin.viz.rerun_internals import ArrowComponent
@@ -29,6 +29,9 @@ BAR_WIDTH = 0.8
 LEAST_A = 0.01
 """Least range: smaller currents must not look large."""
 
+RANGES = (1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0)
+"""Ranges of colours in a decade."""
+
 WITHIN_RANGE = 0.98
 """Share of the values that a range of colours contains; larger ones have the full colour."""
 
@@ -37,7 +40,7 @@ def colour_range(current_A: Array, limit_A: float) -> float:
     """Return the range of the colours of some currents: at most the current limit."""
     size_A = np.abs(current_A[np.isfinite(current_A)])
     usual_A = float(np.quantile(size_A, WITHIN_RANGE)) if len(size_A) else 0.0
-    return min(limit_A, nice(max(MARGIN * usual_A, LEAST_A), NICE_ABOVE_ZERO))
+    return min(limit_A, nice(max(MARGIN * usual_A, LEAST_A), RANGES))
 
 
 _VALUES = next(iter(rr.BarChart.columns(values=np.zeros((1, 1))))).component_descriptor()

@@ -16,7 +16,7 @@ from spheretwin.models.base.errors import InputError
 from spheretwin.models.telemetry.status import Status
 from spheretwin.models.telemetry.table import Table
 from spheretwin.viz.comparison.ghosts import Ghost
-from spheretwin.viz.comparison.merged_recording import EDGE
+from spheretwin.viz.comparison.merged_recording import EDGE, _heading
 from spheretwin.viz.comparison.runs import settled_bounds
 from spheretwin.viz.layout.extents import number
 from spheretwin.viz.quantities import COMPARED_QUANTITIES
@@ -165,9 +165,11 @@ def test_a_run_far_from_the_reference_is_outside():
 def test_titles_of_plots_with_values_outside_say_so(merged):
     (layout,) = layouts(merged.path)
     titles = [rows[0][0] for (_, name), rows in layout.items() if name == "ViewBlueprint:display_name"]
-    cut = {title.removesuffix(", cut").partition(" [")[0] for title in titles if title.endswith(", cut")}
-    assert "α error" in cut
-    assert cut == set(re.findall(r"^- ([^,\n]*) \([^)\n]*\): run", merged.text, re.MULTILINE))
+    cut = {title.removesuffix(", cut") for title in titles if title.endswith(", cut")}
+    assert {"α mrad", "β mrad", "γ mrad"} <= cut
+    stated = re.findall(r"^- (.*) \(([^()]*)\): run", merged.text, re.MULTILINE)
+    headings = {(of.title, of.unit): _heading(of) for of in COMPARED_QUANTITIES}
+    assert cut == {headings[of] for of in stated}
 
 
 @pytest.mark.parametrize(
