@@ -13,11 +13,13 @@ import hashlib
 import html
 import os
 import re
+import time
 from collections import OrderedDict
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
+from typing import NamedTuple
 
 import mujoco
 import numpy as np
@@ -218,7 +220,7 @@ def _read(path: Path) -> Mjcf:
         _turn_principal_axes_back(model)
     if lost := missing_meshes(mujoco.MjSpec.from_file(str(path)), path):
         lines.append(f"recordings do not draw {', '.join(lost)}: no such files below {path.parent.resolve()}")
-    texts, _ = _texts_and_named(path)
+    texts, _ = _texts_and_sources(path)
     return Mjcf(*compiled, tuple(f"model {path}: {line}" for line in lines), _stated_options(texts.values()))
 
 
@@ -304,47 +306,87 @@ _FOLDERS = re.compile(rb"""\b(?:meshdir|texturedir|assetdir)\s*=\s*["']([^"']+)[
 _OTHER_KINDS = (".obj", ".stl", ".msh", ".png", ".ktx", ".skn")
 
 
+class _Seen(NamedTuple):
+    """Fingerprint of a file, and the states of all files that it depends on, also of missing ones."""
+
+    digest: str
+    states: dict[str, tuple[int, ...] | None]
+
+
+_SEEN: dict[str, _Seen] = {}
+
+SETTLED_s = 2.0
+"""Age from which on a change of a file has another change time: file systems count it in steps."""
+
+
 def fingerprint(path: Path) -> str:
-    """Return a digest of a file and its includes, and of the change times of the other files they name."""
-    texts, named = _texts_and_named(path)
+    """Return a digest of a file and its includes, and of the change times of the other files they name.
+
+    It is computed again if the state of any of these files has changed.
+    """
+    place = os.path.abspath(path)
+    seen = _SEEN.get(place)
+    if seen and all(_state(source) == state for source, state in seen.states.items()):
+        return seen.digest
+    texts, sources = _texts_and_sources(path)
+    states = {str(source): _state(source) for source in (place, *texts, *sources)}
     digest = hashlib.sha256()
     for source, text in sorted(texts.items()):
         digest.update(f"{source} {len(text)} ".encode(errors="surrogateescape") + text)
-    for source in sorted(named):
-        state = source.stat()
-        # A copy can keep the modification time and the size, but neither the inode nor its change time.
-        state_text = f"{source} {state.st_ino} {state.st_mtime_ns} {state.st_ctime_ns} {state.st_size} "
-        digest.update(state_text.encode(errors="surrogateescape"))
+    for source in sorted(_files(sources)):
+        digest.update(f"{source} {states[str(source)]} ".encode(errors="surrogateescape"))
+    newest_ns = max(state[CHANGED] for state in states.values() if state)
+    if time.time_ns() - newest_ns > 1e9 * SETTLED_s:
+        _SEEN[place] = _Seen(digest.hexdigest(), states)
     return digest.hexdigest()
+
+
+CHANGED = 2
+
+
+def _state(source: Path | str) -> tuple[int, ...] | None:
+    """Return inode, times and size of a file; None if there is none.
+
+    A copy can keep the modification time and the size, but neither the inode nor its change time.
+    """
+    try:
+        state = os.stat(source)
+    except (OSError, ValueError):
+        return None
+    return state.st_ino, state.st_mtime_ns, state.st_ctime_ns, state.st_size
 
 
 def contents_digest(path: Path) -> str:
     """Return a digest of the contents of a file and of all files that it names, without paths and times."""
-    texts, named = _texts_and_named(path)
+    texts, sources = _texts_and_sources(path)
     contents = {hashlib.sha256(content).digest() for content in texts.values()}
-    contents |= {hashlib.sha256(source.read_bytes()).digest() for source in named}
+    contents |= {hashlib.sha256(source.read_bytes()).digest() for source in _files(sources)}
     return hashlib.sha256(b"".join(sorted(contents))).hexdigest()
 
 
-def _texts_and_named(path: Path) -> tuple[dict[Path, bytes], set[Path]]:
-    """Return the texts of a model and its includes, and every file that they name."""
+def _texts_and_sources(path: Path) -> tuple[dict[Path, bytes], set[Path]]:
+    """Return the texts of a model and its includes, and the places of every file that they name."""
     texts = {path.resolve(): regular_file(path).read_bytes()}
-    named = _named(path, texts)
-    while includes := {source.resolve() for source in named if _is_xml(source)} - texts.keys():
+    sources = _sources(path, texts)
+    while includes := {source.resolve() for source in _files(sources) if _is_xml(source)} - texts.keys():
         texts |= {source: source.read_bytes() for source in includes}
-        named = _named(path, texts)
-    return texts, named
+        sources = _sources(path, texts)
+    return texts, sources
 
 
-def _named(path: Path, texts: Mapping[Path, bytes]) -> set[Path]:
-    """Return the files that the texts of a model name, in all folders that the engine may search."""
+def _sources(path: Path, texts: Mapping[Path, bytes]) -> set[Path]:
+    """Return the places of the files that the texts of a model name, in all folders that may be searched."""
     references = (name for text in texts.values() for names in _NAMED_FILE.findall(text) for name in names)
     names = {_decoded(name) for name in references if name}
     names |= {os.path.basename(name) for name in names}  # strippath
     folders = {path.parent.resolve(), *(source.parent for source in texts)}
     below = {_decoded(name) for text in texts.values() for name in _FOLDERS.findall(text)}
     folders |= {folder / name for folder in folders for name in below}
-    sources = (folder / name for folder in folders for name in names)
+    return {folder / name for folder in folders for name in names}
+
+
+def _files(sources: set[Path]) -> set[Path]:
+    """Return the files that exist."""
     return {regular_file(source) for source in sources if source.exists() and not source.is_dir()}
 
 

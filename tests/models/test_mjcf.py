@@ -48,6 +48,35 @@ def test_a_file_is_read_once(tmp_path, monkeypatch):
     assert inertia(path)[0] == 2.220e-3
 
 
+def test_a_fingerprint_without_a_second_look_at_the_files_misses_no_change(tmp_path, monkeypatch):
+    """All files count as settled at once: what is known of them is used from the second call on."""
+    monkeypatch.setattr(mjcf, "SETTLED_s", -1.0)
+    mesh = '<asset><mesh name="part" file="part.obj"/></asset>'
+    (path := tmp_path / "mine.xml").write_text(TEXT.replace("</mujoco>", f"{mesh}</mujoco>"))
+    (link := tmp_path / "link.xml").symlink_to(path)
+    reads = []
+    real = mjcf._texts_and_sources
+    monkeypatch.setattr(mjcf, "_texts_and_sources", lambda of: (reads.append(of), real(of))[1])
+    found = [mjcf.fingerprint(link)]
+    assert mjcf.fingerprint(link) == found[0]
+    assert len(reads) == 1
+
+    def changed(change):
+        change()
+        found.append(mjcf.fingerprint(link))
+        assert found[-1] not in found[:-1]
+        assert mjcf.fingerprint(link) == found[-1]
+
+    changed(lambda: path.write_text(path.read_text() + "<!-- -->"))
+    changed(lambda: (tmp_path / "part.obj").write_text("v 0 0 0"))
+    changed(lambda: (tmp_path / "part.obj").write_text("v 0 0 0\nv 1 1 1"))
+    shutil.copy(path, other := tmp_path / "other.xml")
+    other.write_text(other.read_text() + "<!-- of the other -->")
+    link.unlink()
+    changed(lambda: link.symlink_to(other))
+    assert len(reads) == 5
+
+
 def test_only_so_many_files_are_kept(tmp_path):
     paths = [tmp_path / f"{number}.xml" for number in range(mjcf.MOST_MODELS + 1)]
     for path in paths:
