@@ -65,6 +65,8 @@ class Extents:
         When the run ended before its time.
     currents : CurrentRanges, optional
         Ranges of the maps of the currents.
+    has_faults : bool
+        Whether the starts of faults are drawn.
     """
 
     def __init__(
@@ -74,7 +76,10 @@ class Extents:
         high: Mapping[str, Array],
         ended_s: float | None,
         currents: CurrentRanges | None = None,
+        *,
+        has_faults: bool = False,
     ) -> None:
+        self.has_faults = has_faults
         self.t_s, self._low, self._high, self.ended_s, self.currents = t_s, low, high, ended_s, currents
 
     def limit(self, *channels: PlotChannel, least: float, above_zero: bool = False) -> float:
@@ -215,11 +220,14 @@ class ExtentTracker:
             self._low = np.fmin.reduceat(self._low, pairs, axis=0)
             self._high = np.fmax.reduceat(self._high, pairs, axis=0)
 
-    def extents(self, ended_s: float | None, currents: CurrentRanges | None = None) -> Extents | None:
+    def extents(
+        self, ended_s: float | None, currents: CurrentRanges | None = None, *, has_faults: bool = False
+    ) -> Extents | None:
         """Return the extents, if there are rows."""
         if not len(self._t_s):
             return None
-        return Extents(self._t_s, self._split(self._low), self._split(self._high), ended_s, currents)
+        low, high = self._split(self._low), self._split(self._high)
+        return Extents(self._t_s, low, high, ended_s, currents, has_faults=has_faults)
 
     def _split(self, bounds: Array) -> dict[str, Array]:
         ends = np.cumsum(list(self._sizes.values()))[:-1]

@@ -21,6 +21,7 @@ from spheretwin.viz.layout.view import (
     ENVELOPE,
     LIMITS,
     MARKS,
+    ONSETS,
     RUN,
     STYLES,
     TELEMETRY,
@@ -199,6 +200,7 @@ class Plots:
         if extents.ended_s is not None:
             axis = time_axis(shown_until_s(self.view.duration_s, extents.ended_s))
             changes |= {f"{view.blueprint_path()}/TimeAxis": axis for view in self._states}
+        verticals = [f"/{ENDED}"] * (axis is not None) + [f"/{ONSETS}/**"] * extents.has_faults
         for view, contents, fit, legend in self._plots:
             path = view.blueprint_path()
             if fit:
@@ -210,7 +212,8 @@ class Plots:
                     changes[f"{path}/PlotLegend"] = rrb.PlotLegend(extents.emptiest_corner(band, *legend))
             if axis:
                 changes[f"{path}/TimeAxis"] = axis
-                changes[f"{path}/ViewContents"] = ViewContents(query=[*contents, f"/{ENDED}"])
+            if verticals:
+                changes[f"{path}/ViewContents"] = ViewContents(query=[*contents, *verticals])
         for square, channel, least in self._squares:
             size = extents.limit(channel, least=least) / 2
             title = f"±{number(size)} {square.name}"

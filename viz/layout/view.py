@@ -89,7 +89,8 @@ RUN, LIMITS = "run", "limits"
 CURRENT_MAP = "currents/map"
 CURRENT_RMS = "currents/rms"
 PHASE_PLANE = "phase_plane"
-ENDED = "ended"
+ENDED, ONSETS = "ended", "onsets"
+"""Vertical lines: the early end of a run, and below the second path the start of each fault."""
 
 
 VALUES, STYLES, DESCRIBED = "values", "styles", "described"

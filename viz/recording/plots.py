@@ -26,6 +26,7 @@ from spheretwin.viz.layout.view import (
     DERIVED,
     ENDED,
     ENVELOPE,
+    ONSETS,
     PHASE_PLANE,
     STYLES,
     SUMMARY,
@@ -56,19 +57,35 @@ _HEIGHTS = np.concatenate([-_HALF, _HALF[::-1]])
 _NEXT_S = 1e-9
 
 
-def log_end(recording: rr.RecordingStream, t_s: float) -> None:
+MOST_ONSETS = 8
+"""Faults whose start is drawn."""
+
+
+def log_times(recording: rr.RecordingStream, summary: Summary, ended_s: float | None) -> bool:
+    """Log vertical lines at the early end of a run and the first faults; return True for faults."""
+    if ended_s is not None:
+        _log_vertical(recording, ENDED, ended_s, "the run ends", theme.FAILURE)
+    onsets = summary.fault_onsets()[:MOST_ONSETS]
+    for place, (t_s, text) in enumerate(onsets):
+        _log_vertical(recording, f"{ONSETS}/{place}", t_s, text, theme.WARNING)
+    return bool(onsets)
+
+
+def _log_vertical(
+    recording: rr.RecordingStream, entity: str, t_s: float, name: str, colour: theme.Colour
+) -> None:
     """Log a vertical line, once for each series that a plot may pick."""
     count = len(ANGLES)
     style = rr.SeriesLines(
-        names=["the run ends"] * count,
-        colors=[theme.FAILURE] * count,
+        names=[name] * count,
+        colors=[colour] * count,
         widths=[2.0] * count,
         aggregation_policy="Off",  # the mean of both ends would be a point
     )
-    recording.log(ENDED, style, static=True)
+    recording.log(entity, style, static=True)
     heights = np.repeat(_HEIGHTS[:, None], count, axis=1)
     times = t_s + _NEXT_S * np.arange(len(heights), dtype=np.float64)
-    recording.send_columns(ENDED, time_index(times), [scalars(heights, count)])
+    recording.send_columns(entity, time_index(times), [scalars(heights, count)])
 
 
 ENVELOPE_RATE_Hz = 25.0
@@ -178,10 +195,10 @@ class PlotData(RecordingPart):
             self._send_envelope(recording, end._replace(t_s=end.last_s))
         log_markdown(recording, SUMMARY, self._summary.ended(status))
         ended_s = None if status in _AS_PLANNED else self._summary.last_s
-        if ended_s is not None:
-            log_end(recording, ended_s)
+        has_faults = log_times(recording, self._summary, ended_s)
         currents = self._current_map.finish(recording)
-        recording.send_blueprint(layout(self.subject.view, self._extent_tracker.extents(ended_s, currents)))
+        extents = self._extent_tracker.extents(ended_s, currents, has_faults=has_faults)
+        recording.send_blueprint(layout(self.subject.view, extents))
 
     def _open(self, recording: rr.RecordingStream) -> None:
         """Send a layout in case the process is killed; most runs end before that is necessary."""

@@ -41,7 +41,7 @@ from spheretwin.viz.quantities import angle_between
 from spheretwin.viz.recording.contents import Contents
 from spheretwin.viz.recording.currents import CoilColours, CurrentMap
 from spheretwin.viz.recording.part import log_markdown, total
-from spheretwin.viz.recording.plots import ENVELOPE_RATE_Hz, Marks, PlottedColumns, log_end
+from spheretwin.viz.recording.plots import ENVELOPE_RATE_Hz, Marks, PlottedColumns, log_times
 from spheretwin.viz.recording.signals import RATE
 from spheretwin.viz.recording.summary import Summary
 from spheretwin.viz.rerun_internals import check_readable, whole_messages
@@ -225,7 +225,7 @@ class RecoveredPlots:
         summary = Summary(_run_facts(facts))
         summary.add(table, error_deg)
         log_markdown(recording, SUMMARY, summary.cut_off())
-        log_end(recording, summary.last_s)
+        has_faults = log_times(recording, summary, summary.last_s)
         current_map = CurrentMap(view.groups, view.current_limit_A)
         colours = CoilColours(view.current_limit_A)
         if len(table):
@@ -233,7 +233,9 @@ class RecoveredPlots:
             colours.add(recording, table)
         colours.finish(recording)
         currents = current_map.finish(recording)
-        recording.send_blueprint(layout(view, tracker.extents(summary.last_s, currents)))
+        recording.send_blueprint(
+            layout(view, tracker.extents(summary.last_s, currents, has_faults=has_faults))
+        )
 
     def _rows(self, sizes: Mapping[str, int], table: Table) -> tuple[Array, Array]:
         """Return times and columns of the rows that have derived quantities."""

@@ -124,6 +124,10 @@ class Summary:
             f" saturated {_percent(self._saturated / self._ticks)} of the time{lost}"
         )
 
+    def fault_onsets(self) -> list[tuple[float, str]]:
+        """Return time, part and mode of the start of each fault."""
+        return [(fault.start_s, f"{fault.part} {fault.mode}") for fault in self._faults.faults]
+
     def _fault_lines(self) -> list[str]:
         planned = len(self._field("run", FAULT) or ())
         faults = sorted(self._faults.faults, key=lambda fault: (fault.start_s, fault.part))

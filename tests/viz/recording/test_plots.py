@@ -8,9 +8,12 @@ from hypothesis import strategies as st
 from spheretwin.models.telemetry.signals import Signal
 from spheretwin.models.telemetry.status import QUIET_S, Status
 from spheretwin.viz.decimation import FIRST_CHUNK_S, TimeBins
+from spheretwin.viz.layout.view import ONSETS
+from spheretwin.viz.recording.recorder import Recorder
 from spheretwin.viz.recording.status import LEVELS, LimitSpells
 from spheretwin.viz.recording.summary import Summary
-from tests.viz.recording.recordings import session_and_facts
+from tests.viz.recording.panels import layouts
+from tests.viz.recording.recordings import session_and_facts, timed
 from tests.viz.tables import table_of
 
 TICK_s = 1e-3
@@ -139,3 +142,21 @@ def test_the_headline_names_each_fault_its_start_and_its_detection(facts_with_fa
     assert chosen.startswith("chosen: trajectory.shape hold · ")
     for stated in ("fault.", "controller.law", "hardware", "disturbance.load"):
         assert stated not in chosen
+
+
+@pytest.mark.parametrize(("faults", "times_s"), [([], []), ([OPEN], [0.02, 0.06])])
+def test_the_start_of_each_fault_is_a_line_in_every_plot_over_time(tmp_path, faults, times_s):
+    path, (session, facts) = tmp_path / "run.rrd", session_and_facts("hold", fault=faults)
+    table = table_of(session.signals, TICK_s * np.arange(100), allocation_scale=1.0)
+    if faults:
+        table["fault"][20:40, 0] = table["fault"][60:, 0] = 1
+    with Recorder(session.actuator, session.signals, facts, path=path) as recorder:
+        recorder.write(table)
+        recorder.finish("completed")
+    first_ms = [timed(path, f"{ONSETS}/{place}", "Scalars:scalars")[0][0] for place in range(len(times_s))]
+    assert first_ms == [round(1e3 * t_s) for t_s in times_s]
+    layout = layouts(path)[-1]
+    plots = {entity.rpartition("/")[0] for entity, name in layout if name.startswith("ScalarAxis:")}
+    assert len(plots) > 8
+    queries = [layout[f"{plot}/ViewContents", "ViewContents:query"][-1] for plot in plots]
+    assert {f"/{ONSETS}/**" in query for query in queries} == {bool(faults)}
