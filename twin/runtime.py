@@ -21,7 +21,7 @@ from spheretwin.external import Connection, ExternalController, ExternalPlant
 from spheretwin.hardware_assembly import faults_of
 from spheretwin.loop import is_python_law, is_user_law, step_that_writes
 from spheretwin.models.base.callback_errors import callback_errors
-from spheretwin.models.base.compiled import COMPILES, for_types_of, uncompiled
+from spheretwin.models.base.compiled import COMPILES, for_types_of, uncompiled, without_fields
 from spheretwin.models.base.errors import InputError, LawError
 from spheretwin.models.base.record import set_states, states_of, transfer_rows
 from spheretwin.models.base.turns import outside_turn
@@ -168,8 +168,10 @@ class Runtime:
         )
         entry = for_types_of(loops.loop, NO_INPUTS, *parts, np.empty((0, self.row_width)))
 
+        given = tuple(map(without_fields, parts)) if COMPILES else parts
+
         def run(inputs: loops.Inputs, log: NDArray[np.float64]) -> tuple[int, int]:
-            return entry(inputs, *parts, log)
+            return entry(inputs, *given, log)
 
         return run
 

@@ -9,6 +9,7 @@ import subprocess
 import sys
 import weakref
 from pathlib import Path
+from typing import Any, NamedTuple
 
 import numba
 import numpy as np
@@ -16,6 +17,7 @@ import pytest
 from numba import types
 
 from spheretwin.models.base import cache, compiled
+from tests.requirements import needs_compiled_functions
 
 SOURCE = Path(compiled.__file__).parent
 
@@ -196,6 +198,11 @@ def test_no_folder_at_all_is_done_without(package):
     assert python(RUN, **environment).split() == ["41", "0", "0"]
 
 
+class Pair(NamedTuple):
+    number: float
+    record: Any
+
+
 SIGNATURE = types.float64(types.float64)
 
 
@@ -218,6 +225,20 @@ def test_callback_lives_no_longer_than_its_function():
     del triple
     gc.collect()
     assert alive() is None
+
+
+@needs_compiled_functions
+def test_machine_code_changes_a_record_that_has_no_fields():
+    @compiled.allocation_free
+    def fill(pair):
+        pair[1].mass = 2.0 * pair[0]
+
+    rows = np.zeros(2, np.dtype((np.record, np.dtype([("id", np.int64), ("mass", np.float64)]))))
+    pair = Pair(3.0, rows[1])
+    given = compiled.without_fields(pair)
+    compiled.for_types_of(fill, pair)(given)
+    assert given.record.dtype.names == ("bytes",)
+    assert rows["mass"].tolist() == [0.0, 6.0]
 
 
 def test_uncompiled_is_the_plain_function():
