@@ -7,7 +7,8 @@ import pytest
 from spheretwin import outputs, replay
 from spheretwin import run as run_module
 from spheretwin import scenario as scenarios
-from spheretwin.active_config import initial_config, warnings_of
+from spheretwin.active_config import initial_config
+from spheretwin.config_warnings import warnings_of
 from spheretwin.models import actuator as actuators
 from spheretwin.models.base.errors import SpheretwinError
 from spheretwin.models.telemetry.run_record import Change, RunRecord
