@@ -41,6 +41,9 @@ MACHINE, TWIN, TEXT, PLOTS = "machine", "twin", "verdict", "plots"
 CONFIDENCE = 1.96
 """Standard deviations on each side of a 95 % band."""
 
+BOUND_GREY = 0.5
+"""Share of grey in the colour of the limits of a band: the estimate stands out."""
+
 _FARTHEST = 8.0  # innovations beyond it are cut
 
 
@@ -62,7 +65,7 @@ BANDS = {
 """Title and scale of the plots of an estimate, by its signal."""
 
 TITLES = {
-    ANGLE: "hinge angles, estimated above measured (grey) [rad]",
+    ANGLE: "hinge angles [rad]: α red, β green, γ violet; estimated above measured (grey)",
     INNOVATION: "measured minus predicted angle over its expected deviation [1]; 95 % within the grey lines",
     **{name: title for name, (title, _) in BANDS.items()},
 }
@@ -198,9 +201,10 @@ def _band(telemetry: Table, name: str, scale: float) -> Iterator[Line]:
     """Yield an estimate and the limits of its band, for each hinge."""
     mean, half = scale * telemetry[name], scale * CONFIDENCE * telemetry[f"{name}_std"]
     for i, colour in enumerate(theme.AXIS_COLOURS):
-        yield Line(ANGLES[i], mean[:, i], colour, MIDDLE)
-        yield Line(f"{ANGLES[i]} + 95 %", (mean + half)[:, i], colour, THIN)
-        yield Line(f"{ANGLES[i]} − 95 %", (mean - half)[:, i], colour, THIN)
+        bound = theme.mixed(colour, theme.COMMAND, BOUND_GREY)
+        yield Line(f"{ANGLES[i]} + 95 %", (mean + half)[:, i], bound, THIN)
+        yield Line(f"{ANGLES[i]} − 95 %", (mean - half)[:, i], bound, THIN)
+        yield Line(ANGLES[i], mean[:, i], colour, THICK)
 
 
 def layout(
@@ -235,6 +239,7 @@ def layout(
             name=title,
             axis_x=axis,
             axis_y=rrb.ScalarAxis(range=limits[name]) if limits else None,
+            plot_legend=rrb.PlotLegend(visible=False),  # it would cover the lines; the title has the colours
         )
         for name, title in titles.items()
     ]

@@ -54,7 +54,7 @@ def test_a_viewer_gets_the_first_row_of_each_frame_and_the_verdict(log, tmp_path
     np.testing.assert_array_equal(drawn, expected)
     _, rates = series(read, "plots/qdot_estimated_rad_s", "Scalars:scalars")
     assert np.all(np.isnan(rates[0]))  # of the first row nothing is known: its band would hide all others
-    np.testing.assert_array_equal(rates[-1, ::3], telemetry["qdot_estimated_rad_s"][firsts[-1]])
+    np.testing.assert_array_equal(rates[-1, 2::3], telemetry["qdot_estimated_rad_s"][firsts[-1]])
     values, _ = read
     assert len(values["/machine/world/rotor", "Transform3D:quaternion"]) == 2  # a second, and the rest
     assert len(values["/twin/world/rotor", "Transform3D:quaternion"]) == 2
