@@ -167,10 +167,14 @@ def test_a_missing_library_is_reported_on_one_line(files, tmp_path, monkeypatch,
 @pytest.mark.parametrize(
     ("status", "text"), [(None, "not closed"), (Status.LEFT_WORKSPACE, "left workspace")]
 )
-def test_the_end_of_a_run_that_is_not_complete_is_at_its_last_row(files, status, text):
+def test_the_end_of_a_run_is_that_of_its_last_tick_and_of_a_file_that_was_not_closed_its_last_row(
+    files, status, text
+):
     run = read(files[0])
     (drawn,) = compared_runs([replace(run, record=replace(run.record, status=status))])
-    assert (drawn.early_end.t_s, drawn.early_end.status) == (run.table["t_s"][-1], text)
+    end_s = run.table["t_s"][-1] + (run.period_s if status else 0.0)
+    assert drawn.early_end.t_s == pytest.approx(end_s, abs=1e-12)
+    assert drawn.early_end.status == text
     assert compared_runs([run])[0].early_end is None
 
 
