@@ -168,7 +168,7 @@ def law_marks(laws: Sequence[str]) -> dict[str, tuple[str, Dash]]:
     return {law: LAW_MARKS.get(law) or next(spare, _SPARE_MARKS[-1]) for law in laws}
 
 
-def current_colours(current: NDArray[np.float64], limit: float) -> NDArray[np.uint8]:
+def current_colours(current: NDArray[np.floating], limit: float) -> NDArray[np.uint8]:
     """Return the colours of signed currents on a linear scale: blue negative, grey zero, orange-red positive.
 
     Parameters

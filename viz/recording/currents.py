@@ -36,7 +36,7 @@ WITHIN_RANGE = 0.98
 """Share of the values that a range of colours contains; larger ones have the full colour."""
 
 
-def colour_range(current_A: Array, limit_A: float) -> float:
+def colour_range(current_A: NDArray[np.floating], limit_A: float) -> float:
     """Return the range of the colours of some currents: at most the current limit."""
     size_A = np.abs(current_A[np.isfinite(current_A)])
     usual_A = float(np.quantile(size_A, WITHIN_RANGE)) if len(size_A) else 0.0
@@ -64,7 +64,7 @@ class CoilColours:
         self._limit_A, self._live = limit_A, live
         self._frames = FirstRows(FRAME_RATE_Hz)
         self._t_s: list[Array] = []
-        self._current_A: list[Array] = []
+        self._current_A: list[NDArray[np.float32]] = []
 
     def begin(self, recording: rr.RecordingStream) -> None:
         """State the range of a live view."""
@@ -77,7 +77,7 @@ class CoilColours:
         if not len(places):
             return
         self._t_s.append(rows["t_s"][places])
-        self._current_A.append(rows["current_A"][places])
+        self._current_A.append(rows["current_A"][places].astype(np.float32))  # hours wait for the end
         if self._live:
             self._send(recording, self._limit_A)
 
