@@ -213,6 +213,7 @@ def test_the_torque_file_is_part_of_the_model_file(tmp_path):
 
 
 def test_an_export_names_the_kind_of_torque_that_it_needs():
+    model = magnetics.torque_model(VENTUSFF)
     message = "expected an actuator with a torque curve, received one with a torque field"
     with pytest.raises(InputError, match=message):
-        magnetic_tables(magnetics.torque_model(VENTUSFF))
+        magnetic_tables(model.arrangement[0], model.tables)

@@ -21,7 +21,7 @@ from tests.requirements import needs_shell
         (("simulate", ""), reading.shipped()),
         (("simulate", "hold", "--controller.law", ""), list(LAWS)),
         (("simulate", "hold", "--controller.law", "afsm"), ["afsm", "afsm_eso"]),
-        (("simulate", "--plant.coul"), ["--plant.coulomb-Nm"]),
+        (("simulate", "--plant.coul"), ["--plant.coulomb-Nm", "--plant.coulomb-asymmetry"]),
         (("magnetics", "cu"), ["curve"]),
         (("magnetics", "map", "--need"), ["--need"]),
         (("review", "--figure-format", "pd"), ["pdf", "pdf-one-column", "pdf-two-columns"]),
