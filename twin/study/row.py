@@ -160,7 +160,7 @@ class Rows:
         self, rows: Sequence[Row], engine: str | None
     ) -> Iterator[tuple[list[int], list[Result | None]]]:
         """Yield the places of rows that run together with their results, None for a row that runs alone."""
-        if self._own:
+        if self._own or len(rows) == 1:
             return
         together: dict[Any, list[tuple[int, Scenario]]] = {}
         for place, row in enumerate(rows):
