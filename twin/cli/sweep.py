@@ -6,6 +6,7 @@ import argparse
 import contextlib
 import json
 import math
+import os
 import shlex
 import sys
 from collections.abc import Callable, Iterator, Mapping
@@ -43,6 +44,9 @@ DRAWS = 100
 
 MANY_ROWS = 500
 """Rows whose Python takes longer than the start of a process."""
+
+FEW_CORES = 2
+"""Cores that threads use: half of such a row is Python."""
 
 GO_ON = "sweep: finished rows are stored; the same command continues from there"
 
@@ -113,8 +117,8 @@ def run(options: argparse.Namespace) -> bool:
         print_message(
             f"sweep: {outcome.damaged} damaged lines of the journal were skipped, and their rows run again"
         )
-    long = outcome.rows - outcome.resumed > MANY_ROWS and options.threads != 1
-    if long and options.engine == "local" and (own := _own_code(study)):
+    many = outcome.rows - outcome.resumed > MANY_ROWS and (options.threads or os.cpu_count() or 1) > FEW_CORES
+    if many and options.engine == "local" and (own := _own_code(study)):
         print_message(
             f"sweep: rows with {own} run one at a time in Python; --engine processes runs them on all cores"
         )
