@@ -115,7 +115,8 @@ def _numbers(values: Sequence[Any], name: str) -> NDArray[Any]:
             column = np.stack(np.broadcast_arrays(*values))
     except ValueError as error:
         raise MixedRowsError(f"expected {name} of one length in all rows, received others") from error
-    if column.dtype == object:
+    too_large = column.dtype.kind == "f" and all(isinstance(value, int) for value in values)
+    if column.dtype == object or too_large:
         raise MixedRowsError(f"expected numbers as {name} in all rows, received others")
     if np.array_equal(column, np.broadcast_to(column[:1], column.shape)) and not _differs(values):
         return values[0]

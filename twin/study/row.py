@@ -169,12 +169,19 @@ class Rows:
                 scenario = self._without_unread(self._scenario(row, shape, engine))
                 if kind := self._kind_of_block(row, scenario, shape):
                     together.setdefault(kind, []).append((place, scenario))
-        for members in together.values():
+        pending = list(together.values())
+        while pending:
+            members = pending.pop()
             if len(members) == 1:  # its session starts in half of the time
                 continue
             places, scenarios = zip(*members, strict=True)
-            with suppress(InputError, MixedRowsError):  # of one row or another: each runs alone
-                yield list(places), self._run_block(scenarios)
+            try:
+                results = self._run_block(scenarios)
+            except (InputError, MixedRowsError):  # of one row or another: the others run together
+                middle = len(members) // 2
+                pending += [members[:middle], members[middle:]]
+            else:
+                yield list(places), results
 
     def _kind_of_block(self, row: Row, scenario: Scenario, shape: tuple[Any, ...]) -> Any:
         """Return what the scenarios of a block have in common; None for a row that runs alone."""

@@ -65,7 +65,9 @@ def test_zeros_of_both_signs_stay_apart():
     assert_array_equal(np.signbit(column_of([0.0, -0.0])), [[False], [True]])
 
 
-@pytest.mark.parametrize("values", [["a", "b"], [None, 1.0], [1.0, None], [(1.0, 2.0), (1.0, 2.0, 3.0)]])
+@pytest.mark.parametrize(
+    "values", [["a", "b"], [None, 1.0], [1.0, None], [1, 2**63], [1, 2**64], [(1.0, 2.0), (1.0, 2.0, 3.0)]]
+)
 def test_refuses_rows_that_differ_in_more_than_numbers(values):
     with pytest.raises(MixedRowsError):
         column_of(values)

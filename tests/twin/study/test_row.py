@@ -19,7 +19,7 @@ from spheretwin.simulation import simulate
 from spheretwin.study.grid import Grid
 from spheretwin.study.row import Rows
 from spheretwin.study.study import load
-from tests.twin.study.cases import LOADS, loads, run_rows, study, table, telemetry, values
+from tests.twin.study.cases import LOADS, SHORT, loads, run_rows, study, table, telemetry, values
 
 FAULTS = (
     [],
@@ -260,3 +260,16 @@ def test_each_row_has_the_model_file_of_its_scenario(tmp_path):
     assert [row["rms_error_rad"] for row in rows] == alone
     light = changed.model_copy(update={"plant": shipped.plant})
     assert figures_of(simulate(light))["rms_error_rad"] != alone[1]
+
+
+def test_a_row_that_cannot_be_set_up_leaves_the_others_together(monkeypatch):
+    """A pose beyond the range of its hinge is refused when the row is set up, not when it is read."""
+    poses = [0.0, 0.01, 9.0, 0.02, 0.03, 0.04, 0.05, 0.06]
+    chosen = study(values("plant.initial_rad.0", *poses), fields={**SHORT, "plant.initial_rad": [0.0] * 3})
+    sizes = []
+    run_block = Rows._run_block
+    monkeypatch.setattr(Rows, "_run_block", lambda self, of: (run_block(self, of), sizes.append(len(of)))[0])
+    results = Rows(chosen).run(list(Grid(chosen)))
+    assert [result.status for result in results] == ["completed"] * 2 + ["refused"] + ["completed"] * 5
+    assert "expected a pose" in results[2].error
+    assert sorted(sizes) == [2, 4]
