@@ -329,7 +329,8 @@ def fingerprint(path: Path) -> str:
     if seen and all(_state(source) == state for source, state in seen.states.items()):
         return seen.digest
     texts, sources = _texts_and_sources(path)
-    states = {str(source): _state(source) for source in (place, *texts, *sources)}
+    places = [place, *map(str, texts), *map(str, sources)]
+    states = {source: _state(source) for source in places}
     digest = hashlib.sha256()
     for source, text in sorted(texts.items()):
         digest.update(f"{source} {len(text)} ".encode(errors="surrogateescape") + text)
