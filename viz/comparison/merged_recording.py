@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
@@ -16,7 +15,24 @@ from rerun.components import MarkerShape
 
 from spheretwin.models.base.files import whole_file
 from spheretwin.viz import theme
-from spheretwin.viz.comparison.ghosts import ROTOR, Array, Ghost, Line, Tip, below, send_lines, write_part
+from spheretwin.viz.comparison.ghosts import Array, Ghost, Line, Tip, below, send_lines, write_part
+from spheretwin.viz.comparison.merged_layout import (
+    BESIDE_TEXTS,
+    COMPARE,
+    DIFFERENCE,
+    END,
+    ERRORS,
+    LARGE,
+    LEGEND,
+    MARKS,
+    REFERENCE,
+    RUNS,
+    TIP,
+    ComparisonView,
+    Plot,
+    application,
+    layout,
+)
 from spheretwin.viz.comparison.runs import (
     ComparedRun,
     PlotRange,
@@ -27,10 +43,8 @@ from spheretwin.viz.comparison.runs import (
     value_bounds,
 )
 from spheretwin.viz.layout.extents import labelled
-from spheretwin.viz.layout.layout import blueprint, eye
-from spheretwin.viz.layout.plots import time_axis, time_range
 from spheretwin.viz.layout.styles import MIDDLE, THICK, THIN
-from spheretwin.viz.layout.view import EVENTS, SCENARIO, application_of
+from spheretwin.viz.layout.view import SCENARIO
 from spheretwin.viz.quantities import ERROR, Quantity, compared_quantities
 from spheretwin.viz.recording.currents import CoilCurrents
 from spheretwin.viz.recording.part import (
@@ -45,164 +59,7 @@ from spheretwin.viz.recording.recorder import PIPE_PATHS, FilePipe
 from spheretwin.viz.recording.scene3d import MovingActuator
 from spheretwin.viz.recording.signals import Signals
 from spheretwin.viz.recording.status import StateChanges, StateLanes, log_lines
-from spheretwin.viz.scene.entities import TRAIL_S, size_of
-from spheretwin.viz.scene.meshes import WORLD
-
-COMPARE, MARKS, END, TIP, DIFFERENCE = "compare", "marks", "end", "tip", "difference"
-"""Parts of the paths of entities, after the name of a run."""
-
-RUNS, LEGEND = "runs", "legend"
-"""Entities of all runs: their description, and their colours with labels."""
-
-REFERENCE = "setpoint"
-"""Before the name of a run: a viewer draws lines in the order of their paths, these above all others."""
-
-LARGE, BESIDE_TEXTS = "whole", "more"
-"""Groups of the error as one angle, and of plots in tabs with the texts."""
-
-ERRORS = "error"
-"""Group of the errors of the hinges, with their differences to those of the first run."""
-
-SWITCHED = (LARGE, ERRORS)
-"""Groups with tabs, which are higher: one for the settled runs, others for all values and for differences."""
-
-
-Limits = tuple[float, float]
-
-
-class Plot(NamedTuple):
-    """Plot of one quantity of all runs."""
-
-    name: str
-    heading: str
-    group: str
-    desired: bool
-    """True if the reference is drawn with it."""
-    limits: Limits
-    whole: Limits
-    """Limits that contain all values."""
-
-    @property
-    def title(self) -> str:
-        """Heading, and that values are outside of the limits."""
-        return self.heading if self.whole == self.limits else f"{self.heading}, cut"
-
-
-class ComparisonView(NamedTuple):
-    """Properties of the runs on which the layout depends."""
-
-    runs: tuple[str, ...]
-    """Names."""
-    leaders: tuple[str, ...]
-    """Names of the runs that show the reference."""
-    plots: tuple[Plot, ...]
-    differences: tuple[Plot, ...]
-    """Plots of the errors minus those of the first run."""
-    duration_s: float
-    states: tuple[str, ...]
-    """Names of the runs with changes of state."""
-    logs: tuple[str, ...]
-    """Names of the runs with events."""
-    failed: tuple[str, ...]
-    """Names of the runs that are not complete."""
-    size: float
-    """Size of the first run's actuator, which is drawn completely."""
-
-
-def application(view: ComparisonView) -> str:
-    """Return the application id of recordings with one layout: a viewer keeps one layout for each."""
-    return application_of("spheretwin-runs", repr(view))
-
-
-def layout(view: ComparisonView) -> rrb.Blueprint:
-    """Blueprint of a recording of several runs."""
-    groups = dict.fromkeys(plot.group for plot in view.plots if plot.group != BESIDE_TEXTS)
-    rows = [_row(view, group) for group in groups]
-    texts = rrb.Tabs(
-        rrb.TextDocumentView(origin=f"/{RUNS}", name="runs"),
-        rrb.TextLogView(origin="/", contents=[f"/{run}/{EVENTS}" for run in view.logs], name="events"),
-        *([_states(view)] if view.states else []),
-        *(_plot(view, plot, plot.limits) for plot in _plots(view, BESIDE_TEXTS)),
-    )
-    return blueprint(
-        rrb.Horizontal(
-            rrb.Vertical(_bodies(view), _legend(view), texts, row_shares=[5, 0.5 + 0.6 * len(view.runs), 3]),
-            rrb.Vertical(*rows, row_shares=[4 if group in SWITCHED else 3 for group in groups]),
-            column_shares=[2, 3],
-            name="compare",
-        )
-    )
-
-
-def _row(view: ComparisonView, group: str) -> rrb.Container:
-    """Return the plots of a group; in tabs with errors that are cut all values, and differences."""
-    plots = _plots(view, group)
-    tabs = [rrb.Horizontal(*(_plot(view, plot, plot.limits) for plot in plots), name="settled")]
-    if group in SWITCHED and any(plot.whole != plot.limits for plot in plots):
-        tabs.append(rrb.Horizontal(*(_plot(view, plot, plot.whole) for plot in plots), name="all values"))
-    if group == ERRORS and view.differences:
-        tabs.append(rrb.Horizontal(*map(partial(_difference, view), view.differences), name="minus run 1"))
-    return rrb.Tabs(*tabs, active_tab=0) if len(tabs) > 1 else tabs[0]
-
-
-def _plots(view: ComparisonView, group: str) -> list[Plot]:
-    return [plot for plot in view.plots if plot.group == group]
-
-
-def _plot(view: ComparisonView, plot: Plot, limits: Limits) -> rrb.TimeSeriesView:
-    contents = [
-        *(f"/{REFERENCE}/{run}/{plot.name}" for run in view.leaders if plot.desired),
-        *(f"/{run}/{COMPARE}/{plot.name}" for run in view.runs),
-        *(f"/{run}/{MARKS}/{plot.name}" for run in view.runs),
-        *(f"/{run}/{END}/{plot.name}" for run in view.failed if limits == plot.limits),
-    ]
-    return _time_plot(view, plot.title if limits == plot.limits else plot.heading, contents, limits)
-
-
-def _difference(view: ComparisonView, plot: Plot) -> rrb.TimeSeriesView:
-    contents = [f"/{run}/{DIFFERENCE}/{plot.name}" for run in view.runs[1:]]
-    return _time_plot(view, plot.title, contents, plot.limits)
-
-
-def _time_plot(
-    view: ComparisonView, title: str, contents: Sequence[str], limits: Limits
-) -> rrb.TimeSeriesView:
-    return rrb.TimeSeriesView(
-        origin="/",
-        contents=contents,
-        name=title,
-        axis_x=time_axis(view.duration_s),
-        axis_y=rrb.ScalarAxis(range=limits),
-        plot_legend=rrb.PlotLegend(visible=False),
-        interaction=rrb.PlotInteraction(tooltip_mode="All"),
-    )
-
-
-def _bodies(view: ComparisonView) -> rrb.Spatial3DView:
-    first, *ghosts = view.runs
-    tips = [f"/{run}/{TIP}" for run in view.runs] + [f"/{REFERENCE}/{run}/{TIP}" for run in view.leaders]
-    bodies = [f"/{first}/{WORLD}/**", *(f"/{run}/{ROTOR}/**" for run in ghosts)]
-    return rrb.Spatial3DView(
-        origin="/",
-        contents=[*bodies, *(f"{tip}/**" for tip in tips)],
-        name="run 1; the others as ghosts",
-        line_grid=False,
-        eye_controls=eye(view.size),
-        overrides={f"{tip}/path": time_range(TRAIL_S) for tip in tips},
-    )
-
-
-def _legend(view: ComparisonView) -> rrb.Spatial2DView:
-    """View of the colours and labels of the runs: a legend within a plot would cover lines."""
-    bounds = rrb.VisualBounds2D(x_range=[-0.1, 1.1], y_range=[-0.5, len(view.runs) - 0.1])
-    return rrb.Spatial2DView(origin=f"/{LEGEND}", name="runs", visual_bounds=bounds)
-
-
-def _states(view: ComparisonView) -> rrb.StateTimelineView:
-    contents = [f"/{run}/**" for run in view.states]
-    return rrb.StateTimelineView(
-        origin="/", contents=contents, name="states", time_view=time_axis(view.duration_s)
-    )
+from spheretwin.viz.scene.entities import size_of
 
 
 @contextmanager
