@@ -196,6 +196,7 @@ class CurrentMap:
         self._groups, self._limit_A, self._live = groups, limit_A, live
         self._bins = TimeBins(CURRENT_MAP_RATE_Hz, immediate=live)
         self._cells: list[tuple[Array, Array, Array]] = []
+        self._begun = False
 
     def begin(self, recording: rr.RecordingStream) -> None:
         """Log the names of the rows."""
@@ -212,19 +213,20 @@ class CurrentMap:
             self._send(recording)
 
     def finish(self, recording: rr.RecordingStream) -> CurrentRanges:
-        """Record what is left, up to the end of the last bin; return the ranges of the colours."""
-        binned = self._bins.flush()
-        self._add(binned)
-        if binned and binned.last_s[-1] > binned.t_s[-1]:
-            end = CompletedBins(*(column[-1:] for column in binned))
-            self._add(end._replace(t_s=end.last_s))
+        """Record what is left; return the ranges of the colours."""
+        self._add(self._bins.flush())
         return self._send(recording)
 
     def _add(self, binned: CompletedBins | None) -> None:
+        """Add points at the ends of bins: a viewer draws the line to a point in the colour of the point."""
         if binned is None:
             return
-        mean_A, mean_square_A2 = np.split(binned.mean, 2, axis=1)
-        self._cells.append((binned.t_s, mean_A, np.sqrt(mean_square_A2)))
+        t_s, mean = binned.last_s, binned.mean
+        if not self._begun and t_s[0] > binned.t_s[0]:
+            t_s, mean = np.append(binned.t_s[:1], t_s), np.concatenate([mean[:1], mean])
+        self._begun = True
+        mean_A, mean_square_A2 = np.split(mean, 2, axis=1)
+        self._cells.append((t_s, mean_A, np.sqrt(mean_square_A2)))
 
     def _send(self, recording: rr.RecordingStream) -> CurrentRanges:
         """Record the cells so far; return the ranges of their colours."""
