@@ -96,7 +96,8 @@ class _Crew:
 
     def _process(self) -> _Process:
         if not hasattr(self._own, "process"):
-            command = [sys.executable, "-P", "-c", f"from {worker.__name__} import main; main()"]
+            start = f"from {worker.__name__} import main; main()"
+            command = [sys.executable, "-P", "-c", start, str(os.getpid())]
             # Of a session of its own: an interruption of the driver lets it finish its batch.
             program: Any = subprocess.Popen(
                 command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, start_new_session=True

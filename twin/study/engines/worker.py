@@ -10,6 +10,7 @@ import os
 import pickle
 import platform
 import sys
+import threading
 import time
 from contextlib import suppress
 from functools import lru_cache
@@ -107,10 +108,25 @@ def _difference_text(name: str, ours: dict[str, str], theirs: dict[str, str]) ->
     return f"{name} ({ours.get(name, 'none')} for {theirs.get(name, 'none')})"
 
 
+def _end_with(driver: int) -> None:
+    """End this process once its driver has ended: user code that never returns would go on for ever."""
+    while os.getppid() == driver:
+        time.sleep(PARENT_S)
+    os._exit(1)
+
+
+PARENT_S = 0.5
+"""Interval of the checks that the driver is still there."""
+
+
 def main() -> None:
-    """Run batches of a job from standard input, to standard output, until it ends."""
+    """Run batches of a job from standard input, to standard output, until it ends.
+
+    The argument of the process is the number of the process of its driver.
+    """
     results = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)  # what user code prints is none of the results
+    threading.Thread(target=_end_with, args=(int(sys.argv[1]),), daemon=True).start()
     job = pickle.load(sys.stdin.buffer)
     while True:
         try:
