@@ -306,14 +306,14 @@ _FOLDERS = re.compile(rb"""\b(?:meshdir|texturedir|assetdir)\s*=\s*["']([^"']+)[
 _OTHER_KINDS = (".obj", ".stl", ".msh", ".png", ".ktx", ".skn")
 
 
-class _Seen(NamedTuple):
+class _FileStates(NamedTuple):
     """Fingerprint of a file, and the states of all files that it depends on, also of missing ones."""
 
     digest: str
     states: dict[str, tuple[int, ...] | None]
 
 
-_SEEN: dict[str, _Seen] = {}
+_FINGERPRINTS: dict[str, _FileStates] = {}
 
 SETTLED_s = 2.0
 """Age from which on a change of a file has another change time: file systems count it in steps."""
@@ -325,7 +325,7 @@ def fingerprint(path: Path) -> str:
     It is computed again if the state of any of these files has changed.
     """
     place = os.path.abspath(path)
-    seen = _SEEN.get(place)
+    seen = _FINGERPRINTS.get(place)
     if seen and all(_state(source) == state for source, state in seen.states.items()):
         return seen.digest
     texts, sources = _texts_and_sources(path)
@@ -338,7 +338,7 @@ def fingerprint(path: Path) -> str:
         digest.update(f"{source} {states[str(source)]} ".encode(errors="surrogateescape"))
     newest_ns = max(state[CHANGED] for state in states.values() if state)
     if time.time_ns() - newest_ns > 1e9 * SETTLED_s:
-        _SEEN[place] = _Seen(digest.hexdigest(), states)
+        _FINGERPRINTS[place] = _FileStates(digest.hexdigest(), states)
     return digest.hexdigest()
 
 

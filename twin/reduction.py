@@ -91,7 +91,8 @@ class Metric(ABC):
         """Process the rows of one chunk of the only run, at least one."""
         write_all([self], rows)
 
-    def reserve(self, ticks: int) -> None:  # noqa: B027  # most states have one size
+    # Not abstract: the states of most metrics have one size, whatever the ticks.
+    def reserve(self, ticks: int) -> None:  # noqa: B027
         """Extend the states to a number of ticks, if their size depends on it."""
 
     def values(self) -> list[Any]:

@@ -64,12 +64,6 @@ def _has_self(kind: type, name: str) -> bool:
     return not isinstance(found, staticmethod)
 
 
-def together(sections: Sequence[Any]) -> Any:
-    """Return the only section, or one that all rows share, or the columns of the sections."""
-    first = sections[0]
-    return first if all(section is first for section in sections) else Columns(sections)
-
-
 def column_of(values: Sequence[Any], name: str = "a value") -> Any:
     """Return the column of the values of a field, one for each row.
 

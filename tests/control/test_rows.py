@@ -36,7 +36,7 @@ from spheretwin.control.supervision.watchdog import (
     WatchdogSection,
     fill_watchdog,
 )
-from spheretwin.models.base.columns import MixedRowsError, column_of, together
+from spheretwin.models.base.columns import MixedRowsError, column_of
 from spheretwin.models.base.compiled import uncompiled
 from spheretwin.models.magnetics import torque_model
 
@@ -127,7 +127,7 @@ CASES = [
 def columns_of(values):
     """Return an argument of all rows from that of each."""
     if isinstance(values[0], BaseModel):
-        return together(values)
+        return column_of(values)
     if hasattr(values[0], "_fields"):
         return type(values[0])(*map(column_of, zip(*values, strict=True)))
     return column_of(values)

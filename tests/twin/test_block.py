@@ -19,7 +19,7 @@ from spheretwin.simulation import follow
 RUNS = 4
 
 
-def drawn(generator, run, **more):
+def random_changes(generator, run, **more):
     """Changes of a run in numbers of every part."""
     return {
         "seed": int(generator.integers(2**40)),
@@ -79,7 +79,7 @@ def test_each_run_is_that_of_its_session(hardware, engine):
     every = []
     for run in range(RUNS):
         changes = {"hardware": hardware, "plant.engine": engine, "duration": 1.3}
-        changes |= drawn(generator, run, **HARDWARE[hardware](generator))
+        changes |= random_changes(generator, run, **HARDWARE[hardware](generator))
         every.append(scenarios.load("sinusoid", changes))
     endings = in_block(every)
     assert len({ending.status for ending in endings}) == 2

@@ -7,7 +7,7 @@ import pytest
 from numpy.testing import assert_array_equal
 from pydantic import BaseModel
 
-from spheretwin.models.base.columns import Columns, MixedRowsError, column_of, together
+from spheretwin.models.base.columns import Columns, MixedRowsError, column_of
 from spheretwin.models.base.record import Record, field, put
 
 pytestmark = pytest.mark.uncompiled
@@ -80,7 +80,7 @@ def test_refuses_sections_of_different_classes():
 
 def test_one_section_of_all_rows_stays_itself():
     section = Section()
-    assert together([section, section]) is section
+    assert column_of([section, section]) is section
 
 
 def test_put_fills_shared_and_varied_columns():

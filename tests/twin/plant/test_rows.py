@@ -12,7 +12,7 @@ from spheretwin.active_config import initial_config
 from spheretwin.electronics.drive_chain import DriveChain
 from spheretwin.models import actuator as actuators
 from spheretwin.models import mjcf
-from spheretwin.models.base.columns import Columns, together
+from spheretwin.models.base.columns import Columns, column_of
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.base.record import Rows
 from spheretwin.models.magnetics import scaled, torque_model
@@ -86,7 +86,7 @@ class Block(NamedTuple):
 
     @property
     def scenario(self):
-        return together(self.scenarios)
+        return column_of(self.scenarios)
 
     def rows(self):
         return [Block([scenario], self.drive[row : row + 1]) for row, scenario in enumerate(self.scenarios)]
