@@ -10,14 +10,20 @@ import numpy as np
 from measuring import fastest, options_of, ratio, report, seconds_of
 
 from spheretwin import plant
+from spheretwin import scenario as scenarios
+from spheretwin.active_config import initial_config
+from spheretwin.assembly import assembled
+from spheretwin.control.supervision.watchdog import GO
 from spheretwin.envs import TwinVectorEnv
 from spheretwin.models import actuator as actuators
+from spheretwin.models.base.columns import Columns
 from spheretwin.models.base.compiled import allocation_free, compiled
 from spheretwin.models.joint_chain import JointChain, fill_ideal
 from spheretwin.plant.friction import Friction, fill_friction, slow_down
 from spheretwin.plant.lagrangian_rotor import LagrangianRotor
 from spheretwin.plant.lagrangian_rotor import step as step_rotor
 from spheretwin.plant.plant_step import step
+from spheretwin.plant.plant_tick import PlantOutput, TickInput, engine_step, plant_tick
 
 PLANTS, STEPS, CALLS = 64, 50, 20
 dt = 1e-9  # s: friction must not bring the rotor to rest, where numbers are denormal and slow
@@ -29,6 +35,17 @@ def single(changes):
     """Time of a public step of one plant, called from compiled code, s."""
     parameters, steps = plant.parameters("nutation", changes), PLANTS * STEPS * CALLS
     return lambda: seconds_of(lambda: _coast(steps, STATE, np.zeros(18), np.zeros(3), parameters)) / steps
+
+
+def row(changes):
+    """Time of a physics step of the plant of a run, ideal hardware, one row after the other, s."""
+    changes = {"plant.engine": "lagrangian", "plant.step_s": 1e-3, **changes}
+    config = initial_config(scenarios.load("nutation", changes), None, None)
+    made = assembled(Columns([config.scenario] * PLANTS), config.files)
+    given = TickInput(np.zeros(18), np.zeros(3), np.zeros(0), GO)
+    output = PlantOutput(np.empty(18), np.empty(18), np.empty(3))
+    arguments = made.rows["plant"], made.stages().tables, engine_step("lagrangian").address, given, output
+    return lambda: seconds_of(lambda: _advance_rows(STEPS * CALLS, *arguments)) / (PLANTS * STEPS * CALLS)
 
 
 def lockstep(changes):
@@ -73,6 +90,13 @@ def _plants(changes):
     return plants
 
 
+@allocation_free
+def _advance_rows(periods, plants, tables, engine, given, output):
+    for number in range(plants.shape[0]):
+        for _ in range(periods):
+            plant_tick(plants[number], tables, engine, given, output)
+
+
 @compiled
 def _coast(calls, state, currents, disturbance, parameters):
     for _ in range(calls):
@@ -111,6 +135,7 @@ def ratios():
     """Measure everything."""
     taken = fastest(
         {
+            "row": row({}), "row, friction": row(FRICTION),
             "single": single({}), "lockstep": lockstep({}), "single, friction": single(FRICTION),
             "lockstep, friction": lockstep(FRICTION), "single, no field": single_without_field(),
             "lockstep, no field": lockstep_without_field(), "torques": environment("torque"),
@@ -119,11 +144,17 @@ def ratios():
         rounds=9,
     )  # fmt: skip
 
+    def row_over_lockstep(of, kind):
+        sides = taken[f"row{kind}"], taken[f"lockstep{kind}"]
+        return ratio(f"row of a block of runs over one of 64 in lockstep, {of}", *sides)
+
     def over_lockstep(of, kind, at_least):
         sides = taken[f"single{kind}"], taken[f"lockstep{kind}"]
         return ratio(f"one plant over one of 64, {of}", *sides, at_least=at_least)
 
     return [
+        row_over_lockstep("rotor and field", ""),
+        row_over_lockstep("rotor, field and friction", ", friction"),
         over_lockstep("rotor and field", "", 2.0),
         over_lockstep("rotor, field and friction", ", friction", 2.0),
         over_lockstep("rotor and friction", ", no field", 5.0),

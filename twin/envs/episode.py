@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from spheretwin.electronics.coil import advance_lag
 from spheretwin.models.base.compiled import allocation_free
 from spheretwin.models.base.record import Rows
-from spheretwin.plant.lanes import HELD, LANES, QDOT, LaneField, Q, advance
+from spheretwin.plant.lanes import LANES, LaneMagnetics, PlantBlock, advance
 from spheretwin.plant.plant_tick import FASTEST_RATE_rad_s
 
 Array = NDArray[np.float64]
@@ -49,7 +49,6 @@ class Episodes(NamedTuple):
     code: NDArray[np.int64]  # (n,) `RUNNING`, or how the episode ended
     reference: Array  # (v, ticks + 1, 3, 3)
     disturbance: Array  # (v, ticks, 3) N·m
-    constant: Array  # (v, 3) N·m, subtracted as a disturbance is
     hinge_range: Array  # (3, 2) rad
     weights: Array  # (4,) of the terms of the reward
     current: Array  # (n, groups) A
@@ -71,8 +70,8 @@ class Physics(NamedTuple):
 
 @allocation_free
 def advance_episodes(
-    blocks: Array,
-    field: LaneField,
+    blocks: Rows,
+    magnetics: LaneMagnetics,
     episodes: Episodes,
     physics: Physics,
     actions: Array,
@@ -84,7 +83,7 @@ def advance_episodes(
 
     Parameters
     ----------
-    blocks, field
+    blocks, magnetics
         Of `lanes.advance`; blocks are changed.
     episodes : Episodes
         Changed; an episode that has ended stays as it is.
@@ -104,18 +103,18 @@ def advance_episodes(
         variant, tick = episodes.variant[i], min(episodes.tick[i], episodes.disturbance.shape[1] - 1)
         block, lane = blocks[i // LANES], i % LANES
         for k in range(3):
-            torque_Nm = -episodes.disturbance[variant, tick, k] - episodes.constant[variant, k]
+            torque_Nm = -episodes.disturbance[variant, tick, k] - block.constant_torque_Nm[k * LANES + lane]
             if not physics.by_current:
                 torque_Nm += min(max(actions[i, k], -limit), limit)
-            block[HELD + k * LANES + lane] = torque_Nm
+            block.held_Nm[k * LANES + lane] = torque_Nm
     if physics.by_current:
         for _ in range(physics.substeps):
             for i in range(n):
                 advance_lag(episodes.lag[0], actions[i], episodes.current[i], episodes.mean_current[i])
-            advance(blocks, field, episodes.mean_current, physics.step_s, 1, physics.slows)
+            advance(blocks, magnetics, episodes.mean_current, physics.step_s, 1, physics.slows)
     else:
         no_currents = episodes.mean_current[:0]
-        advance(blocks, field, no_currents, physics.step_s, physics.substeps, physics.slows)
+        advance(blocks, magnetics, no_currents, physics.step_s, physics.substeps, physics.slows)
     ended = 0
     for i in range(n):
         block, lane = blocks[i // LANES], i % LANES
@@ -134,11 +133,11 @@ def advance_episodes(
 
 
 @allocation_free
-def observe(block: Array, lane: int, i: int, episodes: Episodes, row: NDArray[np.float32]) -> None:
+def observe(block: PlantBlock, lane: int, i: int, episodes: Episodes, row: NDArray[np.float32]) -> None:
     """Write the observation of episode i; numbers beyond their bounds are cut, NaN is 0."""
     reference = episodes.reference[episodes.variant[i], episodes.tick[i]]
     for k in range(3):
-        q, qdot = block[Q + k * LANES + lane], block[QDOT + k * LANES + lane]
+        q, qdot = block.q_rad[k * LANES + lane], block.qdot_rad_s[k * LANES + lane]
         row[k], row[3 + k] = q - reference[0, k], qdot - reference[1, k]
         row[6 + k], row[9 + k], row[12 + k] = q, qdot, reference[2, k]
     for place in range(15):
@@ -147,15 +146,16 @@ def observe(block: Array, lane: int, i: int, episodes: Episodes, row: NDArray[np
 
 
 @allocation_free
-def _judge(block: Array, lane: int, i: int, episodes: Episodes) -> int:
+def _judge(block: PlantBlock, lane: int, i: int, episodes: Episodes) -> int:
     """Return how episode i goes on after its control period."""
     for k in range(3):
         if not (
-            isfinite(block[Q + k * LANES + lane]) and abs(block[QDOT + k * LANES + lane]) < FASTEST_RATE_rad_s
+            isfinite(block.q_rad[k * LANES + lane])
+            and abs(block.qdot_rad_s[k * LANES + lane]) < FASTEST_RATE_rad_s
         ):
             return DIVERGED
     for k in range(3):
-        q = block[Q + k * LANES + lane]
+        q = block.q_rad[k * LANES + lane]
         if not episodes.hinge_range[k, 0] <= q <= episodes.hinge_range[k, 1]:
             return LEFT_WORKSPACE
     return COMPLETED if episodes.tick[i] == episodes.disturbance.shape[1] else RUNNING
@@ -163,7 +163,7 @@ def _judge(block: Array, lane: int, i: int, episodes: Episodes) -> int:
 
 @allocation_free
 def _reward(
-    block: Array, lane: int, i: int, episodes: Episodes, action: Array, limit: float, terms: Array
+    block: PlantBlock, lane: int, i: int, episodes: Episodes, action: Array, limit: float, terms: Array
 ) -> None:
     """Write the terms of the reward, and add to the figures of the episode."""
     weights, code = episodes.weights, episodes.code[i]
@@ -174,8 +174,8 @@ def _reward(
     reference = episodes.reference[episodes.variant[i], episodes.tick[i]]
     angle = rate = effort = 0.0
     for k in range(3):
-        angle += (block[Q + k * LANES + lane] - reference[0, k]) ** 2
-        rate += (block[QDOT + k * LANES + lane] - reference[1, k]) ** 2
+        angle += (block.q_rad[k * LANES + lane] - reference[0, k]) ** 2
+        rate += (block.qdot_rad_s[k * LANES + lane] - reference[1, k]) ** 2
     for k in range(action.shape[0]):
         effort += (min(max(action[k], -limit), limit) / limit) ** 2
     terms[0], terms[1] = -weights[0] * sqrt(angle) / 0.1, -weights[1] * sqrt(rate) / 10.0

@@ -93,7 +93,6 @@ class TwinVectorEnv(VectorEnv[Any, Any, Any]):
             code=np.full(num_envs, RUNNING),
             reference=variants.reference,
             disturbance=variants.disturbance,
-            constant=np.array([one.constant_torque_Nm for one in variants.parameters]),
             hinge_range=variants.hinge_range,
             weights=np.array([weights.tracking, weights.rate, weights.effort, weights.failure]),
             current=np.zeros((num_envs, groups)),
@@ -107,7 +106,7 @@ class TwinVectorEnv(VectorEnv[Any, Any, Any]):
         self._advance = for_types_of(
             advance_episodes,
             self._plants.blocks,
-            self._plants.field,
+            self._plants.magnetics,
             self._episodes,
             self._physics,
             np.empty((0, 0)),
@@ -198,7 +197,7 @@ class TwinVectorEnv(VectorEnv[Any, Any, Any]):
         plants = self._plants
         ended = self._advance(
             plants.blocks,
-            plants.field,
+            plants.magnetics,
             episodes,
             self._physics,
             np.ascontiguousarray(actions),

@@ -3,6 +3,10 @@
 The operations and the formulas are those of `plant_step`. The compiler vectorises only loops without
 branches and calls, so all numbers of a block of plants are in one vector. The reads of the torque table are
 scattered: the field is computed plant by plant.
+
+Rows of the plant of a run, one after the other, do the same, but on one core of an AMD Zen 5 a physics step
+takes 1.35 times as long, with friction 1.7 times, and without a field 5 to 6 times
+(`tests/benchmarks/lanes.py`). So environments and windows of identification have lanes.
 """
 
 from __future__ import annotations
@@ -13,9 +17,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spheretwin.models.base.compiled import allocation_free, inlined
-from spheretwin.models.base.record import Rows
+from spheretwin.models.base.record import Record, Rows, field
 from spheretwin.models.base.trigonometry import sine_cosine
-from spheretwin.models.kinematics import Triple, Turns
+from spheretwin.models.kinematics import Triple, Turns, triple
 from spheretwin.models.lagrangian import acceleration_entries, inertia_entries
 from spheretwin.models.magnetics import Tables, fill_torque_matrix, rotor_torque
 from spheretwin.plant.friction import slowed
@@ -25,16 +29,37 @@ Array = NDArray[np.float64]
 LANES = 16
 """Plants of a block, a constant of the compiled code. Loops over 8 would be unrolled, not vectorised."""
 
-# First number of each quantity in a block. A row has an entry for each plant; most quantities have three.
 _TRIPLE = 3 * LANES
-Q, QDOT, TORQUE, HELD, INERTIA, COULOMB = (_TRIPLE * place for place in range(6))
-VISCOUS, SPRING, MIDDLE_Q, TORQUE_S, ACCELERATION = (_TRIPLE * place for place in range(6, 11))
-STAGE_Q, STAGE_QDOT, SUM_Q, SUM_QDOT = (_TRIPLE * place for place in range(11, 15))
-COSINE, SINE, REVERSE = (_TRIPLE * place for place in range(15, 18))
-WEIGHT, SMOOTHING, ROWS = 54 * LANES, 55 * LANES, 56
+"""Numbers of a quantity of the three hinges: those of all lanes for alpha, then for beta, then for gamma."""
 
 
-class LaneField(NamedTuple):
+class PlantBlock(Record):
+    """State and parameters of some plants, and working space; a parameter has the name of that of a plant."""
+
+    q_rad: Array = field("hinge angles", "rad", _TRIPLE, state=True)
+    qdot_rad_s: Array = field("hinge rates", "rad/s", _TRIPLE, state=True)
+    inertia_kg_m2: Array = field("principal moments about the joint centre", "kg·m²", _TRIPLE)
+    weight_moment_Nm: Array = field("weight of the payload times its distance", "N·m", LANES)
+    forward_Nm: Array = field("Coulomb friction towards positive angles", "N·m", _TRIPLE)
+    reverse_Nm: Array = field("the same towards negative angles", "N·m", _TRIPLE)
+    viscous_Nm_s: Array = field("viscous friction", "N·m·s", _TRIPLE)
+    friction_smoothing_rad_s: Array = field("rate over which Coulomb friction turns", "rad/s", LANES)
+    constant_torque_Nm: Array = field("subtracted as a disturbance is, by the caller", "N·m", _TRIPLE)
+    spring_Nm_rad: Array = field("stiffness of the cable", "N·m/rad", _TRIPLE)
+    held_Nm: Array = field("torque on the hinges besides field, spring and friction", "N·m", _TRIPLE)
+    middle_rad: Array = field("predicted pose in the middle of the step", "rad", _TRIPLE)
+    torque_S: Array = field("of the coils, stator frame", "N·m", _TRIPLE)
+    torque_q: Array = field("on the hinges, held over the step", "N·m", _TRIPLE)
+    stage_rad: Array = field("pose of a stage of the Runge-Kutta step", "rad", _TRIPLE)
+    stage_rad_s: Array = field("its rates", "rad/s", _TRIPLE)
+    stage_rad_s2: Array = field("its accelerations", "rad/s²", _TRIPLE)
+    sum_rad_s: Array = field("weighted rates of the stages", "rad/s", _TRIPLE)
+    sum_rad_s2: Array = field("their weighted accelerations", "rad/s²", _TRIPLE)
+    cosine: Array = field("of the angles of a pose", "", _TRIPLE)
+    sine: Array = field("of the same angles", "", _TRIPLE)
+
+
+class LaneMagnetics(NamedTuple):
     """Magnetics of all plants, and working space."""
 
     arrangement: Rows  # (n,) of Arrangement
@@ -48,14 +73,16 @@ class LaneField(NamedTuple):
 
 
 @allocation_free
-def advance(blocks: Array, field: LaneField, currents: Array, dt: float, steps: int, slows: bool) -> None:
+def advance(
+    blocks: Rows, magnetics: LaneMagnetics, currents: Array, dt: float, steps: int, slows: bool
+) -> None:
     """Advance all plants under held currents.
 
     Parameters
     ----------
-    blocks : (blocks, ROWS * LANES) array
-        Changed in place; HELD has the torque on the hinges besides field, spring and friction.
-    field : LaneField
+    blocks : array of PlantBlock
+        Changed in place.
+    magnetics : LaneMagnetics
     currents : (n, groups) array, A
         Of the first n plants; on the others no field acts.
     dt : float, s
@@ -66,14 +93,15 @@ def advance(blocks: Array, field: LaneField, currents: Array, dt: float, steps: 
     for number in range(blocks.shape[0]):
         block, first = blocks[number], number * LANES
         plants = min(LANES, currents.shape[0] - first)
-        for i in range(TORQUE_S, TORQUE_S + _TRIPLE):
-            block[i] = 0.0
+        for i in range(_TRIPLE):
+            block.torque_S[i] = 0.0
         for _ in range(steps):
-            _predict(block, dt)
+            for i in range(_TRIPLE):
+                block.middle_rad[i] = block.q_rad[i] + 0.5 * dt * block.qdot_rad_s[i]
             if slows:
                 _slow_down(block, dt)
             for lane in range(plants):
-                _compute_field(block, lane, field, first + lane, currents[first + lane])
+                _compute_field(block, lane, magnetics, first + lane, currents[first + lane])
             _collect_torque(block)
             _step_rotor(block, dt)
             if slows:
@@ -82,119 +110,113 @@ def advance(blocks: Array, field: LaneField, currents: Array, dt: float, steps: 
 
 @allocation_free
 def roll_out(
-    blocks: Array, field: LaneField, currents: Array, dt: float, steps: int, slows: bool, angles: Array
+    blocks: Rows, magnetics: LaneMagnetics, currents: Array, dt: float, steps: int, slows: bool, angles: Array
 ) -> None:
     """Advance all plants under rows of currents (rows, n, groups); write the angles reached (rows, n, 3)."""
     for row in range(currents.shape[0]):
-        advance(blocks, field, currents[row], dt, steps, slows)
+        advance(blocks, magnetics, currents[row], dt, steps, slows)
         for plant in range(currents.shape[1]):
-            block, lane = plant // LANES, plant % LANES
-            for i in range(3):
-                angles[row, plant, i] = blocks[block, Q + i * LANES + lane]
+            angles[row, plant] = _triple(blocks[plant // LANES].q_rad, plant % LANES)
 
 
 @inlined
-def _triple(block: Array, first: int, lane: int) -> Triple:
-    return block[first + lane], block[first + LANES + lane], block[first + 2 * LANES + lane]
+def _triple(values: Array, lane: int) -> Triple:
+    return values[lane], values[LANES + lane], values[2 * LANES + lane]
 
 
 @inlined
-def _turns(block: Array, lane: int) -> Turns:
-    ca, cb, cg = _triple(block, COSINE, lane)
-    sa, sb, sg = _triple(block, SINE, lane)
+def _put(values: Array, lane: int, numbers: Triple) -> None:
+    values[lane], values[LANES + lane], values[2 * LANES + lane] = numbers
+
+
+@inlined
+def _turns(block: PlantBlock, lane: int) -> Turns:
+    (ca, cb, cg), (sa, sb, sg) = _triple(block.cosine, lane), _triple(block.sine, lane)
     return Turns(ca, sa, cb, sb, cg, sg)
 
 
 @allocation_free
-def _turn(block: Array, pose: int) -> None:
+def _turn(block: PlantBlock, pose_rad: Array) -> None:
     """Compute cosine and sine of all angles of a pose."""
     for i in range(_TRIPLE):
-        block[SINE + i], block[COSINE + i] = sine_cosine(block[pose + i])
+        block.sine[i], block.cosine[i] = sine_cosine(pose_rad[i])
 
 
 @allocation_free
-def _predict(block: Array, dt: float) -> None:
-    """Predict the pose in the middle of the step."""
-    for i in range(_TRIPLE):
-        block[MIDDLE_Q + i] = block[Q + i] + 0.5 * dt * block[QDOT + i]
-
-
-@allocation_free
-def _compute_field(block: Array, lane: int, field: LaneField, plant: int, current: Array) -> None:
+def _compute_field(
+    block: PlantBlock, lane: int, magnetics: LaneMagnetics, plant: int, current: Array
+) -> None:
     """Compute the torque of the coils of one plant in the stator frame."""
-    table = field.table_of[plant]
-    tables = Tables(field.curves[table], field.fields[table])
-    q, effective, torque_S = field.vectors[0], field.vectors[1], field.vectors[2]
-    gain, groups = field.torque_gain[plant], field.torque_gain.shape[1]
-    for i in range(3):
-        q[i] = block[MIDDLE_Q + i * LANES + lane]
-    fill_torque_matrix(q, field.arrangement[plant], tables, field.G, field.scratch)
+    table, G = magnetics.table_of[plant], magnetics.G
+    tables = Tables(magnetics.curves[table], magnetics.fields[table])
+    q, effective, torque_S = magnetics.vectors[0], magnetics.vectors[1], magnetics.vectors[2]
+    q[0], q[1], q[2] = _triple(block.middle_rad, lane)
+    fill_torque_matrix(q, magnetics.arrangement[plant], tables, G, magnetics.scratch)
+    gain, groups = magnetics.torque_gain[plant], G.shape[1]
     for j in range(groups):
         effective[j] = gain[j] * current[j]
-    rotor_torque(field.G, effective[:groups], torque_S)
-    for i in range(3):
-        block[TORQUE_S + i * LANES + lane] = torque_S[i]
+    rotor_torque(G, effective[:groups], torque_S)
+    _put(block.torque_S, lane, triple(torque_S))
 
 
 @allocation_free
-def _collect_torque(block: Array) -> None:
+def _collect_torque(block: PlantBlock) -> None:
     """Compute the torque on the hinges, held over the step: that of the coils as `generalised_torque`."""
-    _turn(block, MIDDLE_Q)
+    _turn(block, block.middle_rad)
     for lane in range(LANES):
-        at, (x, y, z) = _turns(block, lane), _triple(block, TORQUE_S, lane)
-        block[TORQUE + lane], block[TORQUE + LANES + lane] = x, at.ca * y + at.sa * z
-        block[TORQUE + 2 * LANES + lane] = at.sb * x + at.cb * (at.ca * z - at.sa * y)
+        at, (x, y, z) = _turns(block, lane), _triple(block.torque_S, lane)
+        _put(
+            block.torque_q,
+            lane,
+            (x, at.ca * y + at.sa * z, at.sb * x + at.cb * (at.ca * z - at.sa * y)),
+        )
     for i in range(_TRIPLE):
-        block[TORQUE + i] += block[HELD + i] - block[SPRING + i] * block[MIDDLE_Q + i]
+        block.torque_q[i] += block.held_Nm[i] - block.spring_Nm_rad[i] * block.middle_rad[i]
 
 
 @allocation_free
-def _step_rotor(block: Array, dt: float) -> None:
+def _step_rotor(block: PlantBlock, dt: float) -> None:
     """Advance angles and rates by a Runge-Kutta step, as `lagrangian_rotor.step` does."""
     for i in range(_TRIPLE):
-        block[STAGE_Q + i], block[STAGE_QDOT + i] = block[Q + i], block[QDOT + i]
-        block[SUM_Q + i] = block[SUM_QDOT + i] = 0.0
+        block.stage_rad[i], block.stage_rad_s[i] = block.q_rad[i], block.qdot_rad_s[i]
+        block.sum_rad_s[i] = block.sum_rad_s2[i] = 0.0
     for stage in range(4):
-        _turn(block, STAGE_Q)
+        _turn(block, block.stage_rad)
         _accelerate(block)
         weight = 2.0 if stage == 1 or stage == 2 else 1.0
         time = dt if stage == 2 else 0.5 * dt
         for i in range(_TRIPLE):
-            rate, acceleration = block[STAGE_QDOT + i], block[ACCELERATION + i]
-            block[SUM_Q + i] += weight * rate
-            block[SUM_QDOT + i] += weight * acceleration
-            block[STAGE_Q + i] = block[Q + i] + time * rate
-            block[STAGE_QDOT + i] = block[QDOT + i] + time * acceleration
+            rate, acceleration = block.stage_rad_s[i], block.stage_rad_s2[i]
+            block.sum_rad_s[i] += weight * rate
+            block.sum_rad_s2[i] += weight * acceleration
+            block.stage_rad[i] = block.q_rad[i] + time * rate
+            block.stage_rad_s[i] = block.qdot_rad_s[i] + time * acceleration
     for i in range(_TRIPLE):
-        block[Q + i] += dt / 6 * block[SUM_Q + i]
-        block[QDOT + i] += dt / 6 * block[SUM_QDOT + i]
+        block.q_rad[i] += dt / 6 * block.sum_rad_s[i]
+        block.qdot_rad_s[i] += dt / 6 * block.sum_rad_s2[i]
 
 
 @allocation_free
-def _accelerate(block: Array) -> None:
+def _accelerate(block: PlantBlock) -> None:
     """Compute the accelerations at the stage."""
     for lane in range(LANES):
-        alpha, beta, gamma = acceleration_entries(
+        acceleration = acceleration_entries(
             _turns(block, lane),
-            _triple(block, STAGE_QDOT, lane),
-            _triple(block, TORQUE, lane),
-            _triple(block, INERTIA, lane),
-            block[WEIGHT + lane],
+            _triple(block.stage_rad_s, lane),
+            _triple(block.torque_q, lane),
+            _triple(block.inertia_kg_m2, lane),
+            block.weight_moment_Nm[lane],
         )
-        block[ACCELERATION + lane], block[ACCELERATION + LANES + lane] = alpha, beta
-        block[ACCELERATION + 2 * LANES + lane] = gamma
+        _put(block.stage_rad_s2, lane, acceleration)
 
 
 @allocation_free
-def _slow_down(block: Array, dt: float) -> None:
+def _slow_down(block: PlantBlock, dt: float) -> None:
     """Advance the rates by half a step under friction alone, as `friction.slow_down` does."""
-    t = 0.5 * dt
-    _turn(block, Q)
+    _turn(block, block.q_rad)
     for lane in range(LANES):
-        M = inertia_entries(_turns(block, lane), _triple(block, INERTIA, lane))
-        rates = _triple(block, QDOT, lane)
-        viscous = _triple(block, VISCOUS, lane)
-        coulomb = _triple(block, COULOMB, lane), _triple(block, REVERSE, lane)
-        alpha, beta, gamma = slowed(M, rates, viscous, coulomb, block[SMOOTHING + lane], t, False)
-        block[QDOT + lane], block[QDOT + LANES + lane] = alpha, beta
-        block[QDOT + 2 * LANES + lane] = gamma
+        M = inertia_entries(_turns(block, lane), _triple(block.inertia_kg_m2, lane))
+        rates, viscous = _triple(block.qdot_rad_s, lane), _triple(block.viscous_Nm_s, lane)
+        coulomb = _triple(block.forward_Nm, lane), _triple(block.reverse_Nm, lane)
+        smoothing = block.friction_smoothing_rad_s[lane]
+        _put(block.qdot_rad_s, lane, slowed(M, rates, viscous, coulomb, smoothing, 0.5 * dt, False))

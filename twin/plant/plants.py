@@ -9,11 +9,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from spheretwin.models.base.arrays import is_real, real_array
 from spheretwin.models.base.errors import InputError, shown
-from spheretwin.models.base.record import Rows
+from spheretwin.models.base.record import Rows, put
 from spheretwin.models.magnetics import Tables, scratch_of
 from spheretwin.plant import lanes
 from spheretwin.plant.friction import levels
-from spheretwin.plant.lanes import LANES, LaneField
+from spheretwin.plant.lanes import LANES, LaneMagnetics, PlantBlock
 from spheretwin.plant.plant_step import LONGEST_STEP_s, Parameters, State, check_parameters, roll_out
 
 Array = NDArray[np.float64]
@@ -37,7 +37,7 @@ class Plants:
 
     Attributes
     ----------
-    blocks, field
+    blocks, magnetics
         State and parameters for the compiled code of `lanes`.
 
     Raises
@@ -65,9 +65,9 @@ class Plants:
         if not each:
             raise InputError("plants: expected at least one plant, received none")
         self._parameters = each
-        first, n, blocks = each[0].magnetics, len(each), -(-len(each) // LANES)
+        first, n = each[0].magnetics, len(each)
         groups = first.sizes["groups"]
-        self.field = LaneField(
+        self.magnetics = LaneMagnetics(
             arrangement=np.empty(n, first.arrangement.dtype),
             curves=first.tables.curve[None],
             fields=first.tables.field[None],
@@ -77,12 +77,11 @@ class Plants:
             scratch=scratch_of(first),
             vectors=np.empty((3, max(3, groups))),
         )
-        self.blocks = np.zeros((blocks, lanes.ROWS * LANES))
+        self.blocks = PlantBlock.zeros(-(-n // LANES))
         # A lane without a plant: at rest, of inertia 1.
-        self._write(lanes.INERTIA, np.ones((blocks * LANES, 3)))
-        self.blocks[:, lanes.SMOOTHING : lanes.SMOOTHING + LANES] = 1.0
-        self._constant_Nm = np.zeros((n, 3))
+        put(self.blocks, inertia_kg_m2=1.0, friction_smoothing_rad_s=1.0)
         self._tables = [first.tables]
+        self._every, self._general = divmod(np.arange(n), LANES), np.zeros(n, bool)
         for number, one in enumerate(each):
             self._set(number, one)
 
@@ -92,17 +91,17 @@ class Plants:
     @property
     def groups(self) -> int:
         """Number of coil groups."""
-        return self.field.torque_gain.shape[1]
+        return self.magnetics.torque_gain.shape[1]
 
     @property
     def q_rad(self) -> Array:
         """Hinge angles (n, 3), a copy."""
-        return self._read(lanes.Q)
+        return self._column("q_rad")[self._every]
 
     @property
     def qdot_rad_s(self) -> Array:
         """Hinge rates (n, 3), a copy."""
-        return self._read(lanes.QDOT)
+        return self._column("qdot_rad_s")[self._every]
 
     def set_state(self, q_rad: ArrayLike, qdot_rad_s: ArrayLike, plants: Plant | slice = slice(None)) -> None:
         """Set angles and rates.
@@ -119,15 +118,14 @@ class Plants:
         InputError
             Another shape, or a number that is not finite; nothing is changed.
         """
-        count = len(np.atleast_2d(self._read(lanes.Q)[plants]))
-        states = [
-            (first, _checked(name, values, count, 3, single=True))
-            for first, name, values in ((lanes.Q, "q_rad", q_rad), (lanes.QDOT, "qdot_rad_s", qdot_rad_s))
-        ]
-        for first, given in states:
-            present = self._read(first)
-            present[plants] = given if isinstance(plants, slice) or np.ndim(plants) else given[0]
-            self._write(first, present)
+        chosen = tuple(numbers[plants] for numbers in self._every)  # of blocks and lanes
+        count = np.size(chosen[0])
+        given = {
+            name: _checked(name, values, count, 3, single=True)
+            for name, values in (("q_rad", q_rad), ("qdot_rad_s", qdot_rad_s))
+        }
+        for name, values in given.items():
+            self._column(name)[chosen] = values if np.ndim(chosen[0]) else values[0]
 
     def set_parameters(self, number: int, parameters: Parameters) -> None:
         """Give one plant other parameters; its state stays.
@@ -159,15 +157,8 @@ class Plants:
         InputError
             Another shape, or a number that is not finite.
         """
-        currents, disturbance = (
-            self._each("currents", currents, self.groups),
-            self._each("disturbance", disturbance),
-        )
-        _check_steps(dt, steps)
-        general = self._advance_general(currents[None], disturbance, dt, steps)
-        self._write(lanes.HELD, -(disturbance + self._constant_Nm))
-        lanes.advance(self.blocks, self.field, currents, dt, steps, self._slows)
-        self._put(general)
+        currents = self._each("currents", currents, self.groups)
+        self._advance(currents[None], self._each("disturbance", disturbance), dt, steps)
 
     def step_torque(self, torque_q: ArrayLike, dt: float, steps: int = 1) -> None:
         """Advance all plants under held torques on the hinges, without currents.
@@ -184,12 +175,7 @@ class Plants:
         InputError
             Another shape, or a number that is not finite.
         """
-        torque_q = self._each("torque_q", torque_q)
-        _check_steps(dt, steps)
-        general = self._advance_general(np.zeros((1, len(self), self.groups)), -torque_q, dt, steps)
-        self._write(lanes.HELD, torque_q - self._constant_Nm)
-        lanes.advance(self.blocks, self.field, np.empty((0, self.groups)), dt, steps, self._slows)
-        self._put(general)
+        self._advance(np.empty((1, 0, self.groups)), -self._each("torque_q", torque_q), dt, steps)
 
     def roll_out(self, currents: ArrayLike, disturbance: ArrayLike, dt: float, steps: int = 1) -> Array:
         """Advance all plants under a sequence of currents and return the angles that they reach.
@@ -220,50 +206,54 @@ class Plants:
             )
         if not np.all(np.isfinite(sequence)):
             raise InputError("plants: expected finite currents, received others")
+        return self._advance(sequence, self._each("disturbance", disturbance), dt, steps)
+
+    def _advance(self, currents: Array, disturbance: Array, dt: float, steps: int) -> Array:
+        """Advance all plants under rows of currents (m, n, groups), or without; return the angles reached."""
         _check_steps(dt, steps)
-        reached = np.empty((len(sequence), len(self), 3))
-        disturbance = self._each("disturbance", disturbance)
-        general = self._advance_general(sequence, disturbance, dt, steps, reached)
-        if ideal := [number for number in range(len(self)) if number not in general]:
-            self._write(lanes.HELD, -(disturbance + self._constant_Nm))
-            angles, currents = np.empty_like(reached), np.ascontiguousarray(sequence)
-            lanes.roll_out(self.blocks, self.field, currents, dt, steps, self._slows, angles)
-            reached[:, ideal] = angles[:, ideal]
-        self._put(general)
+        angles, currents = np.empty((len(currents), len(self), 3)), np.ascontiguousarray(currents)
+        general = self._advance_general(currents, disturbance, dt, steps) if self._general.any() else {}
+        if not self._general.all():
+            constant_Nm = self._column("constant_torque_Nm")[self._every]
+            self._column("held_Nm")[self._every] = -(disturbance + constant_Nm)
+            slows = any(np.any(self.blocks[name]) for name in ("forward_Nm", "reverse_Nm", "viscous_Nm_s"))
+            lanes.roll_out(self.blocks, self.magnetics, currents, dt, steps, slows, angles)
+        for number, (state, path) in general.items():
+            self.set_state(*state, number)
+            angles[:, number] = path
+        return angles
+
+    def _advance_general(
+        self, currents: Array, disturbance: Array, dt: float, steps: int
+    ) -> dict[int, tuple[State, Array]]:
+        """Return states and angles that plants with a general joint reach, by their number."""
+        reached, q, qdot = {}, self.q_rad, self.qdot_rad_s
+        for number in np.flatnonzero(self._general).tolist():
+            own, state = self._parameters[number], State(q[number], qdot[number])
+            held = currents[:, number] if currents.shape[1] else np.zeros((len(currents), self.groups))
+            path = np.empty((len(currents), 3))
+            end = roll_out(state, np.ascontiguousarray(held), disturbance[number], own, dt, steps, path)
+            reached[number] = end, path
         return reached
 
     def _set(self, number: int, parameters: Parameters) -> None:
         check_parameters(parameters)
-        model, field = parameters.magnetics, self.field
+        model, magnetics = parameters.magnetics, self.magnetics
         expected, received = (
-            _shape(self._tables[0], field.arrangement),
+            _shape(self._tables[0], magnetics.arrangement),
             _shape(model.tables, model.arrangement),
         )
         if received != expected:
             raise InputError(f"plants: expected magnetics of {expected}, received {received}")
         self._parameters[number] = parameters
-        block, lane = divmod(number, LANES)
-        column = self.blocks[block].reshape(lanes.ROWS, LANES)[:, lane]
         forward_Nm, reverse_Nm = levels(parameters.coulomb_Nm, parameters.coulomb_asymmetry)
-        for first, values in (
-            (lanes.INERTIA, parameters.inertia_kg_m2),
-            (lanes.COULOMB, forward_Nm),
-            (lanes.REVERSE, reverse_Nm),
-            (lanes.VISCOUS, parameters.viscous_Nm_s),
-            (lanes.SPRING, parameters.spring_Nm_rad),
-        ):
-            column[first // LANES : first // LANES + 3] = values
-        column[lanes.WEIGHT // LANES] = parameters.weight_moment_Nm
-        column[lanes.SMOOTHING // LANES] = parameters.friction_smoothing_rad_s
-        self._constant_Nm[number] = parameters.constant_torque_Nm
-        field.torque_gain[number] = parameters.torque_gain
-        field.arrangement[number] = model.arrangement[0]
-        field.table_of[number] = self._place_of(model.tables)
-
-    @property
-    def _slows(self) -> bool:
-        coefficients = lanes.COULOMB, lanes.REVERSE, lanes.VISCOUS
-        return any(np.any(self._read(first)) for first in coefficients)
+        values = parameters._asdict() | {"forward_Nm": forward_Nm, "reverse_Nm": reverse_Nm}
+        for name in PlantBlock.fields().keys() & values:
+            self._column(name)[divmod(number, LANES)] = values[name]
+        self._general[number] = parameters.joint["on"][0]
+        magnetics.torque_gain[number] = parameters.torque_gain
+        magnetics.arrangement[number] = model.arrangement[0]
+        magnetics.table_of[number] = self._place_of(model.tables)
 
     def _place_of(self, tables: Tables) -> int:
         """Return the number of a curve and field among those of all plants, after adding it if it is new."""
@@ -272,50 +262,16 @@ class Plants:
                 return place
         self._tables.append(tables)
         curves, fields = (np.stack(one) for one in zip(*self._tables, strict=True))
-        self.field = self.field._replace(curves=curves, fields=fields)
+        self.magnetics = self.magnetics._replace(curves=curves, fields=fields)
         return len(self._tables) - 1
-
-    def _advance_general(
-        self, currents: Array, disturbance: Array, dt: float, steps: int, angles: Array | None = None
-    ) -> dict[int, State]:
-        """Return the states that plants with a general joint reach, by their number; write their angles."""
-        general = [number for number, one in enumerate(self._parameters) if one.joint["on"][0]]
-        if not general:
-            return {}
-        reached, q, qdot = {}, self.q_rad, self.qdot_rad_s
-        rows = np.empty((len(currents), 3))
-        for number in general:
-            reached[number] = roll_out(
-                State(q[number], qdot[number]),
-                np.ascontiguousarray(currents[:, number]),
-                disturbance[number],
-                self._parameters[number],
-                dt,
-                steps,
-                rows,
-            )
-            if angles is not None:
-                angles[:, number] = rows
-        return reached
-
-    def _put(self, states: dict[int, State]) -> None:
-        for number, state in states.items():
-            self.set_state(*state, number)
 
     def _each(self, name: str, values: ArrayLike, width: int = 3) -> Array:
         """Return values for each plant, (n, width)."""
         return np.ascontiguousarray(_checked(name, values, len(self), width))
 
-    def _read(self, first: int) -> Array:
-        rows = self.blocks[:, first : first + 3 * LANES].reshape(-1, 3, LANES)
-        return rows.transpose(0, 2, 1).reshape(-1, 3)[: len(self)].copy()
-
-    def _write(self, first: int, values: Array) -> None:
-        """Write three rows of the blocks from values (at most lanes, 3)."""
-        complete = np.zeros((len(self.blocks) * LANES, 3))
-        complete[: len(values)] = values
-        rows = complete.reshape(-1, LANES, 3).transpose(0, 2, 1)
-        self.blocks[:, first : first + 3 * LANES] = rows.reshape(len(self.blocks), -1)
+    def _column(self, name: str) -> Array:
+        """Return a field of the blocks as (blocks, lanes, 3) or (blocks, lanes, 1)."""
+        return self.blocks[name].reshape(len(self.blocks), -1, LANES).swapaxes(1, 2)
 
 
 def _shape(tables: Tables, arrangement: Rows) -> str:
