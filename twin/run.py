@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from spheretwin.faults.fault_injector import FaultMessages
 from spheretwin.metrics.figures import Figures
 from spheretwin.metrics.user_metrics import UserMetric, check_names, own_value
 from spheretwin.models.actuator import Actuator
@@ -121,7 +120,7 @@ class Run:
         with Recorder(self.actuator, self.telemetry.signals, facts, path=Path(path)) as recorder:
             if len(self.telemetry):
                 recorder.write(self.telemetry)
-            for t_s, text in self._log():
+            for t_s, text in self._changes():
                 recorder.note(t_s, text)
             recorder.finish(self.status)
         return Path(path)
@@ -211,12 +210,11 @@ class Run:
             )
         ]
 
-    def _log(self) -> list[tuple[float, str]]:
-        """Return the log of faults, events and changes by the user, in the order of time."""
+    def _changes(self) -> list[tuple[float, str]]:
+        """Return the events and the changes by the user, in the order of time."""
         record, period_s = self.provenance, self.scenario.controller.period_s
         events = [event for event in scheduled_changes(self.scenario) if event.tick < len(self.telemetry)]
-        lines = [(change.tick * period_s, change_text(change)) for change in (*events, *record.journal)]
-        return sorted([*lines, *FaultMessages().of(self.telemetry)] if len(self.telemetry) else lines)
+        return sorted((change.tick * period_s, change_text(change)) for change in (*events, *record.journal))
 
 
 def _has_value(value: Any) -> bool:

@@ -13,7 +13,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spheretwin.control.law import Law
-from spheretwin.faults.fault_injector import FaultMessages
 from spheretwin.models.telemetry.run_record import Change
 from spheretwin.models.telemetry.signals import width
 from spheretwin.models.telemetry.status import Status
@@ -38,7 +37,7 @@ class Sink(Protocol):
         """Receive the rows of one chunk, which do not change later."""
 
     def note(self, t_s: float, text: str) -> None:
-        """Receive a message about an event before the tick at `t_s`."""
+        """Receive a message about a change before the tick at `t_s`; the rows show all other events."""
 
     def finish(self, status: Status) -> None:
         """Receive the final status."""
@@ -161,16 +160,13 @@ def follow(
     chunk = _chunk_ticks(session.scenario, live or short_chunks)
     session.compile()
     started, first = time.perf_counter(), session.t_s
-    reported, messages = _report_events(session, 0, sinks), FaultMessages()
+    reported = _report_events(session, 0, sinks)
     while session.tick < ticks and not session.ended and not stop_requested():
         _apply_due(session, ticks, pending, sinks)
         last = min(session.tick + chunk, ticks, *(change.tick for change in pending[:1]))
         rows = _advance(session, last, log)
-        lines = messages.of(rows) if sinks else []
         for sink in sinks:
             sink.write(rows)
-            for t_s, text in lines:
-                sink.note(t_s, text)
         reported = _report_events(session, reported, sinks)
         if live:
             sleep_until(started + session.t_s - first)

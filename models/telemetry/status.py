@@ -7,6 +7,7 @@ from enum import StrEnum
 import numpy as np
 
 from spheretwin.models.base.errors import InputError, did_you_mean, shown
+from spheretwin.models.telemetry.fault_log import FAULT, GROUP_OUT, REPORTED, TIME_TO_DETECTION, ColumnChanges
 from spheretwin.models.telemetry.table import Table, rank_lost, saturated
 
 
@@ -89,17 +90,25 @@ QUIET_S = 0.1
 RANK_LOST = "rank lost: the groups in use give no torque in one direction, and no currents are commanded"
 
 
+FAILSAFE_REASON = "failsafe_reason"
+"""Column of runs with a watchdog: number of the reason of its trip."""
+
+
 class Events:
-    """Detector of the events of a run in its telemetry, chunk by chunk."""
+    """Detector of the events of a run in its telemetry, chunk by chunk: limits, faults, trips.
+
+    A fault is a warning from its start: nothing in the run has answered it yet.
+    """
 
     def __init__(self) -> None:
         self._now_s = 0.0
         self._last_saturated_s = self._last_lost_s = -np.inf
+        self._changes = ColumnChanges()
 
     def of(self, rows: Table) -> list[Event]:
         """Return the events of one chunk."""
         t, scale = rows["t_s"], rows["allocation_scale"]
-        events: list[Event] = []
+        events = self._faults_of(rows)
         for i in np.flatnonzero(rank_lost(rows)):
             if t[i] - self._last_lost_s > QUIET_S:
                 events.append((float(t[i]), Level.WARN, RANK_LOST))
@@ -111,6 +120,26 @@ class Events:
             self._last_saturated_s = t[i]
         self._now_s = float(t[-1])
         return sorted(events, key=lambda event: event[0])
+
+    def _faults_of(self, rows: Table) -> list[Event]:
+        """Return faults, groups that are switched off, and trips of the watchdog."""
+        signals = {signal.name: signal for signal in rows.signals}
+        events: list[Event] = []
+        if FAULT in signals:
+            parts, modes = signals[FAULT].labels, signals[FAULT].states
+            for _, t_s, part, mode in self._changes.of(rows, FAULT):
+                level = Level.WARN if mode else Level.INFO
+                events.append((t_s, level, f"{parts[part]} {modes[mode] if mode else 'works again'}"))
+            delays, states = rows[TIME_TO_DETECTION], signals[GROUP_OUT].states
+            for tick, t_s, group, out in self._changes.of(rows, GROUP_OUT):
+                after_s = delays[tick, group]
+                after = f", {1e3 * after_s:.0f} ms after it failed" if out > REPORTED and after_s >= 0 else ""
+                events.append((t_s, Level.INFO, f"group {group} {states[out]}{after}"))
+        if FAILSAFE_REASON in signals:
+            reasons = signals[FAILSAFE_REASON].states
+            for _, t_s, _, reason in self._changes.of(rows, FAILSAFE_REASON):
+                events.append((t_s, Level.ERROR, f"watchdog: {reasons[reason]}"))
+        return events
 
     def end(self, status: Status) -> Event:
         """Return the event of the end of the run."""

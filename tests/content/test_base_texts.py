@@ -257,7 +257,7 @@ def events():
             ("coil.00", "coil.01", "pot.alpha", "dac.01"),
             ("works", "open", "short"),
         ),
-        Signal("group_out", "1", 2, "out"),
+        Signal("group_out", "1", 2, "out", (), ("in use", "known to be out", "found open", "found shorted")),
         Signal("time_to_detection_s", "s", 2, "delay"),
     )
     table = Table(columns_, np.zeros((ticks, 10)))

@@ -100,7 +100,7 @@ def run_objects():
     lines += [f"index {array(frame.index.to_numpy())} {frame.index.name} {frame.shape}"]
     arrow = run.to_arrow()
     lines += [f"arrow {field.name}: {field.type}" for field in arrow.schema]
-    lines += [f"log {line}" for line in run._log()]
+    lines += [f"log {line}" for line in run._changes()]
     record = run.provenance
     lines += tree({"status": record.status, "journal": list(record.journal), "ticks": record.ticks})
     with pytest.MonkeyPatch.context() as patch:

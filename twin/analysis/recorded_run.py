@@ -17,7 +17,6 @@ import numpy as np
 from spheretwin.active_config import ActiveConfig, initial_config
 from spheretwin.analysis import recovery
 from spheretwin.analysis.recovery import hold_rows, ticks_of
-from spheretwin.faults.fault_injector import FaultMessages
 from spheretwin.models.base.errors import InputError, shown
 from spheretwin.models.base.files import whole_file
 from spheretwin.models.telemetry import joint_states
@@ -248,7 +247,6 @@ def events(run: Reviewed) -> list[Event]:
     else:
         log = Events()
         events = log.of(run.every_tick) if len(run.table) else []
-        events += [(t_s, Level.INFO, text) for t_s, text in FaultMessages().of(run.every_tick)]
         events += [(change.tick * run.period_s, Level.INFO, change_text(change)) for change in _changes(run)]
         end = [log.end(ended)] if ended else []
     return [*sorted(events, key=lambda event: (event[0], event[2])), *end]

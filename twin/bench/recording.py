@@ -10,7 +10,6 @@ from threading import Semaphore
 
 from spheretwin.bench.driver import Driver
 from spheretwin.bench.folder import release
-from spheretwin.faults.fault_injector import FaultMessages
 from spheretwin.models.base.errors import without_breaks
 from spheretwin.models.telemetry.status import Status
 from spheretwin.models.telemetry.table import Table
@@ -127,7 +126,7 @@ class Recording:
 
     def reset(self) -> None:
         """Reset at the beginning of a run."""
-        self._faults, self._noted = FaultMessages(), (0, 0)
+        self._noted = 0, 0
 
     def resume_from(self, session: Session) -> None:
         """Count the changes until now as written."""
@@ -141,12 +140,8 @@ class Recording:
 
     def write(self, rows: Table) -> None:
         """Take the rows of one chunk, which must not change any more."""
-        active = self._active  # the supervisor may end it meanwhile
-        if active is None:
-            return
-        active.write(rows)
-        for t_s, text in self._faults.of(rows):
-            active.note(t_s, text)
+        if active := self._active:  # the supervisor may end it meanwhile
+            active.write(rows)
 
     def note_changes(self, session: Session) -> None:
         """Write the changes since the last call."""

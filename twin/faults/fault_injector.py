@@ -1,14 +1,11 @@
-"""Fault injection: apply the scheduled faults of each control tick to the stages, and report them."""
+"""Fault injection: apply the scheduled faults of each control tick to the stages."""
 
 from __future__ import annotations
 
-from spheretwin.control.supervision.enabled_groups import REPORTED, STATES, mark_faulty_groups
-from spheretwin.control.supervision.watchdog import REASONS
+from spheretwin.control.supervision.enabled_groups import mark_faulty_groups
 from spheretwin.faults.effects import Effects
 from spheretwin.faults.schedule import NEVER, FaultSchedule
 from spheretwin.models.base.record import Rows, columns_of
-from spheretwin.models.telemetry.fault_log import ColumnChanges
-from spheretwin.models.telemetry.table import Table
 
 
 class FaultInjector:
@@ -47,34 +44,3 @@ class FaultInjector:
                 array[...] = healthy
             self._schedule.apply(active, self._effects)
         return self._schedule.next_change(tick)
-
-
-Line = tuple[float, str]
-"""Simulated time in s, text."""
-
-
-class FaultMessages:
-    """Finds faults, switched-off groups and watchdog trips in the telemetry of a run, chunk by chunk."""
-
-    def __init__(self) -> None:
-        self._changes = ColumnChanges()
-
-    def of(self, rows: Table) -> list[Line]:
-        """Return the messages of one chunk, in the order of time."""
-        names = {signal.name: signal for signal in rows.signals}
-        lines: list[Line] = []
-        if len(rows) and "fault" in names:
-            labels, modes = names["fault"].labels, names["fault"].states
-            for _, t_s, part, mode in self._changes.of(rows, "fault"):
-                lines.append(
-                    (t_s, f"{labels[part]} {modes[mode]}" if mode else f"{labels[part]} works again")
-                )
-            delays = rows["time_to_detection_s"]
-            for tick, t_s, group, out in self._changes.of(rows, "group_out"):
-                after_s = delays[tick, group]
-                after = f", {1e3 * after_s:.0f} ms after it failed" if out > REPORTED and after_s >= 0 else ""
-                lines.append((t_s, f"group {group} {STATES[out]}{after}"))
-        if len(rows) and "failsafe_reason" in names:
-            for _, t_s, _, reason in self._changes.of(rows, "failsafe_reason"):
-                lines.append((t_s, f"watchdog: {REASONS[reason].text}"))
-        return sorted(lines, key=lambda line: line[0])

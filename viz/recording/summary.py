@@ -10,12 +10,9 @@ from numpy.typing import NDArray
 from spheretwin.models.telemetry.fault_log import FAULT, FaultLog
 from spheretwin.models.telemetry.run_record import RunFacts
 from spheretwin.models.telemetry.signals import ANGLES
-from spheretwin.models.telemetry.status import Level, Status
+from spheretwin.models.telemetry.status import FAILSAFE_REASON, Level, Status
 from spheretwin.models.telemetry.table import Table, rank_lost, saturated
 from spheretwin.viz.recording.signals import field_texts
-
-FAILSAFE_REASON = "failsafe_reason"
-"""Signal of runs with a watchdog."""
 
 # Two spaces at the end of a line break it, at half of the distance between paragraphs. Headings would take
 # two lines each, and a small window has room for three lines.

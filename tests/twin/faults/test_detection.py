@@ -5,8 +5,8 @@ import pytest
 
 from spheretwin import scenario as scenarios
 from spheretwin.control.supervision.enabled_groups import DETECTED_OPEN, DETECTED_SHORTED, REPORTED
-from spheretwin.faults.fault_injector import FaultMessages
 from spheretwin.models.telemetry.signals import Signal, width
+from spheretwin.models.telemetry.status import Events
 from spheretwin.models.telemetry.table import Table
 from spheretwin.session import Session
 from spheretwin.simulation import simulate
@@ -133,7 +133,7 @@ def test_what_is_known_is_left_out_from_its_tick_on_and_taken_back():
     assert table["time_to_detection_s"][150, 2] == 0.0
 
 
-def test_messages_of_one_chunk_are_in_the_order_of_time():
+def test_events_of_one_chunk_are_in_the_order_of_time():
     """The detection comes between the start of its fault and that of another one, and a trip before it."""
     signals = (
         Signal("t_s", "s", 1, "time"),
@@ -141,15 +141,23 @@ def test_messages_of_one_chunk_are_in_the_order_of_time():
         Signal("group_out", "1", 2, "groups", ("group 0", "group 1"), ("in use", "reported", "found open")),
         Signal("time_to_detection_s", "s", 2, "delay", ("group 0", "group 1")),
         Signal("failsafe_reason", "1", 1, "reason", (), ("none", "other")),
+        Signal("allocation_scale", "1", 1, "scale"),
     )
     table = Table(signals, np.zeros((60, width(signals))))
     table["t_s"][:] = 1e-3 * np.arange(60)
-    table["fault"][10:, 0], table["fault"][50:, 1] = 1, 1
+    table["fault"][10:, 0], table["fault"][50:, 1], table["fault"][55:, 0] = 1, 1, 0
     table["group_out"][30:, 0], table["time_to_detection_s"][30:, 0] = 2, 0.02
     table["failsafe_reason"][20:] = 1
-    messages = FaultMessages().of(table)
-    assert [t_s for t_s, _ in messages] == pytest.approx([0.01, 0.02, 0.03, 0.05])
-    assert [text.split()[0] for _, text in messages] == ["coil.00", "watchdog:", "group", "coil.01"]
+    table["allocation_scale"][:] = 1.0
+    events = Events().of(table)
+    assert [t_s for t_s, _, _ in events] == pytest.approx([0.01, 0.02, 0.03, 0.05, 0.055])
+    assert [(level, text.split()[0]) for _, level, text in events] == [
+        ("WARN", "coil.00"),
+        ("ERROR", "watchdog:"),
+        ("INFO", "group"),
+        ("WARN", "coil.01"),
+        ("INFO", "coil.00"),
+    ]
 
 
 def test_detect_of_a_fault_is_the_detector():
