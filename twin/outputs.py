@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from spheretwin.models.base.errors import InputError, SpheretwinError
 from spheretwin.models.base.files import check_writable
 from spheretwin.models.telemetry.parquet import TelemetryFile
-from spheretwin.models.telemetry.run_record import RunRecord
+from spheretwin.models.telemetry.run_record import RunFacts, RunRecord
 from spheretwin.models.telemetry.status import Status
 from spheretwin.models.telemetry.table import Table
 from spheretwin.provenance import facts_of, record_of
@@ -87,6 +88,8 @@ class Outputs:
         Tick of the first row of the files; None: `begin` states it later.
     live_window_s : float
         Time before the present that the plots of the live view show.
+    replay_of : str
+        Name of the file whose run is replayed.
 
     Attributes
     ----------
@@ -111,15 +114,19 @@ class Outputs:
         record_rate_Hz: float | None = None,
         first_tick: int | None = 0,
         live_window_s: float = LIVE_WINDOW_S,
+        replay_of: str = "",
     ) -> None:
         self._session = session
         self.record, self.telemetry = record, telemetry
         check(record, telemetry)
         self._file: TelemetryFile | None = None
-        self._live = _live_view(session, view, live_window_s) if live else None
+        facts = replace(facts_of(session.initial_scenario), replay_of=replay_of)
+        self._live = _live_view(session, facts, view, live_window_s) if live else None
         # The recorder last: it would leave a file if another output were refused.
         try:
-            self._recorder = _recorder_at_rate(session, record, view, record_rate_Hz) if record else None
+            self._recorder = (
+                _recorder_at_rate(session, facts, record, view, record_rate_Hz) if record else None
+            )
         except SpheretwinError:
             if self._live:
                 self._live.close()
@@ -209,17 +216,17 @@ class _FromTick:
         self._sink.finish(status)
 
 
-def _live_view(session: Session, view: str, window_s: float) -> LiveView:
+def _live_view(session: Session, facts: RunFacts, view: str, window_s: float) -> LiveView:
     from spheretwin.viz.recording.live import LiveView  # Rerun is slow to import
 
-    facts = facts_of(session.initial_scenario)
     live = LiveView(session.actuator, session.signals, facts, shown=view, window_s=window_s)
     print(f"watch: {live.address}", file=sys.stderr, flush=True)
     return live
 
 
-def _recorder_at_rate(session: Session, path: Path, view: str, rate_Hz: float | None) -> Recorder:
+def _recorder_at_rate(
+    session: Session, facts: RunFacts, path: Path, view: str, rate_Hz: float | None
+) -> Recorder:
     from spheretwin.viz.recording.recorder import Recorder  # Rerun is slow to import
 
-    facts = facts_of(session.initial_scenario)
     return Recorder(session.actuator, session.signals, facts, path=path, shown=view, rate_Hz=rate_Hz)

@@ -109,6 +109,15 @@ def rgb(colour: str) -> Colour:
     return red, green, blue
 
 
+def label_colour(colour: Colour) -> Colour:
+    """Return a colour for a label of the scene, mixed with white.
+
+    It has a contrast of 4.5:1 to the dark ground of labels and of 3:1 to a white one. None has 4.5:1 to both.
+    """
+    shares = (mixed(colour, (255, 255, 255), share / 100) for share in range(101))
+    return next(shade for shade in shares if _luminance(shade) >= _READABLE)
+
+
 def law_colour(law: str) -> str:
     """Return the colour of a law for a page; one colour for all laws without their own."""
     return LAW_COLOURS.get(law, OTHER_LAW)
@@ -146,6 +155,17 @@ def run_colours(laws: Sequence[str]) -> list[str]:
 
 
 _LUMINANCE = (0.2126, 0.7152, 0.0722)
+_READABLE = 0.275
+
+
+def _luminance(colour: Colour) -> float:
+    return float(_linear(np.array(colour) / 255) @ _LUMINANCE)
+
+
+def _linear(shares: NDArray[np.float64]) -> NDArray[np.float64]:
+    return np.where(shares <= 0.04045, shares / 12.92, ((shares + 0.055) / 1.055) ** 2.4)
+
+
 _MIDDLE = 0.2
 """Share of white's luminance: it has a contrast of 4:1 to black and to white."""
 
@@ -156,8 +176,7 @@ def _spaced_hues(count: int) -> list[str]:
     colours = []
     for place in range(count):
         shares = np.array([colorsys.hls_to_rgb(place / count, value, 0.8) for value in lightness])
-        linear = np.where(shares <= 0.04045, shares / 12.92, ((shares + 0.055) / 1.055) ** 2.4)
-        middle = shares[np.searchsorted(linear @ _LUMINANCE, _MIDDLE)]
+        middle = shares[np.searchsorted(_linear(shares) @ _LUMINANCE, _MIDDLE)]
         colours.append("#{:02x}{:02x}{:02x}".format(*np.round(255 * middle).astype(int)))
     return colours
 

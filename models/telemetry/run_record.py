@@ -138,6 +138,8 @@ class RunFacts:
         Everything that the run depends on, for display: JSON value by field by section.
     changed : mapping
         Values that were chosen, or that differ from their defaults, by dotted name.
+    replay_of : str
+        Name of the file whose run is replayed; empty for any other run.
     """
 
     name: str
@@ -150,6 +152,7 @@ class RunFacts:
     mjcf: Path
     sections: Mapping[str, Mapping[str, Any]]
     changed: Mapping[str, Any] = field(default_factory=dict)
+    replay_of: str = ""
 
 
 PACKAGES = ("spheretwin", "mujoco", "numba", "numpy", "scipy", "pydantic", "pyarrow", "rerun-sdk")

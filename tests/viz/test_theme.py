@@ -178,3 +178,18 @@ def test_colours_of_many_runs_have_one_luminance(count):
     luminance = [np.dot((0.2126, 0.7152, 0.0722), linear(rgb(colour))) for colour in colours]
     # Steps of lightness are 0.003, whose luminance is at most 0.005 here, and colours have eight bits.
     assert luminance == pytest.approx([0.2] * count, abs=0.008)
+
+
+CURRENTS = theme.current_colours(np.array([-1.0, 0.0, 1.0]), 1.0).tolist()
+LABELLED = (*theme.AXIS_COLOURS, *CURRENTS, theme.FAILURE, theme.COIL_TORQUE, theme.LOAD, (0, 0, 0))
+
+
+@pytest.mark.parametrize("colour", LABELLED, ids=str)
+def test_a_label_is_readable_on_the_grounds_of_labels(colour):
+    label = theme.label_colour(colour)
+    assert contrast(label, (38, 38, 38)) >= 4.5
+    assert contrast(label, (255, 255, 255)) >= 3.0
+
+
+def test_a_readable_colour_is_the_colour_of_its_label():
+    assert theme.label_colour((230, 190, 40)) == (230, 190, 40)

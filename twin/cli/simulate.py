@@ -88,6 +88,7 @@ def run(options: argparse.Namespace) -> bool:
             options.record_rate,
             plan.first_tick,
             options.live_window or LIVE_WINDOW_S,
+            replay_of=options.replay.name if options.replay else "",
         )
         log_files = export.Export(session, options.export_log, options.export_truth)
         try:

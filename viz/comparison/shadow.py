@@ -41,8 +41,8 @@ MACHINE, TWIN, TEXT, PLOTS = "machine", "twin", "verdict", "plots"
 CONFIDENCE = 1.96
 """Standard deviations on each side of a 95 % band."""
 
-BOUND_GREY = 0.5
-"""Share of grey in the colour of the limits of a band: the estimate stands out."""
+SHADE = 0.65
+"""Share of grey in the colour of a band: the estimate stands out."""
 
 _FARTHEST = 8.0  # innovations beyond it are cut
 
@@ -198,12 +198,16 @@ def _range(values: Array) -> tuple[float, float]:
 
 
 def _band(telemetry: Table, name: str, scale: float) -> Iterator[Line]:
-    """Yield an estimate and the limits of its band, for each hinge."""
+    """Yield the shades of the bands of all hinges, then the estimates above them.
+
+    A shade is a line that goes from one limit to the other in each row: a viewer fills no areas.
+    """
     mean, half = scale * telemetry[name], scale * CONFIDENCE * telemetry[f"{name}_std"]
+    half[1::2] *= -1
     for i, colour in enumerate(theme.AXIS_COLOURS):
-        bound = theme.mixed(colour, theme.COMMAND, BOUND_GREY)
-        yield Line(f"{ANGLES[i]} + 95 %", (mean + half)[:, i], bound, THIN)
-        yield Line(f"{ANGLES[i]} − 95 %", (mean - half)[:, i], bound, THIN)
+        shade = theme.mixed(colour, theme.COMMAND, SHADE)
+        yield Line(f"{ANGLES[i]} ± 95 %", (mean + half)[:, i], shade, THIN)
+    for i, colour in enumerate(theme.AXIS_COLOURS):
         yield Line(ANGLES[i], mean[:, i], colour, THICK)
 
 

@@ -9,7 +9,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from spheretwin.models.telemetry.signals import Signal, offsets
+from spheretwin.models.telemetry.signals import ANGLES, COMMON_NAMES, Signal, offsets
 from spheretwin.models.telemetry.table import Table
 
 Array = NDArray[np.float64]
@@ -236,8 +236,13 @@ class ExtentTracker:
 
 def plotted_signals(signals: tuple[Signal, ...]) -> dict[str, int]:
     """Return signals plotted in ranges of the run's own, for which bounds are tracked, with their sizes."""
-    plotted = (signal for signal in signals if not signal.states)
-    return {signal.name: signal.size for signal in plotted if signal.name not in _OF_FIXED_RANGE}
+    return {signal.name: signal.size for signal in signals if not signal.states and not _is_fixed(signal)}
+
+
+def _is_fixed(signal: Signal) -> bool:
+    """Return True for a signal that needs no bounds; a law may give another one the name of one of groups."""
+    own = signal.name not in COMMON_NAMES and signal.size <= len(ANGLES)
+    return signal.name in _OF_FIXED_RANGE and not own
 
 
 _OF_FIXED_RANGE = frozenset(

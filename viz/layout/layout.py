@@ -48,18 +48,28 @@ RATE_SIGNALS = (
 )
 
 
-ROLES = "● actual, × reference"
-"""Markers of the lines of a hinge; squares mark measurements and estimates, + what a governor makes of it."""
+AXIS_KEY = "●α ◆β ▲γ"
+"""Markers of the hinges: no legend covers the lines."""
+
+ROLES = {
+    "q_measured_rad": "■ measured, estimated (orange)",
+    "q_predicted_rad": "■ predicted (orange)",
+    "q_governed_rad": "+ governed",
+}
+"""Markers of the lines of a hinge that not every run has."""
 
 
 def compare(plots: Plots) -> rrb.Container:
     """Angles and rates of each axis with their references; below, the distance between the shaft's tips."""
     angles, rates = _lines(plots, ANGLE_SIGNALS), _lines(plots, RATE_SIGNALS)
+    key = ", ".join(
+        ["● actual, × reference", *(role for name, role in ROLES.items() if name in plots.view.names)]
+    )
     angles_of_each = [
-        plots.whole(f"{name}: {ROLES}", "rad", *angles, least=LEAST_rad, axis=axis)
+        plots.whole(f"{name}: {key}", "rad", *angles, least=LEAST_rad, axis=axis)
         for axis, name in enumerate(ANGLES)
     ]
-    turning = plots.about_zero(f"rates, colours as above: {ROLES}", "rad/s", *rates, least=LEAST_rad_s)
+    turning = plots.about_zero(f"rates, colours as above: {key}", "rad/s", *rates, least=LEAST_rad_s)
     apart = plots.above_zero(
         "tip's distance from its reference", "mm", quantity(TIP_DISTANCE), least=TIP_DISTANCE.floor
     )
@@ -152,8 +162,8 @@ def control(plots: Plots) -> rrb.Container:
 
 
 def error_of_each_axis(plots: Plots) -> rrb.TimeSeriesView:
-    """Tracking errors of the three hinges."""
-    return plots.about_zero("error of each axis", "mrad", quantity(ERROR), least=ERROR.floor)
+    """Tracking errors of the three hinges; the title is the key to all plots of the hinges."""
+    return plots.about_zero(f"error of each axis: {AXIS_KEY}", "mrad", quantity(ERROR), least=ERROR.floor)
 
 
 def _law_plots(plots: Plots) -> list[rrb.Container | rrb.View]:
@@ -222,10 +232,10 @@ def hardware(plots: Plots) -> rrb.Container:
         line = plots.signal("supply_power_W")
         shown.append(plots.whole("supply power", "W", line, least=LEAST_W))
     if "q_measured_rad" in names:
-        title = "measured - true"
+        title = f"measured - true: {AXIS_KEY}"
         shown.append(plots.about_zero(title, "mrad", quantity(MEASURED_ANGLE), least=MEASURED_ANGLE.floor))
     if "qdot_estimated_rad_s" in names:
-        title = "estimated - true"
+        title = f"estimated - true: {AXIS_KEY}"
         shown.append(plots.about_zero(title, "rad/s", quantity(ESTIMATED_RATE), least=ESTIMATED_RATE.floor))
     if "rotor_temperature_degC" in names:
         lines = [plots.signal(f"{body}_temperature_degC") for body in ("stator", "rotor")]
@@ -276,17 +286,16 @@ def overview(plots: Plots) -> rrb.Container:
     """Actuator and currents; next to them errors, torque margin, states and events."""
     maps = rrb.Tabs(*current_maps(plots), active_tab=0)
     left = rrb.Vertical(actuator_view(plots.view.size), maps, row_shares=[3, 2])
+    # Next to each other: in a small window each then has the height for two numbers at its side.
+    whole = rrb.Horizontal(
+        plots.above_zero("error", "°", quantity(ERROR_ANGLE), least=ERROR_ANGLE.floor),
+        plots.fixed("torque margin [1]", quantity(MARGIN), low=-0.05 * MOST, high=1.05 * MOST),
+    )
     right = rrb.Vertical(
-        plots.above_zero("error as one angle", "°", quantity(ERROR_ANGLE), least=ERROR_ANGLE.floor),
+        whole,
         error_of_each_axis(plots),
-        plots.fixed(
-            "torque margin [× command]",
-            quantity(MARGIN),
-            low=-0.05 * MOST,
-            high=1.05 * MOST,
-        ),
-        rrb.Horizontal(plots.states(), log(), column_shares=[1, 1]),
-        row_shares=[3, 3, 2.5, 4 if any(own_signal.states for own_signal in plots.view.own) else 3],
+        rrb.Horizontal(plots.states(), log()),
+        row_shares=[10, 16, 12 if any(own_signal.states for own_signal in plots.view.own) else 10],
     )
     return rrb.Horizontal(left, right, column_shares=[4, 5], name="overview")
 

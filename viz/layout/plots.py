@@ -14,7 +14,7 @@ from rerun.blueprint.encodings import ComponentSourceKind, VisualizerComponentMa
 
 from spheretwin.models.telemetry.signals import ANGLES, common_signals
 from spheretwin.viz.layout.extents import ROOM, CurrentRanges, Extents, PlotChannel, number
-from spheretwin.viz.layout.styles import LINE_LOOKS, MOST_MARKED
+from spheretwin.viz.layout.styles import AXES_ONLY, LINE_LOOKS, MOST_MARKED
 from spheretwin.viz.layout.view import (
     DERIVED,
     ENDED,
@@ -240,9 +240,10 @@ class Plots:
         marked = tuple(line.name for line in fields if line.size <= MOST_MARKED)
         if len(marked) > 1 or (axis is None and any(1 < line.size <= MOST_MARKED for line in fields)):
             contents.append(f"/{self.marked.setdefault(marked, f'{MARKS}/{len(self.marked)}')}")
-        # A legend of one line would repeat the title, and so would one of a title with a key of markers.
+        # A legend of one line would repeat the title, and one with the names of the hinges a key in a title.
         several = len(marked) == len(fields) and sum(line.size for line in fields) > 1
-        has_legend = axis is None and several and KEY not in title
+        has_key = KEY in title or all(line.name in AXES_ONLY for line in fields)
+        has_legend = axis is None and several and not has_key
         one = [place == axis for place in range(len(ANGLES))]
         view = rrb.TimeSeriesView(
             origin="/",

@@ -38,8 +38,7 @@ _SECONDARY = (
 # and commands last and thin.
 _ACTUAL = ("q_rad", "qdot_rad_s", "torque_delivered_Nm")
 
-# They have a plot each, whose title names them: a legend with the names of the axes alone covers less of it.
-_ALONE = (
+AXES_ONLY = (
     "error_mrad",
     "coupling_torque_Nm",
     "rate_error_rad_s",
@@ -49,6 +48,7 @@ _ALONE = (
     "presliding_rad",
     "cable_Nm",
 )
+"""Lines of the hinges with a plot of their own, whose title names them: they have the names of the hinges."""
 
 _AXIS_MARKERS = (MarkerShape.Circle, MarkerShape.Diamond, MarkerShape.Up)
 
@@ -117,7 +117,7 @@ def _look(batch: rr.ComponentBatchLike) -> pa.Array:
 
 
 def _names(name: str, labels: tuple[str, ...], unit: str) -> list[str]:
-    short = "" if name in _ALONE else f"{_short(name)} "
+    short = "" if name in AXES_ONLY else f"{_short(name)} "
     return [f"{short}{label} [{unit}]".replace("  ", " ") for label in labels]
 
 

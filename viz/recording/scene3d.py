@@ -117,7 +117,10 @@ class Ending(RecordingPart):
         ]
         text = f"{status.replace('_', ' ')} at {self._t_s:.3f} s"
         label = rr.Points3D.columns(
-            positions=top, colors=[theme.FAILURE], radii=rr.Radius.ui_points(0.0), labels=[text]
+            positions=top,
+            colors=[theme.label_colour(theme.FAILURE)],
+            radii=rr.Radius.ui_points(0.0),
+            labels=[text],
         )
         index = time_index(np.array([self._t_s]))
         recording.send_columns(FAILURE, index, mark)

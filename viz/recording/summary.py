@@ -141,7 +141,8 @@ class Summary:
 
     def _run_text(self) -> str:
         facts = self._facts
-        parts = [f"{facts.name} under {facts.law}"]
+        parts = [f"replay of {facts.replay_of}"] if facts.replay_of else []
+        parts.append(f"{facts.name} under {facts.law}")
         parts += [
             f"{symbol} = {value:g}"
             for symbol, section, field in (

@@ -60,7 +60,8 @@ def axes(origin_m: Sequence[float] | Array, length_m: float) -> rr.Arrows3D:
 def labels(texts: Sequence[str], colours: Sequence[theme.Colour]) -> rr.Points3D:
     """Return texts for the heads of arrows, as points of size 0: an arrow's own text is at its middle."""
     size = rr.Radius.ui_points(0.0)
-    return rr.Points3D.from_fields(labels=texts, colors=colours, radii=size, show_labels=True)
+    readable = [theme.label_colour(colour) for colour in colours]
+    return rr.Points3D.from_fields(labels=texts, colors=readable, radii=size, show_labels=True)
 
 
 def current_scale(size: float) -> rr.Mesh3D:
@@ -91,7 +92,8 @@ def current_scale_labels(range_A: float, limit_A: float) -> rr.Points3D:
     zero = "0" if range_A == limit_A else f"0, limit {limit_A:g} A"
     suffix = " (limit)" if range_A == limit_A else ""
     texts = [f"{share * range_A:+g} A{suffix}" if share else zero for share in TICKS]
-    return rr.Points3D.from_fields(labels=texts, colors=theme.current_colours(np.array(TICKS), 1.0))
+    red_green_blue = theme.current_colours(np.array(TICKS), 1.0).tolist()
+    return rr.Points3D.from_fields(labels=texts, colors=[theme.label_colour(of) for of in red_green_blue])
 
 
 PAYLOAD_LENGTH_m, PAYLOAD_RADIUS_m = 0.014, 0.011

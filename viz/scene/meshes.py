@@ -22,8 +22,6 @@ from spheretwin.models.mjcf import fingerprint, missing_meshes, read
 from spheretwin.viz import theme
 from spheretwin.viz.scene.solids import merged_surface, revolved_surface
 
-MEDIA_TYPE = "model/gltf-binary"
-
 # Codes of the format.
 _FLOAT, _SHORT, _INT = 5126, 5123, 5125
 _MAGIC, _VERSION = b"glTF", 2
@@ -169,7 +167,7 @@ class Piece(NamedTuple):
     def archetypes(self) -> list[rr.Asset3D | rr.InstancePoses3D]:
         """Return the archetypes of a recording: without poses if the mesh has the pose of its body."""
         contents = binary(self.positions, self.triangles)
-        asset = rr.Asset3D(contents=contents, media_type=MEDIA_TYPE, albedo_factor=self.colour)
+        asset = rr.Asset3D.from_fields(blob=contents, albedo_factor=self.colour)
         if self._has_identity_pose():
             return [asset]
         return [asset, rr.InstancePoses3D(translations=self.translations, mat3x3=self.rotations)]

@@ -54,7 +54,12 @@ def test_a_viewer_gets_the_first_row_of_each_frame_and_the_verdict(log, tmp_path
     np.testing.assert_array_equal(drawn, expected)
     _, rates = series(read, "plots/qdot_estimated_rad_s", "Scalars:scalars")
     assert np.all(np.isnan(rates[0]))  # of the first row nothing is known: its band would hide all others
-    np.testing.assert_array_equal(rates[-1, 2::3], telemetry["qdot_estimated_rad_s"][firsts[-1]])
+    mean, half = telemetry["qdot_estimated_rad_s"], 1.96 * telemetry["qdot_estimated_rad_s_std"]
+    np.testing.assert_array_equal(rates[-2:, 3:], mean[firsts[-2:]])
+    shades = np.abs(rates[-2:, :3] - mean[firsts[-2:]])
+    np.testing.assert_allclose(shades, half[firsts[-2:]], rtol=1e-9)
+    sides = np.sign(rates[-2:, :3] - mean[firsts[-2:]])
+    np.testing.assert_array_equal(sides[0], -sides[1])  # from one limit to the other: the band is filled
     values, _ = read
     assert len(values["/machine/world/rotor", "Transform3D:quaternion"]) == 2  # a second, and the rest
     assert len(values["/twin/world/rotor", "Transform3D:quaternion"]) == 2

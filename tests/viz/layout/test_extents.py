@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from spheretwin.viz.layout.extents import CLIPPED_FROM, Extents, PlotChannel
+from spheretwin.models.telemetry.signals import Signal, common_signals
+from spheretwin.viz.layout.extents import CLIPPED_FROM, Extents, PlotChannel, plotted_signals
 
 T_s = np.arange(100) * 0.1
 ERROR = PlotChannel("error")
@@ -65,3 +66,10 @@ def test_what_a_run_did_not_have_all_the_time_bounds_nothing():
     assert seen(values * np.nan).limit(ERROR, least=0.1) >= 0.1
     assert seen(values).band(ERROR, least=0.1) == pytest.approx((-3.3, 3.3))
     assert seen(values * 0.0 + 1e-6).band(ERROR, least=0.1) == pytest.approx((-0.1, 0.1))
+
+
+def test_a_signal_of_a_law_has_bounds_whatever_its_name():
+    """A signal of the groups with the same name has a fixed range."""
+    own, of_groups = Signal("coil_power_W", "W", 2, "own"), Signal("copper_loss_W", "W", 18, "loss")
+    assert plotted_signals((*common_signals(18), own, of_groups)).keys() >= {"coil_power_W"}
+    assert not plotted_signals((*common_signals(18), own, of_groups)).keys() & {"copper_loss_W", "error_rad"}

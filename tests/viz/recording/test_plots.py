@@ -1,5 +1,7 @@
 """Plotted data of a recording: equal to their source with all peaks, for any chunks."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -142,6 +144,12 @@ def test_the_headline_names_each_fault_its_start_and_its_detection(facts_with_fa
     assert chosen.startswith("chosen: trajectory.shape hold · ")
     for stated in ("fault.", "controller.law", "hardware", "disturbance.load"):
         assert stated not in chosen
+
+
+def test_the_headline_names_the_file_whose_run_is_replayed(facts_with_faults):
+    facts = replace(facts_with_faults, replay_of="run.parquet")
+    assert Summary(facts).running().startswith("**▶ RUNNING · replay of run.parquet · hold under ")
+    assert "replay" not in Summary(facts_with_faults).running()
 
 
 @pytest.mark.parametrize(("faults", "times_s"), [([], []), ([OPEN], [0.02, 0.06])])
