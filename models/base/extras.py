@@ -17,6 +17,7 @@ from spheretwin.models.base.errors import InputError
 PURPOSES = {
     "plots": "figures and pages of studies, experiments and reviews",
     "bench": "the page in a browser that drives the twin",
+    "video": "clips of runs as MP4",
     "tables": "runs as tables of pandas, polars and xarray",
     "magnetics": "torque curve and field from the geometry",
     "machine": "logs as MCAP, a machine at a serial line",

@@ -17,6 +17,7 @@ from spheretwin.analysis.run_summary import amplitudes, peaks
 from spheretwin.metrics.tracking import BAND_rad
 from spheretwin.models.actuator import MJCF_PATH, Actuator
 from spheretwin.models.base.errors import InputError, shortened, shown, without_breaks
+from spheretwin.models.base.files import check_writable
 from spheretwin.models.base.user_code import short_names
 from spheretwin.models.telemetry.run_record import RunFacts
 from spheretwin.models.telemetry.signals import ANGLES
@@ -334,6 +335,28 @@ def _remove(paths: Iterable[Path]) -> None:
                 f"review {path}: expected a figure of an earlier review that can be removed,"
                 f" {without_breaks(error)}"
             ) from None
+
+
+def write_video(runs: Sequence[Reviewed], path: Path) -> Path:
+    """Write a clip of runs as MP4, or its frames into a folder; return which of them.
+
+    Raises
+    ------
+    InputError
+        A run has no rows.
+    SpheretwinError
+        It cannot be written.
+    """
+    from spheretwin.viz.figures import video  # what draws is slow to import
+
+    conditions = common_conditions([run.record.scenario for run in runs])
+    return video.write(path, compared_runs(runs, every_tick=True), conditions or runs[0].path.name)
+
+
+def check_video(path: Path) -> None:
+    """Check that a clip can be drawn and written; raises `InputError` otherwise."""
+    markdown.check_libraries("matplotlib")
+    check_writable(path, ".mp4")
 
 
 def check_figures(into: Path) -> None:

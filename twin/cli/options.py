@@ -30,7 +30,7 @@ COMMON = """
 
 MOST = 10**12
 
-_FILE = re.compile(r"FILE|DIR|[A-Z]+\.[a-z]+")
+_FILE = re.compile(r"FILE|DIR|[A-Z]+\.[a-z0-9]+")
 """Placeholders of paths."""
 
 

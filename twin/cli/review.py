@@ -30,6 +30,8 @@ from spheretwin.viz.terminal.runs import print_written
     --merge OUT.rrd  write all runs into one new recording, with a layout for comparison
     --figures DIR    draw all runs: SVG and one page with interactive plots, without viewer or network
     --figure-format
+    --video OUT.mp4  write a clip: path of the shaft's tip, error over time; PNG frames in a folder if no
+        FFmpeg is found (extra video)
     --json           print the result as JSON, alone on stdout
     """,
     runs=Path,
@@ -50,11 +52,12 @@ def run(options: argparse.Namespace) -> bool:
     page = None
     if options.figures:
         page = comparison.write_figures(runs, summaries, options.figures, options.figure_format)
+    clip = comparison.write_video(runs, options.video) if options.video else None
     if options.json:
         _print_json(reviewed, has_tolerances=options.tolerance is not None)
     else:
         _print_text(reviewed)
-        print_written([path for path in (options.export, options.merge, page) if path])
+        print_written([path for path in (options.export, options.merge, page, clip) if path])
     warn(f"{run.path} {NO_CHECKSUMS}" for run in runs if not run.checked)
     warn(_recovered(run) for run in runs if not run.whole)
     warn(_thinned(run) for run in runs if run.rate_Hz)
@@ -79,6 +82,8 @@ def _check(options: argparse.Namespace) -> None:
         check_writable(options.merge)
     if options.figures:
         comparison.check_figures(options.figures)
+    if options.video:
+        comparison.check_video(options.video)
 
 
 def _print_text(reviewed: Review) -> None:

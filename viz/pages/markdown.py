@@ -188,10 +188,15 @@ def prepare(folder: Path, *libraries: str) -> None:
     InputError
         A library is not installed, or the folder cannot be made or written to.
     """
-    for library in ("matplotlib", *libraries):
+    check_libraries("matplotlib", *libraries)
+    make_folder(folder)
+
+
+def check_libraries(*libraries: str) -> None:
+    """Check that libraries for figures are installed; raises `InputError` otherwise."""
+    for library in libraries:
         if find_spec(library) is None:
             raise missing("output", library, "plots", "to draw figures")
-    make_folder(folder)
 
 
 class ReportPage(NamedTuple):
