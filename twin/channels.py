@@ -18,7 +18,7 @@ from spheretwin.electronics.sensor_chain import write_telemetry as write_sensor_
 from spheretwin.faults.fault import MODES
 from spheretwin.faults.schedule import part_names
 from spheretwin.models.base.compiled import inlined, uncompiled
-from spheretwin.models.telemetry.signals import ANGLES, Signal
+from spheretwin.models.telemetry.signals import ANGLES, Signal, offsets
 from spheretwin.plant.bristle_friction import log_cable, log_end_stops, log_presliding
 from spheretwin.plant.cable import acts
 from spheretwin.plant.magnet_heat import log_heat
@@ -279,3 +279,9 @@ CHANNELS: tuple[Channel, ...] = (
     faults,
     watchdog,
 )
+
+
+def logged_channels(signals: tuple[Signal, ...]) -> list[tuple[Channel, int]]:
+    """Return the channels among the columns of a telemetry, with their first columns."""
+    first = offsets(signals)
+    return [(channel, first[name]) for channel in CHANNELS if (name := channel.signals(1)[0].name) in first]

@@ -14,14 +14,21 @@ import numpy as np
 from numba import types
 from numpy.typing import NDArray
 
-from spheretwin.channels import CHANNELS, Channel
+from spheretwin.channels import Channel, logged_channels
 from spheretwin.electronics.sensor_chain import sense
 from spheretwin.electronics.transducers import sense_currents
 from spheretwin.models.base.addresses import caller_of
-from spheretwin.models.base.compiled import COMPILES, copy_into, part_of_its_caller, stage_address
+from spheretwin.models.base.compiled import (
+    COMPILES,
+    allocation_free,
+    copy_into,
+    part_of_its_caller,
+    stage_address,
+    uncompiled,
+)
 from spheretwin.models.base.record import Rows
 from spheretwin.models.magnetics import Tables
-from spheretwin.models.telemetry.signals import Signal, offsets
+from spheretwin.models.telemetry.signals import Signal
 from spheretwin.plant.plant_tick import PlantOutput, TickInput, engine_step, plant_tick
 
 Array = NDArray[np.float64]
@@ -98,7 +105,10 @@ def plant_stage(plant: Rows, tables: Tables, engine: str) -> PlantStage:
     """
     step = engine_step(engine)
     return PlantStage(
-        _function(_ADVANCE, _advance, plant), _data(plant), tables, getattr(step, "address", step)
+        _function(_ADVANCE, uncompiled(advance_stage), plant),
+        _data(plant),
+        tables,
+        getattr(step, "address", step),
     )
 
 
@@ -113,21 +123,20 @@ def compiled_stages(parts: Mapping[str, Rows], plant: PlantStage, signals: tuple
     signals : tuple of Signal
         Columns of the runs: their channels are among them.
     """
-    first = offsets(signals)
-    logged = {channel: name for channel in CHANNELS if (name := channel.signals(1)[0].name) in first}
+    logged = dict(logged_channels(signals))
     reads = [channel.parts for channel in logged]
     writers = [
         _function(_WRITE, _writer(channel), *(parts[name] for name in channel.parts)) for channel in logged
     ]
     runs = len(parts["plant"])
     return Stages(
-        _function(_SENSE, _sense, parts["sensors"], parts["plant"]),
+        _function(_SENSE, uncompiled(sense_stage), parts["sensors"], parts["plant"]),
         _data(parts["sensors"]),
         *plant,
         np.array(writers, np.intp) if COMPILES else writers,
         _table([_data(parts[names[0]]) for names in reads], runs),
         _table([_data(parts[names[-1]]) for names in reads], runs),
-        np.array([first[name] for name in logged.values()], np.intp),
+        np.array(list(logged.values()), np.intp),
         parts["plant"]["rotor"],
     )
 
@@ -148,13 +157,13 @@ def _table(columns: Sequence[Any], runs: int) -> Any:
     return [[column[run] for column in columns] for run in range(runs)]
 
 
-def _sense(
+@allocation_free
+def sense_stage(
     sensors: Any, plant: Any, noise: Array, draws: Array, measurement: Array, fresh: Array, measured_A: Array
 ) -> bool:
-    is_finite, currents = (
-        sense(sensors, plant.joint_q, plant.rotor.qdot, noise, draws, measurement),
-        plant.current_sensors,
-    )
+    """Measure angles and currents; return whether they are finite."""
+    is_finite = sense(sensors, plant.joint_q, plant.rotor.qdot, noise, draws, measurement)
+    currents = plant.current_sensors
     copy_into(fresh, 0, sensors.fresh, fresh.shape[0])
     if currents.on:
         sense_currents(currents, plant.current, draws)
@@ -162,7 +171,9 @@ def _sense(
     return bool(is_finite)
 
 
-def _advance(plant: Any, tables: Tables, step: Any, given: TickInput, output: PlantOutput) -> int:
+@allocation_free
+def advance_stage(plant: Any, tables: Tables, step: Any, given: TickInput, output: PlantOutput) -> int:
+    """Advance the plant by a control period, `plant_tick`."""
     return plant_tick(plant, tables, step, given, output)
 
 

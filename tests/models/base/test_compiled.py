@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 from numba import types
 
-from spheretwin.models.base import cache, compiled
+from spheretwin.models.base import addresses, cache, compiled
 from tests.requirements import needs_compiled_functions
 
 SOURCE = Path(compiled.__file__).parent
@@ -263,3 +263,21 @@ def test_cached_array_is_computed_once(tmp_path, monkeypatch):
     cache.cached_array(b"key", compute)
     cache.cached_array(b"other key", compute)
     assert len(made) == 3
+
+
+@needs_compiled_functions
+def test_a_caller_of_addresses_also_calls_a_compiled_function_itself():
+    call = addresses.caller_of(types.float64(types.float64, types.float64))
+
+    @compiled.allocation_free
+    def difference(a, b):
+        return a - b
+
+    @compiled.allocation_free
+    def through(function, a, b):
+        return call(function, a, b)
+
+    address = compiled.compiled_callback(
+        types.float64(types.float64, types.float64), compiled.uncompiled(difference)
+    ).address
+    assert through(difference, 5, 2.5) == through(address, 5.0, 2.5) == 2.5
