@@ -73,6 +73,8 @@ def pytest_xdist_auto_num_workers():
 def pytest_pyfunc_call(pyfuncitem):
     """Run a test marked `uncompiled` in a process without a compiler, one process for the tests of a file.
 
+    Kernels of a GPU run in numba's simulator there.
+
     For tests of what a kind of plant holds, not of its numbers: each kind is a minute of compilation, and a
     few ticks in plain Python are a second.
     """
@@ -88,7 +90,7 @@ def _run_uncompiled(file):
     """Run the tests of a file that are marked `uncompiled`; return the report."""
     options = ["-m", "uncompiled", "-rA", "--quiet", "-p", "no:cacheprovider"]
     environment = {name: value for name, value in os.environ.items() if not name.startswith("PYTEST_")}
-    environment["NUMBA_DISABLE_JIT"] = "1"
+    environment |= {"NUMBA_DISABLE_JIT": "1", "NUMBA_ENABLE_CUDASIM": "1"}
     done = subprocess.run(
         [sys.executable, "-m", "pytest", *options, file],
         cwd=ROOT, env=environment, capture_output=True, text=True,

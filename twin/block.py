@@ -8,8 +8,8 @@ The numbers are those of each run alone.
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from functools import cache
-from typing import Any, NamedTuple
+from functools import cache, cached_property
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,7 +30,7 @@ from spheretwin.plant.plant_tick import GOING
 from spheretwin.reduction import PlannedRun
 from spheretwin.scenario.files import Files
 from spheretwin.scenario.sections import ResolvedScenario
-from spheretwin.stages import stages_of
+from spheretwin.stages import Stages, stages_of
 
 
 class Ending(NamedTuple):
@@ -61,19 +61,28 @@ class RunBlock:
         The scenarios differ in something else than numbers.
     """
 
+    takes_user_laws: ClassVar[bool] = False
+    """Whether laws of the user run in it: their exceptions are known only in a session."""
+
+    arithmetic: ClassVar[dict[str, str]] = {}
+    """Part of the provenance of figures that are not those of a session to the last bit."""
+
     def __init__(self, scenarios: Sequence[ResolvedScenario], files: Files, metrics: Iterable[str]) -> None:
         runs, (first, *others) = len(scenarios), scenarios
         scenario: Any = Columns(scenarios) if others else first
         self._ticks = scenario.ticks
         self._assembly = assembled(scenario, files)
         rows, signals = self._assembly.rows, self._assembly.signals
-        self._stages = self._assembly.stages()
         self._inputs = InputGenerator(scenario, None, len(files.actuator.groups))
         self._injectors = [faults_of(own, rows[i : i + 1]) for i, own in enumerate(scenarios) if own.fault]
         self._figures = Figures(PlannedRun(scenario, files.actuator, self._ticks, runs), metrics)
         self._reduction = self._figures.reduction(signals, self._ticks)
         self._log = np.empty((min(BLOCK_TICKS, self._ticks), width(signals)))
         self._codes, self._done = np.full(runs, GOING), np.zeros(runs, np.int64)
+
+    @cached_property
+    def _stages(self) -> Stages:
+        return self._assembly.stages()
 
     def run(self) -> list[Ending | None]:
         """Return the end of each run; None for one whose inputs do not stay finite, which runs alone."""
@@ -87,6 +96,7 @@ class RunBlock:
             self._codes[~finite] = loops.INTERRUPTED
             self.advance(block.inputs, tick - block.first, tick, until - tick)
             tick = until
+        self.collect()
         self._reduction.count(self._done)
         reasons = self._assembly.rows["controller"]["supervision"]["watchdog"]["reason"].tolist()
         ended = zip(self._codes.tolist(), reasons, self._figures.of_each_run(), finite, strict=True)
@@ -110,6 +120,9 @@ class RunBlock:
         )
         run_rows = for_types_of(_runner_of(self._reduction.function), inputs, row, tick, *parts)
         run_rows(inputs, row, tick, *parts)
+
+    def collect(self) -> None:
+        """Take over what `advance` has left elsewhere."""
 
 
 def _ending(code: int, reason: Reason, figures: dict[str, Any]) -> Ending:

@@ -25,6 +25,7 @@ PURPOSES = {
     "control": "linear models, plant and loop as systems of python-control",
     "tune": "search for gains",
     "cluster": "studies on a Ray cluster",
+    "gpu": "studies on a GPU of NVIDIA",
     "meshes": "new meshes of the actuator",
     "casadi": "dynamics as CasADi functions, predictive control",
     "fmu": "simulation and check of exported FMUs",
