@@ -57,7 +57,7 @@ GO_ON = "sweep: finished rows are stored; the same command continues from there"
     --out DIR          folder of journal and table; NAME_study unless given
     --threads N        as many as there are cores unless given
     --engine=local     local, threads of this process, unless given; processes, for rows with Python code of
-        yours; ray, a cluster; the table is the same
+        yours; ray, a cluster: the table is the same; cuda, a GPU: the same within rounding
     --address HOST     for ray: auto, or HOST[:PORT] of a cluster that this machine is a node of; a
         cluster on this machine alone unless given
     --limit ROWS       run only the first rows; finished later rows stay in the table

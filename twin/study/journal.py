@@ -32,6 +32,7 @@ def provenance_of(rows: Rows) -> dict[str, str]:
     """
     study = rows.study.model_dump(mode="json", exclude={"description"})
     return {
+        **rows.block.arithmetic,
         "study": _digest(study),
         "files": _digest(list(_contents(rows))),
         "sources": sources_digest(),

@@ -42,7 +42,7 @@ from spheretwin.session import Session
 from spheretwin.simulation import Sink, follow
 from spheretwin.study.axes import Axis, DrawnAxis
 from spheretwin.study.grid import Row
-from spheretwin.study.study import Study, fast_engine
+from spheretwin.study.study import FAST, Study, fast_engine
 from spheretwin.study.template import Template, is_number, template_of
 
 ENGINE = "plant.engine"
@@ -101,11 +101,18 @@ class Rows:
         self._references = [study.path(name) for name in study.metrics if is_reference(name)]
         self._own = load_metrics(self._references) if own is None else own
         self.chooses_plant = study.fast and not self._names_engine()
+        self.block = RunBlock
 
     @property
     def own_metrics(self) -> tuple[str, ...]:
         """Names of the user metrics."""
         return tuple(self._own)
+
+    def with_block(self, block: type[RunBlock]) -> Rows:
+        """Return these rows, of which another kind of block runs those on the fast plant."""
+        other = copy.copy(self)
+        other.block = block
+        return other
 
     def with_metrics(self, names: Sequence[str]) -> Rows:
         """These rows with other figures, without metrics of the user and without telemetry."""
@@ -186,7 +193,8 @@ class Rows:
     def _kind_of_block(self, row: Row, scenario: Scenario, shape: tuple[Any, ...]) -> Any:
         """Return what the scenarios of a block have in common; None for a row that runs alone."""
         stored = self._telemetry is not None and row.number in self.study.telemetry
-        if stored or scenario.event or is_reference(scenario.controller.law):
+        alone = is_reference(scenario.controller.law) and not self.block.takes_user_laws
+        if stored or scenario.event or alone:
             return None
         clocks = scenario.controller.period_s, scenario.plant.step_s, scenario.ticks
         logged = tuple(bool(channel.logged(scenario)) for channel in CHANNELS)
@@ -195,7 +203,8 @@ class Rows:
     def _run_block(self, scenarios: Sequence[Scenario]) -> list[Result | None]:
         files = self._files.files_of(scenarios[0])
         resolved = [fill_defaults(scenario, files, None, None) for scenario in scenarios]
-        block = RunBlock(resolved, files, self.metrics)
+        kind = self.block if scenarios[0].plant.engine == FAST else RunBlock
+        block = kind(resolved, files, self.metrics)
         with outside_turn:  # little of it is Python
             endings = block.run()
         return [

@@ -125,7 +125,8 @@ def run(
         Folder of journal and table; ``NAME_study`` in the working folder unless given. Rows in a journal of
         the same study are not run again.
     engine : str
-        ``local``, threads of this process, or ``ray``; the table does not depend on it.
+        ``local``, threads of this process, ``processes``, or ``ray``: the table does not depend on it.
+        ``cuda``: a GPU, whose figures are the same within rounding.
     address : str, optional
         For ``ray``: ``auto``, ``HOST`` or ``HOST:PORT`` of a cluster that this machine is a node of; every
         node needs the same sources, versions and files. Without it a cluster on this machine is started for
@@ -153,7 +154,7 @@ def run(
     chosen = _engine(engine, address)
     grid = Grid(study)
     make_folder(folder)
-    rows = Rows(study, _telemetry_folder(study, folder))
+    rows = chosen.prepare(Rows(study, _telemetry_folder(study, folder)))
     check(grid, rows)
     planned = min(len(grid), limit or len(grid))
     with Journal(folder / journal.NAME, digest_of(rows), len(grid)) as stored:

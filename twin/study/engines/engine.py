@@ -125,10 +125,13 @@ class Engine(NamedTuple):
         Yields the rows of an order with their results, in any order; None for a row with a fault.
     takes_address : bool
         Whether it needs the address of a cluster.
+    prepare : callable
+        Returns the rows of a study as the engine runs them.
     """
 
     run: Callable[[Order], Generator[tuple[Row, Result | None]]]
     takes_address: bool = False
+    prepare: Callable[[Rows], Rows] = lambda rows: rows
 
 
 TASK_S = 0.5
@@ -152,13 +155,15 @@ class Batches:
     numbers : iterator of int
     count : int
         Count of the numbers.
+    first, most : int
+        Rows of the first batch, and of the largest one.
     """
 
-    def __init__(self, numbers: Iterator[int], count: int) -> None:
-        self._numbers, self._left = numbers, count
+    def __init__(self, numbers: Iterator[int], count: int, first: int = 1, most: int = MOST_ROWS) -> None:
+        self._numbers, self._left, self._most = numbers, count, most
         self._again: deque[list[int]] = deque()
         self._losses: Counter[int] = Counter()
-        self.rows = 1
+        self.rows = first
         """Rows of a batch that takes about `TASK_S`."""
 
     def next(self, at_a_time: int) -> list[int]:
@@ -173,7 +178,7 @@ class Batches:
     def landed(self, rows: int, wall_s: float) -> None:
         """Adapt the size to a finished batch, by a limited factor: the first row of a process is slow."""
         fitting = TASK_S * rows / max(wall_s, 1e-9)
-        self.rows = int(min(max(fitting, self.rows // 2, 1), 2 * self.rows, MOST_ROWS))
+        self.rows = int(min(max(fitting, self.rows // 2, 1), 2 * self.rows, self._most))
 
     def lost(self, batch: list[int]) -> bool:
         """Take back a batch whose node or process was lost; False if it was lost too often.

@@ -10,7 +10,7 @@ from queue import SimpleQueue
 from typing import TypeVar
 
 from spheretwin.models.base.turns import outside_turn, turn
-from spheretwin.study.engines.engine import Batches, Engine, Order
+from spheretwin.study.engines.engine import MOST_ROWS, Batches, Engine, Order
 from spheretwin.study.grid import Row
 from spheretwin.study.row import Result
 
@@ -95,10 +95,10 @@ def run_each(
                 thread.join()
 
 
-def run(order: Order) -> Generator[tuple[Row, Result | None]]:
-    """Yield the rows of an order with their results."""
+def run(order: Order, first: int = 1, most: int = MOST_ROWS) -> Generator[tuple[Row, Result | None]]:
+    """Yield the rows of an order with their results; sizes of batches as in `Batches`."""
     threads = order.threads or os.cpu_count() or 1
-    batches = Batches(order.numbers, order.rows)
+    batches = Batches(order.numbers, order.rows, first, most)
     timed = iter(lambda: [order.grid[number] for number in batches.next(threads)], [])
 
     def work(rows: list[Row]) -> tuple[list[Result | None], float]:
