@@ -28,6 +28,9 @@ from tests.requirements import needs_shell
         (("new", ""), ["law", "actuator", "study"]),
         (("simulate", "hold", "--record", ""), []),
         (("nonsense", ""), []),
+        (("export", ""), ["fmu", "c"]),
+        (("export", "fmu", "hold", "--ki"), ["--kind"]),
+        (("export", "c", "hold", "--controller.law"), ["--controller.law"]),
     ],
 )
 def test_words(typed, expected):

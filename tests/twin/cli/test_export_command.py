@@ -5,7 +5,6 @@ import zipfile
 import pytest
 from fmpy import read_model_description
 
-from spheretwin.cli import completion
 from spheretwin.export import compiler, fmu
 from tests.requirements import needs_c_compiler
 from tests.twin.cli.calls import call, refusal
@@ -94,9 +93,3 @@ def test_an_error_of_the_compiler_is_one_line_and_leaves_no_file(folder, monkeyp
     assert (result.code, result.err.count("\n")) == (1, 1)
     assert "expected library to compile" in result.err
     assert not (folder / "hold.fmu").exists()
-
-
-def test_its_parts_complete_their_options_and_the_fields_of_a_scenario():
-    assert completion.words(["export", ""]) == ["fmu", "c"]
-    assert completion.words(["export", "fmu", "hold", "--ki"]) == ["--kind"]
-    assert "--controller.law" in completion.words(["export", "c", "hold", "--controller.l"])

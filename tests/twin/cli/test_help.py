@@ -24,12 +24,6 @@ def test_help_of_a_verb_with_fields_fits_one_screen(verb):
     assert 24 <= len(printed(verb, "--help")) <= SCREEN
 
 
-def test_values_are_those_of_the_scenario_and_of_the_flags():
-    lines = printed("simulate", "hold", "--controller.law", "pid", "-h")
-    assert any(line.startswith(f"  --duration {load('hold').duration:g} ") for line in lines)
-    assert any(line.startswith("  --controller.law pid ") for line in lines)
-
-
 def test_all_fields_are_shown_on_request():
     every = [flag for flag, *_ in reading.field_descriptions(load("tilt"))]
     lines = printed("simulate", "tilt", "--help", "all")
