@@ -11,6 +11,8 @@ from scipy import signal
 from spheretwin import scenario as scenarios
 from spheretwin.analysis import tolerances
 from spheretwin.control.law import Law
+from spheretwin.disturbances import TableDisturbance
+from spheretwin.io_systems import LoopSystem
 from spheretwin.linear import linearise
 from spheretwin.machine import Log
 from spheretwin.machine import columns as column_maps
@@ -20,11 +22,13 @@ from spheretwin.models import actuator as actuators
 from spheretwin.models import torque_curve, torque_field
 from spheretwin.models.base.errors import shown
 from spheretwin.models.telemetry.signals import Signal, common_signals
+from spheretwin.scenario.sections import MOST_FAULTS
 from spheretwin.trajectories.trajectory import checked
 from spheretwin.trajectories.waypoints import Waypoints
 from tests.content.content import content_test, refusal, scratch
 from tests.models.model_files import edited
 from tests.models.poses import SECOND
+from tests.twin.disturbance_cases import TORQUES
 
 
 def listed(call, inputs):
@@ -171,9 +175,16 @@ SYSTEMS = [
 ]  # fmt: skip
 
 
+LEAD = signal.TransferFunction([20.0, -19.0], [1.0, -0.6], dt=dT)
+NUMBERS_OF_LTI = [
+    {"inertia_kg_m2": [1.0, 2.0]}, {"constant_torque_Nm": "much"}, {"constant_torque_Nm": [0.0, np.inf, 0.0]},
+]  # fmt: skip
+
+
 def invalid_laws():
     systems = [f"{place}: {refusal(Law.from_lti, system)}" for place, system in enumerate(SYSTEMS)]
-    return "\n".join([listed(made_law, LAWS), *systems])
+    numbers = listed(lambda given: Law.from_lti(LEAD, **given), NUMBERS_OF_LTI)
+    return "\n".join([listed(made_law, LAWS), *systems, numbers])
 
 
 class Own:
@@ -204,7 +215,11 @@ WAYPOINTS = [
 
 def invalid_trajectories():
     own = "\n".join(f"{place}: {refusal(checked, sample)}" for place, sample in enumerate(SAMPLES))
-    return f"{own}\n{of_texts(lambda path: Waypoints(file=str(path)), '.csv', WAYPOINTS)}"
+    waypoints = of_texts(lambda path: Waypoints(file=str(path)), ".csv", WAYPOINTS)
+    torques = of_texts(
+        lambda path: TableDisturbance(file=str(path)), ".csv", [TORQUES.replace("0.3", "2000")]
+    )
+    return "\n".join([own, waypoints, torques])
 
 
 ANGLES, CURRENTS = {"columns": ["a", "b", "c"]}, {"columns": ["i*"]}
@@ -266,6 +281,7 @@ LINEAR = [
     )),
     ({}, {"inputs": "voltages"}), ({}, {"kind": "matlab"}),
     ({"plant.payload_kg": 60.0}, {"pose_rad": [0.3, -0.2, 0.4]}), ({"plant.group_gain": [0.0] * 18}, {}),
+    ({"drive.time_constant_s": [2e-3] * 9 + [6e-3] * 9}, {"pose_rad": [0.3, -0.2, 0.4], "lag": True}),
 ]  # fmt: skip
 
 SCENARIOS = [
@@ -278,6 +294,13 @@ SCENARIOS = [
     *({"name": name} for name in ("a\x1b[31mb", "a\nb", "\udcff")), {"description": "\x07"},
     *({"plant.mjcf": path} for path in ("a\0b", "~\0/b")), {"": 1}, {"controller.": 1}, {3: 1},
     {".".join("a" * 5000): 1}, {"plant": {("a", 1): 2}}, {"a\x1b[2J": 1},
+    {"drive.supply_V": 24.0, "drive.drop_up_V": 24.0}, {"drive.supply_V": 24.0, "drive.drop_down_V": 30.0},
+    {"drive.drop_up_V": 30.0}, {"sensors.encoder.start_error_rad": 0.1},
+    {"sensors.potentiometer.electrical_angle_rad": 1.0, "sensors.potentiometer.nonlinearity_rad": 0.07},
+    {"sensors.potentiometer.hysteresis_rad": 0.004, "sensors.potentiometer.repeatability_rad": 0.003},
+    {"trajectory.shape": "tilt", "trajectory.angle_rad": [0.0] * 3},
+    {"trajectory.angle_rad": [0.0] * 3, "trajectory.shape": "tilt"},
+    *({"fault": [{"target": "coil.00", "mode": "open"}] * count} for count in (MOST_FAULTS, MOST_FAULTS + 1)),
 ]  # fmt: skip
 SOURCES = {
     "broken.toml": "duration = = 2", "empty.toml": "", "digits.toml": f"seed = {'9' * 5000}",
@@ -295,8 +318,11 @@ def invalid_scenarios():
     with contextlib.chdir(folder):
         sources = listed(scenarios.load, SOURCES)
     fields = listed(lambda changes: scenarios.load("nutation", {"seed": 0, **changes}), SCENARIOS)
-    linear = listed(lambda given: linearise(scenarios.load("hold", given[0]), **given[1]), LINEAR)
-    return "\n".join([sources, fields, linear])
+    damped = edited(folder, ('axis="0 0 1"/>', 'axis="0 0 1" damping="1e-3"/>'))
+    cases = [*LINEAR, ({"plant.mjcf": str(damped)}, {})]
+    linear = listed(lambda given: linearise(scenarios.load("hold", given[0]), **given[1]), cases)
+    timed = scenarios.load("hold", {"event": [{"t_s": 0.1, "set": "disturbance.load", "value": 1.0}]})
+    return "\n".join([sources, fields, linear, refusal(LoopSystem, timed)])
 
 
 CASES = {

@@ -6,6 +6,7 @@ import numpy as np
 
 from spheretwin import plant
 from spheretwin import scenario as scenarios
+from spheretwin.bench import Bench
 from spheretwin.control.laws.lqi import regulator
 from spheretwin.envs import TwinVectorEnv
 from spheretwin.external import Measurement
@@ -13,14 +14,20 @@ from spheretwin.inputs import InputGenerator
 from spheretwin.machine import IdentifySettings, Log, identify, shadow
 from spheretwin.machine.link.controller_scenario import check_measurement
 from spheretwin.machine.link.transports import open_transport
+from spheretwin.metrics import MaxAbsCurrent
+from spheretwin.models.actuator import load as load_actuator
 from spheretwin.models.magnetics import Arrangement
+from spheretwin.models.telemetry.signals import Signal
+from spheretwin.models.telemetry.table import Table
 from spheretwin.plant.plant_step import roll_out
+from spheretwin.reduction import PlannedRun
 from spheretwin.session import Session
 from tests.content.content import content_test, refusal, scratch
 from tests.content.test_refusals import listed
 from tests.control.test_manual_currents import series_file
 from tests.control.test_user_law import FILE
 from tests.models.model_files import edited
+from tests.twin.model_files import model_file
 from tests.twin.plant import user_models
 from tests.twin.plant.motions import friction
 from tests.twin.session_cases import ENGINES, REFUSED, session
@@ -123,6 +130,13 @@ SCENARIOS = [
         {"times_s": [1.0, 2.0]}, {"times_s": [1.0, 1.0], "angles_rad": [NONE, NONE]}, {"times_s": [np.nan]},
     )),
     {"trajectory": {"shape": "tilt", "rounding_rad_s2": 0.01}},
+    {"drive.resistance_ohm": [1.3] * 17}, {"nominal.inductance_H": []}, {"drive.inductance_H": [9e-4, "x"]},
+    {"drive.shutdown_degC": "hot"},
+]  # fmt: skip
+NUMBERS_OF_MODELS = [
+    {"group_resistance_ohm": [1.3] * 17}, {"group_inductance_H": [9e-4] * 17 + [-1.0]},
+    {"group_heat_capacity_J_K": 0.0}, {"group_heat_capacity": 60.0}, {"stator_capacity_J_K": 900.0},
+    {"coil_turns": [320.0] * 18}, {"stator_heat_capacity_J_K": -1.0},
 ]  # fmt: skip
 SOURCES = {
     "Feedbak": FILE, "number": FILE, "mine": "import nothing_of_that_name", "two": "1 +", "three": None,
@@ -157,6 +171,13 @@ def invalid_sessions():
     for groups, more in ((17, {}), (0, {}), (18, {"manual.currents_A": [0.0] * 18})):
         file = {"manual.file": series_file(folder, [0.0], [[0.1] * groups], groups)}
         lines.append(f"file of {groups}: {refusal(begin, file | more)}")
+    lines.append(refusal(Bench, scenarios.load("hold", {**file, "manual.currents_A": None})))
+    lines.append(
+        listed(lambda numbers: begin({"plant.mjcf": model_file(folder, **numbers)}), NUMBERS_OF_MODELS)
+    )
+    growing = [{"kind": "random", "bound_Nm": [0.01] * 3, "gamma_envelope": "growing"}]
+    inputs = InputGenerator(scenarios.load("sinusoid", {"disturbance.terms": growing}))
+    lines.append(listed(inputs.check_horizon, [200_000, 240_000]))
     events = [{"t_s": 0.1, "set": name, "value": value} for name, value in (
         ("plant.group_gain", [1.0, 2.0]), ("nominal.torque_curve", "/nowhere/curve.csv"),
         ("controller.law", f"{folder}/Broken.py:Broken"), ("controller.law", f"{folder}/Lazy.py:Lazy"),
@@ -166,6 +187,10 @@ def invalid_sessions():
         ("nutation",), (None,), (scenarios.load("hold"), "mine.py:Mine"), (scenarios.load("hold"), 3.0),
     )]  # fmt: skip
     lines.append(refusal(InputGenerator, scenarios.load("hold"), 3.0))
+    lines.append(refusal(Session, scenarios.load("hold"), external=3))
+    metric = MaxAbsCurrent(PlannedRun(scenarios.load("hold"), load_actuator(), 10))
+    for signal in (Signal("error_rad", "rad", 3, "errors"), Signal("current_A", "A", 3, "currents")):
+        lines.append(refusal(metric.write, Table((signal,), ZEROS((10, 3)))))
     for engine in ENGINES:
         with session(**{"plant.engine": engine}) as live:
             lines += [engine, listed(lambda change, live=live: live.set(*change), REFUSED)]

@@ -166,16 +166,3 @@ def test_parameters_of_another_length_give_no_torque(size):
     torque = np.full(3, np.nan)
     law.step(0.0, REFERENCE[0], MEASUREMENT[0], np.zeros(size), law.state.copy(), torque)
     assert np.all(np.isnan(torque))
-
-
-@pytest.mark.parametrize(
-    ("given", "message"),
-    [
-        ({"inertia_kg_m2": [1.0, 2.0]}, r"inertia_kg_m2 as one number or three, received shape \(2,\)"),
-        ({"constant_torque_Nm": "much"}, "finite real numbers in constant_torque_Nm, received"),
-        ({"constant_torque_Nm": [0, np.inf, 0]}, "finite real numbers in constant_torque_Nm, received"),
-    ],
-)
-def test_numbers_given_with_the_system_are_checked(given, message):
-    with pytest.raises(InputError, match=f"^law lti: expected {message}"):
-        Law.from_lti(LEAD, **given)

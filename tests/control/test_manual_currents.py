@@ -5,9 +5,7 @@ import pytest
 
 from spheretwin import cli
 from spheretwin import scenario as scenarios
-from spheretwin.bench import Bench
 from spheretwin.control.manual_currents import Manual, command_manual_currents
-from spheretwin.models.base.errors import InputError
 from spheretwin.models.telemetry.table import read_parquet
 from spheretwin.session import Session
 from spheretwin.simulation import simulate
@@ -106,9 +104,3 @@ def test_a_file_of_currents_is_replayed_and_its_limit_counts(tmp_path):
     rows = read_parquet(first)[0]
     np.testing.assert_array_equal(rows["current_command_A"][[9, 10], 7], [0.5, -2.0])
     assert rows["allocation_scale"][10] == pytest.approx(2 / 3)
-
-
-def test_the_bench_refuses_a_file_of_currents(tmp_path):
-    path = series_file(tmp_path, [0.0], [[0.1] * 18])
-    with pytest.raises(InputError, match=r"received manual\.file"):
-        Bench(scenarios.load("hold", FAST | {"manual.file": path}))

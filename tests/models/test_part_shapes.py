@@ -40,13 +40,6 @@ def test_a_curve_is_refused_for_other_shapes(tmp_path, capsys, shape):
     assert capsys.readouterr().err.count(f"received the shape {shape}") == 2
 
 
-@pytest.mark.parametrize("shape", SHAPES)
-def test_a_coil_of_another_shape_is_refused(tmp_path, shape):
-    path = model_file(tmp_path, COIL, shape)
-    with pytest.raises(InputError, match=f"expected coil_.* as a cylinder, received the shape {shape}$"):
-        actuators.load(path)
-
-
 @pytest.mark.parametrize(
     ("shape", "radius_m", "length_m"),
     [

@@ -9,7 +9,6 @@ from hypothesis import strategies as st
 
 from spheretwin.models import actuator as actuators
 from spheretwin.models import magnetics
-from spheretwin.models.base.errors import InputError
 from spheretwin.models.design.direct_summation import direct_torque_matrix
 from spheretwin.models.design.workspace import pose
 from spheretwin.models.scatter import Scatter, no_scatter, part_errors, scattered_model, summed_torque_matrix
@@ -111,11 +110,3 @@ def test_a_pole_alone_has_a_line_of_its_own():
     summed = summed_torque_matrix(q, alone, errors)
     np.testing.assert_allclose(compiled(q, alone, errors), summed, rtol=0, atol=1e-4 * np.abs(summed).max())
     assert magnetics.torque_model(alone).sizes["lines"] == len(lines)
-
-
-def test_a_curve_without_sensitivities_refuses_errors_of_distance():
-    bare = replace(ACTUATOR, torque_data=replace(ACTUATOR.torque_curve, distance_sensitivity=None))
-    rng = np.random.default_rng(1)
-    scattered_model(bare, scatter(rng, 0.1, 0.01))
-    with pytest.raises(InputError, match="expected its sensitivities to distance"):
-        scattered_model(bare, scatter(rng, 0.1, 0.01, 1e-4))

@@ -8,7 +8,6 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.interpolate import CubicSpline
 
-from spheretwin.export.plant_code import magnetic_tables
 from spheretwin.models import actuator as actuators
 from spheretwin.models import magnetics, torque_field
 from spheretwin.models.base.errors import InputError
@@ -194,15 +193,6 @@ def test_a_group_may_have_one_coil(tmp_path):
     assert_allclose(magnetics.torque_matrix(q, actuator), of_coils.T, rtol=0, atol=1e-16)
 
 
-def test_a_torque_curve_needs_opposite_coils(tmp_path):
-    path = written(tmp_path)
-    with pytest.raises(InputError, match="expected groups of two opposite coils for a torque curve"):
-        actuators.load(path, actuators.TORQUE_CURVE_PATH)
-    message = r"expected a torque curve here, received the torque field torque_field\.csv"
-    with pytest.raises(InputError, match=message):
-        _ = VENTUSFF.torque_curve
-
-
 def test_the_torque_file_is_part_of_the_model_file(tmp_path):
     path = written(tmp_path)
     before, first = contents_digest(path), actuators.load(path)
@@ -210,10 +200,3 @@ def test_the_torque_file_is_part_of_the_model_file(tmp_path):
     file.write_text(file.read_text().replace("0.01", "0.02"))
     assert contents_digest(path) != before
     assert actuators.load(path) is not first
-
-
-def test_an_export_names_the_kind_of_torque_that_it_needs():
-    model = magnetics.torque_model(VENTUSFF)
-    message = "expected an actuator with a torque curve, received one with a torque field"
-    with pytest.raises(InputError, match=message):
-        magnetic_tables(model.arrangement[0], model.tables)

@@ -8,7 +8,6 @@ from spheretwin.active_config import initial_config
 from spheretwin.electronics.coil import SHORTED
 from spheretwin.electronics.drive_chain import DriveChain, advance, begin, end, fill_drive
 from spheretwin.machine.parameters import KINDS, Machine, Parameter
-from spheretwin.models.base.errors import InputError
 from spheretwin.session import Session
 from tests.twin.model_files import model_file
 
@@ -106,36 +105,6 @@ def test_the_record_of_a_run_gives_the_same_values_again(tmp_path):
     first = resolved(path, hardware="prototype")
     again = initial_config(scenarios.from_record(first.model_dump(mode="json"), "record"), None, None)
     assert (again.scenario.drive, again.scenario.nominal) == (first.drive, first.nominal)
-
-
-@pytest.mark.parametrize(
-    ("numbers", "message"),
-    [
-        ({"group_resistance_ohm": [1.3] * 17}, "group_resistance_ohm as one number or one for each of 18"),
-        ({"group_inductance_H": [9e-4] * 17 + [-1.0]}, "group_inductance_H from 1e-09 to 1e.09, received -1"),
-        ({"group_heat_capacity_J_K": 0.0}, "group_heat_capacity_J_K from 0.001 to 1e.06, received 0"),
-        ({"group_heat_capacity": 60.0}, "received group_heat_capacity; did you mean group_heat_capacity_J_K"),
-        ({"stator_capacity_J_K": 900.0}, "did you mean stator_heat_capacity_J_K"),
-        ({"coil_turns": [320.0] * 18}, "expected one number coil_turns, received 18"),
-    ],
-)
-def test_other_numbers_of_a_model_file_are_refused_by_name(tmp_path, numbers, message):
-    with pytest.raises(InputError, match=message):
-        resolved(model_file(tmp_path, **numbers))
-
-
-@pytest.mark.parametrize(
-    ("field", "value", "message"),
-    [
-        ("drive.resistance_ohm", [1.3] * 17, "expected drive.resistance_ohm for 18 groups, received 17"),
-        ("nominal.inductance_H", [], "expected nominal.inductance_H for 18 groups, received 0"),
-        ("drive.inductance_H", [9e-4, "x"], r"drive.inductance_H.1: expected a number, received 'x'"),
-        ("drive.shutdown_degC", "hot", "drive.shutdown_degC: expected a number, received 'hot'"),
-    ],
-)
-def test_other_lists_of_a_scenario_are_refused_by_name(field, value, message):
-    with pytest.raises(InputError, match=message):
-        initial_config(scenarios.load("hold", {field: value}), None, None)
 
 
 def test_identification_has_the_lag_of_each_group_unless_it_fits_one():

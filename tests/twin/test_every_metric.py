@@ -59,11 +59,6 @@ def test_every_metric_s_bits_are_those_of_any_chunks(runs, name, data):
 
 
 @pytest.mark.parametrize("name", METRICS)
-def test_every_metric_takes_ticks_one_by_one(runs, name):
-    assert in_chunks(runs[1], name, list(range(300))) == in_chunks(runs[1], name, [])
-
-
-@pytest.mark.parametrize("name", METRICS)
 def test_every_metric_s_memory_does_not_hold_the_rows(runs, name):
     """A kilobyte for 10,000 ticks at most, where the rows take 600."""
     run, sizes = runs[0], []

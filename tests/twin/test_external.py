@@ -133,8 +133,3 @@ def test_the_journal_names_the_part_and_a_replay_is_refused(tmp_path):
     rows.write_parquet(path := tmp_path / "run.parquet", record_of(twin).metadata())
     with pytest.raises(InputError, match="expected a run of the twin alone, received one with a test"):
         replay.read(path)
-
-
-def test_refuses_another_object():
-    with pytest.raises(InputError, match="expected an ExternalController or an ExternalPlant, received 3"):
-        session(3)

@@ -7,7 +7,6 @@ import control
 from spheretwin import plant
 from spheretwin import scenario as scenarios
 from spheretwin.io_systems import LoopSystem, loop_system, plant_system, reference_inputs
-from spheretwin.models.base.errors import InputError
 from spheretwin.simulation import simulate
 
 
@@ -58,9 +57,3 @@ def test_python_control_linearises_the_plant_as_linearise_does():
     # Two steps that hold the torque, and forward differences of 1e-6 of python-control.
     np.testing.assert_allclose(sampled.A, exact.A, rtol=0, atol=1e-5)
     np.testing.assert_allclose(sampled.B[:, :18], exact.B, rtol=0, atol=1e-4)
-
-
-def test_a_loop_that_depends_on_the_time_is_refused():
-    event = [{"t_s": 0.1, "set": "disturbance.load", "value": 1.0}]
-    with pytest.raises(InputError, match="expected a scenario without faults and events"):
-        LoopSystem(scenarios.load("hold", {"event": event}))

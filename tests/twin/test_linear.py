@@ -8,13 +8,11 @@ from spheretwin import assembly
 from spheretwin import scenario as scenarios
 from spheretwin.active_config import initial_config
 from spheretwin.linear import linearisation_data, linearise
-from spheretwin.models.base.errors import InputError
 from spheretwin.models.kinematics import rate_jacobian
 from spheretwin.models.lagrangian import acceleration, loaded_inertia
 from spheretwin.models.magnetics import torque_matrix
 from spheretwin.plant.friction import slow_down
 from spheretwin.plant.plant_tick import ENGINES
-from tests.models.model_files import edited
 from tests.twin.plant.motions import friction, gradient
 from tests.twin.plant.test_friction import ideal
 
@@ -137,12 +135,6 @@ def test_a_lag_is_one_more_pole_of_every_response(inputs, states, lag_s):
     np.testing.assert_allclose(behind * poles, expected, rtol=1e-9, atol=1e-12)
 
 
-def test_a_torque_behind_different_lags_is_refused():
-    message = r"expected one lag of all groups .*, received lags of 0\.002 to 0\.006"
-    with pytest.raises(InputError, match=message):
-        linearise(scenario({"drive.time_constant_s": LAGS_s.tolist()}), TILTED, lag=True)
-
-
 def test_a_lag_under_load_is_the_same_for_torques_and_for_the_currents_that_answer_them(actuator):
     """Currents commanded as the allocation does, also as it follows the pose, are a torque commanded."""
     lagging = scenario({"drive.time_constant_s": 4e-3})
@@ -206,9 +198,3 @@ def test_states_inputs_and_outputs_are_named_and_the_first_pose_is_where_it_rest
     assert len(model.states) == len(model.system.A) == 24
     assert len(model.inputs) == model.system.B.shape[1] == len(model.input_at_rest) == 18
     assert model.outputs == ("alpha_rad", "beta_rad", "gamma_rad")
-
-
-def test_a_model_that_the_lagrangian_does_not_know_is_refused(tmp_path):
-    path = edited(tmp_path, ('axis="0 0 1"/>', 'axis="0 0 1" damping="1e-3"/>'))
-    with pytest.raises(InputError, match=r"rigid bodies on three hinges, received a model with .*damp"):
-        linearise(scenario({"plant.mjcf": str(path)}))

@@ -8,7 +8,6 @@ from spheretwin import scenario as scenarios
 from spheretwin.metrics import METRICS
 from spheretwin.metrics.tracking import BAND_rad
 from spheretwin.models import actuator as actuators
-from spheretwin.models.base.errors import InputError
 from spheretwin.models.telemetry.signals import Signal, common_signals, width
 from spheretwin.models.telemetry.table import Table
 from spheretwin.reduction import PlannedRun
@@ -214,11 +213,3 @@ def test_logged_losses_are_added_in_turn(scenario):
     rows = np.hstack([np.zeros((200, width(common))), losses])
     expected = float(in_turn(losses, np.zeros(groups)).sum() * scenario.controller.period_s)
     assert metric_of(metrics.CopperLoss, signals, rows, Session(scenario).scenario, 200) == expected
-
-
-def test_rows_without_a_signal_or_of_another_actuator_are_refused(scenario):
-    metric = metrics.MaxAbsCurrent(PlannedRun(scenario, actuators.load(), 10))
-    with pytest.raises(InputError, match="expected telemetry with 18 columns of current_A, received none"):
-        metric.write(Table((Signal("error_rad", "rad", 3, "errors"),), ROWS))
-    with pytest.raises(InputError, match="expected telemetry with 18 columns of current_A, received 3"):
-        metric.write(Table((Signal("current_A", "A", 3, "currents"),), ROWS))

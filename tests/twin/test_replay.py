@@ -109,12 +109,6 @@ def test_a_file_of_a_version_that_told_no_files_replays(folder):
     assert replay.read(path).ticks == 20
 
 
-def test_a_file_whose_end_is_none_is_refused_by_its_name(folder):
-    path = rewritten(written(folder / "odd.parquet"), lambda known: known | {"status": "flying"})
-    with pytest.raises(InputError, match=r"replay .*odd\.parquet: status: expected one of .*'flying'"):
-        replay.read(path)
-
-
 def test_a_file_that_the_run_could_not_read_and_that_exists_now_is_refused(folder):
     missing = str(folder / "p.csv")
     path = rewritten(

@@ -10,7 +10,6 @@ from spheretwin.analysis.recorded_run import read
 from spheretwin.metrics import METRICS
 from spheretwin.metrics.figures import Figures
 from spheretwin.metrics.user_metrics import OTHER_KEYS
-from spheretwin.models.base.errors import InputError
 from spheretwin.reduction import PlannedRun
 from spheretwin.run import figures_of, summary
 from spheretwin.session import Session
@@ -57,12 +56,6 @@ def test_a_function_of_the_user_s_is_one_more_figure(run):
     assert figures["groups"] == len(run.actuator.groups)
     assert figures["ended"] == {"status": "completed", "at_s": pytest.approx(0.199)}
     assert list(figures) == [*METRICS, *own]
-
-
-@pytest.mark.parametrize("name", ["rms_torque_Nm", "status"])
-def test_a_figure_of_the_user_s_takes_no_other_s_place(run, name):
-    with pytest.raises(InputError, match=f"metric: expected another name than .*, received {name}"):
-        figures_of(run, {name: lambda run: 1.0})
 
 
 def test_an_event_at_the_end_of_a_run_is_not_in_its_log(tmp_path):

@@ -138,13 +138,8 @@ def test_every_part_s_numbers_are_counted_before_anything_is_restored():
         for numbers in ((saved[1:], np.append(saved, 0.0)) if name != "last" else ())
         if numbers.size != saved.size
     ]
-    assert {name for name, _ in wrong} == {
-        "run",
-        "engine",
-        "law parameters",
-        "law memory",
-        "estimator memory",
-    }
+    parts = {"run", "engine", "law parameters", "law memory", "estimator memory"}
+    assert {name for name, _ in wrong} == parts
     for part, state in (
         *wrong,
         ("last command", machine._replace(last=machine.last._replace(command=np.zeros(3)))),

@@ -8,7 +8,6 @@ from spheretwin import cli, plant
 from spheretwin.crosscheck import coil_driven
 from spheretwin.crosscheck.scale import scale_of
 from spheretwin.models import actuator as actuators
-from spheretwin.models.base.errors import InputError
 from spheretwin.models.magnetics import torque_matrix
 from tests.models.poses import SECOND
 from tests.twin.plant.test_plants import assert_equal, one_by_one, together
@@ -43,17 +42,6 @@ def test_plants_in_lanes_move_as_alone():
     case = [rng.uniform(-largest, largest, (20, width)) for largest, width in ranges]
     # Accelerations are up to 1e3 rad/s².
     assert_equal(together(parameters, *case, 20), one_by_one(parameters, *case, 20))
-
-
-def test_plants_of_different_kinds_are_refused_in_one_line():
-    one = plant.parameters("ventusff")
-    tables = one.magnetics.tables
-    smaller = one.magnetics._replace(tables=tables._replace(field=tables.field[:-2]))
-    message = r"expected magnetics of .+, 16 coils and \(39, 75, 3\) coefficients of a torque field"
-    with pytest.raises(InputError, match=message):
-        plant.Plants([one, one._replace(magnetics=smaller)])
-    with pytest.raises(InputError, match=r"expected magnetics of 0 pole lines and 8 groups, .+ received 8"):
-        plant.Plants([one, plant.parameters("tilt")])
 
 
 @pytest.mark.parametrize("engine", ["mujoco", "lagrangian"])

@@ -7,8 +7,7 @@ from scipy.signal import freqz, lfilter
 
 from spheretwin.control.estimators import ESTIMATORS
 from spheretwin.control.estimators.estimator import estimates
-from spheretwin.control.estimators.kalman import Kalman, gains
-from spheretwin.models.base.errors import InputError
+from spheretwin.control.estimators.kalman import gains
 from tests.control.estimators.cases import NOISE, PERIOD, built, on_all_axes, sampling
 
 LINEAR = pytest.mark.parametrize("kind", ["difference", "kalman"])
@@ -99,8 +98,3 @@ def test_density_and_noise_lead_to_a_bandwidth():
     by_own = built("kalman", sampling(noise=0.0), acceleration_density_rad2_s3=density, noise_rad=NOISE)
     np.testing.assert_allclose(by_sensors, by_bandwidth, rtol=1e-12)
     np.testing.assert_allclose(by_own.parameters, by_bandwidth, rtol=1e-12)
-
-
-def test_density_without_noise_is_refused():
-    with pytest.raises(InputError, match=r"kalman: expected a bandwidth in rad/s from 0\.001 to 1e"):
-        Kalman(acceleration_density_rad2_s3=1.0).build(sampling(noise=0.0))

@@ -11,7 +11,6 @@ from scipy.optimize import brentq
 from scipy.spatial.transform import Rotation
 
 from spheretwin.models.actuator import load
-from spheretwin.models.base.errors import InputError
 from spheretwin.models.design import pole_torque
 from spheretwin.models.design.pole_torque import Mesh, MeshConvergence, compute_curve
 from spheretwin.models.magnet_and_coil import CoilGeometry, Magnet
@@ -246,8 +245,3 @@ def test_provenance_tells_a_flat_front_from_a_ground_one():
 
 
 # Refusals
-
-
-def test_winding_without_section_is_refused():
-    with pytest.raises(InputError, match="expected an inner radius below the outer radius"):
-        compute_curve(MAGNET, replace(COIL, inner_radius_m=COIL.outer_radius_m))

@@ -80,11 +80,6 @@ def test_a_file_that_cannot_be_read_is_refused(path):
             joint_states.read(path)
 
 
-def test_times_before_zero_are_refused(tmp_path):
-    with pytest.raises(InputError, match="expected times from 0"):
-        joint_states.write(tmp_path / "a.mcap", np.array([-1.0, 0.0]), {}, {})
-
-
 def test_each_flipped_bit_of_a_file_is_found(path):
     content, draws = path.read_bytes(), random.Random(43)
     for _ in range(300):

@@ -320,10 +320,3 @@ def test_the_target_keeps_to_the_current_limit_with_its_offset():
     exact, current, passed = made(CASES[0], groups=2)[0], np.array([8.0, -8.0]), zero_flow(2)
     drive_coils(exact, exact.whole, made(CASES[0], groups=2)[1], current.copy(), np.zeros(2), current, passed)
     np.testing.assert_array_equal(passed.current_limited_s, 0)  # the limit itself may be commanded
-
-
-@pytest.mark.parametrize("drops", [{"drop_up_V": 24.0}, {"drop_down_V": 30.0}])
-def test_a_swing_of_nothing_is_refused(drops):
-    with pytest.raises(ValueError, match=r"drive\.drop_up_V .*below drive\.supply_V.*24\.0 V"):
-        AmplifierSection(supply_V=24.0, **drops)
-    AmplifierSection(**drops)  # nobody asks for a swing without a supply

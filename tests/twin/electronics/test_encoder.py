@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from pydantic import ValidationError
 
 from spheretwin import scenario as scenarios
 from spheretwin.electronics.sensor_chain import SensorChain, SensorsSection, fill_sensors, sense
@@ -171,8 +170,3 @@ def test_skew_samples_beta_later_to_first_order():
     assert np.abs(got[:, 1] - q[:, 1]).max() == pytest.approx(size * w * skew, rel=1e-3)
     np.testing.assert_allclose(got[:, 0], q[:, 0], rtol=0, atol=1e-15)  # to volts and back
     np.testing.assert_array_equal(got[:, 2], q[:, 2])
-
-
-def test_start_error_without_counts_is_refused():
-    with pytest.raises(ValidationError, match=r"expected counts for a start_error_rad of 0\.1, received 0"):
-        SensorsSection(encoder={"start_error_rad": 0.1})

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from pydantic import ValidationError
 
 from spheretwin import scenario as scenarios
 from spheretwin.electronics.random_streams import noise_table
@@ -86,12 +85,6 @@ def test_the_voltage_rises_with_the_angle_at_the_largest_residual(seed):
     assert np.diff(volts).min() > 0
 
 
-def test_a_residual_with_which_it_might_not_rise_is_refused():
-    message = "expected nonlinearity_rad below 0.06 rad, 6% of electrical_angle_rad.* received 0.07"
-    with pytest.raises(ValidationError, match=message):
-        PotentiometerSection(electrical_angle_rad=1.0, nonlinearity_rad=0.07)
-
-
 WIDTH, SPREAD = 4e-3, 1e-3
 
 
@@ -143,12 +136,6 @@ def test_hysteresis_is_the_difference_of_readings_from_both_sides():
     assert above - below == pytest.approx(WIDTH, rel=1e-12)
     assert above == pytest.approx(WIDTH / 2, rel=1e-12)
     assert stage.lead_rad[0] == above  # the joint is at 0
-
-
-def test_spread_larger_than_the_play_is_refused():
-    message = "expected repeatability_rad of at most half of hysteresis_rad, received 0.003 and 0.004"
-    with pytest.raises(ValidationError, match=message):
-        PotentiometerSection(hysteresis_rad=0.004, repeatability_rad=0.003)
 
 
 def test_wiper_starts_at_the_joint_and_nan_stays_nan():

@@ -10,8 +10,6 @@ from spheretwin.electronics.random_streams import stream_key
 from spheretwin.faults.fault import MODES, Fault
 from spheretwin.faults.schedule import NEVER, FaultSchedule, part_names, part_of
 from spheretwin.faults.targets import TARGETS
-from spheretwin.models.base.errors import InputError
-from spheretwin.scenario.sections import MOST_FAULTS
 
 GROUPS, PERIOD_S = 18, 1e-3
 
@@ -41,12 +39,6 @@ def test_start_and_end_are_exact_ticks(tick, period_s):
         if start_s:
             assert ends.active(first - 1) == (0,)
         assert ends.active(first) == ()
-
-
-def test_a_scenario_has_a_largest_number_of_faults():
-    assert len(tw.load("hold", {"fault": [coil()] * MOST_FAULTS}).fault) == MOST_FAULTS
-    with pytest.raises(InputError, match=f"fault: expected .* {MOST_FAULTS} "):
-        tw.load("hold", {"fault": [coil()] * (MOST_FAULTS + 1)})
 
 
 def test_a_fault_within_a_period_never_acts():

@@ -70,12 +70,6 @@ def test_thermal_data_of_stator_and_rotor_are_those_of_the_model_file(tmp_path, 
     assert fields == stated | {"air_gap_K_W": 3.0}
 
 
-def test_a_number_of_the_stator_beyond_its_bounds_is_refused(tmp_path):
-    path = model_file(tmp_path, stator_heat_capacity_J_K=-1.0)
-    with pytest.raises(InputError, match=r"expected stator_heat_capacity_J_K from 0\.001 to .*, received -1"):
-        resolved(path, "ideal")
-
-
 def test_thermal_data_that_no_one_states_are_assumed_with_the_set(tmp_path):
     path = model_file(tmp_path)
     for hardware, per_K, shutdown_degC in (("ideal", 0.0, None), ("prototype", 0.0039, 155.0)):

@@ -103,13 +103,6 @@ def test_a_new_member_starts_from_its_own_defaults_over_a_shipped_scenario():
     assert scenarios.load("hold", {"trajectory.shape": "hold"}) == scenarios.load("hold")
 
 
-@pytest.mark.parametrize("first", ["trajectory.shape", "trajectory.angle_rad"])
-def test_a_field_that_the_user_gave_for_another_member_is_refused(first):
-    given = {"trajectory.shape": "tilt", "trajectory.angle_rad": [0.0, 0.0, 1.0]}
-    with pytest.raises(InputError, match="angle_rad, a field of shape hold, not of tilt"):
-        scenarios.load("hold", {first: given.pop(first), **given})
-
-
 @pytest.mark.parametrize(
     ("section", "tag", "text", "chosen"),
     [
