@@ -7,7 +7,7 @@ BIN := .venv/bin
 WHEEL := .venv-wheel/bin
 SYNC = $(UV) sync --quiet --frozen --no-default-groups --python $(PYTHON)
 
-.PHONY: demo test test-all compiled check format benchmark peers reproduce tune-rivals screenshots docs docs-snippets fuzz results extras dist setup clean
+.PHONY: demo test test-all compiled check format benchmark gpu peers reproduce tune-rivals screenshots docs docs-snippets fuzz results extras dist setup clean
 
 demo: .venv/demo ## run the nutation under AFSM and leave a recording and its telemetry
 	$(BIN)/spheretwin simulate nutation --record nutation.rrd --telemetry nutation.parquet
@@ -39,6 +39,9 @@ benchmark: setup ## print the speed ratios and the bars of studies, hold the all
 	$(BIN)/python tests/benchmarks/studies.py
 	$(BIN)/python tests/benchmarks/allocation.py
 	$(BIN)/python tests/benchmarks/deadlines.py
+
+gpu: .venv-gpu/installed ## hold runs on a GPU against the processor, and print their speed; without a GPU compile the kernels
+	.venv-gpu/bin/python tests/benchmarks/gpu.py
 
 peers: .venv-peers/installed ## compare JAX, MJX, Drake and plain NumPy with ours, and print the times of all
 	PYTHONPATH=tests/benchmarks .venv-peers/bin/python tests/benchmarks/peers/compare.py
@@ -120,10 +123,15 @@ setup: .venv/installed
 	UV_PROJECT_ENVIRONMENT=.venv-peers $(SYNC) --compile-bytecode --group peers
 	@touch $@
 
+# The compiler for GPUs is large, and numba-cuda holds NumPy back.
+.venv-gpu/installed: uv.lock pyproject.toml $(TOOLS)/uv
+	UV_PROJECT_ENVIRONMENT=.venv-gpu $(SYNC) --compile-bytecode --extra gpu
+	@touch $@
+
 # Type checkers and import-linter do not see folders that are mapped by an editable install.
 .venv-wheel/installed: uv.lock pyproject.toml $(TOOLS)/uv $(shell find models control viz twin -name '*.py')
 	rm -rf build/lib build/bdist*
-	UV_PROJECT_ENVIRONMENT=.venv-wheel $(SYNC) --no-editable --reinstall-package spheretwin --all-extras --group dev
+	UV_PROJECT_ENVIRONMENT=.venv-wheel $(SYNC) --no-editable --reinstall-package spheretwin --all-extras --no-extra gpu --group dev
 	@touch $@
 
 # pip installs uv into a folder of the project: nothing outside it is touched.
@@ -131,4 +139,4 @@ $(TOOLS)/uv:
 	$(PYTHON) -m pip install --quiet --disable-pip-version-check --root-user-action ignore --target $(TOOLS) --upgrade uv==$(UV_VERSION)
 
 clean:
-	rm -rf .venv .venv-wheel .venv-peers $(TOOLS) build *.egg-info
+	rm -rf .venv .venv-wheel .venv-peers .venv-gpu $(TOOLS) build *.egg-info
