@@ -17,11 +17,11 @@ from typing import Any
 from pydantic import BaseModel
 
 from spheretwin import cli
-from spheretwin.assembly import RunData
-from spheretwin.channels import CHANNELS
 from spheretwin.control.law import NominalModel
 from spheretwin.control.laws import LAWS
 from spheretwin.faults.targets import TARGETS
+from spheretwin.loop.assembly import RunData
+from spheretwin.loop.channels import CHANNELS
 from spheretwin.metrics import METRICS
 from spheretwin.models import actuator as actuators
 from spheretwin.models.base.record import Record, kinds_of

@@ -73,7 +73,7 @@ class Kick(DisturbanceTerm):
     def sample(self, t, draws):
         return np.outer((t >= 0.01) & (t < 0.02), [0.0, self.torque_Nm, 0.0])
 ''',
-        "twin/disturbances.py",
+        "twin/trajectories/disturbances.py",
         ("    | RandomDisturbance,\n", "    | RandomDisturbance\n    | Kick,\n"),
     ),
     "telemetry column": Addition(
@@ -87,7 +87,7 @@ def largest(row, plant):
     for j in range(plant.current.shape[0]):
         row[0] = max(row[0], abs(plant.current[j]))
 """,
-        "twin/channels.py",
+        "twin/loop/channels.py",
         ("    drive,\n", "    drive,\n    largest,\n"),
     ),
     "physics engine": Addition(

@@ -41,7 +41,7 @@ def drawn_numbers():
     from spheretwin.electronics.random_streams import noise_table
     from spheretwin.electronics.sensor_chain import SensorChain, fill_sensors, noise_streams, sense
     from spheretwin.faults.schedule import FaultSchedule
-    from spheretwin.hardware_assembly import fault_streams
+    from spheretwin.loop.hardware_assembly import fault_streams
     from spheretwin.session import Session
 
     faults = [
@@ -86,7 +86,7 @@ from spheretwin.crosscheck import suite
 from spheretwin.crosscheck.suite import CrosscheckResult, Subject
 from spheretwin.models import actuator as actuators
 from spheretwin.viz.recording.recorder import Recorder
-from spheretwin.provenance import facts_of
+from spheretwin.records.provenance import facts_of
 from spheretwin.session import Session
 from spheretwin.simulation import follow
 

@@ -8,19 +8,19 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from spheretwin.active_config import initial_config
+from spheretwin.config.active_config import initial_config
+from spheretwin.config.plant_model import parameters_of
 from spheretwin.control.law import Law
 from spheretwin.control.manual_currents import sample_currents
 from spheretwin.electronics.random_streams import noise_table
 from spheretwin.electronics.sensor_chain import noise_streams
-from spheretwin.hardware_assembly import fault_streams
 from spheretwin.linear import python_control
-from spheretwin.loop import Inputs
+from spheretwin.loop.closed_loop import Inputs
+from spheretwin.loop.hardware_assembly import fault_streams
+from spheretwin.loop.runtime import Runtime, RuntimeState
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.mjcf_reader import HINGES
 from spheretwin.plant.plant_step import State, step
-from spheretwin.plant_model import parameters_of
-from spheretwin.runtime import Runtime, RuntimeState
 from spheretwin.scenario.sections import Scenario
 
 Array = NDArray[np.float64]

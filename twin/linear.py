@@ -9,7 +9,8 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from spheretwin.active_config import initial_config
+from spheretwin.config.active_config import initial_config
+from spheretwin.config.plant_model import parameters_of
 from spheretwin.models.actuator import Actuator
 from spheretwin.models.base import extras
 from spheretwin.models.base.errors import InputError, distinct_texts, shown
@@ -19,7 +20,6 @@ from spheretwin.models.lagrangian import gravity_stiffness, gravity_torque, iner
 from spheretwin.models.mjcf_reader import HINGES
 from spheretwin.models.scatter import Scatter, summed_torque_matrix
 from spheretwin.plant.part_scatter import scatter_of
-from spheretwin.plant_model import parameters_of
 from spheretwin.scenario.files import Files
 from spheretwin.scenario.sections import ResolvedScenario, Scenario
 

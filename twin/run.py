@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from spheretwin.metrics.figures import Figures
+from spheretwin.metrics.reduction import PlannedRun
 from spheretwin.metrics.user_metrics import UserMetric, check_names, own_value
 from spheretwin.models.actuator import Actuator
 from spheretwin.models.base.errors import InputError, LawError, shown
@@ -22,8 +23,7 @@ from spheretwin.models.telemetry.run_record import RunRecord, versions
 from spheretwin.models.telemetry.signals import ANGLES
 from spheretwin.models.telemetry.status import Status
 from spheretwin.models.telemetry.table import Table
-from spheretwin.provenance import change_text, facts_of
-from spheretwin.reduction import PlannedRun
+from spheretwin.records.provenance import change_text, facts_of
 from spheretwin.scenario.changes import scheduled_changes
 from spheretwin.scenario.sections import ResolvedScenario
 from spheretwin.session import Session

@@ -13,15 +13,17 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from pydantic import ValidationError
 
-from spheretwin import active_config
-from spheretwin import loop as loops
-from spheretwin.active_config import initial_config
-from spheretwin.config_warnings import warnings_of
+from spheretwin.config import active_config
+from spheretwin.config.active_config import initial_config
+from spheretwin.config.config_warnings import warnings_of
 from spheretwin.control.law import Law
 from spheretwin.control.supervision.watchdog import Reason
 from spheretwin.control.user_law import reference_of
-from spheretwin.external import ExternalController, ExternalPlant, name_of
-from spheretwin.inputs import InputGenerator
+from spheretwin.loop import closed_loop as loops
+from spheretwin.loop.external import ExternalController, ExternalPlant, name_of
+from spheretwin.loop.inputs import InputGenerator
+from spheretwin.loop.runtime import Runtime
+from spheretwin.loop.snapshot import Snapshot, UserLaws
 from spheretwin.models.actuator import Actuator
 from spheretwin.models.base.arrays import real_array
 from spheretwin.models.base.errors import InputError, LawError, SpheretwinError, shown
@@ -29,14 +31,12 @@ from spheretwin.models.telemetry.run_record import Change
 from spheretwin.models.telemetry.signals import Signal, with_more
 from spheretwin.models.telemetry.status import BY_CODE, Status
 from spheretwin.models.telemetry.table import Table, allocated, check_rows
-from spheretwin.runtime import Runtime
 from spheretwin.scenario import files as scenario_files
 from spheretwin.scenario.changes import EXTERNAL, STATE, StateChange, from_now_on, is_fixed, scheduled_changes
 from spheretwin.scenario.fields import explain
 from spheretwin.scenario.files import Files
 from spheretwin.scenario.reading import is_dotted
 from spheretwin.scenario.sections import ResolvedScenario, Scenario, UserPath
-from spheretwin.snapshot import Snapshot, UserLaws
 from spheretwin.trajectories.trajectory import Sampled
 
 

@@ -17,7 +17,7 @@ from spheretwin.models.telemetry.run_record import Change
 from spheretwin.models.telemetry.signals import width
 from spheretwin.models.telemetry.status import Status
 from spheretwin.models.telemetry.table import Table, TelemetryBuffer, allocated
-from spheretwin.provenance import change_text, record_of
+from spheretwin.records.provenance import change_text, record_of
 from spheretwin.run import Run
 from spheretwin.scenario import load
 from spheretwin.scenario.changes import with_change

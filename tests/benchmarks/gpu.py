@@ -18,7 +18,7 @@ from unittest.mock import patch
 import numpy as np
 from measuring import bound_of, options_of, report, seconds_of, tell_value
 
-from spheretwin.cuda_block import CudaBlock
+from spheretwin.loop.cuda_block import CudaBlock
 from spheretwin.models.base import cuda
 from spheretwin.models.base.errors import InputError
 from spheretwin.study.grid import Grid
@@ -96,7 +96,7 @@ def speed(hardware, law):
 
     period_s = 1e-3
     rows, drawn = rows_of(study_of(hardware, law, 2 * WIDE, CALLS * TICKS * period_s), WIDE)
-    with patch.object(cuda, "launch", timed), patch("spheretwin.block.BLOCK_TICKS", TICKS):
+    with patch.object(cuda, "launch", timed), patch("spheretwin.loop.block.BLOCK_TICKS", TICKS):
         rows.with_block(CudaBlock).run(drawn)
     return WIDE * TICKS / min(taken)
 

@@ -11,10 +11,10 @@ from measuring import fastest, options_of, ratio, report, seconds_of
 
 from spheretwin import plant
 from spheretwin import scenario as scenarios
-from spheretwin.active_config import initial_config
-from spheretwin.assembly import assembled
+from spheretwin.config.active_config import initial_config
 from spheretwin.control.supervision.watchdog import GO
 from spheretwin.envs import TwinVectorEnv
+from spheretwin.loop.assembly import assembled
 from spheretwin.models import actuator as actuators
 from spheretwin.models.base.columns import Columns
 from spheretwin.models.base.compiled import allocation_free, compiled

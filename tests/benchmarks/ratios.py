@@ -22,7 +22,6 @@ from measuring import fastest, options_of, ratio, report, seconds_of
 from spheretwin import plant
 from spheretwin import scenario as scenarios
 from spheretwin.control.allocation.bounded import SCRATCH_ROWS, allocate_bounded
-from spheretwin.disturbances import Draws
 from spheretwin.models import actuator as actuators
 from spheretwin.models import mjcf
 from spheretwin.models.base.compiled import compiled
@@ -31,11 +30,12 @@ from spheretwin.models.telemetry.signals import width
 from spheretwin.plant.mass_properties import true_model
 from spheretwin.plant.mujoco_rotor import MujocoRotor
 from spheretwin.plant.plant_step import step
-from spheretwin.provenance import facts_of
+from spheretwin.records.provenance import facts_of
 from spheretwin.scenario.hardware import HARDWARE
 from spheretwin.scenario.sections import Scenario
 from spheretwin.session import Session
 from spheretwin.simulation import follow, simulate
+from spheretwin.trajectories.disturbances import Draws
 from spheretwin.viz.recording.recorder import Recorder
 
 SCENARIO = "nutation"

@@ -21,7 +21,7 @@ from unittest.mock import patch
 import numpy as np
 from measuring import fastest, options_of, ratio, report, seconds_of, tell_value
 
-from spheretwin.block import RunBlock
+from spheretwin.loop.block import RunBlock
 from spheretwin.models.base.mujoco_library import timers_stopped
 from spheretwin.study.engines import threads as local
 from spheretwin.study.grid import Grid

@@ -9,7 +9,7 @@ from spheretwin import scenario as scenarios
 from spheretwin.models.telemetry.signals import width
 from spheretwin.models.telemetry.status import Status
 from spheretwin.models.telemetry.table import Table
-from spheretwin.provenance import facts_of
+from spheretwin.records.provenance import facts_of
 from spheretwin.run import Run
 from spheretwin.scenario.sections import Scenario
 from spheretwin.session import Session

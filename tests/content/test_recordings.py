@@ -8,7 +8,7 @@ from spheretwin.machine.state_estimation import signals
 from spheretwin.models.telemetry.signals import width
 from spheretwin.models.telemetry.status import Level, Status
 from spheretwin.models.telemetry.table import Table
-from spheretwin.provenance import facts_of
+from spheretwin.records.provenance import facts_of
 from spheretwin.viz.comparison import merged_recording, trajectories
 from spheretwin.viz.comparison import shadow as shadow_recording
 from spheretwin.viz.comparison.runs import ComparedRun, EarlyEnd

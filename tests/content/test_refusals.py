@@ -11,7 +11,6 @@ from scipy import signal
 from spheretwin import scenario as scenarios
 from spheretwin.analysis import tolerances
 from spheretwin.control.law import Law
-from spheretwin.disturbances import TableDisturbance
 from spheretwin.io_systems import LoopSystem
 from spheretwin.linear import linearise
 from spheretwin.machine import Log
@@ -23,6 +22,7 @@ from spheretwin.models import torque_curve, torque_field
 from spheretwin.models.base.errors import shown
 from spheretwin.models.telemetry.signals import Signal, common_signals
 from spheretwin.scenario.sections import MOST_FAULTS
+from spheretwin.trajectories.disturbances import TableDisturbance
 from spheretwin.trajectories.trajectory import checked
 from spheretwin.trajectories.waypoints import Waypoints
 from tests.content.content import content_test, refusal, scratch

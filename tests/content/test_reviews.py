@@ -14,7 +14,7 @@ from spheretwin.cli.review import _first as first_exceeded
 from spheretwin.models.telemetry.fault_log import FaultLog
 from spheretwin.models.telemetry.status import Status
 from spheretwin.models.telemetry.table import read_parquet
-from spheretwin.provenance import facts_of, record_of
+from spheretwin.records.provenance import facts_of, record_of
 from spheretwin.viz.recording.recorder import Recorder
 from spheretwin.viz.terminal import reviews as reviews_printed
 from spheretwin.viz.terminal import runs, tables, texts

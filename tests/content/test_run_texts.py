@@ -5,7 +5,7 @@ import json
 import numpy as np
 
 from spheretwin import scenario as scenarios
-from spheretwin.active_config import initial_config
+from spheretwin.config.active_config import initial_config
 from spheretwin.control.laws import LAWS
 from spheretwin.faults.targets import TARGETS
 from spheretwin.models.base.errors import SpheretwinError

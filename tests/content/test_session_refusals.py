@@ -9,18 +9,18 @@ from spheretwin import scenario as scenarios
 from spheretwin.bench import Bench
 from spheretwin.control.laws.lqi import regulator
 from spheretwin.envs import TwinVectorEnv
-from spheretwin.external import Measurement
-from spheretwin.inputs import InputGenerator
+from spheretwin.loop.external import Measurement
+from spheretwin.loop.inputs import InputGenerator
 from spheretwin.machine import IdentifySettings, Log, identify, shadow
 from spheretwin.machine.link.controller_scenario import check_measurement
 from spheretwin.machine.link.transports import open_transport
 from spheretwin.metrics import MaxAbsCurrent
+from spheretwin.metrics.reduction import PlannedRun
 from spheretwin.models.actuator import load as load_actuator
 from spheretwin.models.magnetics import Arrangement
 from spheretwin.models.telemetry.signals import Signal
 from spheretwin.models.telemetry.table import Table
 from spheretwin.plant.plant_step import roll_out
-from spheretwin.reduction import PlannedRun
 from spheretwin.session import Session
 from tests.content.content import content_test, refusal, scratch
 from tests.content.test_refusals import listed

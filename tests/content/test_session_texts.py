@@ -4,16 +4,17 @@ from dataclasses import replace
 
 import pytest
 
-from spheretwin import outputs, replay
+from spheretwin import outputs
 from spheretwin import run as run_module
 from spheretwin import scenario as scenarios
-from spheretwin.active_config import initial_config
-from spheretwin.config_warnings import warnings_of
+from spheretwin.config.active_config import initial_config
+from spheretwin.config.config_warnings import warnings_of
 from spheretwin.models import actuator as actuators
 from spheretwin.models.base.errors import SpheretwinError
 from spheretwin.models.telemetry.run_record import Change, RunRecord
 from spheretwin.models.telemetry.table import read_parquet
-from spheretwin.provenance import facts_of
+from spheretwin.records import replay
+from spheretwin.records.provenance import facts_of
 from spheretwin.session import Session
 from spheretwin.simulation import follow, simulate
 from tests.content.content import content_test, refusal, scratch

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from spheretwin.disturbances import term_draws
+from spheretwin.trajectories.disturbances import term_draws
 
 TORQUES = "t_s,alpha_Nm,beta_Nm,gamma_Nm\n0.5,0.1,0,0\n1.5,0.3,-0.2,0\n2.0,0,0,0.4\n"
 PERIOD = 1e-3

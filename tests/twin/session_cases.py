@@ -8,7 +8,7 @@ from spheretwin.control.law import Law
 from spheretwin.models.telemetry.parquet import TelemetryFile
 from spheretwin.models.telemetry.signals import Signal
 from spheretwin.plant import plant_tick
-from spheretwin.provenance import record_of
+from spheretwin.records.provenance import record_of
 from spheretwin.session import Session
 
 SHIPPED, ENGINES = ("pd", "adaptive_fuzzy", "afsm"), tuple(plant_tick.ENGINES)

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from spheretwin import scenario as scenarios
-from spheretwin.active_config import fill_defaults
-from spheretwin.block import RunBlock
+from spheretwin.config.active_config import fill_defaults
+from spheretwin.loop.block import RunBlock
 from spheretwin.metrics import METRICS
 from spheretwin.metrics.figures import Figures
+from spheretwin.metrics.reduction import PlannedRun
 from spheretwin.models.base.columns import MixedRowsError
-from spheretwin.reduction import PlannedRun
 from spheretwin.scenario.files import files_of
 from spheretwin.session import Session
 from spheretwin.simulation import follow

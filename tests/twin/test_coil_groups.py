@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from spheretwin import scenario as scenarios
-from spheretwin.active_config import initial_config
+from spheretwin.config.active_config import initial_config
 from spheretwin.electronics.coil import SHORTED
 from spheretwin.electronics.drive_chain import DriveChain, advance, begin, end, fill_drive
 from spheretwin.machine.parameters import KINDS, Machine, Parameter

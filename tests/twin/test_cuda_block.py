@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from spheretwin import scenario as scenarios
-from spheretwin.active_config import fill_defaults
-from spheretwin.block import RunBlock
+from spheretwin.config.active_config import fill_defaults
+from spheretwin.loop.block import RunBlock
 from spheretwin.metrics import METRICS
 from spheretwin.models.base import cuda
 from spheretwin.models.base.errors import InputError
@@ -38,7 +38,7 @@ def endings(kind, every):
 
 
 def on_gpu(every):
-    from spheretwin.cuda_block import CudaBlock
+    from spheretwin.loop.cuda_block import CudaBlock
 
     return endings(CudaBlock, every)
 

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from spheretwin import disturbances
 from spheretwin import scenario as scenarios
 from spheretwin.session import Session
+from spheretwin.trajectories import disturbances
 from tests.twin.disturbance_cases import PERIOD, sampled
 
 

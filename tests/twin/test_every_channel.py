@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from spheretwin import scenario as scenarios
-from spheretwin.channels import CHANNELS
 from spheretwin.control.law import Law
+from spheretwin.loop.channels import CHANNELS
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.telemetry.signals import Signal, common_signals
 from spheretwin.session import Session

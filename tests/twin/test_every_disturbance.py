@@ -7,9 +7,9 @@ import pytest
 from pydantic import TypeAdapter
 
 from spheretwin import scenario as scenarios
-from spheretwin.disturbances import KINDS, AnyDisturbance
 from spheretwin.models.telemetry.status import Status
 from spheretwin.simulation import simulate
+from spheretwin.trajectories.disturbances import KINDS, AnyDisturbance
 from tests.twin.disturbance_cases import sampled
 
 # Beside every kind as it is when nothing is said of it.

@@ -10,9 +10,9 @@ from hypothesis import strategies as st
 
 from spheretwin import scenario as scenarios
 from spheretwin.metrics import METRICS
+from spheretwin.metrics.reduction import PlannedRun
 from spheretwin.models.telemetry.signals import width
 from spheretwin.models.telemetry.table import Table
-from spheretwin.reduction import PlannedRun
 from spheretwin.run import figures_of
 from spheretwin.simulation import simulate
 

@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from spheretwin import replay
 from spheretwin import scenario as scenarios
 from spheretwin.control.supervision.watchdog import Reason
-from spheretwin.external import ExternalController, ExternalPlant, Measurement
+from spheretwin.loop.external import ExternalController, ExternalPlant, Measurement
 from spheretwin.models.base.errors import InputError
-from spheretwin.provenance import record_of
+from spheretwin.records import replay
+from spheretwin.records.provenance import record_of
 from spheretwin.session import Session
 from spheretwin.simulation import follow
 

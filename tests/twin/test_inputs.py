@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from spheretwin import scenario as scenarios
-from spheretwin.inputs import BLOCK_TICKS, InputGenerator
+from spheretwin.loop.inputs import BLOCK_TICKS, InputGenerator
 from spheretwin.models.base.columns import Columns
 from spheretwin.models.base.errors import InputError
 from spheretwin.trajectories.shapes import Nutation

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from scipy.signal import cont2discrete
 
-from spheretwin import assembly
 from spheretwin import scenario as scenarios
-from spheretwin.active_config import initial_config
+from spheretwin.config.active_config import initial_config
 from spheretwin.linear import linearisation_data, linearise
+from spheretwin.loop import assembly
 from spheretwin.models.kinematics import rate_jacobian
 from spheretwin.models.lagrangian import acceleration, loaded_inertia
 from spheretwin.models.magnetics import torque_matrix

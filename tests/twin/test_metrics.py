@@ -6,11 +6,11 @@ import pytest
 from spheretwin import metrics
 from spheretwin import scenario as scenarios
 from spheretwin.metrics import METRICS
+from spheretwin.metrics.reduction import PlannedRun
 from spheretwin.metrics.tracking import BAND_rad
 from spheretwin.models import actuator as actuators
 from spheretwin.models.telemetry.signals import Signal, common_signals, width
 from spheretwin.models.telemetry.table import Table
-from spheretwin.reduction import PlannedRun
 from spheretwin.run import figures_of
 from spheretwin.session import Session
 from spheretwin.simulation import simulate

@@ -5,7 +5,7 @@ import hashlib
 from spheretwin import scenario as scenarios
 from spheretwin.models import actuator as actuators
 from spheretwin.models.telemetry.run_record import versions
-from spheretwin.provenance import facts_of, record_of
+from spheretwin.records.provenance import facts_of, record_of
 from spheretwin.session import Session
 
 

@@ -9,8 +9,8 @@ from spheretwin import scenario as scenarios
 from spheretwin.analysis.recorded_run import read
 from spheretwin.metrics import METRICS
 from spheretwin.metrics.figures import Figures
+from spheretwin.metrics.reduction import PlannedRun
 from spheretwin.metrics.user_metrics import OTHER_KEYS
-from spheretwin.reduction import PlannedRun
 from spheretwin.run import figures_of, summary
 from spheretwin.session import Session
 from spheretwin.simulation import follow, simulate

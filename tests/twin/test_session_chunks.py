@@ -8,7 +8,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from spheretwin import scenario as scenarios
-from spheretwin.inputs import BLOCK_TICKS
+from spheretwin.loop.inputs import BLOCK_TICKS
 from spheretwin.models.base.errors import InputError
 from spheretwin.session import Session
 from tests.twin.session_cases import COMPLETE, ENGINES, SHIPPED, WORN, rows, scenario

@@ -5,12 +5,13 @@ import json
 import numpy as np
 import pytest
 
-from spheretwin import cli, replay
+from spheretwin import cli
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.telemetry import parquet as telemetry_file
 from spheretwin.models.telemetry.parquet import TelemetryFile
 from spheretwin.models.telemetry.table import read_parquet
-from spheretwin.provenance import record_of
+from spheretwin.records import replay
+from spheretwin.records.provenance import record_of
 from spheretwin.session import Session
 from spheretwin.simulation import follow
 from tests.twin.session_cases import plain_law, recorded

@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 
-from spheretwin.inputs import BLOCK_TICKS
+from spheretwin.loop.inputs import BLOCK_TICKS
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.telemetry.run_record import Change
 from spheretwin.models.telemetry.signals import common_signals

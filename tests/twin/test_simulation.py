@@ -13,7 +13,7 @@ from spheretwin import scenario as scenarios
 from spheretwin import session as sessions
 from spheretwin import simulation
 from spheretwin.control.law import Law
-from spheretwin.loop import loop
+from spheretwin.loop.closed_loop import loop
 from spheretwin.models.telemetry.table import Table
 from spheretwin.session import Session
 from spheretwin.simulation import follow, simulate

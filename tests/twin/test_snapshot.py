@@ -8,7 +8,7 @@ import sys
 import numpy as np
 import pytest
 
-from spheretwin.inputs import BLOCK_TICKS
+from spheretwin.loop.inputs import BLOCK_TICKS
 from spheretwin.models.base.errors import InputError
 from tests.twin import session_cases as cases
 

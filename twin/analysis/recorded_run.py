@@ -14,9 +14,9 @@ from typing import Any
 
 import numpy as np
 
-from spheretwin.active_config import ActiveConfig, initial_config
 from spheretwin.analysis import recovery
 from spheretwin.analysis.recovery import hold_rows, ticks_of
+from spheretwin.config.active_config import ActiveConfig, initial_config
 from spheretwin.models.base.errors import InputError, shown
 from spheretwin.models.base.files import whole_file
 from spheretwin.models.telemetry import joint_states
@@ -25,7 +25,7 @@ from spheretwin.models.telemetry.joint_states import ANGLE_NAMES, Topic, group_n
 from spheretwin.models.telemetry.run_record import Change, RunRecord
 from spheretwin.models.telemetry.status import Event, Events, Level, Status
 from spheretwin.models.telemetry.table import Table, read_parquet
-from spheretwin.provenance import change_text
+from spheretwin.records.provenance import change_text
 from spheretwin.run import Run
 from spheretwin.scenario import from_record
 from spheretwin.scenario.changes import first_tick, from_now_on

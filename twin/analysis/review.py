@@ -7,11 +7,11 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from spheretwin.active_config import true_sheet
 from spheretwin.analysis import tolerances
 from spheretwin.analysis.recorded_run import Reviewed, of_the_actuator, read
 from spheretwin.analysis.run_summary import figures
 from spheretwin.analysis.tolerances import Exceeded, compare, exceeded
+from spheretwin.config.active_config import true_sheet
 from spheretwin.models.base.errors import InputError, shortened
 from spheretwin.scenario.fields import SHIPPED, flat
 from spheretwin.viz.terminal.reviews import NominalError, SignalTolerance

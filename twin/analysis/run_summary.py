@@ -9,10 +9,10 @@ from numpy.typing import NDArray
 
 from spheretwin.analysis.recorded_run import Reviewed, events, of_the_actuator
 from spheretwin.metrics.figures import Figures
+from spheretwin.metrics.reduction import PlannedRun
 from spheretwin.models.base.errors import InputError, shown
 from spheretwin.models.telemetry.signals import ANGLES
 from spheretwin.models.telemetry.table import Table
-from spheretwin.reduction import PlannedRun
 
 Array = NDArray[np.float64]
 

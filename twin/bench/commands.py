@@ -21,13 +21,13 @@ from spheretwin.bench.folder import release
 from spheretwin.bench.modes import Limits
 from spheretwin.bench.operators import Operators
 from spheretwin.bench.pace import FASTEST, SLOWEST
-from spheretwin.loop import is_user_law
+from spheretwin.loop.closed_loop import is_user_law
 from spheretwin.models.base.errors import InputError, did_you_mean, shown
 from spheretwin.models.base.files import whole_file
 from spheretwin.models.base.user_code import is_reference
 from spheretwin.models.telemetry.run_record import RunRecord
 from spheretwin.outputs import Outputs
-from spheretwin.provenance import record_of
+from spheretwin.records.provenance import record_of
 from spheretwin.scenario import reading
 from spheretwin.scenario.changes import FAULT, is_fixed
 from spheretwin.scenario.sections import Scenario

@@ -8,17 +8,17 @@ from typing import Any, NamedTuple
 from spheretwin.bench import modes
 from spheretwin.bench.command_queue import Current, Place, Text
 from spheretwin.bench.modes import Limits
+from spheretwin.loop.snapshot import Snapshot
 from spheretwin.models.base.errors import InputError, exception_text
 from spheretwin.models.telemetry.run_record import RunRecord
 from spheretwin.models.telemetry.table import Table
-from spheretwin.provenance import record_of
+from spheretwin.records.provenance import record_of
 from spheretwin.scenario.changes import FAULT, is_fixed, with_change
 from spheretwin.scenario.fields import flat
 from spheretwin.scenario.hardware import hardware_fields
 from spheretwin.scenario.reading import override, validated
 from spheretwin.scenario.sections import Scenario
 from spheretwin.session import Session
-from spheretwin.snapshot import Snapshot
 from spheretwin.trajectories.rounding import Triple
 from spheretwin.trajectories.trajectory import Shape
 

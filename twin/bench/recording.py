@@ -14,7 +14,7 @@ from spheretwin.models.base.errors import without_breaks
 from spheretwin.models.telemetry.status import Status
 from spheretwin.models.telemetry.table import Table
 from spheretwin.outputs import Outputs
-from spheretwin.provenance import change_text
+from spheretwin.records.provenance import change_text
 from spheretwin.session import Session
 
 # Writes that may wait; the loop waits for more, so that chunks do not accumulate in memory.

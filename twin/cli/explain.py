@@ -7,9 +7,9 @@ from collections.abc import Iterator, Mapping
 from typing import Any, NamedTuple
 
 from spheretwin import scenario as scenarios
-from spheretwin.active_config import initial_config
 from spheretwin.cli.common import print_json
 from spheretwin.cli.options import verb
+from spheretwin.config.active_config import initial_config
 from spheretwin.models.actuator import Actuator
 from spheretwin.models.base.errors import InputError, did_you_mean, shown
 from spheretwin.scenario import reading

@@ -22,13 +22,13 @@ from spheretwin.machine.link.real_time import real_time
 from spheretwin.machine.link.rehearsal import FileThread, rehearse
 from spheretwin.machine.link.transports import Transport, Udp, open_transport
 from spheretwin.metrics.figures import Figures
+from spheretwin.metrics.reduction import PlannedRun
 from spheretwin.metrics.tracking import BAND_rad
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.base.files import check_writable
 from spheretwin.models.base.mujoco_library import timers_stopped
 from spheretwin.models.telemetry.status import Status
 from spheretwin.outputs import Outputs
-from spheretwin.reduction import PlannedRun
 from spheretwin.run import summary
 from spheretwin.scenario import reading
 from spheretwin.scenario.reading import shipped

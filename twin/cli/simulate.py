@@ -10,13 +10,14 @@ from typing import Any
 
 import numpy as np
 
-from spheretwin import outputs, replay
+from spheretwin import outputs
 from spheretwin import scenario as scenarios
 from spheretwin.cli.common import interruptible, keep_viewer, print_json, print_message, warn
 from spheretwin.cli.options import verb
 from spheretwin.machine import export
 from spheretwin.machine.twin_file import read_twin
 from spheretwin.metrics.figures import Figures
+from spheretwin.metrics.reduction import PlannedRun
 from spheretwin.metrics.tracking import BAND_rad
 from spheretwin.metrics.user_metrics import UserMetric, load_metrics, own_values
 from spheretwin.models.base.errors import InputError, SpheretwinError
@@ -27,8 +28,8 @@ from spheretwin.models.telemetry.signals import ANGLES
 from spheretwin.models.telemetry.status import Status
 from spheretwin.models.telemetry.table import TelemetryBuffer
 from spheretwin.outputs import Outputs
-from spheretwin.reduction import PlannedRun
-from spheretwin.replay import RunPlan
+from spheretwin.records import replay
+from spheretwin.records.replay import RunPlan
 from spheretwin.run import Run, summary
 from spheretwin.scenario import reading
 from spheretwin.scenario.reading import shipped

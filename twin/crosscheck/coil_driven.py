@@ -16,9 +16,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from spheretwin import assembly
 from spheretwin import scenario as scenarios
-from spheretwin.active_config import initial_config
+from spheretwin.config.active_config import initial_config
 from spheretwin.crosscheck.equations import equations_of
 from spheretwin.crosscheck.scale import Scale, scale_of
 from spheretwin.crosscheck.trajectories import (
@@ -30,12 +29,13 @@ from spheretwin.crosscheck.trajectories import (
     solve,
 )
 from spheretwin.linear import Magnetics
+from spheretwin.loop import assembly
+from spheretwin.loop.stages import PlantStage, call_advance, plant_stage
 from spheretwin.models.actuator import Actuator
 from spheretwin.models.base.checks import Check
 from spheretwin.models.base.compiled import compiled
 from spheretwin.models.mjcf import read
 from spheretwin.plant.plant_tick import GOING, PlantOutput, TickInput
-from spheretwin.stages import PlantStage, call_advance, plant_stage
 
 Array = NDArray[np.float64]
 

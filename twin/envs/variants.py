@@ -9,14 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spheretwin import scenario as scenarios
-from spheretwin.active_config import initial_config
+from spheretwin.config.active_config import initial_config
+from spheretwin.config.plant_model import parameters
 from spheretwin.electronics.coil import CurrentLag, fill_lag
 from spheretwin.envs.settings import Settings
-from spheretwin.inputs import InputGenerator
+from spheretwin.loop.inputs import InputGenerator
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.base.record import Rows
 from spheretwin.plant.plant_step import Parameters
-from spheretwin.plant_model import parameters
 from spheretwin.scenario.sections import Scenario
 
 Array = NDArray[np.float64]

@@ -8,9 +8,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from spheretwin import assembly
 from spheretwin import scenario as scenarios
-from spheretwin.active_config import initial_config
+from spheretwin.config.active_config import initial_config
 from spheretwin.control.allocation import ALLOCATIONS
 from spheretwin.control.compensators import Compensators
 from spheretwin.control.controller import Controller, controller_of
@@ -21,6 +20,7 @@ from spheretwin.control.laws import afsm, afsm_eso, pd
 from spheretwin.export.c_text import constant, definitions, header, source
 from spheretwin.export.motion_code import controller_motion
 from spheretwin.export.plant_code import NUMBERS, magnetic_tables
+from spheretwin.loop import assembly
 from spheretwin.models.base.compiled import uncompiled
 from spheretwin.models.base.errors import InputError
 from spheretwin.scenario.sections import ResolvedScenario

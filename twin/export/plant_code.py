@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spheretwin import scenario as scenarios
-from spheretwin.active_config import initial_config
+from spheretwin.config.active_config import initial_config
+from spheretwin.config.plant_model import parameters
 from spheretwin.export.c_text import constant, definitions, header
 from spheretwin.models import magnetics
 from spheretwin.models.base.errors import InputError
@@ -19,7 +20,6 @@ from spheretwin.models.magnetics import Arrangement, Tables
 from spheretwin.models.mjcf_reader import HINGES
 from spheretwin.plant.magnet_heat import initial_degC, remanence
 from spheretwin.plant.plant_step import Parameters
-from spheretwin.plant_model import parameters
 from spheretwin.scenario.sections import ResolvedScenario
 
 Array = NDArray[np.float64]

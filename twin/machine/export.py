@@ -10,9 +10,10 @@ from typing import Any
 
 import numpy as np
 
+from spheretwin.config.plant_model import parameters_of
 from spheretwin.electronics.drive_chain import DriveChain, fill_drive
 from spheretwin.electronics.sensor_chain import SensorChain, fill_sensors
-from spheretwin.hardware_assembly import delays_of
+from spheretwin.loop.hardware_assembly import delays_of
 from spheretwin.machine.files import CONDITIONS, CURRENTS, conditions_of, log_signals
 from spheretwin.machine.log import COMMANDED, MEASURED
 from spheretwin.models.base.errors import SpheretwinError
@@ -21,7 +22,6 @@ from spheretwin.models.telemetry.parquet import TelemetryFile
 from spheretwin.models.telemetry.run_record import versions
 from spheretwin.models.telemetry.signals import Signal
 from spheretwin.models.telemetry.table import Table
-from spheretwin.plant_model import parameters_of
 from spheretwin.scenario.files import files_of
 from spheretwin.session import Session
 

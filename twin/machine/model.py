@@ -9,13 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spheretwin import scenario as scenarios
-from spheretwin.active_config import initial_config
+from spheretwin.config.active_config import initial_config
+from spheretwin.config.plant_model import parameters_of
 from spheretwin.electronics.sensor_chain import SensorsSection
 from spheretwin.models.actuator import Actuator
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.coil_group import PerGroup
 from spheretwin.plant.plant_step import Parameters
-from spheretwin.plant_model import parameters_of
 from spheretwin.scenario.sections import ResolvedScenario, Scenario
 
 Array = NDArray[np.float64]

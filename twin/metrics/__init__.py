@@ -8,8 +8,8 @@ from spheretwin.metrics.effort import (
     RotorTemperature,
     SaturatedFraction,
 )
+from spheretwin.metrics.reduction import Metric
 from spheretwin.metrics.tracking import MaxAbsError, Overshoot, RmsError, SettlingTime, TailRmsError
-from spheretwin.reduction import Metric
 
 METRICS: dict[str, type[Metric]] = {
     "max_abs_error_rad": MaxAbsError,

@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spheretwin.control.applied_torque import lag_step
+from spheretwin.metrics.reduction import Metric, PlannedRun
 from spheretwin.metrics.tracking import add_largest
 from spheretwin.models.base.compiled import rounding_each
-from spheretwin.reduction import Metric, PlannedRun
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]

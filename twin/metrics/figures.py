@@ -6,9 +6,9 @@ from collections.abc import Iterable
 from typing import Any
 
 from spheretwin.metrics import CHECKS, METRICS
+from spheretwin.metrics.reduction import PlannedRun, Reduction, write_all
 from spheretwin.models.telemetry.signals import Signal
 from spheretwin.models.telemetry.table import Table
-from spheretwin.reduction import PlannedRun, Reduction, write_all
 
 
 class Figures:

@@ -7,9 +7,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from spheretwin.metrics.reduction import Metric, PlannedRun
 from spheretwin.models.base.compiled import rounding_each
 from spheretwin.models.telemetry.signals import ANGLES
-from spheretwin.reduction import Metric, PlannedRun
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]

@@ -14,7 +14,7 @@ from spheretwin.models.actuator import MJCF_PATH, TORQUE_CURVE_PATH
 from spheretwin.models.base.cache import cache_folder
 from spheretwin.models.base.errors import SpheretwinError
 from spheretwin.models.telemetry.run_record import versions
-from spheretwin.provenance import digest
+from spheretwin.records.provenance import digest
 from spheretwin.scenario.reading import named_files
 from spheretwin.scenario.sections import Scenario
 from spheretwin.study.journal import Journal

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import cont2discrete
 
-from spheretwin.active_config import initial_config
+from spheretwin.config.active_config import initial_config
 from spheretwin.control.law import Law
 from spheretwin.linear import linearise
 from spheretwin.models.telemetry.table import Table

@@ -20,7 +20,7 @@ _MODULES = {
     "State": "spheretwin.plant.plant_step",
     "step": "spheretwin.plant.plant_step",
     "torque_matrix": "spheretwin.plant.plant_step",
-    "parameters": "spheretwin.plant_model",
+    "parameters": "spheretwin.config.plant_model",
     "linearise": "spheretwin.linear",
 }
 

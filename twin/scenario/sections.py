@@ -18,7 +18,6 @@ from spheretwin.control.manual_currents import ManualSection
 from spheretwin.control.supervision.fault_detector import DetectorSection
 from spheretwin.control.supervision.watchdog import WatchdogSection
 from spheretwin.control.user_law import parameters_of
-from spheretwin.disturbances import Disturbance
 from spheretwin.electronics.delay import steps_of
 from spheretwin.electronics.drive_section import DriveSection, ResolvedDrive
 from spheretwin.electronics.sensor_chain import SensorsSection
@@ -33,6 +32,7 @@ from spheretwin.scenario.plant_sections import (
     Section,
 )
 from spheretwin.trajectories import Trajectory
+from spheretwin.trajectories.disturbances import Disturbance
 
 # A tick must end in reasonable time: 10,000 physics steps take some 50 ms.
 MOST_SUBSTEPS = 10_000

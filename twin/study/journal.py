@@ -15,11 +15,11 @@ from typing import Any, BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
-from spheretwin import provenance
 from spheretwin.models.base.cache import sources_digest
 from spheretwin.models.base.errors import InputError, SpheretwinError, without_breaks
 from spheretwin.models.base.user_code import file_of, is_reference
 from spheretwin.models.telemetry.run_record import versions
+from spheretwin.records import provenance
 from spheretwin.scenario import reading
 from spheretwin.study.grid import Row
 from spheretwin.study.row import Result, Rows

@@ -10,11 +10,12 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from spheretwin.active_config import fill_defaults
-from spheretwin.block import RunBlock
-from spheretwin.channels import CHANNELS
+from spheretwin.config.active_config import fill_defaults
+from spheretwin.loop.block import RunBlock
+from spheretwin.loop.channels import CHANNELS
 from spheretwin.metrics import METRICS
 from spheretwin.metrics.figures import Figures
+from spheretwin.metrics.reduction import PlannedRun
 from spheretwin.metrics.user_metrics import UserMetric, load_metrics, own_values
 from spheretwin.models.base.columns import MixedRowsError
 from spheretwin.models.base.errors import (
@@ -29,8 +30,7 @@ from spheretwin.models.base.turns import outside_turn
 from spheretwin.models.base.user_code import is_reference
 from spheretwin.models.telemetry.parquet import TelemetryFile
 from spheretwin.models.telemetry.table import TelemetryBuffer
-from spheretwin.provenance import record_of
-from spheretwin.reduction import PlannedRun
+from spheretwin.records.provenance import record_of
 from spheretwin.run import Run
 from spheretwin.scenario import reading
 from spheretwin.scenario.changes import check_events, fields_with, is_tag

@@ -10,8 +10,8 @@ import pyarrow.parquet as parquet
 from problem import Problem, problem
 
 from spheretwin import scenario as scenarios
-from spheretwin.active_config import fill_defaults
-from spheretwin.block import RunBlock
+from spheretwin.config.active_config import fill_defaults
+from spheretwin.loop.block import RunBlock
 from spheretwin.scenario.files import files_of
 from spheretwin.scenario.sections import Scenario
 from spheretwin.study import grid, row, runner

@@ -4,7 +4,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from spheretwin.disturbances import Draws
 from spheretwin.electronics.coil import CurrentLag, fill_lag
 from spheretwin.models import actuator as actuators
 from spheretwin.models import mjcf
@@ -13,6 +12,7 @@ from spheretwin.models.magnetics import TorqueModel, torque_model
 from spheretwin.plant.mass_properties import true_model
 from spheretwin.plant.mujoco_rotor import MujocoRotor
 from spheretwin.scenario.sections import Scenario
+from spheretwin.trajectories.disturbances import Draws
 
 
 class Problem(NamedTuple):

@@ -9,7 +9,7 @@ import sys
 import numpy as np
 import pytest
 
-from spheretwin import cli, replay
+from spheretwin import cli
 from spheretwin import scenario as scenarios
 from spheretwin.analysis import recovery
 from spheretwin.analysis.recorded_run import read
@@ -18,7 +18,8 @@ from spheretwin.models.base.errors import InputError
 from spheretwin.models.telemetry.checksums import METADATA, NO_CHECKSUMS
 from spheretwin.models.telemetry.parquet import TelemetryFile
 from spheretwin.outputs import Outputs
-from spheretwin.provenance import record_of
+from spheretwin.records import replay
+from spheretwin.records.provenance import record_of
 from spheretwin.session import Session
 from spheretwin.simulation import follow
 from tests.twin.analysis.runs import PLANT, WITH_EVENTS

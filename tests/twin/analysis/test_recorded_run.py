@@ -19,7 +19,7 @@ from spheretwin.models.base.errors import InputError
 from spheretwin.models.telemetry.parquet import TelemetryFile
 from spheretwin.models.telemetry.table import read_parquet
 from spheretwin.outputs import Outputs
-from spheretwin.provenance import record_of
+from spheretwin.records.provenance import record_of
 from spheretwin.run import figures_of
 from spheretwin.session import Session
 from spheretwin.simulation import simulate

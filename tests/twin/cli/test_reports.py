@@ -9,8 +9,8 @@ import pytest
 from spheretwin import cli
 from spheretwin import scenario as scenarios
 from spheretwin.cli import simulate
+from spheretwin.loop.runtime import Runtime
 from spheretwin.models.base.errors import InputError, SpheretwinError
-from spheretwin.runtime import Runtime
 from spheretwin.scenario.reading import shipped
 from spheretwin.session import Session
 from tests.twin.cli.calls import call, refusal, succeeded, under_law

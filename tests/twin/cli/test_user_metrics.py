@@ -6,7 +6,7 @@ from spheretwin import scenario as scenarios
 from spheretwin.cli import simulate
 from spheretwin.models.telemetry.parquet import TelemetryFile
 from spheretwin.models.telemetry.table import read_parquet
-from spheretwin.provenance import record_of
+from spheretwin.records.provenance import record_of
 from spheretwin.session import Session
 from tests.twin.cli.calls import call, refusal
 

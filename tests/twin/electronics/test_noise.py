@@ -7,12 +7,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from spheretwin.disturbances import term_draws
 from spheretwin.electronics import random_streams
 from spheretwin.electronics.drive_section import STAGES as DRIVE_STAGES
 from spheretwin.electronics.random_streams import errors, noise_table, stream_key, uniforms, width_of
 from spheretwin.electronics.sensor_chain import STAGES as SENSOR_STAGES
 from spheretwin.faults.schedule import part_names
+from spheretwin.trajectories.disturbances import term_draws
 
 SEED, TICKS, WIDTH, STREAM = 7, 400, 11, "adc noise"
 

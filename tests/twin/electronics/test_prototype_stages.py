@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from spheretwin import assembly
 from spheretwin import scenario as scenarios
 from spheretwin.control.estimators import ESTIMATORS
 from spheretwin.control.estimators.estimator import estimates
 from spheretwin.electronics.random_streams import noise_table
 from spheretwin.electronics.sensor_chain import SensorChain, fill_sensors, noise_streams, sense
+from spheretwin.loop import assembly
 from spheretwin.models.lagrangian import inertia_matrix
 from spheretwin.session import Session
 from spheretwin.simulation import simulate

@@ -8,6 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import spheretwin
+from spheretwin.config.plant_model import parameters
 from spheretwin.machine import Log, identify
 from spheretwin.machine.identification import Problem, unidentifiable
 from spheretwin.machine.parameters import KINDS, Machine, members, selected, sensor_angles
@@ -16,7 +17,6 @@ from spheretwin.machine.windows import Shooting, Window, windows_of
 from spheretwin.machine.workflow import CALIBRATED
 from spheretwin.models import actuator
 from spheretwin.models.base.errors import InputError
-from spheretwin.plant_model import parameters
 
 SCENARIO = "sinusoid"
 KNOWN = {**CALIBRATED, "duration": 1.6}

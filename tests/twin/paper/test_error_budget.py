@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from spheretwin import scenario as scenarios
-from spheretwin.active_config import initial_config
+from spheretwin.config.active_config import initial_config
 from spheretwin.paper import error_budget
 from spheretwin.paper.error_budget import BASES, PROTOTYPE, STAGES, Budget, fields_of
 from spheretwin.paper.experiment import Outcomes

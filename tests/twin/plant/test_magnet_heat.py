@@ -12,10 +12,10 @@ from spheretwin.electronics.coil import advance_temperature
 from spheretwin.electronics.drive_chain import DriveChain, fill_drive
 from spheretwin.electronics.drive_section import ResolvedDrive
 from spheretwin.metrics.figures import Figures
+from spheretwin.metrics.reduction import PlannedRun
 from spheretwin.models.actuator import load
 from spheretwin.models.base.errors import InputError
 from spheretwin.plant.magnet_heat import MagnetHeat, ResolvedThermal, advance_heat, begin_heat, fill_heat
-from spheretwin.reduction import PlannedRun
 from spheretwin.scenario.hardware import MACHINE
 from spheretwin.session import Session
 

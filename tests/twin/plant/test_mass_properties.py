@@ -4,9 +4,10 @@ import mujoco
 import numpy as np
 import pytest
 
-from spheretwin import assembly, linearise
+from spheretwin import linearise
 from spheretwin import scenario as scenarios
-from spheretwin.active_config import initial_config
+from spheretwin.config.active_config import initial_config
+from spheretwin.loop import assembly
 from spheretwin.models import actuator as actuators
 from spheretwin.models import mjcf
 from spheretwin.models.base.errors import InputError

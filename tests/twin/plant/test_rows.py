@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from spheretwin import scenario as scenarios
-from spheretwin.active_config import initial_config
+from spheretwin.config.active_config import initial_config
 from spheretwin.electronics.drive_chain import DriveChain
 from spheretwin.models import actuator as actuators
 from spheretwin.models import mjcf

@@ -6,8 +6,8 @@ import pytest
 
 from spheretwin import cli
 from spheretwin import scenario as scenarios
-from spheretwin.active_config import initial_config
-from spheretwin.config_warnings import warnings_of
+from spheretwin.config.active_config import initial_config
+from spheretwin.config.config_warnings import warnings_of
 from spheretwin.machine.link.limits import Limits, LinkSettings
 from spheretwin.machine.link.machine_link import Link
 from spheretwin.models.base.errors import InputError

@@ -7,7 +7,7 @@ from spheretwin import cli
 from spheretwin import scenario as scenarios
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.telemetry.table import read_parquet
-from spheretwin.provenance import record_of
+from spheretwin.records.provenance import record_of
 from spheretwin.session import Session
 from spheretwin.simulation import simulate
 from spheretwin.trajectories.shapes import Sinusoid

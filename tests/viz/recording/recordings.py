@@ -3,7 +3,7 @@
 import pyarrow as pa
 
 from spheretwin import scenario as scenarios
-from spheretwin.provenance import facts_of
+from spheretwin.records.provenance import facts_of
 from spheretwin.session import Session
 from spheretwin.simulation import follow
 from spheretwin.viz.layout.view import TELEMETRY, TIMELINE

@@ -12,7 +12,7 @@ from rerun.chunk import RrdReader
 from spheretwin import scenario as scenarios
 from spheretwin.models.telemetry.signals import width
 from spheretwin.models.telemetry.table import Table
-from spheretwin.provenance import facts_of
+from spheretwin.records.provenance import facts_of
 from spheretwin.session import Session
 from spheretwin.simulation import follow
 from spheretwin.viz.layout.view import EVENTS, SCENARIO, SUMMARY, TELEMETRY

@@ -6,14 +6,14 @@ from typing import Any
 
 import numpy as np
 
-from spheretwin.disturbances import Disturbance
 from spheretwin.electronics.drive_section import DriveSection
 from spheretwin.electronics.sensor_chain import SensorsSection
-from spheretwin.external import Measurement
+from spheretwin.loop.external import Measurement
 from spheretwin.machine.link.codec import Values
 from spheretwin.models.base.errors import InputError
 from spheretwin.scenario.plant_sections import NominalSection, PlantSection
 from spheretwin.scenario.sections import ResolvedScenario, Scenario
+from spheretwin.trajectories.disturbances import Disturbance
 
 PLANT_SECTIONS = frozenset({"plant", "drive", "sensors", "disturbance", "fault"})
 """Sections that describe the machine: the machine itself replaces them."""

@@ -10,7 +10,7 @@ from pydantic import ConfigDict, Field
 
 from spheretwin.control.supervision.watchdog import Reason
 from spheretwin.electronics.drive_section import ResolvedDrive
-from spheretwin.external import Measurement
+from spheretwin.loop.external import Measurement
 from spheretwin.scenario.fields import SettingsModel
 
 Array = NDArray[np.float64]

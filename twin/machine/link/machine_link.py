@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spheretwin.control.supervision.watchdog import Reason
-from spheretwin.external import ExternalPlant, Measurement
+from spheretwin.loop.external import ExternalPlant, Measurement
 from spheretwin.machine.link import frame_format
 from spheretwin.machine.link.admission import ControllerAdmission
 from spheretwin.machine.link.channel import Channel

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from spheretwin.external import ExternalController, Measurement
+from spheretwin.loop.external import ExternalController, Measurement
 from spheretwin.machine.link.admission import MachineAdmission
 from spheretwin.machine.link.channel import Channel
 from spheretwin.machine.link.codec import Values

@@ -32,7 +32,7 @@ def prepare(rows: Rows) -> Rows:
     InputError
         There is no GPU, or it runs none of the rows.
     """
-    from spheretwin.cuda_block import CudaBlock, check_gpu_runs  # imports the compiler for GPUs
+    from spheretwin.loop.cuda_block import CudaBlock, check_gpu_runs  # imports the compiler for GPUs
 
     if own := next(filter(is_reference, rows.study.metrics), None):
         raise InputError(f"cuda: expected figures of this package, received {own}; engine processes runs it")

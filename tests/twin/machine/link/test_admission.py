@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from spheretwin.external import Measurement
+from spheretwin.loop.external import Measurement
 from spheretwin.machine.link import frame_format
 from spheretwin.machine.link.admission import (
     REQUESTS,

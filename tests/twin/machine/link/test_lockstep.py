@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from spheretwin import scenario as scenarios
-from spheretwin.external import Measurement
+from spheretwin.loop.external import Measurement
 from spheretwin.machine.link import frame_format
 from spheretwin.machine.link.controller_scenario import controller_scenario, left_out
 from spheretwin.machine.link.limits import LinkSettings

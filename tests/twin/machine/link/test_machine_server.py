@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from spheretwin.external import Measurement
+from spheretwin.loop.external import Measurement
 from spheretwin.machine.link.frame_format import Flags
 from spheretwin.machine.link.machine_server import MachineServer
 from tests.twin.machine.link.lines import GROUPS, MEASUREMENT, PERIOD_s, Script, command, machine_channel

@@ -98,7 +98,7 @@ def test_a_row_that_takes_its_process_along_is_told_of(study, machines, tmp_path
 
 def test_a_node_with_other_sources_is_refused_in_one_line(study, machines, wanted, tmp_path):
     package = copy_package(tmp_path / "other")
-    with (package / "loop.py").open("a") as file:
+    with (package / "session.py").open("a") as file:
         file.write("# another one\n")
     (tmp_path / "other" / "sitecustomize.py").write_text(FIRST)
     other = machines.add_node(num_cpus=1, env_vars={"PYTHONPATH": str(tmp_path / "other")})

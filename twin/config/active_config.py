@@ -9,7 +9,6 @@ from typing import Any, NamedTuple, TypeVar, cast
 import numpy as np
 from pydantic import BaseModel
 
-from spheretwin import assembly
 from spheretwin.control.law import Law
 from spheretwin.control.law_components.parameters import COMPENSATORS
 from spheretwin.control.laws import LAWS
@@ -17,6 +16,7 @@ from spheretwin.electronics.coil_coupling import check_coupling
 from spheretwin.electronics.drive_section import DriveSection, ResolvedDrive, drive_sheet
 from spheretwin.electronics.sensor_chain import SensorsSection, sensor_sheet
 from spheretwin.faults.fault import Fault
+from spheretwin.loop import assembly
 from spheretwin.models import mjcf
 from spheretwin.models.actuator import Actuator
 from spheretwin.models.base.errors import InputError, distinct_texts, shown

@@ -8,13 +8,13 @@ from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
-from spheretwin import provenance
 from spheretwin import scenario as scenarios
 from spheretwin.control.laws import LAWS
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.base.user_code import file_of, is_reference
 from spheretwin.models.telemetry.run_record import Change, RunRecord
 from spheretwin.models.telemetry.table import read_parquet
+from spheretwin.records import provenance
 from spheretwin.scenario import reading
 from spheretwin.scenario.changes import EXTERNAL
 from spheretwin.scenario.sections import Scenario

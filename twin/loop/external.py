@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spheretwin.control.supervision.watchdog import Reason, trip
-from spheretwin.loop import INTERRUPTED, NO_EXTERNAL, External
+from spheretwin.loop.closed_loop import INTERRUPTED, NO_EXTERNAL, External
 from spheretwin.models.base.compiled import COMPILES, uncompiled
 from spheretwin.models.base.errors import InputError, shown
 from spheretwin.models.base.record import Rows

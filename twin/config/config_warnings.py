@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from math import inf
 
-from spheretwin.active_config import inapplicable
+from spheretwin.config.active_config import inapplicable
 from spheretwin.models import mjcf
 from spheretwin.models.actuator import Actuator
 from spheretwin.models.base.errors import distinct_texts

@@ -14,23 +14,23 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from spheretwin import loop as loops
-from spheretwin.assembly import assembled
 from spheretwin.control.controller import controller_of
 from spheretwin.control.supervision.watchdog import REASONS, Reason
-from spheretwin.hardware_assembly import faults_of
-from spheretwin.inputs import BLOCK_TICKS, InputGenerator
-from spheretwin.loop import Inputs, inputs_of, loop
+from spheretwin.loop import closed_loop as loops
+from spheretwin.loop.assembly import assembled
+from spheretwin.loop.closed_loop import Inputs, inputs_of, loop
+from spheretwin.loop.hardware_assembly import faults_of
+from spheretwin.loop.inputs import BLOCK_TICKS, InputGenerator
+from spheretwin.loop.stages import Stages, stages_of
 from spheretwin.metrics.figures import Figures
+from spheretwin.metrics.reduction import PlannedRun
 from spheretwin.models.base.columns import Columns
 from spheretwin.models.base.compiled import allocation_free, for_types_of
 from spheretwin.models.telemetry.signals import width
 from spheretwin.models.telemetry.status import BY_CODE, Status
 from spheretwin.plant.plant_tick import GOING
-from spheretwin.reduction import PlannedRun
 from spheretwin.scenario.files import Files
 from spheretwin.scenario.sections import ResolvedScenario
-from spheretwin.stages import Stages, stages_of
 
 
 class Ending(NamedTuple):

@@ -15,14 +15,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spheretwin.control.manual_currents import sample_currents
-from spheretwin.disturbances import Draws, term_draws
 from spheretwin.electronics.random_streams import noise_table
 from spheretwin.electronics.sensor_chain import noise_streams
-from spheretwin.hardware_assembly import fault_streams
-from spheretwin.loop import Inputs
+from spheretwin.loop.closed_loop import Inputs
+from spheretwin.loop.hardware_assembly import fault_streams
 from spheretwin.models.base.columns import Columns
 from spheretwin.models.base.errors import InputError
 from spheretwin.scenario.sections import Scenario
+from spheretwin.trajectories.disturbances import Draws, term_draws
 from spheretwin.trajectories.trajectory import Sampled, checked
 
 BLOCK_TICKS = 1000

@@ -14,9 +14,9 @@ import numpy as np
 from numba import types
 from numpy.typing import NDArray
 
-from spheretwin.channels import Channel, logged_channels
 from spheretwin.electronics.sensor_chain import sense
 from spheretwin.electronics.transducers import sense_currents
+from spheretwin.loop.channels import Channel, logged_channels
 from spheretwin.models.base.addresses import caller_of
 from spheretwin.models.base.compiled import (
     COMPILES,

@@ -8,10 +8,10 @@ from typing import Any
 
 from spheretwin.control.law import Law
 from spheretwin.control.laws import LAWS
+from spheretwin.loop.runtime import RuntimeState
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.telemetry.run_record import Change
 from spheretwin.models.telemetry.status import Status
-from spheretwin.runtime import RuntimeState
 from spheretwin.scenario.files import Files, digest
 from spheretwin.scenario.sections import ResolvedScenario
 

@@ -20,6 +20,7 @@ from spheretwin.control.controller import NO_TORQUE, Controller, ControllerData,
 from spheretwin.control.estimators import estimator as estimators
 from spheretwin.control.law import Law
 from spheretwin.control.supervision.watchdog import GO, Reason, count_rundown, replace_invalid, trip
+from spheretwin.loop.stages import Stages, call_advance, call_sense, call_write
 from spheretwin.models.base.addresses import caller_of
 from spheretwin.models.base.callback_errors import report_error
 from spheretwin.models.base.compiled import (
@@ -44,7 +45,6 @@ from spheretwin.plant.plant_tick import (
     PlantOutput,
     TickInput,
 )
-from spheretwin.stages import Stages, call_advance, call_sense, call_write
 
 Array = NDArray[np.float64]
 

@@ -8,7 +8,6 @@ from typing import Any, NamedTuple, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from spheretwin.channels import CHANNELS
 from spheretwin.control.allocation import ALLOCATIONS
 from spheretwin.control.applied_torque import fill_applied_torque
 from spheretwin.control.compensators.feed_forward import NominalRotor, fill_feed_forward
@@ -20,8 +19,10 @@ from spheretwin.control.law import Law, NominalModel
 from spheretwin.control.laws import LAWS
 from spheretwin.electronics.sensor_chain import SensorChain, fill_sensors
 from spheretwin.faults.schedule import part_names
-from spheretwin.hardware_assembly import delays_of, fill_drive_of, fill_supervision
-from spheretwin.loop import Functions, dispatch
+from spheretwin.loop.channels import CHANNELS
+from spheretwin.loop.closed_loop import Functions, dispatch
+from spheretwin.loop.hardware_assembly import delays_of, fill_drive_of, fill_supervision
+from spheretwin.loop.stages import Stages, compiled_stages, plant_stage
 from spheretwin.models.actuator import Actuator
 from spheretwin.models.base.columns import Columns
 from spheretwin.models.base.errors import InputError, SpheretwinError, exception_text, shown
@@ -39,7 +40,6 @@ from spheretwin.plant.rotor import Rotor, RotorSettings
 from spheretwin.scenario.files import Files
 from spheretwin.scenario.plant_sections import ResolvedNominal, ResolvedPlant
 from spheretwin.scenario.sections import ResolvedScenario
-from spheretwin.stages import Stages, compiled_stages, plant_stage
 
 Array = NDArray[np.float64]
 T = TypeVar("T")

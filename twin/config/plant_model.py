@@ -7,9 +7,9 @@ from typing import Any, cast
 
 import numpy as np
 
-from spheretwin import assembly
 from spheretwin import scenario as scenarios
-from spheretwin.active_config import initial_config
+from spheretwin.config.active_config import initial_config
+from spheretwin.loop import assembly
 from spheretwin.models.base.errors import InputError
 from spheretwin.plant.cable import constant_torque_Nm
 from spheretwin.plant.lagrangian_rotor import LagrangianRotor

@@ -15,12 +15,13 @@ import numpy as np
 from numba.extending import is_jitted
 from numpy.typing import NDArray
 
-from spheretwin.assembly import estimator_of
-from spheretwin.block import Ending, RunBlock
-from spheretwin.channels import Channel, logged_channels
 from spheretwin.control.allocation import ALLOCATIONS
 from spheretwin.control.controller import Controller
-from spheretwin.loop import External, Inputs, inputs_of, is_user_law, loop
+from spheretwin.loop.assembly import estimator_of
+from spheretwin.loop.block import Ending, RunBlock
+from spheretwin.loop.channels import Channel, logged_channels
+from spheretwin.loop.closed_loop import External, Inputs, inputs_of, is_user_law, loop
+from spheretwin.loop.stages import Stages, advance_stage, sense_stage
 from spheretwin.models.base import cuda
 from spheretwin.models.base.compiled import allocation_free, compile_error
 from spheretwin.models.base.errors import InputError, LawError
@@ -30,7 +31,6 @@ from spheretwin.models.telemetry.status import Status
 from spheretwin.plant.plant_tick import ENGINES, GOING
 from spheretwin.scenario.files import Files
 from spheretwin.scenario.sections import ResolvedScenario
-from spheretwin.stages import Stages, advance_stage, sense_stage
 
 ENGINE = "lagrangian"
 

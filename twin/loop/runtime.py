@@ -10,16 +10,17 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from spheretwin import loop as loops
-from spheretwin.assembly import assembled, law_of, rotor_of, same_nominal_model
 from spheretwin.control.controller import controller_of
 from spheretwin.control.law import Law
 from spheretwin.control.supervision.watchdog import REASONS, Reason, transfer_trip
 from spheretwin.electronics.drive_chain import transfer_drive
 from spheretwin.electronics.sensor_chain import measure_again
-from spheretwin.external import Connection, ExternalController, ExternalPlant
-from spheretwin.hardware_assembly import faults_of
-from spheretwin.loop import is_python_law, is_user_law, step_that_writes
+from spheretwin.loop import closed_loop as loops
+from spheretwin.loop.assembly import assembled, law_of, rotor_of, same_nominal_model
+from spheretwin.loop.closed_loop import is_python_law, is_user_law, step_that_writes
+from spheretwin.loop.external import Connection, ExternalController, ExternalPlant
+from spheretwin.loop.hardware_assembly import faults_of
+from spheretwin.loop.stages import stages_of
 from spheretwin.models.base.callback_errors import callback_errors
 from spheretwin.models.base.compiled import COMPILES, for_types_of, uncompiled, without_fields
 from spheretwin.models.base.errors import InputError, LawError
@@ -30,7 +31,6 @@ from spheretwin.plant.rotor import Rotor
 from spheretwin.scenario.changes import StateChange
 from spheretwin.scenario.files import Files
 from spheretwin.scenario.sections import ResolvedScenario
-from spheretwin.stages import stages_of
 
 # Only for the types.
 NO_INPUTS = loops.Inputs(

@@ -1,0 +1,1 @@
+"""Configuration of a session: resolved scenario, its warnings, parameters of the plant step."""

@@ -1,0 +1,1 @@
+"""Records of a run: provenance, and replay from its telemetry."""
