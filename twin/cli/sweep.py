@@ -62,7 +62,7 @@ GO_ON = "sweep: finished rows are stored; the same command continues from there"
         cluster on this machine alone unless given
     --limit ROWS       run only the first rows; finished later rows stay in the table
     --row KEY          run only the row of this key, and print its figures
-    --optimise         tune the gains that the section [optimise] of the study names
+    --optimise         tune the gains that the section [optimise] of the study names; engine local or cuda
     --trials N         trials of each law, with --optimise
     --twin TWIN.toml   run each row on machines drawn from the covariance of an identified twin
     --draws N          machines of --twin; {DRAWS} unless given
@@ -197,6 +197,7 @@ def _optimised(study: Study, options: argparse.Namespace) -> bool:
             study,
             folder,
             trials=options.trials,
+            engine=options.engine,
             threads=options.threads,
             **tracking,
         )

@@ -161,7 +161,8 @@ def run(
         resumed, missing = stored.done(), planned - stored.done(planned)
         work = Work(rows)
         todo = (number for number in range(planned) if not stored.has(number))
-        order = Order(todo, missing, grid, work, threads, address, stop_requested)
+        most = threads or chosen.threads
+        order = Order(todo, missing, grid, work, most, address, stop_requested)
         try:
             first = _fill(stored, resumed + missing, chosen, order, done)
         except BaseException:

@@ -122,7 +122,7 @@ def test_plants_that_differ_end_the_study_and_keep_its_rows(tmp_path, monkeypatc
     monkeypatch.setattr(agreement, "_endings", elsewhere)
     monkeypatch.setattr(agreement, "EVERY", 5)
     monkeypatch.setattr("spheretwin.study.engines.threads.AHEAD", 4)  # fewer than the rows behind the fault
-    monkeypatch.setattr("spheretwin.study.engines.engine.MOST_ROWS", 1)
+    monkeypatch.setattr("spheretwin.study.engines.engine.TASK_S", 0.0)  # batches of one row
     with pytest.raises(SpheretwinError) as failure:
         run_rows(loads(), tmp_path)
     wrong = {number for number, _ in checked if number > 0}  # rows that had been handed out have their turn

@@ -6,15 +6,13 @@ that no block takes, with events or stored telemetry, run on the processor, as t
 
 from __future__ import annotations
 
-from collections.abc import Generator
-from typing import Any
+from functools import partial
 
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.base.user_code import is_reference
 from spheretwin.study.engines import threads
-from spheretwin.study.engines.engine import Engine, Order
-from spheretwin.study.grid import Row
-from spheretwin.study.row import Result, Rows
+from spheretwin.study.engines.engine import Engine
+from spheretwin.study.row import Rows
 from spheretwin.study.study import FAST
 
 FIRST_ROWS, MOST_ROWS = 1024, 8192
@@ -41,10 +39,6 @@ def prepare(rows: Rows) -> Rows:
     return rows.with_block(CudaBlock)
 
 
-def run(order: Order) -> Generator[tuple[Row, Result | None]]:
-    """Yield the rows of an order with their results."""
-    own: Any = order._replace(threads=order.threads or THREADS)
-    yield from threads.run(own, FIRST_ROWS, MOST_ROWS)
-
-
-ENGINE = Engine(run, prepare=prepare)
+ENGINE = Engine(
+    partial(threads.run, first=FIRST_ROWS, most=MOST_ROWS), prepare=prepare, in_process=True, threads=THREADS
+)

@@ -127,11 +127,17 @@ class Engine(NamedTuple):
         Whether it needs the address of a cluster.
     prepare : callable
         Returns the rows of a study as the engine runs them.
+    in_process : bool
+        Whether its blocks run in threads of this process: those of a tuning do.
+    threads : int, optional
+        Threads unless they are given; number of cores without it.
     """
 
     run: Callable[[Order], Generator[tuple[Row, Result | None]]]
     takes_address: bool = False
     prepare: Callable[[Rows], Rows] = lambda rows: rows
+    in_process: bool = False
+    threads: int | None = None
 
 
 TASK_S = 0.5

@@ -110,4 +110,4 @@ def run(order: Order, first: int = 1, most: int = MOST_ROWS) -> Generator[tuple[
         yield from zip(rows, results, strict=True)
 
 
-ENGINE = Engine(run)
+ENGINE = Engine(run, in_process=True)

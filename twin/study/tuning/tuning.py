@@ -11,10 +11,12 @@ from contextlib import closing
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+from spheretwin.models.base.errors import InputError
 from spheretwin.models.base.files import make_folder
 from spheretwin.models.telemetry import checksums
 from spheretwin.study import agreement
 from spheretwin.study import optimise as objectives
+from spheretwin.study.engines import ENGINES
 from spheretwin.study.engines.threads import run_each
 from spheretwin.study.grid import Grid, Row
 from spheretwin.study.journal import Journal, digest_of
@@ -217,6 +219,7 @@ def tune(
     folder: Path,
     *,
     trials: int | None = None,
+    engine: str = "local",
     threads: int | None = None,
     done: Callable[[int, int], None] = lambda trials, of: None,
     stop_requested: Stop = lambda: False,
@@ -231,6 +234,8 @@ def tune(
         For storage and table. Trials of the same study in it are continued.
     trials : int, optional
         Of each law; the study's unless given. More are the same and some more.
+    engine : str
+        ``local``, threads of this process, or ``cuda``, a GPU.
     threads : int, optional
         Number of cores unless given; the result does not depend on it.
     done : callable
@@ -247,7 +252,11 @@ def tune(
     """
     started = time.perf_counter()
     optimise = gains.section_of(study)
-    rows = Rows(gains.judged(study))
+    engines = {name: own for name, own in ENGINES.items() if own.in_process}
+    if engine not in engines:
+        raise InputError(f"tuning: expected engine {' or '.join(engines)}, received {engine}")
+    rows = engines[engine].prepare(Rows(gains.judged(study)))
+    threads = threads or engines[engine].threads
     laws = [_Law(study, rows, law) for law in study.law or (None,)]
     gains.check(study, rows, [(law.gains, law.conditions[0]) for law in laws])
     make_folder(folder)

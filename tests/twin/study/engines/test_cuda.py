@@ -4,6 +4,7 @@ import pytest
 
 from spheretwin.models.base.errors import InputError
 from spheretwin.study.runner import run
+from spheretwin.study.tuning.tuning import tune
 from tests.twin.study.cases import rows_of, run_rows, study, values
 
 FIELDS = {"duration": 0.004, "hardware": "electronics"}
@@ -43,3 +44,25 @@ def test_refuses_what_a_gpu_does_not_run(tmp_path, monkeypatch, more, message):
     own = study(values("disturbance.load", 0.0), **more)
     with pytest.raises(InputError, match=message):
         run(own, tmp_path, engine="cuda")
+
+
+OPTIMISE = {
+    "trials": 4,
+    "sampler": "random",
+    "gain": [{"field": "controller.stiffness", "low": 100.0, "high": 900.0, "log": True}],
+    "objective": [{"metric": "rms_error_rad"}],
+}
+
+
+@pytest.mark.uncompiled
+def test_a_tuning_has_the_trials_of_the_processor(tmp_path):
+    tuned = study(values("disturbance.load", 0.0, 1.0), fields=FIELDS, law=[{"law": "pd"}], optimise=OPTIMISE)
+    here, there = (tune(tuned, tmp_path / engine, engine=engine).laws for engine in ("local", "cuda"))
+    assert there == here
+    assert len(here[0].trials) == OPTIMISE["trials"]
+
+
+def test_a_tuning_refuses_engines_of_other_processes(tmp_path):
+    tuned = study(values("disturbance.load", 0.0), optimise=OPTIMISE)
+    with pytest.raises(InputError, match="tuning: expected engine local or cuda, received ray"):
+        tune(tuned, tmp_path, engine="ray")
