@@ -137,21 +137,6 @@ def drifts():
     return crosscheck.drifts(t_s, panels, "Drifts")
 
 
-def closed_loops():
-    t_s = np.linspace(0.0, 1.0, 50)
-    three = np.stack([0.1 * t_s, 0.2 * t_s, t_s], axis=1)
-    return crosscheck.closed_loops(
-        t_s,
-        {"PD": (three, three[:30] + 0.5), "AFSM": (2 * three, 3 * three)},
-        {
-            "PD": (1e-9 * (1 + t_s[:30]), 1e-8),
-            "AFSM": (2e-9 * (1 + t_s), 1e-7),
-        },
-        ("one", "other"),
-        "Loops",
-    )
-
-
 def map_lines():
     count = np.arange(5.0)
     line = maps.StudyLine(1 + count, 0.5 + count, 2 + 3 * count, count == 3)
@@ -339,7 +324,6 @@ FIGURES = {
     "margins_of_laws": margins_of_laws, "ratios": ratios, "estimators": built.estimators,
     "crosscheck_margins": built.margins, "crosscheck_spreads": spreads, "crosscheck_motion": motion,
     "crosscheck_convergence": convergence, "crosscheck_drifts": drifts,
-    "crosscheck_closed_loops": closed_loops,
     "map": built.study_map, "map_narrow": narrow_map, "map_large": large_map, "map_lines": map_lines,
     "map_lines_of_names": map_lines_of_names, "heat": built.heat, "heat_of_many": heat_of_many,
     "workspace": workspace_figures, "distributions": spread_figures, "ranks": rank_figures,

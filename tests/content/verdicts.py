@@ -8,7 +8,7 @@ import numpy as np
 from spheretwin.crosscheck.dynamics import QUANTITIES, Dynamics
 from spheretwin.crosscheck.identities import Drift, FreeRotor
 from spheretwin.crosscheck.suite import CrosscheckResult
-from spheretwin.crosscheck.trajectories import ClosedLoop, Convergence, Pair, Trajectories
+from spheretwin.crosscheck.trajectories import Convergence, Trajectories
 from spheretwin.models import actuator as actuators
 from spheretwin.models.base.checks import Check
 from spheretwin.models.design.curve_check import (
@@ -20,7 +20,6 @@ from spheretwin.models.design.curve_check import (
 )
 from spheretwin.models.design.field_check import Band, FieldVerdict, Sources
 from spheretwin.models.design.torque_map import TorqueAtTilt, TorqueSurvey, WeakPose, WorkspaceVerdict
-from tests.content.runs import rows_of, session_of
 
 COUNT = np.arange(40.0)
 T_s = COUNT / 8
@@ -55,13 +54,6 @@ def evidence() -> CrosscheckResult:
         quantity: {spin: Drift(1e-12 * (place + 1) * COUNT, 1e-9) for spin in ("2π", "30")}
         for place, quantity in enumerate(("energy", "angular momentum", "attitude"))
     }
-    session = session_of("nutation")
-    mujoco, other = rows_of(session, 300), rows_of(session, 300)
-    other["q_rad"][:] += 1e-9 * np.arange(300)[:, None]
-    pairs = {
-        "AFSM": Pair(mujoco, other, True, "completed"),
-        "PD": Pair(mujoco.rows(0, 250), other.rows(0, 200), False, "left_workspace"),
-    }
     findings = {
         "dynamics": Dynamics(
             checks("inertia", "bias"), differences, {each.name: each.bound for each in QUANTITIES}
@@ -70,7 +62,6 @@ def evidence() -> CrosscheckResult:
             checks("motion", "order", "slope"), T_s, three, 1e-9 * three, convergence
         ),
         "torque-free rotor": FreeRotor(checks("energy", "momentum"), T_s, drifts),
-        "closed loop": ClosedLoop(checks("one", "two", "three", "four"), pairs),
     }
     return CrosscheckResult(findings)
 

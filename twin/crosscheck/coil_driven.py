@@ -21,7 +21,6 @@ from spheretwin.config.active_config import initial_config
 from spheretwin.crosscheck.equations import equations_of
 from spheretwin.crosscheck.scale import Scale, scale_of
 from spheretwin.crosscheck.trajectories import (
-    ENGINES,
     Convergence,
     convergence,
     order_check,
@@ -38,6 +37,8 @@ from spheretwin.models.mjcf import read
 from spheretwin.plant.plant_tick import GOING, PlantOutput, TickInput
 
 Array = NDArray[np.float64]
+
+ENGINES = {"MuJoCo": "mujoco", "Lagrangian": "lagrangian"}
 
 DURATION_s = 0.3
 SAMPLE_s = 0.01  # where motions are compared

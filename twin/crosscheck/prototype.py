@@ -13,8 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spheretwin import scenario as scenarios
-from spheretwin.crosscheck.scale import scale_of
-from spheretwin.crosscheck.trajectories import SCENARIO, STATUS, closed_loop_fields
+from spheretwin.crosscheck.scale import nutation_fields, scale_of
 from spheretwin.models.actuator import Actuator
 from spheretwin.models.base.checks import Check
 from spheretwin.models.base.errors import InputError
@@ -25,6 +24,8 @@ Array = NDArray[np.float64]
 
 STEP_s, FINE_s = 5e-4, 1.25e-4
 SEEDS = (1, 2, 3, 4)
+SCENARIO = "nutation"
+STATUS = {"left_workspace": "left the workspace"}
 FIELDS: dict[str, Any] = {
     "hardware": "prototype",
     "controller.law": "afsm_eso",
@@ -55,7 +56,7 @@ def compare(mjcf: Path, actuator: Actuator) -> Prototype:
         Reference and load are scaled to it.
     """
     scale = scale_of(actuator)
-    fields, bound = closed_loop_fields(mjcf, scale, FIELDS), BOUND if scale.tilt >= LEAST_TILT else None
+    fields, bound = nutation_fields(mjcf, scale, FIELDS), BOUND if scale.tilt >= LEAST_TILT else None
     try:
         coarse, fine = ([_run(fields, step_s, seed) for seed in SEEDS] for step_s in (STEP_s, FINE_s))
     except InputError as error:

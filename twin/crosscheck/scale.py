@@ -8,6 +8,7 @@ actuator is 1.
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -115,3 +116,22 @@ def _strength_Nm_A(actuator: Actuator, q: Array) -> float:
     """Return the largest torque of currents of norm 1 at a pose."""
     magnetics = Magnetics(actuator, np.ones(len(actuator.groups)))
     return float(np.linalg.norm(hinge_matrix(q, magnetics), 2))
+
+
+LOAD = 2.0
+"""Of the scenario nutation."""
+
+
+def nutation_fields(mjcf: Path, scale: Scale, overrides: dict[str, Any]) -> dict[str, Any]:
+    """Return the fields of the nutation of a machine, given those of the shipped actuator."""
+    load, torques = overrides.get("disturbance.load", LOAD), scale.load * np.array([2e-3, 1e-3, 1e-3])
+    return {
+        "plant.modelling_torque_Nm": torques.tolist(),
+        "disturbance.random_bound_Nm": 0.05 * scale.load,
+        "trajectory.alpha_amplitude_rad": 0.2 * scale.tilt,
+        "trajectory.beta_growth_rad_s": 0.2 * scale.tilt,
+        "trajectory.spin_rate_rad_s": 2 * np.pi * scale.spin,
+        **{name: scale.field(name, value) for name, value in overrides.items()},
+        "disturbance.load": load * scale.load,
+        "plant.mjcf": str(mjcf),
+    }

@@ -52,7 +52,6 @@ PARTS = (
     CheckPart("trajectories", lambda on: trajectories.compare_trajectories(on.mjcf, on.actuator)),
     CheckPart("torque-free rotor", lambda on: identities.check_free_rotor(on.mjcf, on.actuator)),
     CheckPart("coil-driven motion", lambda on: coil_driven.compare(on.mjcf, on.actuator)),
-    CheckPart("closed loop", lambda on: trajectories.compare_closed_loop(on.mjcf, on.actuator)),
     CheckPart("prototype", lambda on: prototype.compare(on.mjcf, on.actuator)),
 )
 
@@ -104,27 +103,6 @@ def run(
         begun(part.name)
         findings[part.name] = part.examine(subject)
     return CrosscheckResult(findings)
-
-
-def draw_closed_loop(evidence: CrosscheckResult) -> Drawing:
-    """The same run on two plants."""
-    from spheretwin.viz.figures import crosscheck
-
-    pairs = evidence.of(trajectories.ClosedLoop).pairs
-    longest = max(pairs.values(), key=lambda pair: len(pair.mujoco))
-    errors = {law: (pair.mujoco["error_rad"], pair.lagrangian["error_rad"]) for law, pair in pairs.items()}
-    apart = {law: (pair.difference_rad, trajectories.TRACE_BOUND_rad) for law, pair in pairs.items()}
-    titles = {law: f"{law}, load {2 if law == 'AFSM' else 0.5:g}" for law in pairs}
-    figure = crosscheck.closed_loops(
-        longest.mujoco["t_s"],
-        {titles[law]: pair for law, pair in errors.items()},
-        {titles[law]: series for law, series in apart.items()},
-        ("MuJoCo", "Lagrangian"),
-        "The nutation in closed loop on two plants",
-    )
-    return Drawing(
-        "closed_loop.svg", "The same run on MuJoCo and on the Lagrangian under our own RK4.", figure
-    )
 
 
 def draw_convergence(evidence: CrosscheckResult) -> Drawing:
@@ -200,7 +178,6 @@ FIGURES: tuple[Callable[[CrosscheckResult], Drawing], ...] = (
     draw_trajectory,
     draw_convergence,
     draw_torque_free,
-    draw_closed_loop,
 )
 
 

@@ -17,21 +17,15 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
-from spheretwin import scenario as scenarios
-from spheretwin.crosscheck.dynamics import MASS
-from spheretwin.crosscheck.equations import Equations, equations_of, ring_share
-from spheretwin.crosscheck.scale import Scale, scale_of
+from spheretwin.crosscheck.equations import Equations, equations_of
 from spheretwin.models.actuator import Actuator
 from spheretwin.models.base.checks import Check
 from spheretwin.models.base.errors import EngineError
 from spheretwin.models.mjcf import read
-from spheretwin.models.telemetry.table import Table
 from spheretwin.plant import lagrangian_rotor
 from spheretwin.plant.lagrangian_rotor import LagrangianRotor
 from spheretwin.plant.mass_properties import true_model
 from spheretwin.plant.mujoco_rotor import MujocoRotor
-from spheretwin.scenario.changes import with_change
-from spheretwin.simulation import simulate
 from spheretwin.trajectories.shapes import Nutation
 
 Array = NDArray[np.float64]
@@ -233,155 +227,3 @@ def _trajectory(difference: Array, neglected: float) -> Check:
 def _order(name: str, measured: Convergence, order: int) -> Check:
     why = f"order {order} in theory; the margin is what the next power of the step adds at these steps"
     return order_check(name, measured, order, why, "", ", against DOP853")
-
-
-SCENARIO = "nutation"
-
-# At the scenario's load of 2, PD lags so far behind that the currents saturate and the rotor leaves the
-# workspace, on either plant; at a quarter of it, it completes.
-CONDITIONS: dict[str, dict[str, Any]] = {
-    "PD": {"controller.law": "pd", "disturbance.load": 0.5},
-    "AFSM": {"controller.law": "afsm"},
-    "PD, general joint": {
-        "controller.law": "pd",
-        "disturbance.load": 0.5,
-        "plant.coulomb_Nm": [2e-3] * 3,
-        **{f"plant.mass.{name}": value for name, value in MASS},
-    },
-}
-
-TRACE_BOUND_rad = 1e-9
-RING_FACTOR_rad = 3.0  # an inertia wrong by a share moves a trace by a third of it
-LOAD = 2.0  # of the scenario
-STATUS = {"left_workspace": "left the workspace"}
-
-WHY = {
-    "PD": "a smooth law takes both runs to the same motion: only rounding and the gimbal rings (1e-12) part"
-    " them; an inertia wrong by 1e-8 of itself moves the trace by 3e-9",
-    "AFSM": "rounding and the gimbal rings (1e-12) as under PD, as long as they decide no sign of s: one"
-    " flipped sign moves the trace by 1e-5. For that |s| must be below 1e-10 at a tick, where it moves by"
-    " 1e-2 from tick to tick: less than once in a thousand runs",
-    "PD, general joint": "a smooth law and smooth friction, as under PD; both engines have the same rings",
-}
-
-# What the step size costs: a smooth law, and no random torque, so that the runs differ in nothing else.
-ENGINES = {"MuJoCo": "mujoco", "Lagrangian": "lagrangian"}
-LOOP_STEP_s, FINE_s = 5e-4, 5e-5
-SMOOTH: dict[str, Any] = {
-    "controller.law": "afsm_eso",
-    "controller.preset": "ideal",
-    "disturbance.random_bound_Nm": 0.0,
-    "seed": 101,
-}
-STEP_BOUND_rad = 2e-5
-
-
-class Pair(NamedTuple):
-    """One run on both plants."""
-
-    mujoco: Table
-    lagrangian: Table
-    same_end: bool
-    status: str  # on MuJoCo
-
-    @property
-    def difference_rad(self) -> Array:
-        """(n,) largest difference of any hinge angle, up to where the shorter run ended."""
-        rows = min(len(self.mujoco), len(self.lagrangian))
-        apart: Array = np.abs(self.mujoco["q_rad"][:rows] - self.lagrangian["q_rad"][:rows])
-        return np.max(apart, axis=1)
-
-
-class ClosedLoop(NamedTuple):
-    """Checks, and the runs they were taken from, by law."""
-
-    checks: list[Check]
-    pairs: dict[str, Pair]
-
-
-def compare_closed_loop(mjcf: Path, actuator: Actuator) -> ClosedLoop:
-    """Run the nutation under both laws on both plants, and under a smooth law at two physics steps.
-
-    Parameters
-    ----------
-    mjcf : Path
-        Model file that both engines read.
-    actuator : Actuator
-        Reference and load are scaled to its range, inertia and torque.
-    """
-    scale = scale_of(actuator)
-    neglected = ring_share(mjcf, actuator) if read(mjcf).has_ideal_joint else 0.0
-    pairs = {law: _run(mjcf, scale, overrides) for law, overrides in CONDITIONS.items()}
-    traces = [_trace(law, pair, neglected) for law, pair in pairs.items()]
-    return ClosedLoop([*traces, *(_step_size(mjcf, scale, name) for name in ENGINES)], pairs)
-
-
-def closed_loop_fields(mjcf: Path, scale: Scale, overrides: dict[str, Any]) -> dict[str, Any]:
-    """Return the overrides of the nutation of a machine."""
-    load, torques = overrides.get("disturbance.load", LOAD), scale.load * np.array([2e-3, 1e-3, 1e-3])
-    return {
-        "plant.modelling_torque_Nm": torques.tolist(),
-        "disturbance.random_bound_Nm": 0.05 * scale.load,
-        "trajectory.alpha_amplitude_rad": 0.2 * scale.tilt,
-        "trajectory.beta_growth_rad_s": 0.2 * scale.tilt,
-        "trajectory.spin_rate_rad_s": 2 * np.pi * scale.spin,
-        **{name: scale.field(name, value) for name, value in overrides.items()},
-        "disturbance.load": load * scale.load,
-        "plant.mjcf": str(mjcf),
-    }
-
-
-def _run(mjcf: Path, scale: Scale, overrides: dict[str, Any]) -> Pair:
-    scenario = scenarios.load(SCENARIO, closed_loop_fields(mjcf, scale, overrides))
-    on_mujoco = simulate(scenario)
-    on_lagrangian = simulate(with_change(scenario, "plant.engine", "lagrangian"))
-    tables = on_mujoco.telemetry, on_lagrangian.telemetry
-    same_end = on_mujoco.status == on_lagrangian.status and len(tables[0]) == len(tables[1])
-    return Pair(*tables, same_end, on_mujoco.status)
-
-
-def _trace(law: str, pair: Pair, neglected: float) -> Check:
-    load = CONDITIONS[law].get("disturbance.load", LOAD)
-    status = "" if pair.status == "completed" else f"; {STATUS.get(pair.status, pair.status)}"
-    return Check(
-        name=f"closed loop under {law}: trace",
-        compares=f"nutation at load {load:g} on MuJoCo with that on the Lagrangian, largest difference of any"
-        f" hinge angle at any tick{status}",
-        states=len(pair.difference_rad),
-        value=float(np.max(pair.difference_rad)) if pair.same_end else float("inf"),
-        bound=TRACE_BOUND_rad + RING_FACTOR_rad * neglected,
-        why=WHY[law],
-        reason="" if pair.same_end else "ended apart",
-        unit="rad",
-        detail=_figures(pair),
-    )
-
-
-def _step_size(mjcf: Path, scale: Scale, name: str) -> Check:
-    fields = closed_loop_fields(mjcf, scale, SMOOTH) | {"plant.engine": ENGINES[name]}
-    runs = [simulate(scenarios.load(SCENARIO, {**fields, "plant.step_s": h})) for h in (LOOP_STEP_s, FINE_s)]
-    coarse, fine = (run.telemetry["q_rad"] for run in runs)
-    same_end = runs[0].status == runs[1].status and len(coarse) == len(fine)
-    status = "" if runs[0].status == "completed" else f"; {STATUS.get(runs[0].status, runs[0].status)}"
-    return Check(
-        name=f"closed loop: step size, {name}",
-        compares=f"nutation under AFSM-ESO at {1e3 * LOOP_STEP_s:g} ms with that at {1e3 * FINE_s:g} ms,"
-        f" largest difference of any hinge angle at any tick{status}",
-        states=len(coarse),
-        value=float(np.max(np.abs(coarse - fine))) if same_end else float("inf"),
-        bound=STEP_BOUND_rad,
-        why="a step of second order, with a margin of two; a torque matrix taken at the start of each step"
-        " gives 6e-4",
-        unit="rad",
-        reason="" if same_end else "ended apart",
-    )
-
-
-def _figures(pair: Pair) -> dict[str, float]:
-    ours, theirs = np.abs(pair.mujoco["error_rad"]), np.abs(pair.lagrangian["error_rad"])
-    rms = np.sqrt(np.mean(ours**2, axis=0)), np.sqrt(np.mean(theirs**2, axis=0))
-    largest = ours.max(axis=0), theirs.max(axis=0)
-    return {
-        "rms error, relative": float(np.max(np.abs(rms[0] / rms[1] - 1))),
-        "largest error, relative": float(np.max(np.abs(largest[0] / largest[1] - 1))),
-    }

@@ -20,7 +20,6 @@ from spheretwin.viz.figures.style import (
     SERIES,
     faint_grid,
     legend_below,
-    name_axes,
     name_rows,
     sheet,
 )
@@ -163,44 +162,6 @@ def drifts(t_s: Array, panels: Mapping[str, Mapping[str, Bounded]], title: str) 
         axes.set_yscale("log")
         _finish(axes, quantity)
     axes.set_xlabel("time, s")
-    return figure
-
-
-def closed_loops(
-    t_s: Array,
-    errors: Mapping[str, tuple[Array, Array]],
-    apart: Mapping[str, Bounded],
-    sources: tuple[str, str],
-    title: str,
-) -> Figure:
-    """Tracking errors of the same run on two plants, a column a law, and below how far they are apart.
-
-    Parameters
-    ----------
-    t_s : (n,) array, s
-    errors : mapping of law to two (n, 3) arrays, rad
-        Tracking errors on either plant; a run that ended early has fewer rows.
-    apart : mapping of law to Bounded, rad
-        Largest difference of any hinge angle.
-    sources : two str
-        Names of the plants.
-    title : str
-    """
-    figure, (above, below) = sheet(4.8, 2, len(errors), title, sharex=True)
-    for top, bottom, (law, pair) in zip(above, below, errors.items(), strict=True):
-        for axis, (colour, name) in enumerate(zip(AXES, ANGLES, strict=True)):
-            top.plot(t_s[: len(pair[0])], pair[0][:, axis], color=colour, label=f"{name}, {sources[0]}")
-            top.plot(t_s[: len(pair[1])], pair[1][:, axis], color=INK, linewidth=0.9, linestyle=(0, (4, 6)),
-                     label=sources[1] if axis == 2 else None)  # fmt: skip
-        values = _positive(apart[law][0])
-        bottom.plot(t_s[: len(values)], values, color=SERIES[0], linewidth=1, label="worst hinge")
-        bottom.set_yscale("log")
-        _draw_bound(bottom, apart[law][1], "rad")
-        name_axes(top, law, y="tracking error, rad")
-        name_axes(bottom, "", "time, s", "|difference|, rad")
-        faint_grid(top)
-        faint_grid(bottom)
-    legend_below(figure, (above[0], below[0]))
     return figure
 
 

@@ -7,7 +7,10 @@ from pathlib import Path
 
 from spheretwin import cli
 from spheretwin import scenario as scenario_files
+from spheretwin.loop import assembly
 from tests.models.model_files import edited
+
+fill_plant = assembly.fill_plant
 
 FEW = 50
 """States with which most tests check."""
@@ -43,3 +46,9 @@ def broken(checks):
 def machine(kind, folder):
     """Return the model file of a machine."""
     return VENTUSFF if kind == "ventusff" else edited(folder, *GENERAL[kind])
+
+
+def fill_lagging(rows, *arguments):
+    """The plant with its torque matrix taken at the start of each step, as if a step had no middle."""
+    fill_plant(rows, *arguments)
+    rows["step_s"] = 0.0

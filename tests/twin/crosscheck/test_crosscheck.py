@@ -14,18 +14,12 @@ from spheretwin.models.base.errors import InputError
 from spheretwin.models.joint_chain import fill_ideal
 from spheretwin.models.kinematics import rotation
 from spheretwin.models.lagrangian import coriolis_matrix, coupling_torques
-from spheretwin.plant import lagrangian_rotor as plant
-from spheretwin.plant.lagrangian_rotor import LagrangianRotor
 from spheretwin.plant.mujoco_rotor import MujocoRotor
-from spheretwin.simulation import simulate
-from tests.twin.crosscheck.commands import FEW, ROWS, broken, crosscheck
+from tests.twin.crosscheck.commands import FEW, ROWS, broken, crosscheck, fill_lagging
 
-fill_plant = coil_driven.assembly.fill_plant
 QUANTITIES = [quantity.name for quantity in dynamics.QUANTITIES]
 ENGINES = ("MuJoCo", "Pinocchio")
-CLOSED = "closed loop"
-LAGRANGIAN_STEP = f"{CLOSED}: step size, Lagrangian"
-FIGURES = ("margins", "dynamics", "trajectory", "convergence", "torque_free", "closed_loop")
+FIGURES = ("margins", "dynamics", "trajectory", "convergence", "torque_free")
 
 
 def of_both(*quantities):
@@ -200,29 +194,6 @@ def test_a_rotor_that_is_not_axisymmetric_does_not_move_as_euler_found(monkeypat
 
 
 @pytest.mark.release("1 to 2 s; other rows are broken in less")
-@pytest.mark.parametrize(
-    ("error", "rows"),
-    [
-        (1e-8, {f"{CLOSED} under PD: trace"}),
-        (0.1, {f"{CLOSED} {row}" for row in ("under PD: trace", "under AFSM: trace")} | {LAGRANGIAN_STEP}),
-    ],
-)
-def test_wrong_plant_breaks_the_closed_loop(monkeypatch, error, rows):
-    def heavier(joint, step_s):
-        joint["inertia"] *= 1 + error / 1.2  # a share of the nominal inertia
-        return LagrangianRotor(joint, step_s)
-
-    monkeypatch.setattr(plant, "LagrangianRotor", heavier)
-    assert broken(trajectories.compare_closed_loop(actuators.MJCF_PATH, actuators.load()).checks) == rows
-
-
-def fill_lagging(rows, *arguments):
-    """The plant with its torque matrix taken at the start of each step, as if a step had no middle."""
-    fill_plant(rows, *arguments)
-    rows["step_s"] = 0.0
-
-
-@pytest.mark.release("1 to 2 s; other rows are broken in less")
 def test_a_field_that_lags_by_half_a_step_breaks_every_row_of_coils(monkeypatch, actuator):
     monkeypatch.setattr(coil_driven.assembly, "fill_plant", fill_lagging)
     checks = coil_driven.compare(actuators.MJCF_PATH, actuator).checks
@@ -233,22 +204,6 @@ def test_a_field_that_lags_by_half_a_step_breaks_every_row_of_coils(monkeypatch,
             assert check.value == pytest.approx(1, abs=0.1)
 
 
-@pytest.mark.parametrize(
-    ("fill", "rows"),
-    [(fill_plant, set()), (fill_lagging, {f"{CLOSED}: step size, MuJoCo", LAGRANGIAN_STEP})],
-    ids=["right", "lagging by half a step"],
-)
-def test_closed_loops_of_the_shipped_joint_keep_their_bounds_unless_the_field_lags(monkeypatch, fill, rows):
-    """Both engines under both laws; the general joint is compared in the complete cross-check."""
-    conditions = {law: fields for law, fields in trajectories.CONDITIONS.items() if "joint" not in law}
-    assert list(conditions) == ["PD", "AFSM"]
-    monkeypatch.setattr(trajectories, "CONDITIONS", conditions)
-    monkeypatch.setattr(coil_driven.assembly, "fill_plant", fill)
-    checks = trajectories.compare_closed_loop(actuators.MJCF_PATH, actuators.load()).checks
-    assert broken(checks) == rows
-    assert len(checks) == 4
-
-
 @pytest.mark.release("1 to 2 s; other rows are broken in less")
 def test_a_torque_curve_that_is_not_the_plant_s_breaks_the_coil_driven_motion(actuator):
     curve = actuator.torque_curve
@@ -256,22 +211,6 @@ def test_a_torque_curve_that_is_not_the_plant_s_breaks_the_coil_driven_motion(ac
     checks = coil_driven.compare(actuators.MJCF_PATH, dataclasses.replace(actuator, torque_data=other)).checks
     assert broken(checks) >= {"coil-driven motion: MuJoCo", "coil-driven motion: Lagrangian"}
     assert not any("complete plant" in name for name in broken(checks))
-
-
-@pytest.mark.release("1 to 2 s; other rows are broken in less")
-def test_runs_that_end_apart_break_their_rows(monkeypatch):
-    def ends_early(scenario):
-        finished = simulate(scenario)
-        cut = finished.telemetry.rows(0, 4000)
-        early = scenario.plant.engine == "lagrangian"
-        return dataclasses.replace(finished, status="left_workspace", telemetry=cut) if early else finished
-
-    monkeypatch.setattr(trajectories, "simulate", ends_early)
-    checks = trajectories.compare_closed_loop(actuators.MJCF_PATH, actuators.load()).checks
-    laws = ("PD", "AFSM", "PD, general joint")
-    assert broken(checks) == {f"closed loop under {law}: trace" for law in laws}
-    assert checks[0].row()["value"] is None
-    json.dumps([check.row() for check in checks], allow_nan=False)
 
 
 # What it says

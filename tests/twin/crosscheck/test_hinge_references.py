@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 
 from spheretwin.crosscheck import coil_driven
+from spheretwin.crosscheck.coil_driven import ENGINES
 from spheretwin.crosscheck.scale import scale_of
-from spheretwin.crosscheck.trajectories import ENGINES, convergence
+from spheretwin.crosscheck.trajectories import convergence
 from spheretwin.models import actuator as actuators
 from spheretwin.models.lagrangian import inertia_matrix
 from spheretwin.plant.bristle_friction import StictionSection
