@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from spheretwin.machine.link.frame_format import QUANTITIES, TYPE_CODES, FieldFormat, FrameFormat
+from spheretwin.machine.link.frame_format import QUANTITIES, FieldFormat, FrameFormat
 from spheretwin.models.base.errors import InputError
 
 Array = NDArray[np.float64]
@@ -36,47 +36,41 @@ class _Field:
     """Field for a number of coil groups: its count and its conversion."""
 
     def __init__(self, field: FieldFormat, groups: int) -> None:
-        self.name, self.count = field.name, field.numbers(groups)
+        self.name, self.count, self.type = field.name, field.numbers(groups), np.dtype(field.type)
         self.scale, self.offset = field.si_scale, field.si_offset
         self.is_exact = (self.scale, self.offset) == (1.0, 0.0)
-        self.is_integer = QUANTITIES[self.name].is_integer
-        self.is_float = "float" in field.type
-        bits = int(field.type.lstrip("uintfloa"))
-        self.largest = float(np.finfo(np.float32).max) if bits == 32 else math.inf
-        signed = not field.type.startswith("u")
-        self.lowest = -(2 ** (bits - 1)) if signed else 0
-        self.highest = 2 ** (bits - signed) - 1
+        self.is_integer, self.is_float = QUANTITIES[self.name].is_integer, self.type.kind == "f"
+        limits: Any = np.finfo(self.type) if self.is_float else np.iinfo(self.type)
+        self.lowest, self.highest = limits.min, limits.max
         # Numbers that no sensor reports stand for one that is missing.
-        self.missing = self.lowest if signed else self.highest
+        self.missing = math.nan if self.is_float else self.lowest or self.highest
 
-    def numbers(self, values: Mapping[str, Any]) -> list[Any]:
+    def numbers(self, values: Mapping[str, Any]) -> NDArray[Any]:
         """Return the numbers of the frame for its values; a value that is not given is missing."""
         value = values.get(self.name)
         if self.is_integer:
-            return [int(value or 0) & self.highest if self.lowest == 0 else int(value or 0)]
+            return np.array([int(value or 0) & (self.highest - self.lowest)], self.type)
         if value is None:
-            return [math.nan if self.is_float else self.missing] * self.count
-        raw = np.ravel(value).tolist()
+            return np.full(self.count, self.missing)
+        raw = np.ravel(value).astype(np.float64)
         if not self.is_exact:
-            raw = [(number - self.offset) / self.scale for number in raw]
-        return [self._float(number) if self.is_float else self._whole(number) for number in raw]
+            with np.errstate(over="ignore"):  # to infinity
+                raw = (raw - self.offset) / self.scale
+        if self.type.itemsize == 8:
+            return raw
+        if self.is_float:  # a shorter type has no larger number but infinity
+            is_beyond = np.abs(raw) > self.highest
+            return np.where(is_beyond, np.copysign(np.inf, raw), raw)
+        whole = np.clip(np.rint(raw), self.lowest, self.highest)
+        return np.where(np.isfinite(raw), whole, self.missing).astype(self.type)
 
-    def _float(self, number: float) -> float:
-        # A shorter type has no larger number but infinity, and would raise.
-        return math.copysign(math.inf, number) if abs(number) > self.largest else number
-
-    def _whole(self, number: float) -> int:
-        if not math.isfinite(number):
-            return self.missing
-        return min(max(round(number), self.lowest), self.highest)
-
-    def value(self, raw: tuple[Any, ...] | list[Any]) -> Any:
+    def value(self, raw: Any) -> Any:
         """Return the value in SI units of the numbers of the frame."""
         if self.is_integer:
-            return raw[0]
-        if not (self.is_float or self.name == "unused"):
-            raw = [math.nan if number == self.missing else number for number in raw]
+            return int(raw[0])
         value = np.array(raw, np.float64)
+        if not (self.is_float or self.name == "unused"):
+            value[value == self.missing] = np.nan
         if not self.is_exact:
             value = self.scale * value + self.offset
         return value if self.count > 1 else float(value[0])
@@ -104,17 +98,13 @@ class Codec:
             raise InputError("link: expected frames with the field session to authenticate, received others")
         self.frame, self._key = frame, key
         self._fields = [_Field(field, groups) for field in frame.field]
-        order = "<" if frame.byte_order == "little" else ">"
-        codes = (
-            f"{field.count}{TYPE_CODES[declared.type]}"
-            for field, declared in zip(self._fields, frame.field, strict=True)
-        )
-        self._struct = struct.Struct(order + "".join(codes))
-        self._crc = struct.Struct(f"{order}H")
+        columns = [(field.type.newbyteorder(frame.byte_order), field.count) for field in self._fields]
+        self._type = np.dtype([(str(place), *column) for place, column in enumerate(columns)])
+        self._crc = struct.Struct("<H" if frame.byte_order == "little" else ">H")
         self._json_check = b',"hmac":' if key else b',"crc16":'
         self.start, self._end = bytes(frame.start), bytes(frame.end)
         self._check_size = HMAC_BYTES if key else CRC_BYTES if frame.checksum == "crc16" else 0
-        self.size = len(self.start) + self._struct.size + self._check_size + len(self._end)
+        self.size = len(self.start) + self._type.itemsize + self._check_size + len(self._end)
 
     def encode(self, values: Mapping[str, Any]) -> bytes:
         """Return the frame of values in SI units; a field not given is missing.
@@ -124,7 +114,10 @@ class Codec:
         numbers = [field.numbers(values) for field in self._fields]
         if self.frame.encoding == "json":
             return self._encode_line(numbers)
-        content = self.start + self._struct.pack(*(number for field in numbers for number in field))
+        record = np.empty((), self._type)
+        for place, raw in enumerate(numbers):
+            record[str(place)] = raw
+        content = self.start + record.tobytes()
         return content + self._check(content) + self._end
 
     def decode(self, content: bytes) -> Values | None:
@@ -136,11 +129,8 @@ class Codec:
         last = self.size - len(self._end) - self._check_size
         if not hmac.compare_digest(content[last : last + self._check_size], self._check(content[:last])):
             return None
-        numbers, first, values = self._struct.unpack_from(content, len(self.start)), 0, {}
-        for field in self._fields:
-            values[field.name] = field.value(numbers[first : first + field.count])
-            first += field.count
-        return values
+        (record,) = np.frombuffer(content, self._type, 1, len(self.start))
+        return {field.name: field.value(raw) for field, raw in zip(self._fields, record, strict=True)}
 
     def _check(self, content: bytes) -> bytes:
         """Return HMAC or checksum of the bytes of a frame before it; no bytes if it has none."""
@@ -152,10 +142,10 @@ class Codec:
         """Return HMAC or checksum of the text of a line before it."""
         return b'"%s"' % self._check(text).hex().encode() if self._key else str(crc16(text)).encode()
 
-    def _encode_line(self, numbers: list[list[Any]]) -> bytes:
+    def _encode_line(self, numbers: list[NDArray[Any]]) -> bytes:
         entries = {}
         for field, raw in zip(self._fields, numbers, strict=True):
-            plain = [number if math.isfinite(number) else None for number in raw]  # JSON has no NaN
+            plain = [number if math.isfinite(number) else None for number in raw.tolist()]  # JSON has no NaN
             entries[field.name] = plain if field.count > 1 else plain[0]
         text = json.dumps(entries, separators=(",", ":")).encode()
         if self._check_size:

@@ -8,6 +8,7 @@ from importlib import resources
 from math import pi
 from typing import TYPE_CHECKING, Annotated, Literal, NamedTuple
 
+import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from spheretwin.models.base.errors import InputError
@@ -21,16 +22,7 @@ Byte = Annotated[int, Field(ge=0, le=255)]
 MOST_NUMBERS = 1024
 """Largest count of a field: bounds the size of a frame."""
 
-TYPE_CODES = {
-    "uint8": "B",
-    "int8": "b",
-    "uint16": "H",
-    "int16": "h",
-    "uint32": "I",
-    "int32": "i",
-    "float32": "f",
-    "float64": "d",
-}
+TYPES = ("uint8", "int8", "uint16", "int16", "uint32", "int32", "float32", "float64")
 
 
 class Quantity(NamedTuple):
@@ -67,7 +59,7 @@ if TYPE_CHECKING:
     NumberType = str
 else:
     FieldName = Literal[tuple(QUANTITIES)]
-    NumberType = Literal[tuple(TYPE_CODES)]
+    NumberType = Literal[TYPES]
 
 
 class Flags(IntFlag):
@@ -166,8 +158,8 @@ class FrameFormat(BaseModel):
 
     def modulus(self, name: str) -> int:
         """Return the number of values of an integer field; 2³² without the field."""
-        bits = [int("".join(filter(str.isdigit, field.type))) for field in self.field if field.name == name]
-        return int(2 ** bits[0]) if bits else 2**32
+        sizes = [np.dtype(field.type).itemsize for field in self.field if field.name == name]
+        return 256 ** (sizes[0] if sizes else 4)
 
 
 class Frames(BaseModel):

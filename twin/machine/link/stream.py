@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from spheretwin.machine.link import frame_format
 from spheretwin.machine.link.admission import StreamAdmission
-from spheretwin.machine.link.codec import Codec, Values
-from spheretwin.machine.link.decoder import Decoder
+from spheretwin.machine.link.channel import Channel
+from spheretwin.machine.link.codec import Values
 from spheretwin.machine.link.frame_format import DEFAULT_FRAME, Flags
 from spheretwin.machine.link.transports import open_transport
 from spheretwin.machine.log import COMMANDED, MEASURED, Log
@@ -74,21 +74,17 @@ def streamed(
     format_, kind = description.measurement, currents or description.currents or MEASURED
     if lacking := [name for name in ("time", "angle", "current") if not format_.has(name)]:
         raise InputError(f"frame {frame}: expected measurements with {', '.join(lacking)}, received none")
-    codec = Codec(format_, groups, key)
-    transport = open_transport(address, listening=True)
-    decoder = Decoder(codec, datagrams=transport.datagrams)
+    channel = Channel(open_transport(address, listening=True), format_, format_, groups, key=key)
     if key:
-        decoder.admission = StreamAdmission()
+        channel.admit_by(StreamAdmission())
     frames: list[Values] = []
     yielded, heard_s, ended = 0, None, False
     try:
         while not (ended or stop_requested()):
-            content = transport.receive(0.1)
-            if content and (new := decoder.feed(content)):
-                transport.accept()
+            if new := channel.receive(0.1):
                 heard_s, frames = now(), frames + new
                 ended = bool(new[-1].get("flags", 0) & Flags.END)
-            elif transport.is_closed or (heard_s is not None and now() - heard_s > SILENCE_s):
+            elif channel.transport.is_closed or (heard_s is not None and now() - heard_s > SILENCE_s):
                 ended = True
             if len(frames) >= BLOCK_ROWS:
                 yield _log(frames, kind, address)
@@ -97,10 +93,10 @@ def streamed(
             yield _log(frames, kind, address)
         elif not yielded:
             raise SpheretwinError(
-                f"stream {address}: expected frames, received {decoder.counts.corrupt} texts that are none"
+                f"stream {address}: expected frames, received {channel.counts.corrupt} texts that are none"
             )
     finally:
-        transport.close()
+        channel.transport.close()
 
 
 def played(

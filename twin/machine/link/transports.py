@@ -10,7 +10,7 @@ import sys
 import time
 from collections import Counter, deque
 from collections.abc import Callable, Iterator
-from typing import Any, Protocol
+from typing import Any
 from urllib.parse import urlsplit
 
 from spheretwin.models.base.errors import InputError, SpheretwinError, shown, without_breaks
@@ -33,7 +33,7 @@ MOST_QUEUED = 1_000
 EXPECTED = "udp://HOST:PORT, serial:DEVICE@BAUD, or - for standard input and output"
 
 
-class Transport(Protocol):
+class Transport:
     """Connection to one peer.
 
     Attributes
@@ -48,16 +48,20 @@ class Transport(Protocol):
         True if the peer has closed the connection.
     """
 
-    datagrams: bool
-    refused: Counter[str]
-    announce: Callable[[str], None]
-    is_closed: bool
+    datagrams = True
+    is_closed = False
+
+    def __init__(self) -> None:
+        self.refused: Counter[str] = Counter()
+        self.announce: Callable[[str], None] = lambda _: None
 
     def send(self, content: bytes) -> None:
         """Send bytes; they are dropped as long as there is no peer."""
+        raise NotImplementedError
 
     def receive(self, timeout_s: float) -> bytes:
         """Return the received bytes, after at most a time; empty if there are none."""
+        raise NotImplementedError
 
     def accept(self, *, is_peer: bool = True) -> None:
         """Answer the sender of the last received bytes; as the peer, it is the only one that is heard."""
@@ -69,7 +73,7 @@ class Transport(Protocol):
         """Close the connection."""
 
 
-class Udp:
+class Udp(Transport):
     """Datagrams; a listening end takes the sender of the first frame of a session as the peer.
 
     Parameters
@@ -79,11 +83,8 @@ class Udp:
         True binds the address, False sends to it.
     """
 
-    datagrams, is_closed = True, False
-
     def __init__(self, host: str, port: int, *, listening: bool) -> None:
-        self.refused: Counter[str] = Counter()
-        self.announce: Callable[[str], None] = lambda _: None
+        super().__init__()
         self._peer: Any = None
         self._candidate: Any = None
         self._others: socket.socket | None = None
@@ -208,7 +209,7 @@ def _name(sender: Any) -> str:
     return f"{sender[0]}:{sender[1]}"
 
 
-class Stream:
+class ByteStream(Transport):
     """Bytes from and to files of the system: a pipe or a serial line.
 
     Parameters
@@ -222,10 +223,8 @@ class Stream:
     datagrams = False
 
     def __init__(self, source: int, sink: int, close: Callable[[], object] = lambda: None) -> None:
-        self.refused: Counter[str] = Counter()
-        self.announce: Callable[[str], None] = lambda _: None
+        super().__init__()
         self._source, self._sink, self._close = source, sink, close
-        self.is_closed = False
 
     def send(self, content: bytes) -> None:
         """Write all bytes.
@@ -255,18 +254,12 @@ class Stream:
         self.is_closed = not content
         return content
 
-    def accept(self, *, is_peer: bool = True) -> None:
-        """Do nothing: there is only one peer."""
-
-    def refuse(self) -> None:
-        """Do nothing: there is only one peer."""
-
     def close(self) -> None:
         """Close the files."""
         self._close()
 
 
-class StandIn:
+class StandIn(Transport):
     """Transport to a peer that replies at once, with a clock that only waiting moves.
 
     Parameters
@@ -275,11 +268,8 @@ class StandIn:
         Returns the reply to sent bytes, and the first frame of the peer to no bytes.
     """
 
-    datagrams, is_closed = True, False
-
     def __init__(self, reply: Callable[[bytes], bytes]) -> None:
-        self.refused: Counter[str] = Counter()
-        self.announce: Callable[[str], None] = lambda _: None
+        super().__init__()
         self._reply, self._waiting, self._now_s = reply, reply(b""), 0.0
 
     def now(self) -> float:
@@ -296,15 +286,6 @@ class StandIn:
         if not content:
             self._now_s += timeout_s + 1e-9  # rounding must not leave a rest to wait for
         return content
-
-    def accept(self, *, is_peer: bool = True) -> None:
-        """Do nothing: there is only one peer."""
-
-    def refuse(self) -> None:
-        """Do nothing: there is only one peer."""
-
-    def close(self) -> None:
-        """Do nothing."""
 
 
 def _is_readable(file: Any, timeout_s: float) -> bool:
@@ -345,15 +326,15 @@ def open_transport(address: str, *, listening: bool = False) -> Transport:
     return Udp(host, port, listening=listening)
 
 
-def _standard_streams() -> Stream:
+def _standard_streams() -> ByteStream:
     """Return standard input and output; what is printed from now on goes to standard error."""
     sys.stdout.flush()
     sink = os.dup(1)
     os.dup2(2, 1)
-    return Stream(0, sink, lambda: os.close(sink))
+    return ByteStream(0, sink, lambda: os.close(sink))
 
 
-def _serial_line(rest: str) -> Stream:
+def _serial_line(rest: str) -> ByteStream:
     device, _, baud = rest.partition("@")
     if baud and not (baud.isascii() and baud.isdecimal()):
         raise InputError(f"link: expected {EXPECTED}, received {shown(f'serial:{rest}')}")
@@ -368,4 +349,4 @@ def _serial_line(rest: str) -> Stream:
             f"link: expected a serial line that can be opened, received {device}, {without_breaks(error)}"
         ) from None
     port.reset_input_buffer()  # frames from before the start are late
-    return Stream(port.fileno(), port.fileno(), port.close)
+    return ByteStream(port.fileno(), port.fileno(), port.close)

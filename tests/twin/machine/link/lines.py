@@ -1,8 +1,6 @@
 """Transports without a network or a clock, and the pieces of a link in tests."""
 
 import queue
-from collections import Counter
-from typing import ClassVar
 
 import numpy as np
 
@@ -11,31 +9,17 @@ from spheretwin.machine.link import frame_format
 from spheretwin.machine.link.channel import Channel
 from spheretwin.machine.link.codec import Codec
 from spheretwin.machine.link.limits import CoilHeat, Limits
+from spheretwin.machine.link.transports import Transport
 
 GROUPS, PERIOD_s = 18, 1e-3
 OWN, LIMITS = frame_format.load("spheretwin"), Limits(current_A=8.0)
-
-
-class Transport:
-    """What the connections of tests have in common."""
-
-    datagrams, is_closed = True, False
-    refused: ClassVar[Counter] = Counter()
-
-    def accept(self, *, is_peer=True):
-        pass
-
-    def refuse(self):
-        pass
-
-    def close(self):
-        pass
 
 
 class Line(Transport):
     """One end of a connection between two threads."""
 
     def __init__(self, sink=None, source=None):
+        super().__init__()
         self.sink, self.source = sink or queue.Queue(), source or queue.Queue()
 
     def other_end(self):
@@ -56,6 +40,7 @@ class Script(Transport):
     """Connection whose deliveries are planned, with the clock that they move."""
 
     def __init__(self, answer=None):
+        super().__init__()
         self.t_s, self.sent, self.planned, self.answer = 0.0, [], [], answer
 
     def now(self):

@@ -9,7 +9,7 @@ import sys
 
 import pytest
 
-from spheretwin.machine.link.transports import MOST_LOOKS, MOST_NAMES, Stream, Udp, open_transport
+from spheretwin.machine.link.transports import MOST_LOOKS, MOST_NAMES, ByteStream, Udp, open_transport
 from spheretwin.models.base.errors import SpheretwinError
 from tests.requirements import needs_pseudo_terminal
 from tests.waiting import UNLIMITED_S
@@ -135,7 +135,7 @@ def test_a_serial_line_carries_bytes_of_any_value():
 def test_the_end_of_a_pipe_is_noticed():
     source, sink = os.pipe()
     ours, theirs = os.pipe()
-    stream = Stream(source, theirs)
+    stream = ByteStream(source, theirs)
     os.write(sink, b"last words")
     os.close(sink)
     assert (stream.receive(UNLIMITED_S), stream.is_closed) == (b"last words", False)
@@ -149,7 +149,7 @@ def test_a_peer_that_does_not_read_is_an_error(monkeypatch):
     source, sink = os.pipe()
     os.set_blocking(sink, False)
     with pytest.raises(SpheretwinError, match="expected a peer that reads"):
-        Stream(source, sink).send(bytes(2**22))  # more than any pipe holds
+        ByteStream(source, sink).send(bytes(2**22))  # more than any pipe holds
     os.close(source)
     os.close(sink)
 
