@@ -57,8 +57,7 @@ class Player:
         run = reviewed.read(path)
         self.path, self.table = path, run.table
         self._groups = groups = run.table["current_A"].shape[1] if len(run.table) else 0
-        known = {signal.name for signal in run.table.signals}
-        if not {signal.name for signal in common_signals(max(groups, 1))} <= known:
+        if not {signal.name for signal in common_signals(max(groups, 1))} <= set(run.table):
             raise InputError(
                 f"bench: expected rows of a complete run in {path}, received {len(run.table)} rows"
             )

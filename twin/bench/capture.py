@@ -125,8 +125,7 @@ class Capture:
         return values > level if self.trigger.edge == "rising" else values < level
 
     def _fault(self, rows: Table) -> int | None:
-        has_faults = any(signal.name == "fault" for signal in rows.signals)
-        modes = rows["fault"].reshape(len(rows), -1) if has_faults else np.zeros((len(rows), 0))
+        modes = rows["fault"].reshape(len(rows), -1) if "fault" in rows else np.zeros((len(rows), 0))
         before = self._failing
         if before is None:
             before = modes[0]

@@ -31,10 +31,9 @@ def plotted_signals(groups: int) -> tuple[Signal, ...]:
 
 def plotted_values(rows: Table, signals: tuple[Signal, ...]) -> Array:
     """Return some signals of rows as (n, width); NaN for a signal that the rows do not have."""
-    names = {signal.name for signal in rows.signals}
     parts = [
         rows[signal.name].reshape(len(rows), -1)
-        if signal.name in names
+        if signal.name in rows
         else np.full((len(rows), signal.size), np.nan)
         for signal in signals
     ]

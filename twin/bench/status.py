@@ -190,13 +190,14 @@ def _of_row(row: Table, limit_A: float) -> dict[str, Any]:
     error_rad = float(np.linalg.norm(row["error_rad"][0]))
     largest_A = float(np.abs(row["current_command_A"][0]).max())
     lost = bool(rank_lost(row)[0])
-    warm = any(signal.name == "coil_temperature_degC" for signal in row.signals)
     return {
         "t_s": float(row["t_s"][0]),
         **{name: tuple(row[name][0].tolist()) for name in VECTORS},
         "error_mrad": 1e3 * error_rad,
         "error_deg": float(np.degrees(error_rad)),
-        "temperature_C": tuple(row["coil_temperature_degC"][0].tolist()) if warm else None,
+        "temperature_C": tuple(row["coil_temperature_degC"][0].tolist())
+        if "coil_temperature_degC" in row
+        else None,
         "torque_margin": 0.0 if lost else max(0.0, 1.0 - largest_A / limit_A) if limit_A else 1.0,
         "saturated": bool(saturated(row)[0]),
         "rank_lost": lost,

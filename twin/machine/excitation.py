@@ -102,7 +102,9 @@ def design(
         No motion stays within the limits.
     """
     settings = settings or DesignSettings()
-    base = {**(changes or {}), "duration": settings.duration_s}
+    experiment = _Experiment(
+        scenario, parameters, {**(changes or {}), "duration": settings.duration_s}, settings
+    )
     generator = np.random.default_rng(settings.seed)
     best: _Candidate | None = None
     refused = 0
@@ -111,7 +113,7 @@ def design(
             motion = _random_motion(generator, settings)
         else:
             motion = _varied(best.motion, generator, settings)
-        candidate = _tried(motion, scenario, parameters, base, settings)
+        candidate = experiment.candidate(motion)
         if candidate is None:
             refused += 1
         elif best is None or candidate.merit > best.merit:
@@ -121,9 +123,8 @@ def design(
             f"design: expected a motion within the limits of angle, rate, current and temperature, received"
             f" none of {settings.candidates}"
         )
-    runs = _experiments(scenario, {**base, **REFERENCE}, settings.payloads_kg)
-    reference = _information(runs, scenario, parameters, base, settings.payloads_kg)
-    fields = {**base, **_fields(best.motion), "plant.payload_kg": settings.payloads_kg[0]}
+    reference = experiment.information(experiment.runs(REFERENCE))
+    fields = {**experiment.fields, **_fields(best.motion), "plant.payload_kg": settings.payloads_kg[0]}
     return Design(
         scenarios.load(scenario, fields),
         best.runs,
@@ -153,60 +154,54 @@ class _Candidate(NamedTuple):
 _SIZES, _SMALLER = 4, 0.6
 
 
-def _tried(
-    motion: _Motion,
-    scenario: str,
-    parameters: Sequence[str],
-    base: Mapping[str, Any],
-    settings: DesignSettings,
-) -> _Candidate | None:
-    """Return a motion with its information, at the largest size within the limits; None if there is none."""
-    for _ in range(_SIZES):
-        runs = _experiments(scenario, {**base, **_fields(motion)}, settings.payloads_kg)
-        if len(runs) == len(settings.payloads_kg) and all(_within(run, settings) for run in runs):
-            information = _information(runs, scenario, parameters, base, settings.payloads_kg)
-            _, merit = np.linalg.slogdet(information[0])
-            return _Candidate(motion, runs, information, float(merit))
-        motion = motion._replace(amplitude_rad=_SMALLER * motion.amplitude_rad)
-    return None
+class _Experiment(NamedTuple):
+    """Experiment whose motion is sought; scenario, parameters and fields are those of `design`."""
+
+    scenario: str
+    parameters: Sequence[str]
+    fields: Mapping[str, Any]
+    settings: DesignSettings
+
+    def candidate(self, motion: _Motion) -> _Candidate | None:
+        """Return a motion at the largest size within the limits; None if there is none."""
+        for _ in range(_SIZES):
+            runs = self.runs(_fields(motion))
+            if len(runs) == len(self.settings.payloads_kg) and all(map(self._is_within, runs)):
+                information = self.information(runs)
+                _, merit = np.linalg.slogdet(information[0])
+                return _Candidate(motion, runs, information, float(merit))
+            motion = motion._replace(amplitude_rad=_SMALLER * motion.amplitude_rad)
+        return None
+
+    def runs(self, motion: Mapping[str, Any]) -> tuple[Table, ...]:
+        """Return the telemetry of the fields of a motion under each payload, as far as they completed."""
+        fields = {**self.fields, **motion}
+        payloads = self.settings.payloads_kg
+        runs = [simulate(self.scenario, {**fields, "plant.payload_kg": payload}) for payload in payloads]
+        return tuple(run.telemetry for run in runs if run.status is Status.COMPLETED)
+
+    def information(self, runs: Sequence[Table]) -> tuple[Array, list[str]]:
+        """Return the information of runs on the parameters, and their names."""
+        logs = [log_of(run, payload) for run, payload in zip(runs, self.settings.payloads_kg, strict=False)]
+        return Problem(logs, self.scenario, self.parameters, self.fields).information()
+
+    def _is_within(self, run: Table) -> bool:
+        settings = self.settings
+        limits = [
+            (run["q_rad"][:, :2], settings.largest_angle_rad),
+            (run["qdot_rad_s"], settings.largest_rate_rad_s),
+            (run["current_command_A"], settings.largest_current_A),
+        ]
+        if "coil_temperature_degC" in run:
+            limits.append((run["coil_temperature_degC"], settings.largest_temperature_degC))
+        return all(np.max(np.abs(values)) <= limit for values, limit in limits)
 
 
-def _experiments(scenario: str, fields: Mapping[str, Any], payloads_kg: Sequence[float]) -> tuple[Table, ...]:
-    """Return the telemetry of a motion under each payload, as far as they completed."""
-    runs = [simulate(scenario, {**fields, "plant.payload_kg": payload}) for payload in payloads_kg]
-    return tuple(run.telemetry for run in runs if run.status is Status.COMPLETED)
-
-
-def _within(run: Table, settings: DesignSettings) -> bool:
-    names = {signal.name for signal in run.signals}
-    limits = [
-        (run["q_rad"][:, :2], settings.largest_angle_rad),
-        (run["qdot_rad_s"], settings.largest_rate_rad_s),
-        (run["current_command_A"], settings.largest_current_A),
-    ]
-    if "coil_temperature_degC" in names:
-        limits.append((run["coil_temperature_degC"], settings.largest_temperature_degC))
-    return all(np.max(np.abs(values)) <= limit for values, limit in limits)
-
-
-def _information(
-    runs: Sequence[Table],
-    scenario: str,
-    parameters: Sequence[str],
-    base: Mapping[str, Any],
-    payloads_kg: Sequence[float],
-) -> tuple[Array, list[str]]:
-    """Return the information on the parameters, and their names."""
-    logs = [log_of(run, payload) for run, payload in zip(runs, payloads_kg, strict=False)]
-    return Problem(logs, scenario, parameters, base).information()
-
-
-def log_of(run: Table, payload_kg: float) -> Log:
+def log_of(run: Table, payload_kg: float, name: str = "experiment") -> Log:
     """Return what a machine would log of a run: commanded currents and measured angles."""
-    names = {signal.name for signal in run.signals}
-    angles = "q_measured_rad" if "q_measured_rad" in names else "q_rad"
+    angles = "q_measured_rad" if "q_measured_rad" in run else "q_rad"
     conditions = {"plant.payload_kg": payload_kg}
-    return Log(run["t_s"], run["current_command_A"], run[angles], name="experiment", conditions=conditions)
+    return Log(run["t_s"], run["current_command_A"], run[angles], name=name, conditions=conditions)
 
 
 def _deviations(information: tuple[Array, list[str]]) -> dict[str, float]:

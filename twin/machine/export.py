@@ -51,10 +51,9 @@ class SignalFile:
 
     def write(self, rows: Table) -> None:
         """Write the rows of one chunk."""
-        available = {signal.name for signal in rows.signals}
         columns = []
         for names, signal in self._sources.items():
-            name = next((name for name in names if name in available), None)
+            name = next((name for name in names if name in rows), None)
             columns.append(rows[name] if name else np.full((len(rows), signal.size), np.nan))
         self._file.write(Table(self._signals, np.column_stack(columns)))
 

@@ -108,7 +108,7 @@ def write(log: Log, path: str | Path) -> None:
     elif path.suffix.lower() == ".csv":
         with whole_file(path) as temporary, temporary.open("w", encoding="utf-8", newline="") as file:
             writer = csv.writer(file, lineterminator="\n")
-            writer.writerow(signal.name for signal in table.signals)
+            writer.writerow(table)
             writer.writerows(map(repr, row) for row in table.values.tolist())
     else:
         raise _unknown_kind(path)

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from spheretwin import scenario as scenarios
-from spheretwin.machine.excitation import Design, DesignSettings, design
+from spheretwin.machine.excitation import Design, DesignSettings, design, log_of
 from spheretwin.machine.identification import Identified, identify
 from spheretwin.machine.intervals import Uncertainty
 from spheretwin.machine.log import Log
@@ -27,8 +27,10 @@ from spheretwin.machine.verdict import Verdict, check
 from spheretwin.machine.watching import Alarm, Watch
 from spheretwin.models import actuator as actuators
 from spheretwin.models.base.errors import SpheretwinError
+from spheretwin.models.telemetry.status import Status
+from spheretwin.models.telemetry.table import Table
 from spheretwin.scenario.fields import SettingsModel
-from spheretwin.session import Session
+from spheretwin.simulation import simulate
 
 Array = NDArray[np.float64]
 
@@ -83,12 +85,10 @@ class WorkflowSettings(SettingsModel):
 
 
 class Played(NamedTuple):
-    """Log and true motion of a run of the hidden machine."""
+    """Log and telemetry of a run of the hidden machine."""
 
     log: Log
-    q_rad: Array
-    """True angles, (n, 3)."""
-    qdot_rad_s: Array
+    telemetry: Table
 
 
 class Judged(NamedTuple):
@@ -98,7 +98,7 @@ class Judged(NamedTuple):
     validation: Validation
 
 
-class Change(NamedTuple):
+class MachineChange(NamedTuple):
     """Change of the machine during a log."""
 
     label: str
@@ -113,7 +113,7 @@ class Change(NamedTuple):
 class Watched(NamedTuple):
     """Result of the watch over a log with a change, or without one."""
 
-    change: Change | None
+    change: MachineChange | None
     alarms: tuple[Alarm, ...]
     t_s: Array
     """End of each window."""
@@ -228,31 +228,28 @@ def _components(designed: Design) -> Any:
 
 
 def _play(
-    fields: Mapping[str, Any], payload_kg: float, duration_s: float, seed: int, change: Change | None = None
+    fields: Mapping[str, Any],
+    payload_kg: float,
+    duration_s: float,
+    seed: int,
+    change: MachineChange | None = None,
 ) -> Played:
     """Return what the hidden machine leaves; a change takes place at its time."""
-    conditions = {"plant.payload_kg": payload_kg}
-    scenario = scenarios.load(SCENARIO, {**fields, **conditions, "duration": duration_s, "seed": seed})
-    period_s, parts = scenario.controller.period_s, []
-    with Session(scenario) as session:
-        for until_s in (change.t_s, duration_s) if change else (duration_s,):
-            rows = session.advance(round(until_s / period_s) - session.tick)
-            parts.append([rows[name].copy() for name in _COLUMNS])
-            if change and until_s < duration_s:
-                session.set(change.field, change.value)
-        if session.tick < round(duration_s / period_s):
-            raise SpheretwinError(
-                f"workflow: expected a run of {duration_s:g} s, received {session.status} after"
-                f" {session.t_s:.3g} s"
-            )
-    t_s, current_A, angle_rad, q_rad, qdot_rad_s = (
-        np.concatenate(column) for column in zip(*parts, strict=True)
-    )
-    name = f"payload {1e3 * payload_kg:g} g"
-    return Played(Log(t_s, current_A, angle_rad, name=name, conditions=conditions), q_rad, qdot_rad_s)
+    event = {"t_s": round(change.t_s, 3), "set": change.field, "value": change.value} if change else None
+    own = {
+        "plant.payload_kg": payload_kg,
+        "duration": duration_s,
+        "seed": seed,
+        "event": [event] if event else [],
+    }
+    run = simulate(SCENARIO, {**fields, **own})
+    if run.status is not Status.COMPLETED:
+        raise SpheretwinError(
+            f"workflow: expected a run of {duration_s:g} s, received {run.status} after"
+            f" {run.telemetry['t_s'][-1]:.3g} s"
+        )
+    return Played(log_of(run.telemetry, payload_kg, f"payload {1e3 * payload_kg:g} g"), run.telemetry)
 
-
-_COLUMNS = ("t_s", "current_command_A", "q_measured_rad", "q_rad", "qdot_rad_s")
 
 _FIT_s = 1.0  # rows for the noise of the shadow
 
@@ -266,52 +263,31 @@ def _judge(log: Log, fields: Mapping[str, Any], uncertainty: Uncertainty | None)
     return Judged(shadow(log, model, settings=fitted.settings), validation)
 
 
-def _changes(true: Mapping[str, float], seed: int) -> list[Change]:
+def _changes(true: Mapping[str, float], seed: int) -> list[MachineChange]:
     """Return the changes that the watch should name, at times from a seed."""
     times_s = np.random.default_rng([seed, 1]).uniform(*CHANGED_s, 4).tolist()
-    gains, friction_Nm = (_fields(true)[name] for name in ("plant.group_gain", "plant.coulomb_Nm"))
-    weak = [0.8 * gain if group == _WEAK else gain for group, gain in enumerate(gains)]
-    offset_rad = float(np.radians(0.1))
+    fields = _fields(true)
+    gains, friction_Nm = np.array(fields["plant.group_gain"]), np.array(fields["plant.coulomb_Nm"])
+    weak, offset_rad = 0.2 * gains[_WEAK] * (np.arange(len(gains)) == _WEAK), float(np.radians(0.1))
+    offset, group = "sensors.angle_offset_rad", f"plant.group_gain.{_WEAK}"
+    rows = (
+        ("torque −3 %", "plant.group_gain", 0.97 * gains, "torque_scale", -0.03),
+        (f"group {_WEAK} −20 %", "plant.group_gain", gains - weak, group, -weak[_WEAK]),
+        ("offset of α +0.1°", offset, np.array([offset_rad, 0.0, 0.0]), f"{offset}.0", offset_rad),
+        ("friction doubled", "plant.coulomb_Nm", 2 * friction_Nm, "plant.coulomb_Nm", np.mean(friction_Nm)),
+    )
     return [
-        Change(
-            "torque −3 %",
-            "plant.group_gain",
-            [0.97 * gain for gain in gains],
-            "torque_scale",
-            -0.03,
-            times_s[0],
-        ),
-        Change(
-            f"group {_WEAK} −20 %",
-            "plant.group_gain",
-            weak,
-            f"plant.group_gain.{_WEAK}",
-            -0.2 * gains[_WEAK],
-            times_s[1],
-        ),
-        Change(
-            "offset of α +0.1°",
-            "sensors.angle_offset_rad",
-            [offset_rad, 0.0, 0.0],
-            "sensors.angle_offset_rad.0",
-            offset_rad,
-            times_s[2],
-        ),
-        Change(
-            "friction doubled",
-            "plant.coulomb_Nm",
-            [2 * value for value in friction_Nm],
-            "plant.coulomb_Nm",
-            float(np.mean(friction_Nm)),
-            times_s[3],
-        ),
+        MachineChange(label, field, value.tolist(), what, float(size), t_s)
+        for (label, field, value, what, size), t_s in zip(rows, times_s, strict=True)
     ]
 
 
 _WEAK = 5  # a group that the motion needs
 
 
-def _watch(hidden: Mapping[str, Any], twin: Mapping[str, Any], change: Change | None, seed: int) -> Watched:
+def _watch(
+    hidden: Mapping[str, Any], twin: Mapping[str, Any], change: MachineChange | None, seed: int
+) -> Watched:
     """Return the alarms of a log, judged window by window."""
     log = _play(hidden, max(PAYLOADS_kg), CHANGED_s[1] + AFTER_s, seed, change).log
     watch = Watch(SCENARIO, {**twin, **log.conditions})

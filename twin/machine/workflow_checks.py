@@ -23,7 +23,7 @@ def settled_errors(result: Workflow, judged: Judged, name: str) -> tuple[Array, 
     """Return errors of an estimate against the truth, and their 95 % half-widths, once it has settled."""
     played, table = result.logs[-1], judged.shadowed.telemetry
     first = int(np.searchsorted(played.log.t_s, played.log.t_s[0] + SETTLED_s))
-    return (table[name] - getattr(played, TRUE_COLUMNS[name]))[first:], Z95 * table[f"{name}_std"][first:]
+    return (table[name] - played.telemetry[TRUE_COLUMNS[name]])[first:], Z95 * table[f"{name}_std"][first:]
 
 
 def checks_of(result: Workflow) -> list[Check]:
