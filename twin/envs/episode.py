@@ -9,8 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spheretwin.electronics.coil import advance_lag
-from spheretwin.models.base.compiled import allocation_free
+from spheretwin.models.base.compiled import allocation_free, inlined
 from spheretwin.models.base.record import Rows
+from spheretwin.models.kinematics import Triple
 from spheretwin.plant.lanes import LANES, LaneMagnetics, PlantBlock, advance
 from spheretwin.plant.plant_tick import FASTEST_RATE_rad_s
 
@@ -117,53 +118,74 @@ def advance_episodes(
         advance(blocks, magnetics, no_currents, physics.step_s, physics.substeps, physics.slows)
     ended = 0
     for i in range(n):
-        block, lane = blocks[i // LANES], i % LANES
-        rewards[i] = 0.0
-        for k in range(4):
-            terms[i, k] = 0.0
-        if episodes.code[i] == RUNNING:
-            episodes.tick[i] += 1
-            episodes.code[i] = _judge(block, lane, i, episodes)
-            _reward(block, lane, i, episodes, actions[i], limit, terms[i])
-            for k in range(4):
-                rewards[i] += terms[i, k]
-            ended += episodes.code[i] != RUNNING
-        observe(block, lane, i, episodes, observations[i])
+        q, qdot = motion_of(blocks[i // LANES], i % LANES)
+        ended += finish(q, qdot, i, episodes, actions[i], limit, rewards, terms[i])
+        observe(q, qdot, i, episodes, observations[i])
     return ended
 
 
+@inlined
+def motion_of(block: PlantBlock, lane: int) -> tuple[Triple, Triple]:
+    """Return angles and rates of one plant."""
+    q, qdot = block.q_rad, block.qdot_rad_s
+    return (
+        (q[lane], q[LANES + lane], q[2 * LANES + lane]),
+        (qdot[lane], qdot[LANES + lane], qdot[2 * LANES + lane]),
+    )
+
+
+@inlined
+def finish(
+    q: Triple,
+    qdot: Triple,
+    i: int,
+    episodes: Episodes,
+    action: Array,
+    limit: float,
+    rewards: Array,
+    terms: Array,
+) -> bool:
+    """Write reward and terms of episode i after its control period; return True if it ended with it."""
+    rewards[i] = 0.0
+    for k in range(4):
+        terms[k] = 0.0
+    if episodes.code[i] != RUNNING:
+        return False
+    episodes.tick[i] += 1
+    episodes.code[i] = _judge(q, qdot, i, episodes)
+    _reward(q, qdot, i, episodes, action, limit, terms)
+    for k in range(4):
+        rewards[i] += terms[k]
+    return bool(episodes.code[i] != RUNNING)
+
+
 @allocation_free
-def observe(block: PlantBlock, lane: int, i: int, episodes: Episodes, row: NDArray[np.float32]) -> None:
+def observe(q: Triple, qdot: Triple, i: int, episodes: Episodes, row: NDArray[np.float32]) -> None:
     """Write the observation of episode i; numbers beyond their bounds are cut, NaN is 0."""
     reference = episodes.reference[episodes.variant[i], episodes.tick[i]]
     for k in range(3):
-        q, qdot = block.q_rad[k * LANES + lane], block.qdot_rad_s[k * LANES + lane]
-        row[k], row[3 + k] = q - reference[0, k], qdot - reference[1, k]
-        row[6 + k], row[9 + k], row[12 + k] = q, qdot, reference[2, k]
+        row[k], row[3 + k] = q[k] - reference[0, k], qdot[k] - reference[1, k]
+        row[6 + k], row[9 + k], row[12 + k] = q[k], qdot[k], reference[2, k]
     for place in range(15):
         bound = BOUNDS[place]
         row[place] = min(max(row[place], -bound), bound) if row[place] == row[place] else 0.0
 
 
 @allocation_free
-def _judge(block: PlantBlock, lane: int, i: int, episodes: Episodes) -> int:
+def _judge(q: Triple, qdot: Triple, i: int, episodes: Episodes) -> int:
     """Return how episode i goes on after its control period."""
     for k in range(3):
-        if not (
-            isfinite(block.q_rad[k * LANES + lane])
-            and abs(block.qdot_rad_s[k * LANES + lane]) < FASTEST_RATE_rad_s
-        ):
+        if not (isfinite(q[k]) and abs(qdot[k]) < FASTEST_RATE_rad_s):
             return DIVERGED
     for k in range(3):
-        q = block.q_rad[k * LANES + lane]
-        if not episodes.hinge_range[k, 0] <= q <= episodes.hinge_range[k, 1]:
+        if not episodes.hinge_range[k, 0] <= q[k] <= episodes.hinge_range[k, 1]:
             return LEFT_WORKSPACE
     return COMPLETED if episodes.tick[i] == episodes.disturbance.shape[1] else RUNNING
 
 
 @allocation_free
 def _reward(
-    block: PlantBlock, lane: int, i: int, episodes: Episodes, action: Array, limit: float, terms: Array
+    q: Triple, qdot: Triple, i: int, episodes: Episodes, action: Array, limit: float, terms: Array
 ) -> None:
     """Write the terms of the reward, and add to the figures of the episode."""
     weights, code = episodes.weights, episodes.code[i]
@@ -174,8 +196,8 @@ def _reward(
     reference = episodes.reference[episodes.variant[i], episodes.tick[i]]
     angle = rate = effort = 0.0
     for k in range(3):
-        angle += (block.q_rad[k * LANES + lane] - reference[0, k]) ** 2
-        rate += (block.qdot_rad_s[k * LANES + lane] - reference[1, k]) ** 2
+        angle += (q[k] - reference[0, k]) ** 2
+        rate += (qdot[k] - reference[1, k]) ** 2
     for k in range(action.shape[0]):
         effort += (min(max(action[k], -limit), limit) / limit) ** 2
     terms[0], terms[1] = -weights[0] * sqrt(angle) / 0.1, -weights[1] * sqrt(rate) / 10.0

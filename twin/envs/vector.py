@@ -1,31 +1,25 @@
-"""Vector environment: many episodes in lockstep, in the interface of Gymnasium."""
+"""Vector environment: many episodes in lockstep on one core, in the interface of Gymnasium."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
 from math import isfinite
-from typing import Any, TypeGuard
+from typing import Any
 
 import numpy as np
-from gymnasium import spaces
-from gymnasium.utils import seeding
-from gymnasium.vector import AutoresetMode, VectorEnv
-from gymnasium.vector.utils import batch_space
+from gymnasium.vector import AutoresetMode
 from numpy.typing import NDArray
 
+from spheretwin.envs.batch import EpisodeBatch
 from spheretwin.envs.episode import (
     BOUNDS,
     COMPLETED,
     REWARD_TERMS,
     RUNNING,
     STATUS,
-    Episodes,
-    Physics,
     advance_episodes,
+    motion_of,
     observe,
 )
-from spheretwin.envs.settings import settings_of
-from spheretwin.envs.variants import build_variants
 from spheretwin.models.base.arrays import real_array
 from spheretwin.models.base.compiled import for_types_of
 from spheretwin.models.base.errors import InputError, shown
@@ -35,7 +29,7 @@ from spheretwin.plant.plants import Plants
 Array = NDArray[np.float64]
 
 
-class TwinVectorEnv(VectorEnv[Any, Any, Any]):
+class TwinVectorEnv(EpisodeBatch):
     """Many plants on one core, each in an episode of its own.
 
     Parameters
@@ -61,8 +55,6 @@ class TwinVectorEnv(VectorEnv[Any, Any, Any]):
         A setting is unknown or out of range, or the scenario does not fit.
     """
 
-    reward_terms = REWARD_TERMS
-
     def __init__(
         self,
         num_envs: int = 1,
@@ -70,37 +62,8 @@ class TwinVectorEnv(VectorEnv[Any, Any, Any]):
         autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
         **settings: Any,
     ) -> None:
-        if not num_envs >= 1:
-            raise InputError(f"environment: expected at least one plant, received num_envs {num_envs}")
-        self.settings = settings_of(task, settings)
-        self.autoreset_mode = AutoresetMode(autoreset_mode)
-        self.metadata = {"autoreset_mode": self.autoreset_mode, "render_modes": []}
-        self.num_envs = num_envs
-        self._variants = variants = build_variants(self.settings)
-        self._plants = Plants(variants.parameters[0], num_envs)
-        by_current, groups = self.settings.actions == "current", self._plants.groups
-        self._physics = Physics(
-            step_s=self.settings.step_s,
-            substeps=round(variants.period_s / self.settings.step_s),
-            slows=any(np.any(one.coulomb_Nm) or np.any(one.viscous_Nm_s) for one in variants.parameters),
-            by_current=by_current,
-            limit=float(variants.lag["current_limit_A"][0]) if by_current else self.settings.torque_limit_Nm,
-        )
-        weights = self.settings.reward
-        self._episodes = Episodes(
-            tick=np.zeros(num_envs, np.int64),
-            variant=np.zeros(num_envs, np.int64),
-            code=np.full(num_envs, RUNNING),
-            reference=variants.reference,
-            disturbance=variants.disturbance,
-            hinge_range=variants.hinge_range,
-            weights=np.array([weights.tracking, weights.rate, weights.effort, weights.failure]),
-            current=np.zeros((num_envs, groups)),
-            mean_current=np.zeros((num_envs, groups)),
-            lag=variants.lag,
-            squares=np.zeros(num_envs),
-            largest=np.zeros(num_envs),
-        )
+        super().__init__(num_envs, task, autoreset_mode, settings)
+        self._plants = Plants(self._variants.parameters[0], num_envs)
         self._any_over = False
         # Numba's check of the types of all arguments would take as long as the physics.
         self._advance = for_types_of(
@@ -114,52 +77,6 @@ class TwinVectorEnv(VectorEnv[Any, Any, Any]):
             np.empty(0),
             np.empty((0, 0)),
         )
-        self._generators = [np.random.default_rng() for _ in range(num_envs)]
-        bounds = BOUNDS.astype(np.float32)
-        size = groups if by_current else 3
-        self.single_observation_space = spaces.Box(-bounds, bounds, dtype=np.float32)
-        self.single_action_space = spaces.Box(-1.0, 1.0, (size,), np.float32)
-        self.observation_space = batch_space(self.single_observation_space, num_envs)
-        self.action_space = batch_space(self.single_action_space, num_envs)
-
-    def reset(
-        self, *, seed: int | Sequence[int | None] | None = None, options: dict[str, Any] | None = None
-    ) -> tuple[NDArray[np.float32], dict[str, Any]]:
-        """Start episodes anew.
-
-        Parameters
-        ----------
-        seed : int or sequence of int, optional
-            Of each plant; a single one counts up from plant to plant.
-        options : dict, optional
-            ``reset_mask``, (n,) of bool: which plants; default: all.
-
-        Raises
-        ------
-        InputError
-            Unknown options, or another number of seeds than of plants.
-        """
-        if not isinstance(options, Mapping | None):
-            raise InputError(f"environment: expected options as a table, received {shown(options)}")
-        options = dict(options or {})
-        mask = np.asarray(options.pop("reset_mask", np.ones(self.num_envs, np.bool_)))
-        if options or mask.shape != (self.num_envs,) or mask.dtype != np.bool_:
-            raise InputError(
-                f"environment: expected reset_mask of {self.num_envs} booleans, received {options or mask}"
-            )
-        if seed is not None:
-            seeds = [seed + i for i in range(self.num_envs)] if _is_seed(seed) else seed
-            if not (isinstance(seeds, Sequence) and all(one is None or _is_seed(one) for one in seeds)):
-                raise InputError(
-                    f"environment: expected whole numbers from 0 on as seeds, received {shown(seed)}"
-                )
-            if len(seeds) != self.num_envs:
-                raise InputError(f"environment: expected {self.num_envs} seeds, received {len(seeds)}")
-            for i, one in enumerate(seeds):
-                if one is not None and mask[i]:
-                    self._generators[i] = seeding.np_random(int(one))[0]
-        self._start(np.flatnonzero(mask))
-        return self._observations(), self._infos_of_start(mask)
 
     def step(
         self, actions: Any
@@ -221,21 +138,11 @@ class TwinVectorEnv(VectorEnv[Any, Any, Any]):
         self._any_over = bool(np.any(code != RUNNING))
         return observations, rewards, terminations, truncations, infos
 
-    def share_generator(self, generator: np.random.Generator) -> None:
-        """Draw the episodes of every plant from one generator."""
-        self._generators = [generator] * self.num_envs
-
-    def scenario_of(self, plant: int) -> Any:
-        """Return the scenario of the present episode of a plant."""
-        return self._variants.scenarios[self._episodes.variant[plant]]
-
     def _start(self, plants: NDArray[np.intp]) -> None:
         episodes, variants = self._episodes, self._variants
-        for i in plants:
-            variant = int(self._generators[i].integers(len(variants.scenarios)))
-            episodes.variant[i] = variant
-            self._plants.set_parameters(int(i), variants.parameters[variant])
-        chosen = episodes.variant[plants]
+        chosen = self._draw(plants)
+        for i, variant in zip(plants.tolist(), chosen.tolist(), strict=True):
+            self._plants.set_parameters(i, variants.parameters[variant])
         self._plants.set_state(variants.q_rad[chosen], variants.qdot_rad_s[chosen], plants)
         for column in (episodes.tick, episodes.code, episodes.current, episodes.squares, episodes.largest):
             column[plants] = 0
@@ -260,15 +167,13 @@ class TwinVectorEnv(VectorEnv[Any, Any, Any]):
 
     def _observe(self, plants: NDArray[np.intp], observations: NDArray[np.float32]) -> None:
         for i in plants:
-            observe(self._plants.blocks[i // LANES], i % LANES, i, self._episodes, observations[i])
+            q, qdot = motion_of(self._plants.blocks[i // LANES], i % LANES)
+            observe(q, qdot, i, self._episodes, observations[i])
 
     def _observations(self) -> NDArray[np.float32]:
         observations = np.empty((self.num_envs, len(BOUNDS)), np.float32)
         self._observe(np.arange(self.num_envs), observations)
         return observations
-
-    def _infos_of_start(self, mask: NDArray[np.bool_]) -> dict[str, Any]:
-        return {"variant": self._episodes.variant.copy(), "_variant": mask.copy()}
 
     def _infos_of_end(self, mask: NDArray[np.bool_]) -> dict[str, Any]:
         episodes = self._episodes
@@ -281,7 +186,3 @@ class TwinVectorEnv(VectorEnv[Any, Any, Any]):
             "rms_error_rad": np.where(mask, rms, 0.0),
         }
         return columns | {f"_{name}": mask.copy() for name in columns}
-
-
-def _is_seed(value: object) -> TypeGuard[int]:
-    return isinstance(value, int | np.integer) and bool(value >= 0)
