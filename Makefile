@@ -125,7 +125,7 @@ setup: .venv/installed
 
 # The compiler for GPUs is large, and numba-cuda holds NumPy back.
 .venv-gpu/installed: uv.lock pyproject.toml $(TOOLS)/uv
-	UV_PROJECT_ENVIRONMENT=.venv-gpu $(SYNC) --compile-bytecode --extra gpu
+	UV_PROJECT_ENVIRONMENT=.venv-gpu $(SYNC) --compile-bytecode --extra gpu --extra rl
 	@touch $@
 
 # Type checkers and import-linter do not see folders that are mapped by an editable install.

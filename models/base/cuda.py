@@ -111,6 +111,16 @@ def on_device(value: Any) -> Any:
     return value.copy() if SIMULATED else cuda.to_device(np.ascontiguousarray(value))
 
 
+def borrowed(value: Any) -> Any:
+    """Return an array of another package on the GPU, not copied; of NumPy, copied; None if it is no array."""
+    try:
+        if SIMULATED or isinstance(value, np.ndarray):
+            return on_device(np.asarray(value))
+        return cuda.as_cuda_array(value)
+    except (TypeError, ValueError):
+        return None
+
+
 def send(value: np.ndarray[Any, Any], copy: Any) -> None:
     """Copy an array into its copy of `on_device`."""
     if SIMULATED:

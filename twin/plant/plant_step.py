@@ -227,7 +227,7 @@ def step(state: State, currents: Array, disturbance: Array, parameters: Paramete
     G, vectors = np.empty((3, groups)), np.empty((8, max(3, groups)))
     scratch = np.empty((_lines(parameters), SCRATCH_COLUMNS))
     q, qdot = state.q_rad.copy(), state.qdot_rad_s.copy()
-    _advance(q, qdot, currents, disturbance, parameters, dt, vectors, G, scratch)
+    advance(q, qdot, currents, disturbance, parameters, dt, vectors, G, scratch)
     if not (_has(q, 3) and _has(qdot, 3)):
         raise InputError("plant: expected a step with a finite result, received one that diverges")
     return State(q, qdot)
@@ -243,7 +243,7 @@ def step_of_checked(
     G, vectors = np.empty((3, groups)), np.empty((8, max(3, groups)))
     scratch = np.empty((_lines(parameters), SCRATCH_COLUMNS))
     q, qdot = state.q_rad.copy(), state.qdot_rad_s.copy()
-    _advance(q, qdot, currents, disturbance, parameters, dt, vectors, G, scratch)
+    advance(q, qdot, currents, disturbance, parameters, dt, vectors, G, scratch)
     return State(q, qdot)
 
 
@@ -286,7 +286,7 @@ def roll_out(
     present, qdot = state.q_rad.copy(), state.qdot_rad_s.copy()
     for k in range(currents.shape[0]):
         for _ in range(steps):
-            _advance(present, qdot, currents[k], disturbance, parameters, dt, vectors, G, scratch)
+            advance(present, qdot, currents[k], disturbance, parameters, dt, vectors, G, scratch)
         q[k] = present
     return State(present, qdot)
 
@@ -299,7 +299,7 @@ def _levels(parameters: Parameters) -> Levels:
 
 
 @allocation_free
-def _advance(
+def advance(
     q: Array,
     qdot: Array,
     currents: Array,
@@ -310,7 +310,10 @@ def _advance(
     G: Array,
     scratch: Array,
 ) -> None:
-    """Advance angles and rates in place; `vectors` (8, n), `G` and `scratch` are working space."""
+    """Advance angles and rates in place, without a field if there are no currents.
+
+    `vectors` (8, n), `G` and `scratch` are working space.
+    """
     joint, friction_q, middle_q, torque_S = parameters.joint[0], vectors[3], vectors[4], vectors[5]
     torque_q, effective = vectors[6], vectors[7]
     inertia, (forward, reverse) = triple(parameters.inertia_kg_m2), _levels(parameters)
@@ -321,10 +324,12 @@ def _advance(
         acts = acts or forward[i] > 0 or reverse[i] > 0 or viscous[i] > 0
     if acts:
         slow_hinges(joint, inertia, viscous, (forward, reverse), smoothing, dt, q, qdot, friction_q)
-    _fill(middle_q, parameters, vectors, G, scratch)
-    for j in range(G.shape[1]):
-        effective[j] = parameters.torque_gain[j] * currents[j]
-    rotor_torque(G, effective[: G.shape[1]], torque_S)
+    torque_S[0] = torque_S[1] = torque_S[2] = 0.0
+    if currents.shape[0] > 0:
+        _fill(middle_q, parameters, vectors, G, scratch)
+        for j in range(G.shape[1]):
+            effective[j] = parameters.torque_gain[j] * currents[j]
+        rotor_torque(G, effective[: G.shape[1]], torque_S)
     torque_on_hinges(joint, middle_q, torque_S, torque_q)
     for i in range(3):
         torque_q[i] -= (
