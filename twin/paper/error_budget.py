@@ -11,10 +11,10 @@ import numpy as np
 from spheretwin.control.laws import LAWS
 from spheretwin.models import actuator
 from spheretwin.models.telemetry.signals import ANGLES
+from spheretwin.paper.cells import Numbers, of_axis, table
 from spheretwin.paper.experiment import Array, Case, Finding, Outcome, Outcomes, Section
-from spheretwin.paper.experiment_file import ExperimentFile, table
+from spheretwin.paper.experiment_file import ExperimentFile
 from spheretwin.paper.laws import BY_LAW
-from spheretwin.paper.page import of_axis, spread_deg
 from spheretwin.scenario.hardware import HARDWARE, MACHINE
 from spheretwin.viz.pages.markdown import Drawing
 
@@ -118,7 +118,7 @@ def findings(outcomes: Outcomes) -> list[Finding]:
 def _cell(budget: Budget, law: str, axis: int) -> Callable[[str], str]:
     def cell(stage: str) -> str:
         runs = budget.runs(law, stage)
-        return spread_deg(of_axis(runs, "max_abs_error", axis)) if runs else "not run"
+        return f"{Numbers(of_axis(runs, 'max_abs_error', axis)):.3f deg}" if runs else "not run"
 
     return cell
 

@@ -140,3 +140,19 @@ class Experiment(NamedTuple):
     """Lines of the first page; none of cases that were not run."""
     trajectories: Callable[[Outcomes], Mapping[str, LawTrajectory]] = lambda outcomes: {}
     """Runs of one condition for a recording, by the labels of their laws."""
+
+
+def padded(arrays: Sequence[Array]) -> Array:
+    """Stack arrays (n, k) of runs to (runs, longest n, k); NaN after the end of a run that ended early."""
+    longest = max(arrays, key=len)
+    stacked = np.full((len(arrays), *longest.shape), np.nan)
+    for run, array in zip(stacked, arrays, strict=True):
+        run[: len(array)] = array.reshape(len(array), *longest.shape[1:])
+    return stacked
+
+
+def window_maxima(error: Array, window_s: float, period_s: float) -> Array:
+    """Largest absolute value of each column of an error (n, k) within each complete window."""
+    ticks = max(1, round(window_s / period_s))
+    windows = len(error) // ticks
+    return np.abs(error)[: windows * ticks].reshape(windows, ticks, error.shape[1]).max(axis=1)

@@ -10,9 +10,18 @@ from importlib import resources
 from itertools import product
 from typing import TYPE_CHECKING, Any, TypeVar
 
+from spheretwin.metrics import METRICS
+from spheretwin.paper.cells import (
+    ERRORS,
+    Cell,
+    Numbers,
+    figures_named,
+    hinges,
+    statuses_text,
+    table,
+)
 from spheretwin.paper.experiment import SEEDS, STATUSES, Case, Experiment, Outcome, Outcomes, Section
-from spheretwin.paper.laws import COMPARED_LAWS, printed_rad
-from spheretwin.study.statistics import quantile_text
+from spheretwin.paper.laws import COMPARED_LAWS, TABLES, printed_rad
 from spheretwin.viz.pages.markdown import Drawing, ResultTable
 
 if TYPE_CHECKING:
@@ -25,13 +34,19 @@ T = TypeVar("T")
 
 @dataclass(frozen=True)
 class CaseRuns:
-    """Case with its runs; an item is a column of the case."""
+    """Case with its runs; an item is a column of the case, an error or a metric, the status, or the data."""
 
     case: Case
     runs: Sequence[Outcome]
 
-    def __getitem__(self, column: str) -> Any:
-        return self.case.columns[column]
+    def __getitem__(self, name: str) -> Any:
+        if name in ERRORS:
+            return hinges(map(ERRORS[name], self.runs))
+        if name in METRICS:
+            return Numbers(figures_named(self.runs, name))
+        if name == "status":
+            return statuses_text(self.runs)
+        return self.runs[0].data if name == "data" else self.case.columns[name]
 
 
 class ExperimentFile:
@@ -58,6 +73,7 @@ class ExperimentFile:
         content = tomllib.loads((FOLDER / f"{name}.toml").read_text(encoding="utf-8"))
         self._content: dict[str, Any] = {"law": [law._asdict() for law in COMPARED_LAWS]}
         self._content |= content | content.get(part, {}) | lists
+        self._tables = TABLES | self._content.get("table", {})
         self._laws = {law["law"]: law for law in self["law"]}
 
     def __getitem__(self, entry: str) -> Any:
@@ -98,6 +114,20 @@ class ExperimentFile:
         """Figure with the file name and the caption of the file."""
         file, caption = (self[key][entry].format(**values) for entry in ("file", "caption"))
         return Drawing(file, caption, figure)
+
+    def table(
+        self,
+        key: str,
+        items: Iterable[T],
+        before: Mapping[str, Cell[T]] | None = None,
+        /,
+        **measures: Callable[[T], Any],
+    ) -> ResultTable:
+        """Table of the file with a row for each item; some cells may be before those of the file."""
+        of_file = self._tables[key]
+        cells = {**(before or {}), **of_file["cells"]}
+        texts = of_file.get("texts", 1) + len(before or {})
+        return table(of_file["title"], items, cells, texts, **measures)
 
     def experiment(self, **functions: Any) -> Experiment:
         """Experiment with the name, title and summary of the file."""
@@ -140,35 +170,3 @@ class ExperimentFile:
             seeds=option.get("seeds", SEEDS),
             columns=columns,
         )
-
-
-Cells = dict[str, Callable[[CaseRuns], str]]
-"""Cells of a table by the head of their column."""
-
-
-def table(
-    title: str, items: Iterable[T], columns: Mapping[str, Callable[[T], str]], texts: int = 1
-) -> ResultTable:
-    """Table with a row for each item, each cell a function of it."""
-    rows = [tuple(cell(item) for cell in columns.values()) for item in items]
-    return ResultTable(title, tuple(columns), rows, texts)
-
-
-def quantiles(
-    head: str, values: Callable[[T], Sequence[float]], text: Callable[[float], str], *shares: float
-) -> dict[str, Callable[[T], str]]:
-    """Cells of quantiles of the values of an item, the median first, each with its interval."""
-    return {
-        head if share == 0.5 else f"{100 * share:g} %": _quantile(values, text, share) for share in shares
-    }
-
-
-def _quantile(
-    values: Callable[[T], Sequence[float]], text: Callable[[float], str], share: float
-) -> Callable[[T], str]:
-    return lambda item: quantile_text(values(item), text, share)
-
-
-def column(name: str, text: str = "{}") -> Callable[[CaseRuns], str]:
-    """Cell with a column of the case."""
-    return lambda item: text.format(item[name])

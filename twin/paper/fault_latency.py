@@ -6,18 +6,17 @@ from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from itertools import pairwise
 from math import inf
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from spheretwin.paper import fault_cases as cases
+from spheretwin.paper.cells import NONE, Numbers, table
 from spheretwin.paper.experiment import Outcome, Section
-from spheretwin.paper.experiment_file import quantiles, table
 from spheretwin.paper.fault_cases import FEW, FILE, FaultRuns
 from spheretwin.paper.fault_outcomes import tracks
 from spheretwin.paper.fault_sections import percent
 from spheretwin.paper.laws import BY_LAW
-from spheretwin.paper.page import NONE
 from spheretwin.study.statistics import quantile_text, share_interval
 from spheretwin.viz.pages.markdown import Drawing
 
@@ -47,11 +46,7 @@ def section(faults: FaultRuns) -> Section:
     costs = [(_named(*interval), _within(pairs, *interval)) for interval in _intervals()]
     tables = [
         table("Detection latency of failed groups", by_kind.items(), LATENCY),
-        table(
-            "One or two open groups: cost of the delay, by the latency of the slower group",
-            [cost for cost in costs if cost[1]],
-            COST,
-        ),
+        FILE.table("cost", [cost for cost in costs if cost[1]], **COST),
     ]
     drawings = [lambda: _draw(by_kind)] if by_kind else []
     return FILE.section("latency", tables, drawings, f"{_why(by_kind)}{_verdict(pairs)}")
@@ -206,22 +201,14 @@ def _costs(pairs: Pairs) -> list[float]:
     return [1e3 * cost_rad(*pair) for pair in pairs]
 
 
-Interval = tuple[str, Pairs]
-"""Interval of the latency with its pairs."""
-
-
-def _healthy(interval: Interval) -> str:
-    return f"{np.median([1e3 * detecting.data.healthy_rad for detecting, _ in interval[1]]):.1f}"
-
-
-COST: dict[str, Callable[[Interval], str]] = {
-    "slowest latency, ms": lambda interval: interval[0],
-    "runs": lambda interval: str(len(interval[1])),
-    **quantiles("cost, mrad: median", lambda one: _costs(one[1]), "{:.3f}".format, 0.5, 0.95, 0.99),
-    "largest of these": lambda interval: f"{max(_costs(interval[1])):.3f}",
-    "healthy error, mrad: median": _healthy,
+COST: dict[str, Callable[[tuple[str, Pairs]], Any]] = {
+    "interval": lambda interval: interval[0],
+    "runs": lambda interval: len(interval[1]),
+    "cost": lambda interval: Numbers(_costs(interval[1])),
+    "healthy": lambda interval: Numbers(1e3 * detecting.data.healthy_rad for detecting, _ in interval[1]),
     "track": lambda interval: percent([tracks(detecting) for detecting, _ in interval[1]]),
 }
+"""Measures of an interval of the latency with its pairs."""
 
 
 def _named(first: float, end: float) -> str:

@@ -4,21 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from spheretwin.control.supervision.watchdog import Reason
 from spheretwin.models.telemetry.status import Status
 from spheretwin.paper import fault_cases as cases
+from spheretwin.paper.cells import NONE, Numbers, statuses_text, table
 from spheretwin.paper.experiment import Array, Outcome, Section
-from spheretwin.paper.experiment_file import quantiles, table
 from spheretwin.paper.fault_cases import COILS, FEW, FILE, FaultRuns
 from spheretwin.paper.fault_outcomes import TWICE, FaultData, tracks
-from spheretwin.paper.page import NONE, statuses_text
 from spheretwin.viz.pages.markdown import Drawing
-
-Cells = dict[str, Callable[["Group"], str]]
 
 
 def parts_section(faults: FaultRuns) -> Section:
@@ -133,28 +130,11 @@ class Group(NamedTuple):
     runs: Sequence[Outcome]
 
 
-def _ratios(group: Group) -> list[float]:
-    return [run.data.ratio for run in group.runs]
-
-
-TRACKING: Cells = {
-    "track": lambda group: percent([tracks(run) for run in group.runs]),
-    **quantiles("error ratio: median", _ratios, "{:.2f}".format, 0.5, 0.95, 0.99),
-    "largest": lambda group: f"{np.max(_ratios(group)):.2f}",
-}
-BY_NUMBER: Cells = {
-    "open groups": lambda group: group.name,
-    "way": lambda group: group.way,
-    "sets": lambda group: str(group.sets),
-    "runs": lambda group: str(len(group.runs)),
+MEASURES: dict[str, Callable[[Group], Any]] = {
+    "number": lambda group: len(group.runs),
+    "ratio": lambda group: Numbers(run.data.ratio for run in group.runs),
     "completed": lambda group: percent([run.is_complete for run in group.runs]),
-    **TRACKING,
-}
-BY_START: Cells = {
-    "fault starts, s": lambda group: group.name,
-    "way": lambda group: group.way,
-    "runs": lambda group: str(len(group.runs)),
-    **TRACKING,
+    "track": lambda group: percent([tracks(run) for run in group.runs]),
 }
 INTERVALS_s = ((0.0, 1.0), (1.0, 2.0), (2.0, 3.0), (3.0, 4.0), (4.0, 5.0))
 """Intervals of the run, of 5 s, in which faults start."""
@@ -168,8 +148,8 @@ def groups_section(faults: FaultRuns) -> Section:
     by_start = [_started(faults, *interval, way) for interval in INTERVALS_s for way in cases.OF_GROUPS]
     by_number, by_start = ([group for group in groups if group.runs] for groups in (by_number, by_start))
     tables = [
-        table("Open groups by their number and way", by_number, BY_NUMBER, 2),
-        table("One or two open groups, by the start of the fault", by_start, BY_START, 2),
+        FILE.table("by_number", by_number, **MEASURES),
+        FILE.table("by_start", by_start, **MEASURES),
     ]
     drawings = [lambda: _draw_shares(faults), lambda: _draw_pairs(faults)] if by_number else []
     text = f" {_numbers(faults)}{_goal(faults)}"

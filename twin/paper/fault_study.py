@@ -3,19 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from functools import partial
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from spheretwin.paper import fault_cases as cases
 from spheretwin.paper import fault_latency
 from spheretwin.paper.experiment import Finding, Outcome, Outcomes, Section
-from spheretwin.paper.experiment_file import CaseRuns, table
+from spheretwin.paper.experiment_file import CaseRuns
 from spheretwin.paper.fault_cases import COILS, FEW, FILE, FaultRuns
 from spheretwin.paper.fault_outcomes import TWICE, reduce, row_fields, tracks
 from spheretwin.paper.fault_sections import ERROR, groups_section, parts_section
-from spheretwin.paper.page import NONE
 from spheretwin.viz.pages.markdown import Drawing
 
 FIGURES = {
@@ -47,7 +45,7 @@ class Split(NamedTuple):
 
 def causes_section(faults: FaultRuns) -> Section:
     """Separation of the sets that track by rank and torque, and the smallest sets that do not track."""
-    causes = [cause for way, figure in JUDGED if (cause := _cause(faults, way, figure)).sets]
+    causes = [cause for way, figure in JUDGED if sum(map(len, (cause := _cause(faults, way, figure))[2:]))]
     by_way = {
         way.name: items
         for way in (cases.REPORTED, cases.BOUNDED)
@@ -55,8 +53,8 @@ def causes_section(faults: FaultRuns) -> Section:
     }
     small = [item for items in by_way.values() for item in smallest(items)]
     tables = [
-        table("How well one figure tells the sets that track, each with the first seed", causes, CAUSES, 2),
-        table(f"The smallest sets that do not track, at most {LISTED} of each way", small, SMALL, 4),
+        FILE.table("causes", causes, **CAUSES),
+        FILE.table("smallest", small, **SMALL),
     ]
     drawings = [lambda: _draw(by_way)] if by_way else []
     verdicts = "".join(_causes_verdict(items, way) for way, items in by_way.items())
@@ -72,10 +70,14 @@ class Cause(NamedTuple):
     """Of the sets that track."""
     bad: Sequence[float]
 
-    @property
-    def sets(self) -> int:
-        """Number of the sets."""
-        return len(self.good) + len(self.bad)
+
+CAUSES: dict[str, Callable[[Cause], Any]] = {
+    "least": lambda cause: min(cause.good, default=None),
+    "largest": lambda cause: max(cause.bad, default=None),
+    "lost": lambda cause: len(cause.bad),
+    "sets": lambda cause: len(cause.good) + len(cause.bad),
+    "split": lambda cause: split(cause.good, cause.bad) if cause.good and cause.bad else None,
+}
 
 
 def _cause(faults: FaultRuns, way: cases.Way, figure: str) -> Cause:
@@ -90,22 +92,6 @@ def _by_tracking(runs: Sequence[Outcome], figure: str) -> tuple[list[float], lis
         for tracking in (True, False)
     )
     return good, bad
-
-
-def _split_text(text: Callable[[Split], str], cause: Cause) -> str:
-    return text(split(cause.good, cause.bad)) if cause.good and cause.bad else NONE
-
-
-CAUSES: dict[str, Callable[[Cause], str]] = {
-    "way": lambda cause: cause.way,
-    "figure": lambda cause: cause.figure,
-    "sets": lambda cause: str(cause.sets),
-    "do not track": lambda cause: str(len(cause.bad)),
-    "track: least": lambda cause: f"{min(cause.good):.3f}" if cause.good else NONE,
-    "do not: largest": lambda cause: f"{max(cause.bad):.3f}" if cause.bad else NONE,
-    "threshold": partial(_split_text, lambda best: f"{best.at:.3f}"),
-    "correct side": partial(_split_text, lambda best: f"{100 * best.rightly:.1f} %"),
-}
 
 
 def split(good: Sequence[float], bad: Sequence[float]) -> Split:
@@ -156,24 +142,15 @@ def smallest(items: Sequence[CaseRuns]) -> list[CaseRuns]:
     return failing[:LISTED]
 
 
-def _worst(text: Callable[[Outcome], str]) -> Callable[[CaseRuns], str]:
-    def cell(item: CaseRuns) -> str:
-        bad = [run for run in item.runs if not tracks(run)]
-        return text(max(bad, key=lambda run: run.data.ratio))
-
-    return cell
+def _lost(item: CaseRuns) -> list[Outcome]:
+    return [run for run in item.runs if not tracks(run)]
 
 
-SMALL: dict[str, Callable[[CaseRuns], str]] = {
-    "open groups": lambda item: " ".join(map(str, item["groups"])),
-    "way": lambda item: item["way"],
-    "seeds that do not track": lambda item: f"{[*map(tracks, item.runs)].count(False)} of {len(item.runs)}",
-    "status of the worst": _worst(lambda run: str(run.status)),
-    "error ratio": _worst(lambda run: f"{run.data.ratio:.2f}"),
-    "rank": _worst(lambda run: str(run.data.remaining.rank)),
-    "least singular value, N·m/A": _worst(lambda run: f"{run.data.remaining.singular_value_Nm_per_A:.4f}"),
-    "torque left / needed": _worst(lambda run: f"{run.data.remaining.torque:.2f}"),
-    "by least norm": _worst(lambda run: f"{run.data.remaining.least_norm:.2f}"),
+SMALL: dict[str, Callable[[CaseRuns], Any]] = {
+    "open_groups": lambda item: " ".join(map(str, item["groups"])),
+    "lost": lambda item: len(_lost(item)),
+    "number": lambda item: len(item.runs),
+    "worst": lambda item: max(_lost(item), key=lambda run: run.data.ratio),
 }
 
 
@@ -208,24 +185,14 @@ class EnginePairs(NamedTuple):
     way: str
     pairs: Sequence[tuple[Outcome, Outcome]]
 
-    def same(self, value: Callable[[Outcome], object]) -> str:
+    def same(self, value: Callable[[Outcome], object]) -> int:
         """Count the pairs of which a value is the same."""
-        return str([value(one) == value(other) for one, other in self.pairs].count(True))
+        return [value(one) == value(other) for one, other in self.pairs].count(True)
 
-    def largest(self, condition: Callable[[Outcome], bool]) -> str:
-        """Largest difference of the pairs of which both runs meet a condition."""
+    def largest(self, condition: Callable[[Outcome], bool]) -> float | None:
+        """Largest difference of the pairs of which both runs meet a condition, rad; None without one."""
         pairs = [pair for pair in self.pairs if all(map(condition, pair))]
-        return f"{max(difference_rad(*pair) for pair in pairs):.1e}" if pairs else NONE
-
-
-ENGINES: dict[str, Callable[[EnginePairs], str]] = {
-    "way": lambda both: both.way,
-    "sets": lambda both: str(len(both.pairs)),
-    "same status": lambda both: both.same(lambda run: run.status),
-    "same tracking": lambda both: both.same(tracks),
-    "difference if they track, rad": lambda both: both.largest(tracks),
-    "if they complete, rad": lambda both: both.largest(lambda run: run.is_complete),
-}
+        return max((difference_rad(*pair) for pair in pairs), default=None)
 
 
 def engines_section(faults: FaultRuns) -> Section:
@@ -233,7 +200,15 @@ def engines_section(faults: FaultRuns) -> Section:
     every = [both for way in cases.OF_GROUPS if (both := engine_pairs(faults, way)).pairs]
     agreed = [agree(*pair) for both in every for pair in both.pairs]
     more = f" {agreed.count(True)} of {len(agreed)} agree." if agreed else ""
-    engines = table("Largest error of each hinge on the two engines", every, ENGINES)
+    engines = FILE.table(
+        "engines",
+        every,
+        sets=lambda both: len(both.pairs),
+        status=lambda both: both.same(lambda run: run.status),
+        tracking=lambda both: both.same(tracks),
+        if_tracking=lambda both: both.largest(tracks),
+        if_complete=lambda both: both.largest(lambda run: run.is_complete),
+    )
     return FILE.section("engines", [engines], more=more, sample=cases.SAMPLE, bound_rad=BOUND_rad)
 
 

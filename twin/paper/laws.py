@@ -5,7 +5,7 @@ from __future__ import annotations
 import tomllib
 from collections.abc import Mapping
 from importlib import resources
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 
 class ComparedLaw(NamedTuple):
@@ -24,6 +24,9 @@ _CONTENT = tomllib.loads((resources.files("spheretwin.paper") / "laws.toml").rea
 COMPARED_LAWS = tuple(ComparedLaw(**law) for law in _CONTENT["law"])
 BY_LAW = {law.law: law for law in COMPARED_LAWS}
 PAPER_LAWS = tuple(law for law in COMPARED_LAWS if law.of_paper)
+
+TABLES: Mapping[str, Any] = _CONTENT["table"]
+"""Tables that several experiments have."""
 
 Three = tuple[float, float, float]
 

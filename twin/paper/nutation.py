@@ -10,11 +10,10 @@ import numpy as np
 
 from spheretwin.models import actuator as actuators
 from spheretwin.models.telemetry.signals import ANGLES
-from spheretwin.paper import page
-from spheretwin.paper.experiment import Array, Finding, Outcome, Outcomes, Section
-from spheretwin.paper.experiment_file import CaseRuns, Cells, ExperimentFile, column, table
+from spheretwin.paper.cells import Numbers, hinges
+from spheretwin.paper.experiment import Array, Finding, Outcome, Outcomes, Section, padded, window_maxima
+from spheretwin.paper.experiment_file import CaseRuns, ExperimentFile
 from spheretwin.paper.laws import PAPER_LAWS
-from spheretwin.paper.sinusoid import EFFORT, EFFORT_TITLE, LARGEST_TITLE, STATUS, hinge_cells, triple
 from spheretwin.run import Run
 from spheretwin.viz.pages.markdown import Drawing
 
@@ -64,7 +63,7 @@ def reduce(run: Run) -> NutationData:
         q_ref_rad=table["q_ref_rad"][every].copy(),
         torque_Nm=np.linalg.norm(table["torque_Nm"][every], axis=1),
     )
-    windows = page.window_maxima(table["error_rad"], WINDOW_s, period_s)
+    windows = window_maxima(table["error_rad"], WINDOW_s, period_s)
     return NutationData(windows, trajectory if run.scenario.seed == 0 else None)
 
 
@@ -97,9 +96,7 @@ def errors(items: Items) -> Drawing:
     from spheretwin.viz.figures import over_time as figures
 
     by_label = {
-        item["label"]: figures.ErrorBand(
-            item["law"], page.padded([run.data.windows_rad for run in item.runs])
-        )
+        item["label"]: figures.ErrorBand(item["law"], padded([run.data.windows_rad for run in item.runs]))
         for item in items
     }
     figure = figures.errors(by_label, WINDOW_s, ANGLES, TITLE)
@@ -130,24 +127,14 @@ def _longest(items: Items) -> Trajectory:
     return max(trajectories, key=lambda trajectory: len(trajectory.t_s))
 
 
-def _largest_after(item: CaseRuns) -> str:
-    largest = np.median([run.data.largest_after(FROM_s) for run in item.runs], axis=0)
-    return triple(1e3 * largest, 1)
-
-
-LARGEST: Cells = {
-    "law": column("label"),
-    "gains": column("gains"),
-    **STATUS,
-    **hinge_cells("max_abs_error"),
-    f"from {FROM_s:g} s on, mrad": _largest_after,
-}
+def _later(item: CaseRuns) -> tuple[Numbers, ...]:
+    return hinges(run.data.largest_after(FROM_s) for run in item.runs)
 
 
 def sections(outcomes: Outcomes) -> list[Section]:
     """Errors, angles and paths."""
     items, shown = FILE.runs(outcomes), _in_figures(outcomes)
-    tables = [table(LARGEST_TITLE, items, LARGEST, 3), table(EFFORT_TITLE, items, EFFORT)]
+    tables = [FILE.table("largest", items, later=_later), FILE.table("effort", items)]
     drawings = [lambda: angles(shown), lambda: errors(shown), lambda: paths(shown)] if shown else []
     return [FILE.section("laws", tables, drawings, from_s=FROM_s)]
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -11,7 +11,8 @@ import numpy as np
 
 from spheretwin.models import actuator as actuators
 from spheretwin.models.telemetry.status import Status
-from spheretwin.paper.experiment import Array, Case, Experiment, Finding, Outcome, Outcomes, Section
+from spheretwin.paper.cells import ERRORS, figures_named
+from spheretwin.paper.experiment import Case, Experiment, Finding, Outcome, Outcomes, Section
 from spheretwin.paper.runner import CaseSummary, Plan, PlanResult, command_line, summarise
 from spheretwin.study.agreement import BOUND
 from spheretwin.study.statistics import finite_ends
@@ -145,17 +146,6 @@ def _commands_file(chapter: Chapter) -> str:
     return f"{chapter.experiment.name}_commands.txt"
 
 
-NONE = "–"
-"""Cell of a table without a value."""
-
-ERRORS: dict[str, Callable[[Outcome], Any]] = {
-    "max_abs_error": lambda outcome: outcome.max_abs_error,
-    "measured_max_abs_error": lambda outcome: outcome.measured_max_abs_error,
-    "rms_error": lambda outcome: outcome.rms_error,
-    "tail_rms_error": lambda outcome: outcome.tail_rms_error,
-}
-"""Errors of each hinge; the JSON has their median, its interval, and lowest and highest, over the seeds."""
-
 EFFORT = {"rms_torque_Nm": "rms_torque_range_Nm", "current_variation_A_s": "current_variation_range_A_s"}
 """Metrics of the effort; the JSON has their median, and lowest and highest, over the seeds."""
 
@@ -221,58 +211,6 @@ def _status(case: Case, outcomes: Sequence[Outcome]) -> Status:
     counts = Counter(outcome.status for outcome in outcomes)
     unexpected = [status for status in counts if status not in case.expected_statuses]
     return unexpected[0] if unexpected else counts.most_common(1)[0][0]
-
-
-def spread(values: Array | Sequence[float], digits: int) -> str:
-    """Numbers as their median, and lowest to highest if these differ."""
-    if not len(values) or not np.all(np.isfinite(values)):
-        return NONE
-    low, middle, high = (f"{value:.{digits}f}" for value in np.quantile(values, [0, 0.5, 1]))
-    return middle if low == high else f"{middle} ({low} to {high})"
-
-
-def spread_deg(values: Array | Sequence[float], digits: int = 3) -> str:
-    """`spread` of angles in rad, as degrees."""
-    return spread(np.degrees(values), digits)
-
-
-def spread_mrad(values: Array | Sequence[float], digits: int = 1) -> str:
-    """`spread` of angles in rad, as mrad."""
-    return spread(1e3 * np.asarray(values), digits)
-
-
-def of_axis(outcomes: Sequence[Outcome], error: str, axis: int) -> Array:
-    """One of `ERRORS` of one hinge for each seed, rad."""
-    return np.array([ERRORS[error](outcome)[axis] for outcome in outcomes])
-
-
-def figures_named(outcomes: Sequence[Outcome], metric: str) -> Array:
-    """One metric of each seed; NaN if a run has none."""
-    return np.array([outcome.figures.get(metric) for outcome in outcomes], dtype=np.float64)
-
-
-def statuses_text(outcomes: Sequence[Outcome]) -> str:
-    """Statuses of the runs of a case, for a table."""
-    counts = Counter(outcome.status for outcome in outcomes)
-    if len(counts) == 1:
-        return str(next(iter(counts)))
-    return ", ".join(f"{count} {status}" for status, count in counts.items())
-
-
-def padded(arrays: Sequence[Array]) -> Array:
-    """Stack arrays (n, k) of runs to (runs, longest n, k); NaN after the end of a run that ended early."""
-    longest = max(arrays, key=len)
-    stacked = np.full((len(arrays), *longest.shape), np.nan)
-    for run, array in zip(stacked, arrays, strict=True):
-        run[: len(array)] = array.reshape(len(array), *longest.shape[1:])
-    return stacked
-
-
-def window_maxima(error: Array, window_s: float, period_s: float) -> Array:
-    """Largest absolute value of each column of an error (n, k) within each complete window."""
-    ticks = max(1, round(window_s / period_s))
-    windows = len(error) // ticks
-    return np.abs(error)[: windows * ticks].reshape(windows, ticks, error.shape[1]).max(axis=1)
 
 
 def plants_text(plants: Sequence[str], differences: Sequence[float]) -> str:

@@ -7,8 +7,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from spheretwin.paper.cells import table
 from spheretwin.paper.experiment import Array, Case, Finding, Outcome, Outcomes, Section
-from spheretwin.paper.experiment_file import ExperimentFile, table
+from spheretwin.paper.experiment_file import ExperimentFile
 from spheretwin.paper.laws import PAPER_LAWS, PRINTED_rad, printed_rad
 from spheretwin.viz.pages.markdown import Drawing, ResultTable
 

@@ -7,10 +7,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from spheretwin.paper.cells import ERRORS, NONE, figures_named, table
 from spheretwin.paper.experiment import Array, Finding, Outcome, Outcomes
-from spheretwin.paper.experiment_file import table
 from spheretwin.paper.laws import BY_LAW
-from spheretwin.paper.page import ERRORS, NONE, figures_named
 from spheretwin.paper.rival_conditions import ELECTRONICS, FILE, HARDWARE, OUR_LAW, Hardware
 from spheretwin.run import Run
 from spheretwin.scenario.fields import quantity_text

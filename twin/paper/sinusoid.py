@@ -9,9 +9,9 @@ from itertools import pairwise
 import numpy as np
 
 from spheretwin.models.telemetry.signals import ANGLES
-from spheretwin.paper import page
+from spheretwin.paper.cells import of_axis
 from spheretwin.paper.experiment import Array, Finding, Outcome, Outcomes, Section
-from spheretwin.paper.experiment_file import CaseRuns, Cells, ExperimentFile, column, table
+from spheretwin.paper.experiment_file import CaseRuns, ExperimentFile
 from spheretwin.paper.laws import COMPARED_LAWS, PAPER_LAWS, ComparedLaw, printed_rad
 from spheretwin.viz.pages.markdown import Drawing
 
@@ -103,68 +103,17 @@ def _loss_text(runs: Sequence[Outcome]) -> str:
 
 
 def _median_rad(runs: Sequence[Outcome]) -> Array:
-    return np.array([np.median(page.of_axis(runs, "max_abs_error", axis)) for axis in range(3)])
+    return np.array([np.median(of_axis(runs, "max_abs_error", axis)) for axis in range(3)])
 
 
 def _all_complete(runs: Sequence[Outcome]) -> bool:
     return all(run.is_complete for run in runs)
 
 
-def hinge_cells(error: str, digits: int = 1) -> Cells:
-    """Cells of an error of each hinge in mrad, then of the medians of all three in degrees."""
-
-    def of_hinge(axis: int, item: CaseRuns) -> str:
-        return page.spread_mrad(page.of_axis(item.runs, error, axis), digits)
-
-    def in_degrees(item: CaseRuns) -> str:
-        medians = [np.median(page.of_axis(item.runs, error, axis)) for axis in range(3)]
-        return triple(np.degrees(medians), 2)
-
-    cells: Cells = {f"{name}, mrad": partial(of_hinge, axis) for axis, name in enumerate("αβγ")}
-    return cells | {"in degrees": in_degrees}
-
-
-def triple(values: Array, digits: int) -> str:
-    """Numbers of α, β and γ."""
-    return " / ".join(f"{value:.{digits}f}" if np.isfinite(value) else page.NONE for value in values)
-
-
-def _metric(name: str, digits: int, item: CaseRuns) -> str:
-    return page.spread(page.figures_named(item.runs, name), digits)
-
-
-def _tail(item: CaseRuns) -> str:
-    return triple(1e3 * np.median([run.tail_rms_error for run in item.runs], axis=0), 2)
-
-
-def _printed(item: CaseRuns) -> str:
-    return " / ".join(f"{1e3 * error:.1f}" for error in item["paper"]) if item["paper"] else page.NONE
-
-
-LARGEST_TITLE = "Largest |error|: median over the seeds, and range"
-EFFORT_TITLE = "RMS error, and what it costs: RMS torque, and variation of the commands a group and second"
-STATUS: Cells = {"status": lambda item: page.statuses_text(item.runs)}
-LARGEST: Cells = {
-    "law": column("label"),
-    **STATUS,
-    "printed, mrad": _printed,
-    **hinge_cells("max_abs_error"),
-}
-EFFORT: Cells = {
-    "law": column("label"),
-    **hinge_cells("rms_error", 2),
-    "second half, mrad": _tail,
-    "torque, N·m": partial(_metric, "rms_torque_Nm", 3),
-    "variation, A/s": partial(_metric, "current_variation_A_s", 1),
-}
-
-
 def _sections(file: ExperimentFile, outcomes: Outcomes) -> list[Section]:
-    items, symbol = file.runs(outcomes), {file["symbol"]: column(file["symbol"], "{:g}")}
-    tables = [
-        table(LARGEST_TITLE, items, symbol | LARGEST, 4),
-        table(EFFORT_TITLE, items, symbol | EFFORT, 2),
-    ]
+    items, symbol = file.runs(outcomes), file["symbol"]
+    value = {symbol: f"{{{symbol}:g}}"}
+    tables = [file.table(name, items, value) for name in ("largest", "effort")]
     return [file.section("errors", tables, [lambda: _draw(file, items)], quantity=file["quantity"])]
 
 

@@ -10,11 +10,11 @@ import numpy as np
 from spheretwin import scenario as scenarios
 from spheretwin.models.telemetry.table import Table
 from spheretwin.paper import frequency_response as responses
+from spheretwin.paper.cells import NONE, table
 from spheretwin.paper.experiment import Array, Case, Finding, Outcome, Outcomes, Section
-from spheretwin.paper.experiment_file import CaseRuns, Cells, ExperimentFile, column, table
+from spheretwin.paper.experiment_file import CaseRuns, ExperimentFile
 from spheretwin.paper.laws import BY_LAW
 from spheretwin.paper.lyapunov import Descent, descent
-from spheretwin.paper.page import NONE
 from spheretwin.run import Run
 from spheretwin.viz.pages.markdown import Drawing, ResultTable
 
@@ -108,7 +108,7 @@ of the amplitude."""
 def sections(outcomes: Outcomes) -> list[Section]:
     """Descent and reaching, ten minutes, and margins of each law."""
     reached = FILE.runs(outcomes, part="reaching")
-    reaching = table("Reaching times, and V of (44) along AFSM's runs", reached, REACHING, 2)
+    reaching = FILE.table("reaching", reached, reached=_reached)
     tested = _tested(outcomes)
     drawings = [lambda: _draw(tested)] if tested else []
     return [
@@ -221,25 +221,6 @@ def _drift_findings(outcomes: Outcomes) -> list[Finding]:
 def _reached(item: CaseRuns) -> str:
     reached_s = item.runs[0].data.reached_s
     return "not within the run" if reached_s is None else f"{reached_s:.2f} s"
-
-
-def _of_descent(text: Callable[[Descent], str]) -> Callable[[CaseRuns], str]:
-    def cell(item: CaseRuns) -> str:
-        course: Descent | None = item.runs[0].data.descent
-        return NONE if course is None else text(course)
-
-    return cell
-
-
-REACHING: Cells = {
-    "law": column("label"),
-    "L": column("L", "{:g}"),
-    "reached after": _reached,
-    "V rises at": _of_descent(lambda course: f"{100 * course.rises:.2g} %"),
-    "all rises / V₀": _of_descent(lambda course: f"{course.risen:.1e}"),
-    "fallen / V₀": _of_descent(lambda course: f"{course.fallen:.1e}"),
-    "parameters' share of V₀": _of_descent(lambda course: f"{100 * course.of_parameters:.2f} %"),
-}
 
 
 def _drift(outcomes: Outcomes) -> ResultTable:

@@ -2,16 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
-from spheretwin.paper import page
-from spheretwin.paper.experiment import Array, Case, Finding, Outcome, Outcomes, Section
-from spheretwin.paper.experiment_file import CaseRuns, Cells, ExperimentFile, column, table
+from spheretwin.paper.cells import NONE, of_axis
+from spheretwin.paper.experiment import (
+    Array,
+    Case,
+    Finding,
+    Outcome,
+    Outcomes,
+    Section,
+    padded,
+    window_maxima,
+)
+from spheretwin.paper.experiment_file import CaseRuns, ExperimentFile
 from spheretwin.paper.runner import measured_error
-from spheretwin.paper.sinusoid import STATUS
 from spheretwin.run import Run
 from spheretwin.viz.pages.markdown import Drawing
 
@@ -34,7 +42,7 @@ Errors = tuple[Array, Array]
 def reduce(run: Run) -> Array:
     """Largest measured |error| of α and β in each window of the figure, (windows, 2) in rad."""
     error = measured_error(run)[:, [ALPHA, BETA]]
-    return page.window_maxima(error, WINDOW_s, run.scenario.controller.period_s)
+    return window_maxima(error, WINDOW_s, run.scenario.controller.period_s)
 
 
 def row_fields(case: Case, outcomes: Sequence[Outcome]) -> Mapping[str, Any]:
@@ -50,7 +58,7 @@ def row_fields(case: Case, outcomes: Sequence[Outcome]) -> Mapping[str, Any]:
 def paper_text(law: CaseRuns) -> str:
     """Largest error of α in the paper's figure, for a table."""
     columns = law.case.columns
-    return f"{columns['relation']} {columns['paper_deg']:g}" if "paper_deg" in columns else page.NONE
+    return f"{columns['relation']} {columns['paper_deg']:g}" if "paper_deg" in columns else NONE
 
 
 def errors_drawing(items: Sequence[CaseRuns]) -> Drawing:
@@ -63,7 +71,7 @@ def errors_drawing(items: Sequence[CaseRuns]) -> Drawing:
         origin = f"paper {paper_text(item)}°" if "paper_deg" in columns else item["gains"]
         courses[f"{item['label']} ({origin})"] = figures.ErrorBand(
             item["law"],
-            page.padded([run.data for run in item.runs]),
+            padded([run.data for run in item.runs]),
             np.radians(columns.get("paper_deg", 0.0)),
             tuple(columns.get("paper_axes", ())),
         )
@@ -98,28 +106,15 @@ def estimators_drawing() -> Drawing:
     return FILE.drawing("rates", figure)
 
 
-def _hinge(error: str, axis: int) -> Callable[[CaseRuns], str]:
-    return lambda item: page.spread_deg(page.of_axis(item.runs, error, axis))
-
-
 MEASURED, TRUE = "measured_max_abs_error", "max_abs_error"
-PRINTED: Cells = {
-    "law": column("label"),
-    "gains": column("gains"),
-    **STATUS,
-    "paper": paper_text,
-    **{f"{name} measured": _hinge(MEASURED, axis) for axis, name in enumerate("αβ")},
-    **{f"{name} true": _hinge(TRUE, axis) for axis, name in enumerate("αβγ")},
-}
 
 
 def printed_section(outcomes: Outcomes) -> Section:
     """Errors of the laws next to the paper's, and their course."""
     items = FILE.runs(outcomes, as_printed=True)
-    title = "Largest |error| over the run in degrees: median over the seeds, and range"
     order = "".join(f" T{finding.text.removeprefix('t')}." for finding in _order(outcomes))
     drawings = [lambda: errors_drawing(items)] if items else []
-    return FILE.section("printed", [table(title, items, PRINTED, 3)], drawings, order)
+    return FILE.section("printed", [FILE.table("printed", items, paper_text=paper_text)], drawings, order)
 
 
 def findings(outcomes: Outcomes) -> list[Finding]:
@@ -138,7 +133,7 @@ def _order(outcomes: Outcomes) -> list[Finding]:
     of_paper = _printed(outcomes)
     if len(of_paper) < sum("paper_deg" in law for law in FILE["law"]):
         return []
-    errors = np.array([page.of_axis(law.runs, MEASURED, ALPHA) for law in of_paper])
+    errors = np.array([of_axis(law.runs, MEASURED, ALPHA) for law in of_paper])
     right, seeds = int(np.sum(np.all(np.diff(errors, axis=0) < 0, axis=0))), errors.shape[1]
     order = " > ".join(law["label"] for law in of_paper)
     text = f"the paper's order, {order}, holds for α under {right} of {seeds} seeds"
@@ -149,7 +144,7 @@ def _sizes(outcomes: Outcomes) -> list[Finding]:
     """Compare the measured errors of α with the paper's."""
     texts, reproduced = [], True
     for law in _printed(outcomes):
-        median = float(np.degrees(np.median(page.of_axis(law.runs, MEASURED, ALPHA))))
+        median = float(np.degrees(np.median(of_axis(law.runs, MEASURED, ALPHA))))
         reproduced = reproduced and median <= REACHED * law["paper_deg"]
         texts.append(f"{law['label']} {median:.2f}° (paper {paper_text(law)})")
     if not texts:
@@ -161,8 +156,7 @@ def _sizes(outcomes: Outcomes) -> list[Finding]:
 def change_section(outcomes: Outcomes) -> Section:
     """Errors under every single change."""
     items = FILE.runs(outcomes, as_printed=False)
-    title = "Largest |error| of α in degrees: median over the seeds, and range"
-    tables = [table(title, items, CHANGES, 3)]
+    tables = [FILE.table("changes", items, paper_text=paper_text, reached=_reached)]
     drawings = [lambda: changes_drawing(outcomes)] if items else []
     return FILE.section("changes", tables, drawings, _sufficient_changes(items), times=REACHED)
 
@@ -170,7 +164,7 @@ def change_section(outcomes: Outcomes) -> Section:
 def reached(paper_deg: float | None, measured: Array, true: Array) -> str:
     """State if a law reaches the paper's figure, from the errors (rad) of all seeds."""
     if paper_deg is None:
-        return page.NONE
+        return NONE
     limit = REACHED * np.radians(paper_deg)
     if np.median(measured) <= limit:
         return "yes"
@@ -179,16 +173,6 @@ def reached(paper_deg: float | None, measured: Array, true: Array) -> str:
 
 def _reached(item: CaseRuns) -> str:
     return reached(item.case.columns.get("paper_deg"), *_alpha(item))
-
-
-CHANGES: Cells = {
-    "law": column("label"),
-    "single change": column("change"),
-    "reaches the paper": _reached,
-    "paper": paper_text,
-    "α measured": _hinge(MEASURED, ALPHA),
-    "α true": _hinge(TRUE, ALPHA),
-}
 
 
 def _sufficient_changes(items: Sequence[CaseRuns]) -> str:
@@ -202,7 +186,7 @@ def _sufficient_changes(items: Sequence[CaseRuns]) -> str:
 
 
 def _alpha(item: CaseRuns) -> Errors:
-    return page.of_axis(item.runs, MEASURED, ALPHA), page.of_axis(item.runs, TRUE, ALPHA)
+    return of_axis(item.runs, MEASURED, ALPHA), of_axis(item.runs, TRUE, ALPHA)
 
 
 def sections(outcomes: Outcomes) -> list[Section]:

@@ -3,8 +3,8 @@
 import numpy as np
 
 from spheretwin.models.telemetry.status import Status
+from spheretwin.paper.cells import Numbers, of_axis
 from spheretwin.paper.experiment import Case, Experiment, Outcome, Section
-from spheretwin.paper.page import of_axis, spread_deg
 from spheretwin.viz.pages.markdown import ResultTable
 
 SHORT = {"duration": 0.2, "plant.engine": "lagrangian"}
@@ -16,7 +16,9 @@ LOST = Case("lost", "hold", HEAVY, is_random=False)
 
 
 def sections(outcomes):
-    rows = [(name, spread_deg(of_axis(runs, "max_abs_error", 0))) for name, runs in outcomes.items()]
+    rows = [
+        (name, f"{Numbers(of_axis(runs, 'max_abs_error', 0)):.3f deg}") for name, runs in outcomes.items()
+    ]
     tables = [ResultTable("Errors", ("case", "α"), rows)]
     return [Section("What | was found", "In *words*, and <b>no tag</b>.", tables)]
 

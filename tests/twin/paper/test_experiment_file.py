@@ -1,12 +1,13 @@
 """Study files of experiments: cases from crossed lists, texts with values, tables from cells."""
 
+import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
 from spheretwin.models.telemetry.status import Status
 from spheretwin.paper import experiment_file
 from spheretwin.paper.experiment import Outcomes
-from spheretwin.paper.experiment_file import ExperimentFile, column, quantiles, table
+from spheretwin.paper.experiment_file import ExperimentFile
 from tests.twin.paper.cases import outcome
 
 TEXT = """
@@ -38,7 +39,31 @@ title = "Errors of {quantity}"
 text = "Up to {most:.1f}."
 file = "{quantity}.svg"
 caption = "The {quantity}."
+
+[table.errors]
+title = "Errors"
+texts = 2
+
+[table.errors.cells]
+law = "{label}"
+L = "{L:g}"
+alpha = "{max_abs_error[0]:.0f mrad}"
+beta = "{max_abs_error[1]:.1f}"
+gamma = "{max_abs_error[2]:.1f}"
+most = "{max_abs_error[0]:.0f mrad max}"
+all = "{max_abs_error:.1f deg median}"
+median = "{max_abs_error[0]:.0f mrad q0.5}"
+"90 %" = "{max_abs_error[0]:.0f mrad q0.9}"
+metric = "{rms_torque_Nm:.1f}"
+status = "{status}, {data}"
+absent = "{absent.number:.1f} {absent:.1f}"
 """
+
+CELLS = {
+    "law": "tuned PID", "L": "1", "alpha": "4 (1 to 7)", "beta": "0.1", "gamma": "–", "most": "7",
+    "all": "0.2 / 5.7 / –", "median": "4 [2, 6]", "90 %": "7 [5, –]", "metric": "–",
+    "status": "completed, completed", "absent": "– –",
+}  # fmt: skip
 
 
 @pytest.fixture
@@ -82,11 +107,8 @@ def test_texts_have_their_values(file):
 
 
 def test_a_table_has_a_cell_of_each_column(file):
-    items = file.runs(Outcomes({"pid: L 1": [outcome(float(error)) for error in range(1, 8)]}))
-    cells = {"law": column("label"), "L": column("L", "{:g}")}
-    cells |= quantiles(
-        "median", lambda item: [run.max_abs_error[0] for run in item.runs], "{:g}".format, 0.5, 0.9
-    )
-    made = table("Errors", items, cells, 2)
-    assert (made.title, made.head, made.texts) == ("Errors", ("law", "L", "median", "90 %"), 2)
-    assert made.rows == [("tuned PID", "1", "4 [2, 6]", "7 [5, –]")]
+    runs = [outcome([0.001 * error, 0.1, np.nan], data=Status.COMPLETED) for error in range(1, 8)]
+    items = file.runs(Outcomes({"pid: L 1": runs}))
+    made = file.table("errors", items, {"before": "{law}"}, absent=lambda item: None)
+    assert (made.title, made.head, made.texts) == ("Errors", ("before", *CELLS), 3)
+    assert made.rows == [("pid", *CELLS.values())]

@@ -5,9 +5,8 @@ import pytest
 
 from spheretwin.models.telemetry.status import Status
 from spheretwin.paper import nutation
-from spheretwin.paper.experiment import Outcomes
+from spheretwin.paper.experiment import Outcomes, padded
 from spheretwin.paper.laws import COMPARED_LAWS
-from spheretwin.paper.page import padded
 from spheretwin.paper.runner import make_plan, run_plan, scenario_of
 
 

@@ -3,7 +3,8 @@
 import numpy as np
 
 from spheretwin.models.telemetry.status import Status
-from spheretwin.paper.page import rows, spread_deg
+from spheretwin.paper.cells import Numbers
+from spheretwin.paper.page import rows
 from spheretwin.paper.runner import make_plan
 from tests.twin.paper.cases import NOISY, allowed, experiment, outcome
 
@@ -17,8 +18,8 @@ def test_status_is_what_should_not_have_been():
 
 
 def test_a_spread_in_degrees_has_no_range_if_it_is_none():
-    assert spread_deg(np.radians([0.25, 0.25]), digits=2) == "0.25"
-    assert spread_deg([np.nan, 1.0]) == "–"
+    assert f"{Numbers(np.radians([0.25, 0.25])):.2f deg}" == "0.25"
+    assert f"{Numbers([np.nan, 1.0]):.3f deg}" == "–"
 
 
 def test_a_row_has_the_interval_of_its_median_if_the_seeds_are_enough():
