@@ -11,8 +11,6 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from spheretwin.metrics.figures import Figures
 from spheretwin.metrics.reduction import PlannedRun
 from spheretwin.metrics.user_metrics import UserMetric, check_names, own_value
@@ -130,16 +128,16 @@ class Run:
         return self.telemetry.arrow(self.provenance.metadata())
 
     def to_pandas(self) -> pd.DataFrame:
-        """Return the telemetry as a DataFrame over ``t_s``, a column for each number: ``q_rad[alpha]``.
+        """Return the telemetry as a DataFrame over ``t_s``, a column for each number: ``q_rad_alpha``.
 
         Raises
         ------
         InputError
             pandas is not installed.
         """
-        return _imported("pandas").DataFrame(
-            dict(self._columns()), index=_imported("pandas").Index(self.telemetry["t_s"], name="t_s")
-        )
+        table = self.telemetry.scalars()
+        columns = {name: table[name] for name in table}
+        return _imported("pandas").DataFrame(columns).set_index("t_s")
 
     def to_polars(self) -> pl.DataFrame:
         """Return the telemetry as a polars DataFrame, an Array column for each signal of several numbers.
@@ -198,17 +196,6 @@ class Run:
     def _rows(self) -> list[tuple[str, str]]:
         """Return the metrics that have a value as text, those of several axes by the names of the hinges."""
         return [(name, _text(value)) for name, value in self.figures.items() if _has_value(value)]
-
-    def _columns(self) -> list[tuple[str, Any]]:
-        """Return the columns of all signals except time, by name and label."""
-        return [
-            (heading, column)
-            for signal in self.telemetry.signals
-            if signal.name != "t_s"
-            for heading, column in zip(
-                signal.headings(), np.atleast_2d(self.telemetry[signal.name].T), strict=True
-            )
-        ]
 
     def _changes(self) -> list[tuple[float, str]]:
         """Return the events and the changes by the user, in the order of time."""

@@ -70,13 +70,6 @@ class Signal:
                 f"signal {self.name}: expected {self.size} labels or none, received {len(self.labels)}"
             )
 
-    def headings(self) -> list[str]:
-        """Return the heading of each entry: the name, which ends in its unit, and its label or place."""
-        if self.size == 1:
-            return [self.name]
-        labels = self.labels or tuple(map(str, range(self.size)))
-        return [f"{self.name}[{label}]" for label in labels]
-
     def scalars(self) -> tuple[Signal, ...]:
         """Return a signal for each number of a row, with a plain name such as ``q_rad_alpha``."""
         if self.size == 1:

@@ -175,7 +175,7 @@ def columns():
     ):  # fmt: skip
         lines += [f"{arguments}: {result(Signal, *arguments)}"]
     common = signals.common_signals(18)
-    lines += [f"{signal}, {signal.headings()[:4]}" for signal in common]
+    lines += [f"{signal}, {[one.name for one in signal.scalars()][:4]}" for signal in common]
     lines += [repr(signals.offsets(common)), repr(signals.width(common))]
     lines.append(result(signals.with_more, {"a": Signal("a", "rad", 1, "m")}, (Signal("a", "rad", 2, "m"),)))
     lines.append(

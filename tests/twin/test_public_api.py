@@ -148,7 +148,7 @@ def test_it_converts_to_the_tables_of_other_packages(run):
     frame, dataset, arrow = run.to_pandas(), run.to_xarray(), run.to_arrow()
     assert isinstance(frame, pandas.DataFrame)
     np.testing.assert_array_equal(frame.index, run.telemetry["t_s"])
-    np.testing.assert_array_equal(frame["q_rad[β]"], run.telemetry["q_rad"][:, 1])
+    np.testing.assert_array_equal(frame["q_rad_beta"], run.telemetry["q_rad"][:, 1])
     np.testing.assert_array_equal(frame["allocation_scale"], run.telemetry["allocation_scale"])
     assert len(frame.columns) == run.telemetry.values.shape[1] - 1
     table = run.to_polars()

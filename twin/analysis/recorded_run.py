@@ -295,7 +295,7 @@ def export(run: Reviewed, path: Path) -> None:
     else:
         with whole_file(path) as temporary, temporary.open("w", encoding="utf-8", newline="") as file:
             writer = csv.writer(file, lineterminator="\n")
-            writer.writerow([name for signal in run.table.signals for name in signal.headings()])
+            writer.writerow(run.table.scalars().keys())
             writer.writerows(map(repr, row) for row in run.table.values.tolist())
 
 

@@ -1,5 +1,6 @@
 """Files of logs: each format gives the same log back, and other programs read it."""
 
+import re
 import subprocess
 import sys
 from dataclasses import replace
@@ -18,6 +19,7 @@ from spheretwin.models.base.errors import InputError
 from spheretwin.models.telemetry import joint_states
 from spheretwin.models.telemetry.joint_states import Topic
 
+GREEK = {"alpha": "α", "beta": "β", "gamma": "γ"}
 TIMES = np.arange(50) * 1e-3
 RANDOM = np.random.default_rng(0)
 LOG = Log(
@@ -75,13 +77,16 @@ def test_telemetry_is_a_log(tmp_path):
     assert np.array_equal(log.current_A, run.telemetry["current_command_A"])
 
 
-def test_headings_of_telemetry_are_names_of_a_log(tmp_path):
-    """As `review --export run.csv` writes them."""
+@pytest.mark.parametrize("former", [False, True])
+def test_names_of_telemetry_are_names_of_a_log(tmp_path, former):
+    """As `review --export run.csv` writes them, and as it wrote them in former versions."""
     signals = log_signals(18, ("measured",))
-    heads = [heading for signal in signals for heading in signal.headings()]
+    heads = [scalar.name for signal in signals for scalar in signal.scalars()]
     rows = np.column_stack([LOG.t_s, LOG.angle_rad, LOG.current_A])
     path = tmp_path / "run.csv"
-    heads = [head.replace("[", "[group ") if "current" in head else head for head in heads]
+    if former:
+        heads = [re.sub(r"_(\d+)$", r"[group \1]", head) for head in heads]
+        heads = [re.sub(r"_(alpha|beta|gamma)$", lambda end: f"[{GREEK[end[1]]}]", head) for head in heads]
     path.write_text("\n".join([",".join(heads), *(",".join(map(repr, row)) for row in rows.tolist())]))
     log = machine.read(path)
     assert (log.digest, log.currents, log.notes) == (LOG.digest, "measured", ())
