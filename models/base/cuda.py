@@ -49,7 +49,7 @@ def check_gpu() -> str:
         name = cuda.get_current_device().name
     except Exception as error:  # of the driver, of several kinds
         raise InputError(
-            f"cuda: expected a GPU of NVIDIA with its driver, received {without_breaks(error).rstrip()}"
+            f"cuda: expected a GPU of NVIDIA with its driver, received {without_breaks(error).rstrip(" :")}"
         ) from None
     return name.decode() if isinstance(name, bytes) else str(name)
 

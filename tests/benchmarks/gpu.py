@@ -18,6 +18,7 @@ from unittest.mock import patch
 import numpy as np
 from measuring import bound_of, options_of, report, seconds_of, tell_value
 
+from spheretwin.envs import CudaVectorEnv
 from spheretwin.loop.cuda_block import CudaBlock
 from spheretwin.models.base import cuda
 from spheretwin.models.base.errors import InputError
@@ -52,6 +53,7 @@ AT_LEAST = {("ideal", "pd"): 450e6, ("ideal", "afsm"): 250e6, ("electronics", "a
 CAPABILITY = (9, 0)
 
 WIDE, TICKS, CALLS = 32_768, 200, 3
+PERIODS, PLANTS, PERIODS_AT_LEAST = 500, 65_536, 200e6
 SWEEP_ROWS, SWEEP_AT_MOST_S = 100_000, 10.0
 
 
@@ -101,30 +103,51 @@ def speed(hardware, law):
     return WIDE * TICKS / min(taken)
 
 
-class CompiledError(Exception):
-    """A kernel was compiled."""
+def periods(num_envs=PLANTS):
+    """Control periods of an environment per second, currents; the actions are on the GPU."""
+    env = CudaVectorEnv(num_envs, "Track", actions="current")
+    env.reset(seed=0)
+    actions = cuda.on_device(np.random.default_rng().uniform(-0.1, 0.1, env.action_space.shape))
+    env.step(actions)
+    seconds = seconds_of(lambda: [env.step(actions) for _ in range(PERIODS)])
+    return num_envs * PERIODS / seconds
 
 
-def compiled_bytes(hardware, law):
-    """Bytes of the assembly of a kernel, for compute capability 9.0; needs no GPU."""
+@contextlib.contextmanager
+def compiled_only(sizes):
+    """Compile kernels for compute capability 9.0, and do not run them; append the bytes of their assembly."""
     from numba import cuda as compiler
     from numba import typeof
 
     def compile_only(kernel, threads, arguments):
-        raise CompiledError(compiler.compile_ptx(kernel.py_func, (typeof(arguments),), cc=CAPABILITY)[0])
+        sizes.append(len(compiler.compile_ptx(kernel.py_func, (typeof(arguments),), cc=CAPABILITY)[0]))
 
-    same = {"check_gpu": lambda: "none", "on_device": lambda value: value, "send": lambda value, copy: None}
+    same = {"check_gpu": lambda: "none", "on_device": lambda value: value}
+    same |= {"borrowed": lambda value: value, "send": lambda value, copy: None}
     card = SimpleNamespace(compute_capability=CAPABILITY)
-    rows, drawn = rows_of(study_of(hardware, law, 4, 0.01), 2)
     with (
         patch("numba.cuda.dispatcher.get_current_device", lambda: card),
-        patch.multiple(cuda, launch=compile_only, **same),
+        patch.multiple(cuda, launch=compile_only, fetch=lambda copy, value: None, **same),
     ):
-        try:
-            rows.with_block(CudaBlock).run(drawn)
-        except CompiledError as kernel:
-            return len(kernel.args[0])
-    raise AssertionError("no kernel was compiled")
+        yield
+
+
+def compiled_bytes(hardware, law):
+    """Bytes of the assembly of a kernel; needs no GPU."""
+    sizes, (rows, drawn) = [], rows_of(study_of(hardware, law, 4, 0.01), 2)
+    with compiled_only(sizes):
+        rows.with_block(CudaBlock).run(drawn)
+    return sizes[0]
+
+
+def compiled_environment():
+    """Bytes of the assembly of the kernels of an environment; needs no GPU."""
+    sizes = []
+    with compiled_only(sizes):
+        env = CudaVectorEnv(2, "Track", actions="current", variants=1)
+        env.reset(seed=0)
+        env.step(np.zeros(env.action_space.shape))
+    return sum(sizes)
 
 
 def work(channel, hardware, law):
@@ -178,12 +201,14 @@ def main():
         print(f"no GPU: {error}")
         for (hardware, law), size in ask(kernels(), "compiled_bytes", together=True).items():
             print(f"{hardware}, {law}: {size / 1e6:.2f} MB of assembly")
+        print(f"environment: {compiled_environment() / 1e6:.2f} MB of assembly")
         return
     started, channels, table = time.perf_counter(), kernels(), []
     for (hardware, law), value in ask(channels, "largest_difference", together=True).items():
         table.append(row(f"difference of figures, {hardware}, {law}", value, at_most=LAWS[law][1]))
     for names, value in ask(channels, "speed", together=False).items():
         table.append(row(f"ticks/s, {', '.join(names)}", value, at_least=AT_LEAST.get(names)))
+    table.append(row("periods/s of environments, currents", periods(), at_least=PERIODS_AT_LEAST))
     seconds = sweep_seconds()
     table.append(row(f"whole sweep of {SWEEP_ROWS} rows, s", seconds, at_most=SWEEP_AT_MOST_S))
     if as_json:
