@@ -48,9 +48,8 @@ def check_gpu() -> str:
     try:
         name = cuda.get_current_device().name
     except Exception as error:  # of the driver, of several kinds
-        raise InputError(
-            f"cuda: expected a GPU of NVIDIA with its driver, received {without_breaks(error).rstrip(" :")}"
-        ) from None
+        received = without_breaks(error).rstrip(" :")
+        raise InputError(f"cuda: expected a GPU of NVIDIA with its driver, received {received}") from None
     return name.decode() if isinstance(name, bytes) else str(name)
 
 
