@@ -27,7 +27,7 @@ from spheretwin.models import actuator as actuators
 from spheretwin.models.base.record import Record, kinds_of
 from spheretwin.models.telemetry.signals import Signal, common_signals
 from spheretwin.models.telemetry.status import Status
-from spheretwin.scenario.fields import Kind, kind_of, unit_of
+from spheretwin.scenario.fields import FieldKind, kind_of, unit_of
 from spheretwin.scenario.hardware import HARDWARE, ORIGINS
 from spheretwin.scenario.reading import value_text
 from spheretwin.scenario.sections import Scenario
@@ -138,7 +138,7 @@ def _fields(section: type[BaseModel], prefix: str = "") -> Iterator[tuple[str, A
         yield from _unique(field for member in _members(name, kind) for field in _fields(member, below))
 
 
-def _members(name: str, kind: Kind) -> Iterable[type[BaseModel]]:
+def _members(name: str, kind: FieldKind) -> Iterable[type[BaseModel]]:
     return [next(iter(kind.members.values()))] if name == "controller" else kind.members.values()
 
 

@@ -217,7 +217,7 @@ def draw_names(evidence):
     "experiment": Addition(
         "twin/paper/holding.py",
         """
-from spheretwin.paper.experiment import Case, Experiment, Section
+from spheretwin.paper.experiment import Case, Experiment, ExperimentSection
 from spheretwin.viz.pages.markdown import ResultTable
 
 
@@ -228,7 +228,7 @@ def cases():
 
 def tell(outcomes):
     rows = [(name, str(found[0].status)) for name, found in outcomes.items()]
-    return [Section("All", "They hold.", [ResultTable("Ends", ("law", "status"), rows)])]
+    return [ExperimentSection("All", "They hold.", [ResultTable("Ends", ("law", "status"), rows)])]
 
 
 EXPERIMENT = Experiment("holding", "Holding on", "Laws that hold on.", cases, tell)

@@ -11,7 +11,7 @@ import numpy as np
 
 from spheretwin import cli, machine
 from spheretwin.cli import reproduce
-from spheretwin.paper.experiment import Case, Finding
+from spheretwin.paper.experiment import Case, Statement
 from spheretwin.study.grid import Grid
 from spheretwin.study.optimise import Objective
 from spheretwin.study.study import load
@@ -227,7 +227,10 @@ def tunings():
 def reproductions():
     """Experiments by name, all of them, one that ends early, and one with what its law does not have."""
     folder = scratch("reproductions")
-    good, bad = Finding(True, "the order holds" + " under every condition" * 9), Finding(False, "it is 0.36")
+    good, bad = (
+        Statement(True, "the order holds" + " under every condition" * 9),
+        Statement(False, "it is 0.36"),
+    )
     case = Case("ideal", "hold", {"duration": 0.05}, is_random=False)
     made = {f"figure{number}": experiment(case, findings=lambda _: [good, bad]) for number in range(10)}
     made |= {"lost": experiment(case, LOST), "engine": experiment(case)}

@@ -12,7 +12,7 @@ from spheretwin.crosscheck import suite
 from spheretwin.models.actuator import TORQUE_CURVE_PATH
 from spheretwin.models.design import curve_check, field_check, torque_map
 from spheretwin.study import report, statistics
-from spheretwin.study.statistics import Rows
+from spheretwin.study.statistics import StudyTable
 from spheretwin.study.tuning import report as tuning_report
 from spheretwin.study.tuning.trials import Ended, FinishedTrial, Tried
 from spheretwin.study.tuning.tuning import Holdout, LawResult, ReportedTrial, TuningResult
@@ -36,7 +36,7 @@ from tests.twin.study.tuning.cases import study as tuning_study
 COUNT = np.arange(48.0)
 
 
-def rows_of(axes: dict, count: int = 48, laws=("pd", "afsm"), lost=(3, 8, 13, 40)) -> Rows:
+def rows_of(axes: dict, count: int = 48, laws=("pd", "afsm"), lost=(3, 8, 13, 40)) -> StudyTable:
     """Rows with three figures; some are lost, of three kinds, and one figure has gaps."""
     figures = {
         "max_abs_error_rad": 1e-3 * (5 + (7 * COUNT[:count]) % 31),

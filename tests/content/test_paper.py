@@ -13,7 +13,7 @@ from spheretwin.paper.experiment import Case, Experiment
 from spheretwin.paper.page import chapter_of, rows
 from spheretwin.paper.runner import Plan, PlanResult
 from spheretwin.run import figures_of
-from spheretwin.study.row import Result
+from spheretwin.study.row import RowResult
 from tests.content.content import Cases, content_test, scratch
 from tests.content.pages import folder_text
 from tests.content.runs import made_run
@@ -76,7 +76,7 @@ def _text(experiment: Experiment, cases: Sequence[Case], seeds: int) -> str:
         scenario = runner.scenario_of(job.case, job.plant, job.seed)
         run = made_run(scenario, name=job.name, most_ticks=MOST_TICKS.get(name, 1500))
         figures = figures_of(run, runner.figures_of(experiment))
-        outcomes.append(runner.outcome_of(experiment, Result(str(run.status), None, None, figures)))
+        outcomes.append(runner.outcome_of(experiment, RowResult(str(run.status), None, None, figures)))
     result = PlanResult(plan, runner.summarise(plan), plan.by_case(outcomes), [1e-9, 3e-9])
     of_json = rows(plan, result.outcomes, result.summaries)
     with patch.object(noise_and_lag, "compare", made_comparison):

@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 
 from spheretwin.crosscheck.dynamics import QUANTITIES, Dynamics
-from spheretwin.crosscheck.identities import Drift, FreeRotor
+from spheretwin.crosscheck.identities import BoundedDrift, FreeRotor
 from spheretwin.crosscheck.suite import CrosscheckResult
 from spheretwin.crosscheck.trajectories import Convergence, Trajectories
 from spheretwin.models import actuator as actuators
@@ -51,7 +51,7 @@ def evidence() -> CrosscheckResult:
         "Euler": Convergence(np.array([1e-3, 2e-3]), np.array([1e-4, 2e-4]), 1.0),
     }
     drifts = {
-        quantity: {spin: Drift(1e-12 * (place + 1) * COUNT, 1e-9) for spin in ("2π", "30")}
+        quantity: {spin: BoundedDrift(1e-12 * (place + 1) * COUNT, 1e-9) for spin in ("2π", "30")}
         for place, quantity in enumerate(("energy", "angular momentum", "attitude"))
     }
     findings = {

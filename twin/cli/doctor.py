@@ -29,7 +29,7 @@ VULKAN_FOLDERS = ("/usr/share/vulkan/icd.d", "/etc/vulkan/icd.d", "/usr/local/sh
 """Folders in which the drivers of Linux register."""
 
 
-class Finding(NamedTuple):
+class Fact(NamedTuple):
     """One line of the report."""
 
     name: str
@@ -60,7 +60,7 @@ def run(options: argparse.Namespace) -> bool:
     return all(finding.ok for finding in groups["needed"])
 
 
-def report() -> dict[str, list[Finding]]:
+def report() -> dict[str, list[Fact]]:
     """Return the findings of each group."""
     return {
         "needed": [*versions(), compile_cache(), processor()],
@@ -70,34 +70,32 @@ def report() -> dict[str, list[Finding]]:
     }
 
 
-def versions() -> Iterator[Finding]:
+def versions() -> Iterator[Fact]:
     """Yield the versions of Python and of the packages that every run needs."""
-    yield Finding("spheretwin", version("spheretwin"), ok=True)
-    yield Finding("Python", f"{platform.python_version()}, {sys.executable}", ok=True)
-    yield Finding("system", f"{platform.system()} {platform.release()}, {platform.machine()}", ok=True)
+    yield Fact("spheretwin", version("spheretwin"), ok=True)
+    yield Fact("Python", f"{platform.python_version()}, {sys.executable}", ok=True)
+    yield Fact("system", f"{platform.system()} {platform.release()}, {platform.machine()}", ok=True)
     for name in PACKAGES:
         try:
-            yield Finding(name, version(name), ok=True)
+            yield Fact(name, version(name), ok=True)
         except PackageNotFoundError:
             optional = name == "rerun-sdk"
-            yield Finding(name, "missing", ok=optional, advice="install spheretwin with its dependencies")
+            yield Fact(name, "missing", ok=optional, advice="install spheretwin with its dependencies")
 
 
-def compile_cache() -> Finding:
+def compile_cache() -> Fact:
     """Return folder, entries and size of the compiled code for these sources."""
     folder, refusal = cache.checked_folder()
     if folder is None:
         advice = "set SPHERETWIN_CACHE_DIR to a folder of your own; else every process compiles again"
-        return Finding("compile cache", refusal or "no writable folder", ok=True, advice=advice)
+        return Fact("compile cache", refusal or "no writable folder", ok=True, advice=advice)
     sizes = [entry.stat().st_size for entry in folder.iterdir()] if folder.is_dir() else []
     if not sizes:
-        return Finding(
-            "compile cache", f"{folder}: empty", ok=True, advice="the first run compiles, a minute"
-        )
-    return Finding("compile cache", f"{folder}: {len(sizes)} entries, {sum(sizes) / 1e6:.0f} MB", ok=True)
+        return Fact("compile cache", f"{folder}: empty", ok=True, advice="the first run compiles, a minute")
+    return Fact("compile cache", f"{folder}: {len(sizes)} entries, {sum(sizes) / 1e6:.0f} MB", ok=True)
 
 
-def processor() -> Finding:
+def processor() -> Fact:
     """Return the cores of this process and the widest vectors of the processor."""
     import llvmlite.binding as llvm
 
@@ -105,7 +103,7 @@ def processor() -> Finding:
     widths = {"avx512f": 512, "avx2": 256, "sve": 128, "neon": 128, "sse2": 128}
     bits = next((width for name, width in widths.items() if features.get(name)), 128)
     text = f"{usable_cores()} of {os.cpu_count()}, vectors of {bits} bits, {llvm.get_host_cpu_name()}"
-    return Finding("cores", text, ok=True)
+    return Fact("cores", text, ok=True)
 
 
 def usable_cores() -> int:
@@ -114,49 +112,47 @@ def usable_cores() -> int:
     return len(affinity(0)) if affinity else os.cpu_count() or 1
 
 
-def viewer() -> Finding:
+def viewer() -> Fact:
     """Return the path of Rerun's viewer."""
     name = "rerun.exe" if sys.platform == "win32" else "rerun"
     near = Path(sys.executable).with_name(name)
     path = str(near) if near.exists() else shutil.which("rerun")
     if path:
-        return Finding("viewer", path, ok=True)
+        return Fact("viewer", path, ok=True)
     advice = "recordings are written and reviewed without it; rerun-sdk contains it"
-    return Finding("viewer", "no rerun command", ok=False, advice=advice)
+    return Fact("viewer", "no rerun command", ok=False, advice=advice)
 
 
-def graphics() -> Finding:
+def graphics() -> Fact:
     """Return whether the viewer finds a graphics driver, without starting it."""
     if sys.platform in ("darwin", "win32"):
-        return Finding("graphics", "Metal" if sys.platform == "darwin" else "Direct3D 12 or Vulkan", ok=True)
+        return Fact("graphics", "Metal" if sys.platform == "darwin" else "Direct3D 12 or Vulkan", ok=True)
     drivers = [path.stem for folder in VULKAN_FOLDERS for path in sorted(Path(folder).glob("*.json"))]
     screen = os.environ.get("WAYLAND_DISPLAY") or os.environ.get("DISPLAY")
     text = f"{'Vulkan: ' + ', '.join(drivers) if drivers else 'no Vulkan driver'}; screen {screen or 'none'}"
     advice = "" if drivers else "for the viewer: a Vulkan driver, in software mesa-vulkan-drivers"
     if drivers and not screen:
         advice = "without a screen: review RUN --figures DIR, or --live in a browser"
-    return Finding("graphics", text, ok=bool(drivers and screen), advice=advice)
+    return Fact("graphics", text, ok=bool(drivers and screen), advice=advice)
 
 
-def browser() -> Finding:
+def browser() -> Fact:
     """Return a browser for the bench, a live view and pages."""
     path = next(filter(None, map(shutil.which, BROWSERS)), None)
     if path or sys.platform in ("darwin", "win32"):
-        return Finding("browser", path or "that of the system", ok=True)
-    return Finding("browser", "none on the path", ok=False, advice="for the bench, --live and pages")
+        return Fact("browser", path or "that of the system", ok=True)
+    return Fact("browser", "none on the path", ok=False, advice="for the bench, --live and pages")
 
 
-def bench_port() -> Finding:
+def bench_port() -> Fact:
     """Return whether the default port of the bench is free on 127.0.0.1."""
     with socket.socket() as probe, suppress(OSError):
         probe.bind(("127.0.0.1", PORT))
-        return Finding("port of the bench", f"{PORT} is free", ok=True)
-    return Finding(
-        "port of the bench", f"{PORT} is in use", ok=False, advice="bench --port 0 takes a free one"
-    )
+        return Fact("port of the bench", f"{PORT} is free", ok=True)
+    return Fact("port of the bench", f"{PORT} is in use", ok=False, advice="bench --port 0 takes a free one")
 
 
-def real_time_permissions() -> list[Finding]:
+def real_time_permissions() -> list[Fact]:
     """Return what the system permits to `drive` and `machine --real-time`; it is tried for a moment."""
     with real_time() as granted:
         pass
@@ -165,7 +161,7 @@ def real_time_permissions() -> list[Finding]:
         ("priority", granted.priority, f"ulimit -r {PRIORITY}", f"rtprio {PRIORITY}"),
     )
     return [
-        Finding(
+        Fact(
             name,
             "permitted" if permitted else "not permitted",
             ok=permitted,
@@ -175,9 +171,9 @@ def real_time_permissions() -> list[Finding]:
     ]
 
 
-def extras() -> Iterator[Finding]:
+def extras() -> Iterator[Fact]:
     """Yield each extra with its purpose; the advice is the command that installs it."""
     for extra, purpose in PURPOSES.items():
         missing = missing_packages(extra)
         text = f"{purpose}: {'without ' + ', '.join(missing) if missing else 'installed'}"
-        yield Finding(extra, text, ok=not missing, advice=install_command(extra) if missing else "")
+        yield Fact(extra, text, ok=not missing, advice=install_command(extra) if missing else "")

@@ -238,7 +238,7 @@ def _outcome_json(outcome: StudyResult) -> dict[str, Any]:
 
 
 def _report(
-    outcome: StudyResult, rows: statistics.Rows, printed: dict[str, Any], options: argparse.Namespace
+    outcome: StudyResult, rows: statistics.StudyTable, printed: dict[str, Any], options: argparse.Namespace
 ) -> list[Path]:
     """Write the page next to the table if figures can be drawn."""
     if report.can_be_drawn():

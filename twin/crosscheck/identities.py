@@ -138,7 +138,7 @@ class FreeMotion(NamedTuple):
         return np.einsum("nij,nj->ni", self.R_SR, self.inertia * self.w_SR_R)
 
 
-class Drift(NamedTuple):
+class BoundedDrift(NamedTuple):
     """A quantity that should stay at zero, and its bound."""
 
     values: Array  # (n,)
@@ -150,7 +150,7 @@ class FreeRotor(NamedTuple):
 
     checks: list[Check]
     t_s: Array
-    drifts: dict[str, dict[str, Drift]]
+    drifts: dict[str, dict[str, BoundedDrift]]
 
 
 def check_free_rotor(mjcf: Path, actuator: Actuator) -> FreeRotor:
@@ -165,20 +165,20 @@ def check_free_rotor(mjcf: Path, actuator: Actuator) -> FreeRotor:
     """
     mjcf = ideal_file(mjcf, actuator)
     rings = ring_share(mjcf, actuator)
-    drifts: dict[str, dict[str, Drift]] = {"energy": {}, "angular momentum": {}, "attitude": {}}
+    drifts: dict[str, dict[str, BoundedDrift]] = {"energy": {}, "angular momentum": {}, "attitude": {}}
     t_s = np.zeros(0)
     for name, spin in SPINS_rad_s.items():
         free = fly(mjcf, actuator.inertia, spin)
         nods = _nodding_share(free)
         truncation = (spin * STEP_s) ** 4
-        drifts["energy"][name] = Drift(
+        drifts["energy"][name] = BoundedDrift(
             np.abs(free.energy_J / free.energy_J[0] - 1), nods**2 * truncation + rings
         )
-        drifts["angular momentum"][name] = Drift(_momentum_drift(free), nods * truncation + rings)
+        drifts["angular momentum"][name] = BoundedDrift(_momentum_drift(free), nods * truncation + rings)
         axisymmetric = fly(mjcf, actuator.inertia[[0, 0, 2]], spin)
         fastest = spin * max(1.0, float(actuator.inertia[2] / actuator.inertia[0]))
         shares = (fastest * STEP_s) ** 4 / 120 + rings
-        drifts["attitude"][name] = Drift(_attitude_error(axisymmetric), fastest * DURATION_s * shares)
+        drifts["attitude"][name] = BoundedDrift(_attitude_error(axisymmetric), fastest * DURATION_s * shares)
         t_s = free.t_s
     checks = [
         _drift_check(quantity, spin, drift) for quantity in drifts for spin, drift in drifts[quantity].items()
@@ -269,7 +269,7 @@ _WHY = {
 }
 
 
-def _drift_check(quantity: str, spin: str, drift: Drift) -> Check:
+def _drift_check(quantity: str, spin: str, drift: BoundedDrift) -> Check:
     return Check(
         name=f"torque-free rotor at {spin} rad/s: {quantity}",
         compares=f"MuJoCo RK4 at {1e3 * STEP_s:g} ms over {DURATION_s:g} s, {_COMPARED[quantity]}",

@@ -33,7 +33,7 @@ from spheretwin.scenario.files import Files
 from spheretwin.scenario.sections import ResolvedScenario
 
 
-class Ending(NamedTuple):
+class RunEnding(NamedTuple):
     """End of a run of a block."""
 
     status: Status
@@ -84,7 +84,7 @@ class RunBlock:
     def _stages(self) -> Stages:
         return self._assembly.stages()
 
-    def run(self) -> list[Ending | None]:
+    def run(self) -> list[RunEnding | None]:
         """Return the end of each run; None for one whose inputs do not stay finite, which runs alone."""
         tick, finite = 0, np.ones(len(self._codes), bool) & self._inputs.stays_finite(self._ticks - 1)
         while tick < self._ticks and np.any(self._codes == GOING):
@@ -125,9 +125,9 @@ class RunBlock:
         """Take over what `advance` has left elsewhere."""
 
 
-def _ending(code: int, reason: Reason, figures: dict[str, Any]) -> Ending:
+def _ending(code: int, reason: Reason, figures: dict[str, Any]) -> RunEnding:
     status = Status.FAILSAFE if reason else BY_CODE[code]
-    return Ending(Status.COMPLETED if status == Status.RUNNING else status, reason, figures)
+    return RunEnding(Status.COMPLETED if status == Status.RUNNING else status, reason, figures)
 
 
 @cache

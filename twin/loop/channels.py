@@ -28,7 +28,7 @@ Column = Callable[[int], Signal]
 """Signal for a number of coil groups."""
 
 
-class Channel(NamedTuple):
+class TelemetryChannel(NamedTuple):
     """Telemetry columns of one stage."""
 
     signals: Callable[[int], tuple[Signal, ...]]
@@ -47,13 +47,13 @@ class Channel(NamedTuple):
         return code.co_varnames[1 : code.co_argcount]
 
 
-def channel(logged: Callable[[Scenario], bool], *columns: Column) -> Callable[[Any], Channel]:
+def channel(logged: Callable[[Scenario], bool], *columns: Column) -> Callable[[Any], TelemetryChannel]:
     """Decorate the function that writes the columns of a channel.
 
     Parameters
     ----------
     logged, write
-        As in `Channel`.
+        As in `TelemetryChannel`.
     *columns : callable
         Columns in their order.
     """
@@ -62,7 +62,7 @@ def channel(logged: Callable[[Scenario], bool], *columns: Column) -> Callable[[A
     def signals(groups: int) -> tuple[Signal, ...]:
         return tuple(column(groups) for column in columns)
 
-    return lambda write: Channel(signals, logged, inlined(write))
+    return lambda write: TelemetryChannel(signals, logged, inlined(write))
 
 
 def single(name: str, unit: str, meaning: str, states: tuple[str, ...] = ()) -> Column:
@@ -263,7 +263,7 @@ def watchdog(row: NDArray, controller: Any) -> None:
     row[0] = controller.supervision.watchdog.reason
 
 
-CHANNELS: tuple[Channel, ...] = (
+CHANNELS: tuple[TelemetryChannel, ...] = (
     sensed_motion,
     sensor_states,
     measured_currents,
@@ -281,7 +281,7 @@ CHANNELS: tuple[Channel, ...] = (
 )
 
 
-def logged_channels(signals: tuple[Signal, ...]) -> list[tuple[Channel, int]]:
+def logged_channels(signals: tuple[Signal, ...]) -> list[tuple[TelemetryChannel, int]]:
     """Return the channels among the columns of a telemetry, with their first columns."""
     first = offsets(signals)
     return [(channel, first[name]) for channel in CHANNELS if (name := channel.signals(1)[0].name) in first]

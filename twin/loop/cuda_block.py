@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 from spheretwin.control.allocation import ALLOCATIONS
 from spheretwin.control.controller import Controller
 from spheretwin.loop.assembly import estimator_of
-from spheretwin.loop.block import Ending, RunBlock
-from spheretwin.loop.channels import Channel, logged_channels
+from spheretwin.loop.block import RunBlock, RunEnding
+from spheretwin.loop.channels import TelemetryChannel, logged_channels
 from spheretwin.loop.closed_loop import External, Inputs, inputs_of, is_user_law, loop
 from spheretwin.loop.stages import Stages, advance_stage, sense_stage
 from spheretwin.models.base import cuda
@@ -95,7 +95,7 @@ class CudaBlock(RunBlock):
         if self._injectors:  # faults write into the records
             self.collect()
 
-    def run(self) -> list[Ending | None]:
+    def run(self) -> list[RunEnding | None]:
         """Return the end of each run; None for one that runs alone, as a law of the user may have raised."""
         endings = super().run()
         if not is_user_law(self._assembly.law):
@@ -156,7 +156,7 @@ def _write_nothing(run: Any, same: Any, row: Any) -> None:
 
 
 @cache
-def _writer_of(channels: tuple[tuple[Channel, int], ...]) -> Any:
+def _writer_of(channels: tuple[tuple[TelemetryChannel, int], ...]) -> Any:
     """Return one function that writes all channels of a run, without a loop over functions."""
     if not channels:
         return _write_nothing

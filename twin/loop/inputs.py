@@ -28,7 +28,7 @@ from spheretwin.trajectories.trajectory import Sampled, checked
 BLOCK_TICKS = 1000
 
 
-class Block(NamedTuple):
+class InputBlock(NamedTuple):
     """Inputs of some runs at the ticks of a block."""
 
     first: int
@@ -72,7 +72,7 @@ class InputGenerator:
     @scenario.setter
     def scenario(self, scenario: Scenario) -> None:
         self._scenario = scenario
-        self._block: Block | None = None
+        self._block: InputBlock | None = None
 
     def rows(self, tick: int, most: int) -> Inputs:
         """Return the inputs of the only run from a tick on, at least one row and at most `most`.
@@ -91,7 +91,7 @@ class InputGenerator:
         t, *columns = block.inputs
         return Inputs(t[first:last], *(column[0, first:last] for column in columns))
 
-    def block(self, tick: int) -> Block:
+    def block(self, tick: int) -> InputBlock:
         """Return the inputs of all runs in the block that contains a tick.
 
         Raises
@@ -103,7 +103,7 @@ class InputGenerator:
         if self._block is None or self._block.first != first:
             motion = self._noise_free(first, BLOCK_TICKS, self._draws_of)
             rows = np.where(motion.finite.all(axis=1), BLOCK_TICKS, np.argmin(motion.finite, axis=1))
-            self._block = Block(first, self._with_noise(motion, first), rows)
+            self._block = InputBlock(first, self._with_noise(motion, first), rows)
         return self._block
 
     def stays_finite(self, tick: int) -> NDArray[np.bool_]:

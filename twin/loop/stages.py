@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from spheretwin.electronics.sensor_chain import sense
 from spheretwin.electronics.transducers import sense_currents
-from spheretwin.loop.channels import Channel, logged_channels
+from spheretwin.loop.channels import TelemetryChannel, logged_channels
 from spheretwin.models.base.addresses import caller_of
 from spheretwin.models.base.compiled import (
     COMPILES,
@@ -178,7 +178,7 @@ def advance_stage(plant: Any, tables: Tables, step: Any, given: TickInput, outpu
 
 
 @cache
-def _writer(channel: Channel) -> Callable[..., None]:
+def _writer(channel: TelemetryChannel) -> Callable[..., None]:
     write = channel.write
 
     def of_one(part: Any, _: Any, row: Array) -> None:

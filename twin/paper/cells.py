@@ -16,7 +16,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from spheretwin.paper.experiment import Array, Outcome
+from spheretwin.paper.experiment import Array, RunOutcome
 from spheretwin.study.statistics import quantile_text
 from spheretwin.viz.pages.markdown import ResultTable
 
@@ -28,7 +28,7 @@ SCALES = {"mrad": 1e3, "ms": 1e3, "%": 100.0, "deg": float(np.degrees(1.0))}
 
 T = TypeVar("T")
 
-ERRORS: dict[str, Callable[[Outcome], Any]] = {
+ERRORS: dict[str, Callable[[RunOutcome], Any]] = {
     "max_abs_error": lambda outcome: outcome.max_abs_error,
     "measured_max_abs_error": lambda outcome: outcome.measured_max_abs_error,
     "rms_error": lambda outcome: outcome.rms_error,
@@ -122,17 +122,17 @@ def table(
     return ResultTable(title, tuple(cells), rows, texts)
 
 
-def of_axis(outcomes: Sequence[Outcome], error: str, axis: int) -> Array:
+def of_axis(outcomes: Sequence[RunOutcome], error: str, axis: int) -> Array:
     """One of `ERRORS` of one hinge for each seed, rad."""
     return np.array([ERRORS[error](outcome)[axis] for outcome in outcomes])
 
 
-def figures_named(outcomes: Sequence[Outcome], metric: str) -> Array:
+def figures_named(outcomes: Sequence[RunOutcome], metric: str) -> Array:
     """One metric of each seed; NaN if a run has none."""
     return np.array([outcome.figures.get(metric) for outcome in outcomes], dtype=np.float64)
 
 
-def statuses_text(outcomes: Sequence[Outcome]) -> str:
+def statuses_text(outcomes: Sequence[RunOutcome]) -> str:
     """Statuses of the runs of a case."""
     counts = Counter(outcome.status for outcome in outcomes)
     if len(counts) == 1:

@@ -18,10 +18,10 @@ from spheretwin.records.provenance import digest
 from spheretwin.scenario.reading import named_files
 from spheretwin.scenario.sections import Scenario
 from spheretwin.study.journal import Journal
-from spheretwin.study.row import Result
+from spheretwin.study.row import RowResult
 
 if TYPE_CHECKING:
-    from spheretwin.paper.runner import Job
+    from spheretwin.paper.runner import CaseRun
 
 MOST_RUNS = 1_000_000
 """Largest number of runs of an experiment that are cached."""
@@ -55,12 +55,12 @@ class EarlierRuns:
     """
 
     def __init__(self, experiment: str, keys: Mapping[str, str]) -> None:
-        self._keys, self._results = keys, dict[str, Result]()
+        self._keys, self._results = keys, dict[str, RowResult]()
         self._journal: Journal | None = None
         if folder := cache_folder():
             with suppress(SpheretwinError):
                 self._journal = Journal(folder / f"reproduce_{experiment}.jsonl", "", MOST_RUNS)
-                self._results = {key: Result(*rest) for _, (key, *rest) in self._journal.records()}
+                self._results = {key: RowResult(*rest) for _, (key, *rest) in self._journal.records()}
 
     def __enter__(self) -> EarlierRuns:
         return self
@@ -69,16 +69,16 @@ class EarlierRuns:
         if self._journal:
             self._journal.close()
 
-    def find(self, job: Job) -> Result | None:
+    def find(self, job: CaseRun) -> RowResult | None:
         """Result of an earlier run; None if there is none."""
         return self._results.get(self._key(job))
 
-    def add(self, job: Job, result: Result) -> None:
+    def add(self, job: CaseRun, result: RowResult) -> None:
         """Store a result if the journal can be written."""
         self._results[self._key(job)] = result
         if self._journal and self._journal.done() < MOST_RUNS:
             with suppress(SpheretwinError):  # a full disk
                 self._journal.append(self._journal.done(), [self._key(job), *result])
 
-    def _key(self, job: Job) -> str:
+    def _key(self, job: CaseRun) -> str:
         return f"{self._keys[job.case.name]} {job.plant} {job.seed}"

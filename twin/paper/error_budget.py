@@ -12,7 +12,7 @@ from spheretwin.control.laws import LAWS
 from spheretwin.models import actuator
 from spheretwin.models.telemetry.signals import ANGLES
 from spheretwin.paper.cells import Numbers, of_axis, table
-from spheretwin.paper.experiment import Array, Case, Finding, Outcome, Outcomes, Section
+from spheretwin.paper.experiment import Array, Case, ExperimentSection, Outcomes, RunOutcome, Statement
 from spheretwin.paper.experiment_file import ExperimentFile
 from spheretwin.paper.laws import BY_LAW
 from spheretwin.scenario.hardware import HARDWARE, MACHINE
@@ -62,7 +62,7 @@ class Budget:
         self._runs = {(item["law"], item["stage"]): item.runs for item in FILE.runs(outcomes)}
         self.laws = [law for law in LAWS if any(law == of for of, _ in self._runs)]
 
-    def runs(self, law: str, stage: str) -> Sequence[Outcome]:
+    def runs(self, law: str, stage: str) -> Sequence[RunOutcome]:
         """Runs of a stage under a law; empty if there are none."""
         return self._runs.get((law, stage), ())
 
@@ -95,7 +95,7 @@ def law_name(law: str) -> str:
     return f"{BY_LAW[law].label}, preset {preset}" if preset else BY_LAW[law].label
 
 
-def sections(outcomes: Outcomes) -> list[Section]:
+def sections(outcomes: Outcomes) -> list[ExperimentSection]:
     """Section with a table for each hinge, and one figure."""
     budget = Budget(outcomes)
     title = "Largest true |error| of {} in degrees: median over the seeds, and range"
@@ -109,10 +109,10 @@ def sections(outcomes: Outcomes) -> list[Section]:
     return [FILE.section("stages", tables, [lambda: _drawing(budget)], more)]
 
 
-def findings(outcomes: Outcomes) -> list[Finding]:
+def findings(outcomes: Outcomes) -> list[Statement]:
     """Finding on the part of the prototype with the largest change of the error, under each law."""
     most = Budget(outcomes).largest_changes()
-    return [Finding(None, f"single part with the largest change of the error: {most}")] if most else []
+    return [Statement(None, f"single part with the largest change of the error: {most}")] if most else []
 
 
 def _cell(budget: Budget, law: str, axis: int) -> Callable[[str], str]:

@@ -57,7 +57,7 @@ class Case(NamedTuple):
         return {**self.fields, **self.seeded_fields(seed)}
 
 
-class Outcome(NamedTuple):
+class RunOutcome(NamedTuple):
     """Result of one run; angles in rad."""
 
     status: Status
@@ -94,15 +94,15 @@ def _by_hinge(figure: Sequence[float] | None) -> Array:
     return np.full(3, np.nan) if figure is None else np.array(figure)
 
 
-class Outcomes(dict[str, Sequence[Outcome]]):
+class Outcomes(dict[str, Sequence[RunOutcome]]):
     """Outcomes of each seed by the name of the case; cases that were not run are absent."""
 
-    def runs(self, case: Case) -> Sequence[Outcome]:
+    def runs(self, case: Case) -> Sequence[RunOutcome]:
         """Outcomes of a case; empty if it was not run."""
         return self.get(case.name, ())
 
 
-class Section(NamedTuple):
+class ExperimentSection(NamedTuple):
     """Section of the page: text, tables and figures."""
 
     title: str
@@ -113,7 +113,7 @@ class Section(NamedTuple):
     """Functions that draw the figures; only a page calls them."""
 
 
-class Finding(NamedTuple):
+class Statement(NamedTuple):
     """One line of the first page: a statement of the paper and the result."""
 
     reproduced: bool | None
@@ -131,12 +131,12 @@ class Experiment(NamedTuple):
     """Content in a sentence or two."""
     cases: Callable[[], list[Case]]
     """In the order of the JSON's rows; a limit leaves the first of them."""
-    sections: Callable[[Outcomes], list[Section]]
+    sections: Callable[[Outcomes], list[ExperimentSection]]
     reduce: Callable[[Run], Any] = lambda run: None
     """Data that `sections` need in addition to the figures; the telemetry is released."""
-    row_fields: Callable[[Case, Sequence[Outcome]], Mapping[str, Any]] = lambda case, outcomes: {}
+    row_fields: Callable[[Case, Sequence[RunOutcome]], Mapping[str, Any]] = lambda case, outcomes: {}
     """Further entries of a case's row in the JSON."""
-    findings: Callable[[Outcomes], list[Finding]] = lambda outcomes: []
+    findings: Callable[[Outcomes], list[Statement]] = lambda outcomes: []
     """Lines of the first page; none of cases that were not run."""
     trajectories: Callable[[Outcomes], Mapping[str, LawTrajectory]] = lambda outcomes: {}
     """Runs of one condition for a recording, by the labels of their laws."""

@@ -20,7 +20,15 @@ from spheretwin.paper.cells import (
     statuses_text,
     table,
 )
-from spheretwin.paper.experiment import SEEDS, STATUSES, Case, Experiment, Outcome, Outcomes, Section
+from spheretwin.paper.experiment import (
+    SEEDS,
+    STATUSES,
+    Case,
+    Experiment,
+    ExperimentSection,
+    Outcomes,
+    RunOutcome,
+)
 from spheretwin.paper.laws import COMPARED_LAWS, TABLES, printed_rad
 from spheretwin.viz.pages.markdown import Drawing, ResultTable
 
@@ -37,7 +45,7 @@ class CaseRuns:
     """Case with its runs; an item is a column of the case, an error or a metric, the status, or the data."""
 
     case: Case
-    runs: Sequence[Outcome]
+    runs: Sequence[RunOutcome]
 
     def __getitem__(self, name: str) -> Any:
         if name in ERRORS:
@@ -105,10 +113,10 @@ class ExperimentFile:
         drawings: Sequence[Callable[[], Drawing]] = (),
         more: str = "",
         **values: Any,
-    ) -> Section:
+    ) -> ExperimentSection:
         """Section of the page with the title and the text of the file, and more text behind it."""
         title, text = (self[key][entry].format(**values) for entry in ("title", "text"))
-        return Section(title, text + more, tables, drawings)
+        return ExperimentSection(title, text + more, tables, drawings)
 
     def drawing(self, key: str, figure: Figure, **values: Any) -> Drawing:
         """Figure with the file name and the caption of the file."""

@@ -15,7 +15,7 @@ from spheretwin import scenario as scenarios
 from spheretwin.faults.targets import TARGETS
 from spheretwin.models import actuator
 from spheretwin.models.telemetry.status import Status
-from spheretwin.paper.experiment import Case, Outcome, Outcomes
+from spheretwin.paper.experiment import Case, Outcomes, RunOutcome
 from spheretwin.paper.experiment_file import CaseRuns, ExperimentFile
 from spheretwin.scenario.hardware import PROTOTYPE_DRIVE, PROTOTYPE_SENSORS
 from spheretwin.scenario.sections import Scenario
@@ -182,7 +182,7 @@ class FaultRuns:
         every = (item for kind in kinds for item in self._by_kind.get(kind, ()))
         return [item for item in every if columns.items() <= item.case.columns.items()]
 
-    def runs(self, *kinds: str, **columns: Any) -> list[Outcome]:
+    def runs(self, *kinds: str, **columns: Any) -> list[RunOutcome]:
         """Return the runs of the cases `of` some kinds with some columns."""
         return [run for item in self.of(*kinds, **columns) for run in item.runs]
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from spheretwin.paper import fault_cases as cases
 from spheretwin.paper.cells import NONE, Numbers, table
-from spheretwin.paper.experiment import Outcome, Section
+from spheretwin.paper.experiment import ExperimentSection, RunOutcome
 from spheretwin.paper.fault_cases import FEW, FILE, FaultRuns
 from spheretwin.paper.fault_outcomes import tracks
 from spheretwin.paper.fault_sections import percent
@@ -35,11 +35,11 @@ class Detection(NamedTuple):
     driven_ticks: int
 
 
-Pairs = Sequence[tuple[Outcome, Outcome]]
+Pairs = Sequence[tuple[RunOutcome, RunOutcome]]
 """Runs of the same faults, detected and reported."""
 
 
-def section(faults: FaultRuns) -> Section:
+def section(faults: FaultRuns) -> ExperimentSection:
     """Distribution of the latency, its reason, and its cost."""
     by_kind = {kind: detections for kind, detections in _detections(faults).items() if detections}
     pairs = _pairs(faults)
@@ -73,7 +73,7 @@ def _draw(by_kind: Mapping[str, Sequence[Detection]]) -> Drawing:
     return FILE.drawing("latency", figure)
 
 
-def _of_run(run: Outcome, number: int = 0) -> list[Detection]:
+def _of_run(run: RunOutcome, number: int = 0) -> list[Detection]:
     return [
         Detection(number, inf if latency_s is None else latency_s, ticks)
         for latency_s, ticks in zip(run.data.latencies_s, run.data.driven_ticks, strict=True)
@@ -176,12 +176,12 @@ def _intervals() -> list[tuple[float, float]]:
     return [*pairwise(EDGES_ms), (inf, inf), (0.0, inf)]
 
 
-def cost_rad(detecting: Outcome, reported: Outcome) -> float:
+def cost_rad(detecting: RunOutcome, reported: RunOutcome) -> float:
     """Return what the delay of the detection adds to the largest error after the fault."""
     return float(detecting.data.after_rad - reported.data.after_rad)
 
 
-def _slowest_s(run: Outcome) -> float:
+def _slowest_s(run: RunOutcome) -> float:
     return max(one.latency_s for one in _of_run(run))
 
 

@@ -19,7 +19,7 @@ from spheretwin.models.actuator import Actuator
 from spheretwin.models.base.compiled import compiled
 from spheretwin.models.design.capability import LOST, torque_matrices
 from spheretwin.models.telemetry.table import Table
-from spheretwin.paper.experiment import Case, Outcome
+from spheretwin.paper.experiment import Case, RunOutcome
 from spheretwin.run import Run
 from spheretwin.scenario.sections import Scenario
 from spheretwin.simulation import simulate
@@ -217,12 +217,12 @@ def reduce(run: Run) -> FaultData:
     )
 
 
-def tracks(outcome: Outcome) -> bool:
+def tracks(outcome: RunOutcome) -> bool:
     """True if a run completed and its error ratio is at most `TWICE`."""
     return outcome.is_complete and outcome.data.ratio <= TWICE
 
 
-def reason(outcome: Outcome) -> str | None:
+def reason(outcome: RunOutcome) -> str | None:
     """Reason for which a run does not track or was stopped; None if it tracks or the reason is unknown."""
     data: FaultData = outcome.data
     if data.stop_reason is not Reason.NONE:
@@ -237,7 +237,7 @@ def reason(outcome: Outcome) -> str | None:
     return f"{data.remaining.least_share:.3f} of the commanded torque is delivered"
 
 
-def row_fields(case: Case, outcomes: Sequence[Outcome]) -> Mapping[str, Any]:
+def row_fields(case: Case, outcomes: Sequence[RunOutcome]) -> Mapping[str, Any]:
     """Entries of the JSON: medians and ranges over the seeds, the smallest remaining torque."""
     data: list[FaultData] = [outcome.data for outcome in outcomes]
     remaining = [run.remaining for run in data if run.remaining is not None]

@@ -12,13 +12,13 @@ from spheretwin.control.supervision.watchdog import Reason
 from spheretwin.models.telemetry.status import Status
 from spheretwin.paper import fault_cases as cases
 from spheretwin.paper.cells import NONE, Numbers, statuses_text, table
-from spheretwin.paper.experiment import Array, Outcome, Section
+from spheretwin.paper.experiment import Array, ExperimentSection, RunOutcome
 from spheretwin.paper.fault_cases import COILS, FEW, FILE, FaultRuns
 from spheretwin.paper.fault_outcomes import TWICE, FaultData, tracks
 from spheretwin.viz.pages.markdown import Drawing
 
 
-def parts_section(faults: FaultRuns) -> Section:
+def parts_section(faults: FaultRuns) -> ExperimentSection:
     """Result of every mode of every part in its three ways."""
     failures = [item["failure"] for item in faults.of("part", way=cases.ALONE.name)]
     by_way = {
@@ -34,7 +34,7 @@ def parts_section(faults: FaultRuns) -> Section:
     return FILE.section("parts", [table(title, failures, cells, len(cells) - 1)], more=text)
 
 
-Runs = Mapping[str, Sequence[Outcome]]
+Runs = Mapping[str, Sequence[RunOutcome]]
 """Runs by the name of the failure."""
 
 
@@ -127,7 +127,7 @@ class Group(NamedTuple):
     name: str
     way: str
     sets: int
-    runs: Sequence[Outcome]
+    runs: Sequence[RunOutcome]
 
 
 MEASURES: dict[str, Callable[[Group], Any]] = {
@@ -140,7 +140,7 @@ INTERVALS_s = ((0.0, 1.0), (1.0, 2.0), (2.0, 3.0), (3.0, 4.0), (4.0, 5.0))
 """Intervals of the run, of 5 s, in which faults start."""
 
 
-def groups_section(faults: FaultRuns) -> Section:
+def groups_section(faults: FaultRuns) -> ExperimentSection:
     """Shares that complete and track, pairs, and the smallest torque that is left."""
     by_number = [
         _of_number(faults, number, way) for number in (1, 2, *cases.SIZES) for way in cases.OF_GROUPS

@@ -9,7 +9,7 @@ import numpy as np
 
 from spheretwin.paper import fault_cases as cases
 from spheretwin.paper import fault_latency
-from spheretwin.paper.experiment import Finding, Outcome, Outcomes, Section
+from spheretwin.paper.experiment import ExperimentSection, Outcomes, RunOutcome, Statement
 from spheretwin.paper.experiment_file import CaseRuns
 from spheretwin.paper.fault_cases import COILS, FEW, FILE, FaultRuns
 from spheretwin.paper.fault_outcomes import TWICE, reduce, row_fields, tracks
@@ -43,7 +43,7 @@ class Split(NamedTuple):
     """Share of the runs on the right side of the threshold."""
 
 
-def causes_section(faults: FaultRuns) -> Section:
+def causes_section(faults: FaultRuns) -> ExperimentSection:
     """Separation of the sets that track by rank and torque, and the smallest sets that do not track."""
     causes = [cause for way, figure in JUDGED if sum(map(len, (cause := _cause(faults, way, figure))[2:]))]
     by_way = {
@@ -85,7 +85,7 @@ def _cause(faults: FaultRuns, way: cases.Way, figure: str) -> Cause:
     return Cause(way.name, FIGURES[figure], *_by_tracking(runs, figure))
 
 
-def _by_tracking(runs: Sequence[Outcome], figure: str) -> tuple[list[float], list[float]]:
+def _by_tracking(runs: Sequence[RunOutcome], figure: str) -> tuple[list[float], list[float]]:
     """Return a figure of the runs that track, and of those that do not."""
     good, bad = (
         [getattr(run.data.remaining, figure) for run in runs if tracks(run) is tracking]
@@ -142,7 +142,7 @@ def smallest(items: Sequence[CaseRuns]) -> list[CaseRuns]:
     return failing[:LISTED]
 
 
-def _lost(item: CaseRuns) -> list[Outcome]:
+def _lost(item: CaseRuns) -> list[RunOutcome]:
     return [run for run in item.runs if not tracks(run)]
 
 
@@ -183,19 +183,19 @@ class EnginePairs(NamedTuple):
     """Runs of a way on both engines, with the first seed."""
 
     way: str
-    pairs: Sequence[tuple[Outcome, Outcome]]
+    pairs: Sequence[tuple[RunOutcome, RunOutcome]]
 
-    def same(self, value: Callable[[Outcome], object]) -> int:
+    def same(self, value: Callable[[RunOutcome], object]) -> int:
         """Count the pairs of which a value is the same."""
         return [value(one) == value(other) for one, other in self.pairs].count(True)
 
-    def largest(self, condition: Callable[[Outcome], bool]) -> float | None:
+    def largest(self, condition: Callable[[RunOutcome], bool]) -> float | None:
         """Largest difference of the pairs of which both runs meet a condition, rad; None without one."""
         pairs = [pair for pair in self.pairs if all(map(condition, pair))]
         return max((difference_rad(*pair) for pair in pairs), default=None)
 
 
-def engines_section(faults: FaultRuns) -> Section:
+def engines_section(faults: FaultRuns) -> ExperimentSection:
     """Differences between the engines."""
     every = [both for way in cases.OF_GROUPS if (both := engine_pairs(faults, way)).pairs]
     agreed = [agree(*pair) for both in every for pair in both.pairs]
@@ -212,13 +212,13 @@ def engines_section(faults: FaultRuns) -> Section:
     return FILE.section("engines", [engines], more=more, sample=cases.SAMPLE, bound_rad=BOUND_rad)
 
 
-def agree(one: Outcome, other: Outcome) -> bool:
+def agree(one: RunOutcome, other: RunOutcome) -> bool:
     """True if two runs have the same status, and almost the same error if they track."""
     same = one.status == other.status and tracks(one) == tracks(other)
     return same and (not tracks(one) or difference_rad(one, other) <= BOUND_rad)
 
 
-def difference_rad(one: Outcome, other: Outcome) -> float:
+def difference_rad(one: RunOutcome, other: RunOutcome) -> float:
     """Difference of the largest errors of any hinge, of the complete run or after the fault."""
     whole = np.abs(one.max_abs_error - other.max_abs_error).max()
     return float(max(whole, abs(one.data.after_rad - other.data.after_rad)))
@@ -231,7 +231,7 @@ def engine_pairs(faults: FaultRuns, way: cases.Way) -> EnginePairs:
     return EnginePairs(way.name, [(item.runs[0], others[item["groups"]]) for item in items])
 
 
-def sections(outcomes: Outcomes) -> list[Section]:
+def sections(outcomes: Outcomes) -> list[ExperimentSection]:
     """Open groups, detection, why some sets do not track, all other parts, and the other engine."""
     faults = FaultRuns(outcomes)
     return [
@@ -243,7 +243,7 @@ def sections(outcomes: Outcomes) -> list[Section]:
     ]
 
 
-def findings(outcomes: Outcomes) -> list[Finding]:
+def findings(outcomes: Outcomes) -> list[Statement]:
     """Number of the runs with one or two open groups that track, by way."""
     faults = FaultRuns(outcomes)
     by_way = {way.name: faults.runs(*FEW, way=way.name) for way in cases.OF_GROUPS}
@@ -251,7 +251,7 @@ def findings(outcomes: Outcomes) -> list[Finding]:
         f"{way} {[*map(tracks, runs)].count(True)} of {len(runs)}" for way, runs in by_way.items() if runs
     ]
     text = f"runs that track with one or two groups open: {', '.join(texts)}"
-    return [Finding(None, text)] if texts else []
+    return [Statement(None, text)] if texts else []
 
 
 EXPERIMENT = FILE.experiment(

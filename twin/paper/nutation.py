@@ -11,7 +11,15 @@ import numpy as np
 from spheretwin.models import actuator as actuators
 from spheretwin.models.telemetry.signals import ANGLES
 from spheretwin.paper.cells import Numbers, hinges
-from spheretwin.paper.experiment import Array, Finding, Outcome, Outcomes, Section, padded, window_maxima
+from spheretwin.paper.experiment import (
+    Array,
+    ExperimentSection,
+    Outcomes,
+    RunOutcome,
+    Statement,
+    padded,
+    window_maxima,
+)
 from spheretwin.paper.experiment_file import CaseRuns, ExperimentFile
 from spheretwin.paper.laws import PAPER_LAWS
 from spheretwin.run import Run
@@ -131,7 +139,7 @@ def _later(item: CaseRuns) -> tuple[Numbers, ...]:
     return hinges(run.data.largest_after(FROM_s) for run in item.runs)
 
 
-def sections(outcomes: Outcomes) -> list[Section]:
+def sections(outcomes: Outcomes) -> list[ExperimentSection]:
     """Errors, angles and paths."""
     items, shown = FILE.runs(outcomes), _in_figures(outcomes)
     tables = [FILE.table("largest", items, later=_later), FILE.table("effort", items)]
@@ -139,7 +147,7 @@ def sections(outcomes: Outcomes) -> list[Section]:
     return [FILE.section("laws", tables, drawings, from_s=FROM_s)]
 
 
-def findings(outcomes: Outcomes) -> list[Finding]:
+def findings(outcomes: Outcomes) -> list[Statement]:
     """Compare the order of the laws with the paper's."""
     runs = [outcomes.runs(FILE.case(law=law.law)) for law in PAPER_LAWS]
     if not all(runs):
@@ -152,10 +160,10 @@ def findings(outcomes: Outcomes) -> list[Finding]:
         for law, error, of_law in zip(PAPER_LAWS, worst, runs, strict=True)
     )
     verdict = "AFSM follows the nutation closest" if in_order else "the laws are not in the paper's order"
-    return [Finding(in_order, f"{verdict} (largest error of any of {', '.join(ANGLES)}: {texts})")]
+    return [Statement(in_order, f"{verdict} (largest error of any of {', '.join(ANGLES)}: {texts})")]
 
 
-def _loss_text(runs: Sequence[Outcome]) -> str:
+def _loss_text(runs: Sequence[RunOutcome]) -> str:
     lost = sorted({str(run.status).replace("_", " ") for run in runs if not run.is_complete})
     return f" and {', '.join(lost)}" if lost else ""
 

@@ -12,7 +12,7 @@ import numpy as np
 from spheretwin.models import actuator as actuators
 from spheretwin.models.telemetry.status import Status
 from spheretwin.paper.cells import ERRORS, figures_named
-from spheretwin.paper.experiment import Case, Experiment, Finding, Outcome, Outcomes, Section
+from spheretwin.paper.experiment import Case, Experiment, ExperimentSection, Outcomes, RunOutcome, Statement
 from spheretwin.paper.runner import CaseSummary, Plan, PlanResult, command_line, summarise
 from spheretwin.study.agreement import BOUND
 from spheretwin.study.statistics import finite_ends
@@ -37,8 +37,8 @@ class Chapter(NamedTuple):
     """One experiment on the page."""
 
     experiment: Experiment
-    sections: Sequence[Section]
-    findings: Sequence[Finding] = ()
+    sections: Sequence[ExperimentSection]
+    findings: Sequence[Statement] = ()
     commands: Sequence[str] = ()
     """Command that runs each row alone, with the first seed."""
     plants: str = ""
@@ -168,7 +168,7 @@ def rows(
     return [_row(plan, case, summaries[case.name], outcomes[case.name]) for case in plan.cases]
 
 
-def _row(plan: Plan, case: Case, summary: CaseSummary, outcomes: Sequence[Outcome]) -> dict[str, Any]:
+def _row(plan: Plan, case: Case, summary: CaseSummary, outcomes: Sequence[RunOutcome]) -> dict[str, Any]:
     return {
         "figure": plan.experiment.name,
         "case": case.name,
@@ -186,7 +186,7 @@ def _row(plan: Plan, case: Case, summary: CaseSummary, outcomes: Sequence[Outcom
     }
 
 
-def _errors(outcomes: Sequence[Outcome]) -> dict[str, Any]:
+def _errors(outcomes: Sequence[RunOutcome]) -> dict[str, Any]:
     fields: dict[str, Any] = {}
     for name, error in ERRORS.items():
         values = np.array([error(outcome) for outcome in outcomes])
@@ -196,7 +196,7 @@ def _errors(outcomes: Sequence[Outcome]) -> dict[str, Any]:
     return fields
 
 
-def _effort(outcomes: Sequence[Outcome]) -> dict[str, Any]:
+def _effort(outcomes: Sequence[RunOutcome]) -> dict[str, Any]:
     fields: dict[str, Any] = {}
     for name, range_name in EFFORT.items():
         values = figures_named(outcomes, name)
@@ -206,7 +206,7 @@ def _effort(outcomes: Sequence[Outcome]) -> dict[str, Any]:
     return fields
 
 
-def _status(case: Case, outcomes: Sequence[Outcome]) -> Status:
+def _status(case: Case, outcomes: Sequence[RunOutcome]) -> Status:
     """Unexpected status of any run, else the most frequent status."""
     counts = Counter(outcome.status for outcome in outcomes)
     unexpected = [status for status in counts if status not in case.expected_statuses]

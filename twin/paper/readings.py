@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from spheretwin.paper.cells import table
-from spheretwin.paper.experiment import Array, Case, Finding, Outcome, Outcomes, Section
+from spheretwin.paper.experiment import Array, Case, ExperimentSection, Outcomes, RunOutcome, Statement
 from spheretwin.paper.experiment_file import ExperimentFile
 from spheretwin.paper.laws import PAPER_LAWS, PRINTED_rad, printed_rad
 from spheretwin.viz.pages.markdown import Drawing, ResultTable
@@ -27,7 +27,7 @@ class ReadingResult(NamedTuple):
     surface_slope: float | None
     """λ of the laws that have one; None for the printed one."""
     ratios: Array  # (conditions, laws, 3) largest error over the printed one
-    runs: Sequence[Outcome]
+    runs: Sequence[RunOutcome]
 
     @property
     def score(self) -> float:
@@ -57,7 +57,7 @@ def results(outcomes: Outcomes) -> list[ReadingResult]:
     return results
 
 
-def sections(outcomes: Outcomes) -> list[Section]:
+def sections(outcomes: Outcomes) -> list[ExperimentSection]:
     """Table and figure of all readings."""
     complete = results(outcomes)
     slopes = (f" {_with_slope(result)}" for result in complete if result.surface_slope is not None)
@@ -106,7 +106,7 @@ def _ranges(result: ReadingResult, law: int) -> str:
     )
 
 
-def findings(outcomes: Outcomes) -> list[Finding]:
+def findings(outcomes: Outcomes) -> list[Statement]:
     """Test if the printed errors follow from the printed gains under any reading."""
     every = results(outcomes)
     if len(every) < len(READINGS):
@@ -115,7 +115,7 @@ def findings(outcomes: Outcomes) -> list[Finding]:
     torque = min((result for result in every if result.level == TORQUE), key=_score)
     reproduced = best.surface_slope is None and best.score < np.log(1.25)
     return [
-        Finding(
+        Statement(
             reproduced,
             f"nearest to all {best.ratios.size} printed errors is (41) read {best.label}, with an RMS"
             f" log ratio of {best.score:.2f}; with the printed gains it is {shipped.score:.2f}"

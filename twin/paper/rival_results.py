@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from spheretwin.paper.cells import ERRORS, NONE, figures_named, table
-from spheretwin.paper.experiment import Array, Finding, Outcome, Outcomes
+from spheretwin.paper.experiment import Array, Outcomes, RunOutcome, Statement
 from spheretwin.paper.laws import BY_LAW
 from spheretwin.paper.rival_conditions import ELECTRONICS, FILE, HARDWARE, OUR_LAW, Hardware
 from spheretwin.run import Run
@@ -21,7 +21,7 @@ COMPLETE = "prototype"
 """Condition with every imperfection."""
 
 
-class Result(NamedTuple):
+class RivalResult(NamedTuple):
     """A law under one condition: medians unless stated; NaN if any run was lost."""
 
     law: str
@@ -43,7 +43,7 @@ class Result(NamedTuple):
         """Whether any run did not complete."""
         return not np.isfinite(self.largest_rad)
 
-    def is_level(self, other: Result) -> bool:
+    def is_level(self, other: RivalResult) -> bool:
         """True if the intervals overlap: the seeds do not rank the two."""
         return self.low_rad <= other.high_rad and other.low_rad <= self.high_rad
 
@@ -54,10 +54,12 @@ def conditions(hardware: Hardware, perturbed: bool) -> list[str]:
     return [one["condition"] for one in every if one.get("comparable", True) is not perturbed]
 
 
-def results(hardware: Hardware, condition: str, outcomes: Outcomes, seeds: int | None = None) -> list[Result]:
+def results(
+    hardware: Hardware, condition: str, outcomes: Outcomes, seeds: int | None = None
+) -> list[RivalResult]:
     """Results under a condition: tuned laws by limit, then presets; of the first seeds, or of all."""
     return [
-        Result(
+        RivalResult(
             columns["law"],
             columns["row"],
             columns.get("limit_A_s"),
@@ -69,7 +71,7 @@ def results(hardware: Hardware, condition: str, outcomes: Outcomes, seeds: int |
     ]
 
 
-def within(results: Sequence[Result], limit_A_s: float) -> list[Result]:
+def within(results: Sequence[RivalResult], limit_A_s: float) -> list[RivalResult]:
     """Laws tuned within a limit, the least error first and lost ones last."""
     of_limit = [result for result in results if result.limit_A_s == limit_A_s]
     return sorted(of_limit, key=lambda result: (result.is_lost, result.largest_rad))
@@ -96,7 +98,7 @@ def start_error(run: Run) -> Array:
     return np.where(until, np.abs(error), 0.0).max(axis=0)
 
 
-def _medians(hardware: Hardware, runs: Sequence[Outcome]) -> tuple[float, ...]:
+def _medians(hardware: Hardware, runs: Sequence[RunOutcome]) -> tuple[float, ...]:
     if not all(run.is_complete for run in runs):
         return (np.nan,) * 6
     largest, tail = (
@@ -170,7 +172,7 @@ def robustness(hardware: Hardware, outcomes: Outcomes) -> list[ResultTable]:
 
 def complete_prototype(hardware: Hardware, outcomes: Outcomes) -> list[ResultTable]:
     """Median and worst error with every imperfection; no table for hardware without this condition."""
-    cells: dict[str, Callable[[Result], str]] = {
+    cells: dict[str, Callable[[RivalResult], str]] = {
         "limit, A/s": lambda result: NONE if result.limit_A_s is None else f"{result.limit_A_s:g}",
         "law": lambda result: result.label,
         "median error, degrees": lambda result: _cell(result, lambda one: _error(hardware, one)),
@@ -186,16 +188,16 @@ def complete_prototype(hardware: Hardware, outcomes: Outcomes) -> list[ResultTab
 def predictive_control(outcomes: Outcomes) -> list[ResultTable]:
     """Largest error and variation of predictive control, PID and AFSM-ESO on the seeds of the first."""
     compared, limits = (OUR_LAW, "pid"), (max(ELECTRONICS.search.limits), None)
-    every: list[tuple[str, Result]] = []
+    every: list[tuple[str, RivalResult]] = []
     for own in FILE.runs(outcomes, candidate="predictive control"):
         condition, figures = own["condition"], _medians(ELECTRONICS, own.runs)
-        every.append((condition, Result("", "predictive control", None, None, *figures)))
+        every.append((condition, RivalResult("", "predictive control", None, None, *figures)))
         every += [
             (condition, result)
             for result in results(ELECTRONICS, condition, outcomes, len(own.runs))
             if result.law in compared and result.limit_A_s in limits
         ]
-    cells: dict[str, Callable[[tuple[str, Result]], str]] = {
+    cells: dict[str, Callable[[tuple[str, RivalResult]], str]] = {
         "condition": lambda row: row[0],
         "law": lambda row: row[1].label,
         "largest error, degrees": lambda row: _cell(row[1], lambda one: f"{np.degrees(one.largest_rad):.3f}"),
@@ -204,7 +206,7 @@ def predictive_control(outcomes: Outcomes) -> list[ResultTable]:
     return [table("Predictive control of the tilt", every, cells, 2)] if every else []
 
 
-def _by_limit_and_error(result: Result) -> tuple[float, bool, float]:
+def _by_limit_and_error(result: RivalResult) -> tuple[float, bool, float]:
     limit = np.inf if result.limit_A_s is None else result.limit_A_s
     return limit, result.is_lost, result.largest_rad
 
@@ -214,7 +216,7 @@ def _tables(
 ) -> list[ResultTable]:
     """A table for each measure: a row for each law, by limit and by the error under the first condition."""
     unit = "degrees" if hardware.in_degrees else "mrad"
-    measures: dict[str, Callable[[Result], str]] = {
+    measures: dict[str, Callable[[RivalResult], str]] = {
         f"largest error, {unit}": lambda result: _error(hardware, result),
         "variation of the commands, A/s": _variation,
         f"RMS error of the second half, {unit}": lambda result: _angle(hardware, result.tail_rad),
@@ -223,7 +225,7 @@ def _tables(
     by_law = [{(result.limit_A_s, result.label): result for result in of_one} for of_one in by_condition]
     head = ("limit, A/s", "law", *conditions)
 
-    def rows(text: Callable[[Result], str]) -> list[tuple[str, ...]]:
+    def rows(text: Callable[[RivalResult], str]) -> list[tuple[str, ...]]:
         return [
             (
                 "as shipped" if limit is None else f"{limit:g}",
@@ -236,7 +238,7 @@ def _tables(
     return [ResultTable(f"{title}: {name}", head, rows(text), 2) for name, text in measures.items()]
 
 
-def _order(hardware: Hardware, of_first: Sequence[Result]) -> list[tuple[float | None, str]]:
+def _order(hardware: Hardware, of_first: Sequence[RivalResult]) -> list[tuple[float | None, str]]:
     """Limits and laws of the rows: tuned laws by their error, those without gains in the limit, presets."""
     order: list[tuple[float | None, str]] = []
     for limit in hardware.search.limits:
@@ -246,17 +248,17 @@ def _order(hardware: Hardware, of_first: Sequence[Result]) -> list[tuple[float |
     return order + [(None, result.label) for result in of_first if result.limit_A_s is None]
 
 
-def _cell(result: Result | None, text: Callable[[Result], str], lost: str = "lost") -> str:
+def _cell(result: RivalResult | None, text: Callable[[RivalResult], str], lost: str = "lost") -> str:
     if result is None:
         return NONE
     return lost if result.is_lost else text(result)
 
 
-def _variation(result: Result) -> str:
+def _variation(result: RivalResult) -> str:
     return f"{result.variation_A_s:.1f}"
 
 
-def _error(hardware: Hardware, result: Result) -> str:
+def _error(hardware: Hardware, result: RivalResult) -> str:
     """Median and its interval; a dash for an end for which the seeds are too few."""
     low, high = (
         _angle(hardware, end) if np.isfinite(end) else NONE for end in (result.low_rad, result.high_rad)
@@ -268,10 +270,10 @@ def _angle(hardware: Hardware, value_rad: float) -> str:
     return f"{np.degrees(value_rad):.4f}" if hardware.in_degrees else f"{1e3 * value_rad:.3f}"
 
 
-def findings(outcomes: Outcomes) -> list[Finding]:
+def findings(outcomes: Outcomes) -> list[Statement]:
     """Law with the smallest error within each limit, and laws that are level with or better than our own."""
     return [
-        Finding(None, f"{hardware.title}, {condition}: {'; '.join(statements)}")
+        Statement(None, f"{hardware.title}, {condition}: {'; '.join(statements)}")
         for hardware in HARDWARE
         for perturbed in (False, True)
         for condition in conditions(hardware, perturbed)
@@ -293,7 +295,7 @@ def _by_limit(hardware: Hardware, condition: str, outcomes: Outcomes) -> list[st
     return [f"within {_listed(texts)} A/s {statement}" for statement, texts in limits.items()]
 
 
-def _comparison(ordered: Sequence[Result]) -> str:
+def _comparison(ordered: Sequence[RivalResult]) -> str:
     """Compare some laws, the least error first, with our own."""
     own = BY_LAW[OUR_LAW].label
     ours = next((result for result in ordered if result.label == own), None)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from spheretwin.paper import rival_results
-from spheretwin.paper.experiment import Outcomes, Section
+from spheretwin.paper.experiment import ExperimentSection, Outcomes
 from spheretwin.paper.laws import BY_LAW
 from spheretwin.paper.rival_conditions import FILE, HARDWARE, Hardware, cases
 from spheretwin.paper.rival_results import conditions, current_limits_rad, results, start_error
@@ -53,7 +53,7 @@ def _panel(hardware: Hardware, condition: str, outcomes: Outcomes) -> FrontPanel
     )
 
 
-def _sections(outcomes: Outcomes) -> list[Section]:
+def _sections(outcomes: Outcomes) -> list[ExperimentSection]:
     predictive = rival_results.predictive_control(outcomes)
     return [
         section
@@ -63,7 +63,7 @@ def _sections(outcomes: Outcomes) -> list[Section]:
     ] + [FILE.section("predictive_control", [table]) for table in predictive]
 
 
-def _of_hardware(hardware: Hardware, outcomes: Outcomes) -> list[Section]:
+def _of_hardware(hardware: Hardware, outcomes: Outcomes) -> list[ExperimentSection]:
     title, search = hardware.title.capitalize(), hardware.search
     method = FILE["method"].format(draws=search.draws, perturbations=search.perturbations)
     errors = rival_results.errors(hardware, outcomes)

@@ -18,14 +18,14 @@ from spheretwin.metrics.user_metrics import UserMetric
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.telemetry.status import Status
 from spheretwin.paper.earlier_runs import EarlierRuns, key_of
-from spheretwin.paper.experiment import STATUSES, Case, Experiment, Outcome, Outcomes
+from spheretwin.paper.experiment import STATUSES, Case, Experiment, Outcomes, RunOutcome
 from spheretwin.run import Run
 from spheretwin.scenario.sections import Scenario
 from spheretwin.scenario.writing import command_words
 from spheretwin.study.agreement import Ending, compare
 from spheretwin.study.engines.threads import run_each
 from spheretwin.study.grid import Row
-from spheretwin.study.row import Result, Rows
+from spheretwin.study.row import RowResult, Rows
 from spheretwin.study.study import FULL, Study
 
 Array = NDArray[np.float64]
@@ -36,7 +36,7 @@ EVERY = 100
 """In addition to the first run of each law, one run in this many runs on MuJoCo too."""
 
 
-class Job(NamedTuple):
+class CaseRun(NamedTuple):
     """One run."""
 
     case: Case
@@ -61,18 +61,20 @@ class Plan(NamedTuple):
     """Plant of the cases that do not name one; the fast one if the model allows it, unless given."""
 
     @property
-    def jobs(self) -> list[Job]:
+    def jobs(self) -> list[CaseRun]:
         """Every case with every seed, from 0 on."""
         return [
-            Job(case, plant_of(case, self.plant), seed) for case in self.cases for seed in self._seeds(case)
+            CaseRun(case, plant_of(case, self.plant), seed)
+            for case in self.cases
+            for seed in self._seeds(case)
         ]
 
     @property
-    def sample(self) -> list[Job]:
+    def sample(self) -> list[CaseRun]:
         """Runs that are repeated on MuJoCo: the first of each law, and some chosen by their names."""
         if self.plant == FULL:
             return []
-        jobs: list[Job] = []
+        jobs: list[CaseRun] = []
         laws: set[Any] = set()
         for case in self.cases:
             if plant_of(case, None) or not case.comparable:
@@ -81,11 +83,11 @@ class Plan(NamedTuple):
             for seed in self._seeds(case):
                 lot = zlib.crc32(f"{self.experiment.name} {case.name} {seed}".encode())
                 if law not in laws or lot % EVERY == 0:
-                    jobs.append(Job(case, FULL, seed))
+                    jobs.append(CaseRun(case, FULL, seed))
                 laws.add(law)
         return jobs
 
-    def by_case(self, outcomes: Sequence[Outcome]) -> Outcomes:
+    def by_case(self, outcomes: Sequence[RunOutcome]) -> Outcomes:
         """Return the outcomes of `jobs` by the name of the case."""
         remaining = iter(outcomes)
         return Outcomes({case.name: list(islice(remaining, len(self._seeds(case)))) for case in self.cases})
@@ -273,11 +275,11 @@ def compare_plants(
 
 def _run(
     plan: Plan,
-    jobs: Sequence[Job],
+    jobs: Sequence[CaseRun],
     done: Callable[[str], None],
     threads: int | None,
     earlier: EarlierRuns | None,
-) -> list[Outcome]:
+) -> list[RunOutcome]:
     """Return outcomes in the order of the jobs."""
     experiment = plan.experiment
     results = {i: result for i, job in enumerate(jobs) if earlier and (result := earlier.find(job))}
@@ -285,7 +287,7 @@ def _run(
         done(jobs[i].case.name)
     missing = [i for i in range(len(jobs)) if i not in results]
 
-    def work(i: int) -> Result:
+    def work(i: int) -> RowResult:
         case, plant, seed = jobs[i]
         (result,) = rows_of(experiment, case.scenario).run([_row(case, seed)], _engine(case, plant))
         return result
@@ -301,12 +303,12 @@ def _run(
     return [outcome_of(experiment, results[i]) for i in range(len(jobs))]
 
 
-def outcome_of(experiment: Experiment, result: Result) -> Outcome:
+def outcome_of(experiment: Experiment, result: RowResult) -> RunOutcome:
     """Outcome of a run from its result in JSON types."""
     figures = dict(result.figures)
     measured = np.array(figures.pop(MEASURED), np.float64)
     data = _data_type(experiment.reduce).validate_python(figures.pop(DATA))
-    return Outcome(STATUSES[result.status], figures, measured, data)
+    return RunOutcome(STATUSES[result.status], figures, measured, data)
 
 
 @cache
@@ -314,7 +316,7 @@ def _data_type(reduce: Callable[[Run], Any]) -> TypeAdapter[Any]:
     return TypeAdapter(get_type_hints(reduce, include_extras=True).get("return", Any))
 
 
-def _ending(outcome: Outcome) -> Ending:
+def _ending(outcome: RunOutcome) -> Ending:
     return outcome.status, outcome.figures["rms_error_rad"] or [0.0] * 3
 
 
@@ -324,7 +326,7 @@ def unexpected_ends(plan: Plan, outcomes: Outcomes) -> list[str]:
     return [f"{name} ({', '.join(statuses)})" for name, statuses in ends.items() if statuses]
 
 
-def _unexpected(case: Case, outcomes: Sequence[Outcome]) -> list[Status]:
+def _unexpected(case: Case, outcomes: Sequence[RunOutcome]) -> list[Status]:
     return sorted({outcome.status for outcome in outcomes} - set(case.expected_statuses))
 
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from spheretwin.models.telemetry.signals import ANGLES
 from spheretwin.paper.cells import of_axis
-from spheretwin.paper.experiment import Array, Finding, Outcome, Outcomes, Section
+from spheretwin.paper.experiment import Array, ExperimentSection, Outcomes, RunOutcome, Statement
 from spheretwin.paper.experiment_file import CaseRuns, ExperimentFile
 from spheretwin.paper.laws import COMPARED_LAWS, PAPER_LAWS, ComparedLaw, printed_rad
 from spheretwin.viz.pages.markdown import Drawing
@@ -23,7 +23,7 @@ SIZE = 0.25
 NAMES = " > ".join(law.label for law in PAPER_LAWS)
 
 
-def order(file: ExperimentFile, outcomes: Outcomes) -> list[Finding]:
+def order(file: ExperimentFile, outcomes: Outcomes) -> list[Statement]:
     """Compare the order of the laws with the paper's at every point."""
     by_point = [
         (point[file["symbol"]], [outcomes.runs(file.case(law=law.law, **point)) for law in PAPER_LAWS])
@@ -41,10 +41,10 @@ def order(file: ExperimentFile, outcomes: Outcomes) -> list[Finding]:
             total += 3 * count
     span = f"{file['symbol']} = {by_point[0][0]:g} to {by_point[-1][0]:g}"
     share = "at every point, hinge and seed" if right == total else f"in {right} of {total} comparisons"
-    return [Finding(right == total, f"the order {NAMES} over {span} holds {share}")]
+    return [Statement(right == total, f"the order {NAMES} over {span} holds {share}")]
 
 
-def sizes(file: ExperimentFile, outcomes: Outcomes) -> list[Finding]:
+def sizes(file: ExperimentFile, outcomes: Outcomes) -> list[Statement]:
     """Compare the errors of each law with the printed ones."""
     m, L = file["printed"].values()
     by_law = {law: outcomes.runs(file.case(law=law.law, m=m, L=L)) for law in PAPER_LAWS}
@@ -57,15 +57,15 @@ def sizes(file: ExperimentFile, outcomes: Outcomes) -> list[Finding]:
     findings = []
     if close:
         findings.append(
-            Finding(True, f"{where} within {100 * SIZE:.0f} %: {_ratios_text(close, ratios)} of them")
+            Statement(True, f"{where} within {100 * SIZE:.0f} %: {_ratios_text(close, ratios)} of them")
         )
     if other:
         smaller = all(np.all(ratios[law] < 1) for law in other)
         why = "; the printed gains hold the rotor closer than the paper says" if smaller else ""
-        findings.append(Finding(False, f"{where}: {_ratios_text(other, ratios)} of them{why}"))
+        findings.append(Statement(False, f"{where}: {_ratios_text(other, ratios)} of them{why}"))
     for law in lost:
         text = f"{_ratios_text([law], ratios)} of them, but {_loss_text(by_law[law])}"
-        findings.append(Finding(False, f"{where}: {text}"))
+        findings.append(Statement(False, f"{where}: {text}"))
     return findings
 
 
@@ -73,7 +73,7 @@ def _ratios_text(laws: Sequence[ComparedLaw], ratios: Mapping[ComparedLaw, Array
     return ", ".join(f"{law.label} {ratios[law].min():.2f} to {ratios[law].max():.2f} times" for law in laws)
 
 
-def growth(file: ExperimentFile, outcomes: Outcomes) -> list[Finding]:
+def growth(file: ExperimentFile, outcomes: Outcomes) -> list[Statement]:
     """Test if AFSM's error grows with the load, as the paper concludes."""
     points = file.runs(outcomes, law="afsm")
     if len(points) < 2:
@@ -83,7 +83,7 @@ def growth(file: ExperimentFile, outcomes: Outcomes) -> list[Finding]:
     first, last = 1e3 * medians.max(axis=1)[[0, -1]]
     verdict = "grows with the load" if grows else "does not grow with the load throughout"
     return [
-        Finding(
+        Statement(
             grows,
             f"{points[0]['label']}'s error {verdict}, from {first:.0f} mrad at L = {points[0]['L']:g} to"
             f" {last:.0f} mrad at L = {points[-1]['L']:g}",
@@ -91,7 +91,7 @@ def growth(file: ExperimentFile, outcomes: Outcomes) -> list[Finding]:
     ]
 
 
-def _loss_text(runs: Sequence[Outcome]) -> str:
+def _loss_text(runs: Sequence[RunOutcome]) -> str:
     """Describe how runs were lost."""
     lost = [run for run in runs if not run.is_complete]
     saturated = float(np.median([run.figures["saturated_fraction"] or 0.0 for run in lost]))
@@ -102,22 +102,22 @@ def _loss_text(runs: Sequence[Outcome]) -> str:
     )
 
 
-def _median_rad(runs: Sequence[Outcome]) -> Array:
+def _median_rad(runs: Sequence[RunOutcome]) -> Array:
     return np.array([np.median(of_axis(runs, "max_abs_error", axis)) for axis in range(3)])
 
 
-def _all_complete(runs: Sequence[Outcome]) -> bool:
+def _all_complete(runs: Sequence[RunOutcome]) -> bool:
     return all(run.is_complete for run in runs)
 
 
-def _sections(file: ExperimentFile, outcomes: Outcomes) -> list[Section]:
+def _sections(file: ExperimentFile, outcomes: Outcomes) -> list[ExperimentSection]:
     items, symbol = file.runs(outcomes), file["symbol"]
     value = {symbol: f"{{{symbol}:g}}"}
     tables = [file.table(name, items, value) for name in ("largest", "effort")]
     return [file.section("errors", tables, [lambda: _draw(file, items)], quantity=file["quantity"])]
 
 
-def _findings(file: ExperimentFile, outcomes: Outcomes) -> list[Finding]:
+def _findings(file: ExperimentFile, outcomes: Outcomes) -> list[Statement]:
     findings = [*order(file, outcomes), *sizes(file, outcomes)]
     return [*findings, *growth(file, outcomes)] if file is FIGURE7 else findings
 

@@ -11,7 +11,7 @@ from spheretwin import scenario as scenarios
 from spheretwin.models.telemetry.table import Table
 from spheretwin.paper import frequency_response as responses
 from spheretwin.paper.cells import NONE, table
-from spheretwin.paper.experiment import Array, Case, Finding, Outcome, Outcomes, Section
+from spheretwin.paper.experiment import Array, Case, ExperimentSection, Outcomes, RunOutcome, Statement
 from spheretwin.paper.experiment_file import CaseRuns, ExperimentFile
 from spheretwin.paper.laws import BY_LAW
 from spheretwin.paper.lyapunov import Descent, descent
@@ -105,7 +105,7 @@ HOLDS_rad = 0.01
 of the amplitude."""
 
 
-def sections(outcomes: Outcomes) -> list[Section]:
+def sections(outcomes: Outcomes) -> list[ExperimentSection]:
     """Descent and reaching, ten minutes, and margins of each law."""
     reached = FILE.runs(outcomes, part="reaching")
     reaching = FILE.table("reaching", reached, reached=_reached)
@@ -119,12 +119,12 @@ def sections(outcomes: Outcomes) -> list[Section]:
     ]
 
 
-def findings(outcomes: Outcomes) -> list[Finding]:
+def findings(outcomes: Outcomes) -> list[Statement]:
     """Course of V, and of the variation over ten minutes."""
     return [*_descent_findings(outcomes), *_drift_findings(outcomes)]
 
 
-def holds(outcome: Outcome) -> bool:
+def holds(outcome: RunOutcome) -> bool:
     """True if a law holds, as defined by `HOLDS_rad`."""
     return outcome.is_complete and bool(np.all(outcome.tail_rms_error < HOLDS_rad))
 
@@ -136,7 +136,7 @@ def ends_of(kept_within: Sequence[bool]) -> tuple[int | None, int | None]:
     return (last if last >= 0 else None), first
 
 
-def _response_section(items: Sequence[CaseRuns]) -> list[Section]:
+def _response_section(items: Sequence[CaseRuns]) -> list[ExperimentSection]:
     """Section of the frequency responses, if they were run."""
     if not items:
         return []
@@ -186,7 +186,7 @@ def _drift_runs(outcomes: Outcomes) -> list[tuple[str, StabilityMeasures, Span, 
     return [(law, data, data.early, data.late) for law, data in items if data.early and data.late]
 
 
-def _descent_findings(outcomes: Outcomes) -> list[Finding]:
+def _descent_findings(outcomes: Outcomes) -> list[Statement]:
     courses = [
         (item["L"], course)
         for item in FILE.runs(outcomes, part="reaching")
@@ -205,17 +205,17 @@ def _descent_findings(outcomes: Outcomes) -> list[Finding]:
         f"V of (44) {'falls' if falls else 'does not fall'} along AFSM's runs ({texts}); weak evidence, as"
         f" {100 * least:.2f} % of V₀ are the parameters' errors"
     )
-    return [Finding(None if falls else False, text)]
+    return [Statement(None if falls else False, text)]
 
 
-def _drift_findings(outcomes: Outcomes) -> list[Finding]:
+def _drift_findings(outcomes: Outcomes) -> list[Statement]:
     texts = [
         f"{law} {early.variation_A_s:.0f} to {late.variation_A_s:.0f} A/s"
         for law, _, early, late in _drift_runs(outcomes)
     ]
     if not texts:
         return []
-    return [Finding(None, f"variation of the commands, first to last of ten minutes: {', '.join(texts)}")]
+    return [Statement(None, f"variation of the commands, first to last of ten minutes: {', '.join(texts)}")]
 
 
 def _reached(item: CaseRuns) -> str:

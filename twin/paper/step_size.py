@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from spheretwin.control.laws import LAWS
-from spheretwin.paper.experiment import Array, Finding, Outcomes, Section
+from spheretwin.paper.experiment import Array, ExperimentSection, Outcomes, Statement
 from spheretwin.paper.experiment_file import CaseRuns, ExperimentFile
 from spheretwin.run import Run
 from spheretwin.scenario.plant_sections import PlantSection
@@ -27,7 +27,7 @@ class Trace(NamedTuple):
     ended_s: float
 
 
-class Cost(NamedTuple):
+class StepCost(NamedTuple):
     """Difference of a run from that at the fine step."""
 
     difference_rad: float
@@ -40,7 +40,7 @@ def reduce(run: Run) -> Trace:
     return Trace(table["q_rad"][::every].copy(), float(table["t_s"][-1]) if len(table) else 0.0)
 
 
-Costs = dict[tuple[str, str, float], Cost]
+Costs = dict[tuple[str, str, float], StepCost]
 """Differences by law, scenario and step in ms."""
 
 
@@ -53,7 +53,7 @@ def costs(outcomes: Outcomes) -> Costs:
     for item in of_steps:
         coarse, reference = (run.data.q_rad for run in (item.runs[0], fine[_motion(item)]))
         if rows := min(len(coarse), len(reference)):
-            cost = Cost(float(np.max(np.abs(coarse[:rows] - reference[:rows]))), item)
+            cost = StepCost(float(np.max(np.abs(coarse[:rows] - reference[:rows]))), item)
             if np.isfinite(cost.difference_rad):
                 every[item["law"], item["scenario"], item["ms"]] = cost
     return every
@@ -63,7 +63,7 @@ def _motion(item: CaseRuns) -> tuple[str, str, float]:
     return item["law"], item["scenario"], item["period_s"]
 
 
-def sections(outcomes: Outcomes) -> list[Section]:
+def sections(outcomes: Outcomes) -> list[ExperimentSection]:
     """Section with a table for each scenario."""
     every = costs(outcomes)
     tables = [_table(outcomes, every, motion["scenario"]) for motion in FILE["motion"]]
@@ -82,7 +82,7 @@ def _table(outcomes: Outcomes, every: Costs, scenario: str) -> ResultTable:
     return ResultTable(f"Difference in mrad: {scenario}", head, rows)
 
 
-def findings(outcomes: Outcomes) -> list[Finding]:
+def findings(outcomes: Outcomes) -> list[Statement]:
     """Largest difference at the default step and at twice that step, in runs that complete."""
     complete = [cost for cost in costs(outcomes).values() if cost.item.runs[0].is_complete]
     largest = []
@@ -96,10 +96,10 @@ def findings(outcomes: Outcomes) -> list[Finding]:
         f" {cost.item['scenario']})"
         for cost in largest
     )
-    return [Finding(None, f"the physics step changes a motion by at most {' and '.join(texts)}")]
+    return [Statement(None, f"the physics step changes a motion by at most {' and '.join(texts)}")]
 
 
-def _cell(cost: Cost | None) -> str:
+def _cell(cost: StepCost | None) -> str:
     if cost is None:
         return "not run"
     run = cost.item.runs[0]

@@ -11,10 +11,10 @@ from spheretwin.paper.cells import NONE, of_axis
 from spheretwin.paper.experiment import (
     Array,
     Case,
-    Finding,
-    Outcome,
+    ExperimentSection,
     Outcomes,
-    Section,
+    RunOutcome,
+    Statement,
     padded,
     window_maxima,
 )
@@ -45,7 +45,7 @@ def reduce(run: Run) -> Array:
     return window_maxima(error, WINDOW_s, run.scenario.controller.period_s)
 
 
-def row_fields(case: Case, outcomes: Sequence[Outcome]) -> Mapping[str, Any]:
+def row_fields(case: Case, outcomes: Sequence[RunOutcome]) -> Mapping[str, Any]:
     """Errors of the paper's figure, for the JSON."""
     law = case.columns
     if "paper_deg" not in law:
@@ -109,7 +109,7 @@ def estimators_drawing() -> Drawing:
 MEASURED, TRUE = "measured_max_abs_error", "max_abs_error"
 
 
-def printed_section(outcomes: Outcomes) -> Section:
+def printed_section(outcomes: Outcomes) -> ExperimentSection:
     """Errors of the laws next to the paper's, and their course."""
     items = FILE.runs(outcomes, as_printed=True)
     order = "".join(f" T{finding.text.removeprefix('t')}." for finding in _order(outcomes))
@@ -117,7 +117,7 @@ def printed_section(outcomes: Outcomes) -> Section:
     return FILE.section("printed", [FILE.table("printed", items, paper_text=paper_text)], drawings, order)
 
 
-def findings(outcomes: Outcomes) -> list[Finding]:
+def findings(outcomes: Outcomes) -> list[Statement]:
     """Compare order and sizes of the errors with the paper's."""
     return [*_order(outcomes), *_sizes(outcomes)]
 
@@ -128,7 +128,7 @@ def _printed(outcomes: Outcomes) -> list[CaseRuns]:
     return [law for law in laws if "paper_deg" in law.case.columns]
 
 
-def _order(outcomes: Outcomes) -> list[Finding]:
+def _order(outcomes: Outcomes) -> list[Statement]:
     """Compare the order of the laws with the paper's, seed by seed."""
     of_paper = _printed(outcomes)
     if len(of_paper) < sum("paper_deg" in law for law in FILE["law"]):
@@ -137,10 +137,10 @@ def _order(outcomes: Outcomes) -> list[Finding]:
     right, seeds = int(np.sum(np.all(np.diff(errors, axis=0) < 0, axis=0))), errors.shape[1]
     order = " > ".join(law["label"] for law in of_paper)
     text = f"the paper's order, {order}, holds for α under {right} of {seeds} seeds"
-    return [Finding(right == seeds, text)]
+    return [Statement(right == seeds, text)]
 
 
-def _sizes(outcomes: Outcomes) -> list[Finding]:
+def _sizes(outcomes: Outcomes) -> list[Statement]:
     """Compare the measured errors of α with the paper's."""
     texts, reproduced = [], True
     for law in _printed(outcomes):
@@ -150,10 +150,10 @@ def _sizes(outcomes: Outcomes) -> list[Finding]:
     if not texts:
         return []
     why = "" if reproduced else "; its chapter lists the single changes with which a law reaches it"
-    return [Finding(reproduced, f"largest measured error of α: {', '.join(texts)}{why}")]
+    return [Statement(reproduced, f"largest measured error of α: {', '.join(texts)}{why}")]
 
 
-def change_section(outcomes: Outcomes) -> Section:
+def change_section(outcomes: Outcomes) -> ExperimentSection:
     """Errors under every single change."""
     items = FILE.runs(outcomes, as_printed=False)
     tables = [FILE.table("changes", items, paper_text=paper_text, reached=_reached)]
@@ -189,7 +189,7 @@ def _alpha(item: CaseRuns) -> Errors:
     return of_axis(item.runs, MEASURED, ALPHA), of_axis(item.runs, TRUE, ALPHA)
 
 
-def sections(outcomes: Outcomes) -> list[Section]:
+def sections(outcomes: Outcomes) -> list[ExperimentSection]:
     """Errors as printed, the changes, and the estimators."""
     rates = FILE.section("rates", drawings=[estimators_drawing])
     return [printed_section(outcomes), change_section(outcomes), rates]

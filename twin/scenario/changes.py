@@ -14,7 +14,7 @@ from pydantic_core import to_jsonable_python
 from spheretwin.control.laws import LAWS
 from spheretwin.models.base.errors import InputError, shown
 from spheretwin.models.telemetry.run_record import Change
-from spheretwin.scenario.fields import Kind, families, kind_of, section_kind
+from spheretwin.scenario.fields import FieldKind, families, kind_of, section_kind
 from spheretwin.scenario.reading import (
     fill_hardware,
     is_dotted,
@@ -249,7 +249,7 @@ def _drop_foreign_fields(
 ) -> None:
     """If a change selects another member of a family, drop the fields that do not fit the new member."""
     *sections, name = dotted.split(".")
-    kind: Kind | None = section_kind(kind_after)
+    kind: FieldKind | None = section_kind(kind_after)
     inside: Any = fields
     present: Any = before
     for section in sections:

@@ -23,7 +23,7 @@ SHIPPED = "shipped"
 
 
 @dataclass(frozen=True)
-class Kind:
+class FieldKind:
     """Kind of a field that contains fields: section, family or list of them."""
 
     members: Mapping[str, type[BaseModel]]
@@ -43,7 +43,7 @@ class FieldLocation(NamedTuple):
     """Location that a path of names, tags and indices leads to."""
 
     dotted: str
-    kind: Kind | None
+    kind: FieldKind | None
     """Kind of the field; None if it has no fields."""
 
 
@@ -55,14 +55,14 @@ class NamedFile(NamedTuple):
     dotted: str
 
 
-def kind_of(field: FieldInfo) -> Kind | None:
+def kind_of(field: FieldInfo) -> FieldKind | None:
     """Return the kind of a field that contains fields; None for a plain value."""
     return _kind(field.annotation, field.discriminator)
 
 
-def section_kind(section: type[BaseModel]) -> Kind:
+def section_kind(section: type[BaseModel]) -> FieldKind:
     """Return the kind of one plain section."""
-    return Kind({"": section}, None)
+    return FieldKind({"": section}, None)
 
 
 def fields_of(section: BaseModel, prefix: str = "") -> Iterator[tuple[str, Any, FieldInfo]]:
@@ -114,7 +114,7 @@ def without_indices(dotted: str) -> str:
 def place_of(scenario: type[BaseModel], path: tuple[str | int, ...]) -> FieldLocation:
     """Follow a path of pydantic, which contains the tag of each family."""
     dotted: list[str] = []
-    kind: Kind | None = section_kind(scenario)
+    kind: FieldKind | None = section_kind(scenario)
     entered: type[BaseModel] | None = scenario
     has_keys = True
     for part in path:
@@ -137,7 +137,7 @@ def place_of(scenario: type[BaseModel], path: tuple[str | int, ...]) -> FieldLoc
     return FieldLocation(".".join(dotted), kind)
 
 
-def files_in(fields: dict[str, Any], kind: Kind, prefix: str = "") -> Iterator[NamedFile]:
+def files_in(fields: dict[str, Any], kind: FieldKind, prefix: str = "") -> Iterator[NamedFile]:
     """Yield every file that given fields name, also in sections and lists of sections."""
     members = [_candidates(member) for member in kind.chosen(fields)]
     for name, value in fields.items():
@@ -160,7 +160,7 @@ def _holds(annotation: Any, kind: type) -> bool:
 
 
 @cache
-def _candidates(section: type[BaseModel]) -> dict[str, tuple[Any, Kind | None]]:
+def _candidates(section: type[BaseModel]) -> dict[str, tuple[Any, FieldKind | None]]:
     """Return mark and kind of each field of a section that can name a file or contain fields."""
     extras = {name: field.json_schema_extra for name, field in section.model_fields.items()}
     marks = {name: extra.get("path") if isinstance(extra, dict) else None for name, extra in extras.items()}
@@ -176,7 +176,7 @@ def _names_file(mark: Any, value: Any) -> bool:
     return bool(mark and isinstance(value, str) and value and not is_name)
 
 
-def _kind(annotation: Any, discriminator: Any) -> Kind | None:
+def _kind(annotation: Any, discriminator: Any) -> FieldKind | None:
     origin, inside = get_origin(annotation), get_args(annotation)
     if origin is Annotated:
         tags = [info.discriminator for info in inside[1:] if isinstance(info, FieldInfo)]
@@ -191,9 +191,11 @@ def _kind(annotation: Any, discriminator: Any) -> Kind | None:
     return None
 
 
-def _of_union(members: list[Any], discriminator: Any) -> Kind | None:
+def _of_union(members: list[Any], discriminator: Any) -> FieldKind | None:
     if isinstance(discriminator, str):
-        return Kind({member.model_fields[discriminator].default: member for member in members}, discriminator)
+        return FieldKind(
+            {member.model_fields[discriminator].default: member for member in members}, discriminator
+        )
     return _kind(members[0], None) if len(members) == 1 else None
 
 
@@ -313,7 +315,7 @@ def _expected(error: Mapping[str, Any]) -> str:
     return text.replace(" 1 characters", " 1 character").replace(" 1 entries", " 1 entry")
 
 
-def _unknown_member(kind: Kind, table: Any) -> str:
+def _unknown_member(kind: FieldKind, table: Any) -> str:
     """Return the message for a member that its family does not have."""
     tag = table.get(kind.discriminator) if isinstance(table, dict) else None  # the error's own tag is text
     near = did_you_mean(str(tag), kind.members)
@@ -322,7 +324,7 @@ def _unknown_member(kind: Kind, table: Any) -> str:
     return f"{kind.discriminator}: expected one of {', '.join(kind.members)}{more}, received {received}{near}"
 
 
-def _allows_user_code(kind: Kind) -> bool:
+def _allows_user_code(kind: FieldKind) -> bool:
     member = next(iter(kind.members.values()))
     extra = member.model_fields[kind.discriminator or ""].json_schema_extra
     return isinstance(extra, dict) and extra.get("path") == "code"

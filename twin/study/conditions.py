@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spheretwin.scenario.fields import quantity_text
-from spheretwin.study.statistics import Rows, quantile_text
+from spheretwin.study.statistics import StudyTable, quantile_text
 from spheretwin.viz.pages.markdown import PageSection, ResultTable
 
 MOST_CONDITIONS = 60
@@ -24,7 +24,7 @@ METHOD = (
 )
 
 
-def section(rows: Rows) -> list[PageSection]:
+def section(rows: StudyTable) -> list[PageSection]:
     """Section of the table; none if there is one condition, more than are listed, or one row of each."""
     numbers = _numbers(rows)
     count = int(numbers.max(initial=-1)) + 1
@@ -44,7 +44,7 @@ def section(rows: Rows) -> list[PageSection]:
     return [PageSection(title, [METHOD, ResultTable("", head, body, len(varied) + 1)])]
 
 
-def _row(rows: Rows, varied: list[str], chosen: NDArray[np.bool_], law: str) -> list[str]:
+def _row(rows: StudyTable, varied: list[str], chosen: NDArray[np.bool_], law: str) -> list[str]:
     complete = chosen & rows.completed
     first = int(np.flatnonzero(chosen)[0])
     values = [rows.axes[field][first] for field in varied]
@@ -58,7 +58,7 @@ def _row(rows: Rows, varied: list[str], chosen: NDArray[np.bool_], law: str) -> 
     return [*map(_value_text, values), law, counted, *cells]
 
 
-def _numbers(rows: Rows) -> NDArray[np.int64]:
+def _numbers(rows: StudyTable) -> NDArray[np.int64]:
     """Number of the condition of each row, in the order of their first rows."""
     number_of: dict[tuple[Any, ...], int] = {}
     columns = [values.tolist() for values in rows.axes.values()]

@@ -22,7 +22,7 @@ from spheretwin.models.telemetry.run_record import versions
 from spheretwin.records import provenance
 from spheretwin.scenario import reading
 from spheretwin.study.grid import Row
-from spheretwin.study.row import Result, Rows
+from spheretwin.study.row import RowResult, Rows
 
 
 def provenance_of(rows: Rows) -> dict[str, str]:
@@ -161,7 +161,7 @@ class Journal:
         """Whether a row is finished."""
         return bool(self._offsets[number] != MISSING)
 
-    def add(self, row: Row, result: Result) -> None:
+    def add(self, row: Row, result: RowResult) -> None:
         """Store a result.
 
         Raises
@@ -177,9 +177,9 @@ class Journal:
         self._write(_line([number, *record]))
         self._offsets[number] = offset
 
-    def results(self) -> Iterator[tuple[int, Result]]:
+    def results(self) -> Iterator[tuple[int, RowResult]]:
         """Finished rows in the order of the study: the number of each, and its result."""
-        return ((number, Result(*record[1:])) for number, record in self.records())
+        return ((number, RowResult(*record[1:])) for number, record in self.records())
 
     def records(self) -> Iterator[tuple[int, list[Any]]]:
         """Yield the records with their numbers, in the order of the numbers."""

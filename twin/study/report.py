@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from spheretwin.models.base.errors import shown
 from spheretwin.scenario.fields import quantity_text
 from spheretwin.study import conditions
-from spheretwin.study.statistics import Array, Rows, ranked, strongest
+from spheretwin.study.statistics import Array, StudyTable, ranked, strongest
 from spheretwin.viz.pages import markdown as pieces
 from spheretwin.viz.pages.markdown import Drawing, PageSection, ReportPage, ResultTable
 
@@ -34,7 +34,7 @@ MOST_RANKED = 100_000
 """Rows from which on only some of a law, evenly spaced, are ranked and drawn as dots."""
 
 
-def drawings(rows: Rows) -> Iterator[Drawing]:
+def drawings(rows: StudyTable) -> Iterator[Drawing]:
     """Figures of a study, in the order of its page; none without a completed row."""
     varied = {field: values for field, values in rows.axes.items() if len(_distinct(values)) > 1}
     if rows.main is None or not np.any(rows.completed):
@@ -50,7 +50,7 @@ def drawings(rows: Rows) -> Iterator[Drawing]:
         yield _distributions(rows)
 
 
-def _lines(rows: Rows, field: str, values: NDArray[Any]) -> Drawing:
+def _lines(rows: StudyTable, field: str, values: NDArray[Any]) -> Drawing:
     from spheretwin.viz.figures import maps
 
     x, places = _placed(values)
@@ -67,7 +67,7 @@ def _lines(rows: Rows, field: str, values: NDArray[Any]) -> Drawing:
     return Drawing("report_axis.svg", caption, figure)
 
 
-def _map(rows: Rows, varied: Mapping[str, NDArray[Any]]) -> Drawing:
+def _map(rows: StudyTable, varied: Mapping[str, NDArray[Any]]) -> Drawing:
     from spheretwin.viz.figures import maps
 
     (first, down), (second, across) = ((field, _placed(values)) for field, values in varied.items())
@@ -86,7 +86,7 @@ def _map(rows: Rows, varied: Mapping[str, NDArray[Any]]) -> Drawing:
     return Drawing("report_map.svg", caption, figure)
 
 
-def _many(rows: Rows, numbers: Mapping[str, NDArray[Any]]) -> Iterator[Drawing]:
+def _many(rows: StudyTable, numbers: Mapping[str, NDArray[Any]]) -> Iterator[Drawing]:
     from spheretwin.viz.figures import distributions
 
     complete = {law: np.flatnonzero(_complete(rows, law)) for law in rows.law_names}
@@ -133,7 +133,7 @@ def _many(rows: Rows, numbers: Mapping[str, NDArray[Any]]) -> Iterator[Drawing]:
     yield Drawing("report_strongest.svg", caption, figure)
 
 
-def _distributions(rows: Rows) -> Drawing:
+def _distributions(rows: StudyTable) -> Drawing:
     from spheretwin.viz.figures import distributions
 
     figures = {
@@ -155,11 +155,11 @@ def _distributions(rows: Rows) -> Drawing:
     return Drawing("report_spread.svg", caption, figure)
 
 
-def _quantity(rows: Rows) -> str:
+def _quantity(rows: StudyTable) -> str:
     return quantity_text(str(rows.main))
 
 
-def _complete(rows: Rows, law: str) -> NDArray[np.bool_]:
+def _complete(rows: StudyTable, law: str) -> NDArray[np.bool_]:
     """Completed rows of a law that have the main figure."""
     return (rows.laws == law) & rows.completed & np.isfinite(rows.figures[str(rows.main)])
 
@@ -182,7 +182,7 @@ def _placed(values: NDArray[Any]) -> tuple[NDArray[Any], NDArray[np.int64]]:
     return np.array(names, dtype=object), np.array([names.index(value) for value in values])
 
 
-def _panel(rows: Rows, law: str, down: NDArray[np.int64], across: NDArray[np.int64]) -> MapPanel:
+def _panel(rows: StudyTable, law: str, down: NDArray[np.int64], across: NDArray[np.int64]) -> MapPanel:
     from spheretwin.viz.figures.maps import MapPanel
 
     shape = (int(down.max()) + 1, int(across.max()) + 1)
@@ -190,7 +190,7 @@ def _panel(rows: Rows, law: str, down: NDArray[np.int64], across: NDArray[np.int
     return MapPanel(line.median.reshape(shape), line.lost.reshape(shape))
 
 
-def _line(rows: Rows, law: str, places: NDArray[np.int64], count: int) -> StudyLine:
+def _line(rows: StudyTable, law: str, places: NDArray[np.int64], count: int) -> StudyLine:
     from spheretwin.viz.figures.maps import StudyLine
 
     of_law, complete = rows.laws == law, _complete(rows, law)
@@ -219,7 +219,7 @@ def can_be_drawn() -> bool:
 
 def write(
     folder: Path,
-    rows: Rows,
+    rows: StudyTable,
     summary: Mapping[str, Any],
     requested: tuple[int, int],
     source: str,
@@ -231,7 +231,7 @@ def write(
     ----------
     folder : Path
         Exists.
-    rows : Rows
+    rows : StudyTable
     summary : mapping
         `statistics.summary` of the rows.
     requested : two int
@@ -260,7 +260,7 @@ def write(
     return ReportPage(NAME, study["name"], lead, sections, command + limit).write(folder, figure_format)
 
 
-def _ends(rows: Rows, of: int, total: int) -> str:
+def _ends(rows: StudyTable, of: int, total: int) -> str:
     """Number of the rows and their statuses."""
     count = len(rows.laws)
     ends = ", ".join(f"{number} {status}" for status, number in Counter(rows.statuses.tolist()).items())
@@ -293,7 +293,7 @@ def _spread(figure: Mapping[str, Any]) -> str:
     return f"{figure['median']:.4g} [{', '.join(ends)}] ({low:.4g} to {high:.4g})"
 
 
-def _worst(rows: Rows, command: str) -> list[PageSection]:
+def _worst(rows: StudyTable, command: str) -> list[PageSection]:
     """Completed rows with the largest main figure, and the command that runs each alone."""
     if rows.main is None:
         return []
@@ -310,7 +310,7 @@ def _worst(rows: Rows, command: str) -> list[PageSection]:
     return [PageSection("Completed rows with the largest value", [table, alone])]
 
 
-def _failures(rows: Rows) -> list[PageSection]:
+def _failures(rows: StudyTable) -> list[PageSection]:
     """Rows that did not complete by status and reason, with the first of each kind."""
     by_kind: dict[tuple[str, str, str], list[int]] = {}
     for place in np.flatnonzero(~rows.completed).tolist():
@@ -333,7 +333,7 @@ def _failures(rows: Rows) -> list[PageSection]:
     return [PageSection("Rows that did not complete", [ResultTable("", head, body, 3, head[-1:]), rest])]
 
 
-def _axes(study: Mapping[str, Any], rows: Rows) -> ResultTable | str:
+def _axes(study: Mapping[str, Any], rows: StudyTable) -> ResultTable | str:
     """Axes with the values of the finished rows."""
     if not study["axis"]:
         return "Only the seed differs."

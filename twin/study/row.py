@@ -57,7 +57,7 @@ FAILED = "failed"
 """Status of a row in which user code raised an exception."""
 
 
-class Result(NamedTuple):
+class RowResult(NamedTuple):
     """Result of a row in JSON types; it does not depend on where and when the row runs."""
 
     status: str
@@ -152,20 +152,20 @@ class Rows:
         numbers = tuple(name for name in row.values if name not in others)
         return json.dumps([row.law, others]), numbers, engine
 
-    def run(self, rows: Sequence[Row], engine: str | None = None) -> list[Result]:
+    def run(self, rows: Sequence[Row], engine: str | None = None) -> list[RowResult]:
         """Run rows; an error of a row is its result.
 
         Rows that differ in numbers run as a block. A row with events, a law, metric or trajectory of the
         user, or telemetry to be stored, runs alone.
         """
-        results: dict[int, Result | None] = {}
+        results: dict[int, RowResult | None] = {}
         for places, block in self._blocks(rows, engine):
             results |= zip(places, block, strict=True)
         return [results.get(place) or self._alone(row, engine) for place, row in enumerate(rows)]
 
     def _blocks(
         self, rows: Sequence[Row], engine: str | None
-    ) -> Iterator[tuple[list[int], list[Result | None]]]:
+    ) -> Iterator[tuple[list[int], list[RowResult | None]]]:
         """Yield the places of rows that run together with their results, None for a row that runs alone."""
         if self._own or len(rows) == 1:
             return
@@ -200,7 +200,7 @@ class Rows:
         logged = tuple(bool(channel.logged(scenario)) for channel in CHANNELS)
         return *shape, scenario.plant.engine, clocks, logged, id(self._files.files_of(scenario))
 
-    def _run_block(self, scenarios: Sequence[Scenario]) -> list[Result | None]:
+    def _run_block(self, scenarios: Sequence[Scenario]) -> list[RowResult | None]:
         files = self._files.files_of(scenarios[0])
         resolved = [fill_defaults(scenario, files, None, None) for scenario in scenarios]
         kind = self.block if scenarios[0].plant.engine == FAST else RunBlock
@@ -209,25 +209,25 @@ class Rows:
             endings = block.run()
         return [
             ending
-            and Result(
+            and RowResult(
                 str(ending.status), ending.reason.text if ending.reason else None, None, ending.figures
             )
             for ending in endings
         ]
 
-    def _alone(self, row: Row, engine: str | None) -> Result:
+    def _alone(self, row: Row, engine: str | None) -> RowResult:
         try:
             scenario = self.scenario(row, engine)
             with self.session(scenario) as session:
                 return self._follow(row, scenario, session)
         except InputError as error:
-            return Result(REFUSED, None, str(error), {})
+            return RowResult(REFUSED, None, str(error), {})
         except LawError as error:
-            return Result(FAILED, None, str(error), {})
+            return RowResult(FAILED, None, str(error), {})
         except SpheretwinError:  # not of the row: a full disk
             raise
         except Exception as error:  # user code may raise anything
-            return Result(FAILED, None, exception_text(error), {})
+            return RowResult(FAILED, None, exception_text(error), {})
 
     def session(self, scenario: Scenario) -> Session:
         """Session of a row's scenario without unread sensors; its files are read once for a study."""
@@ -301,7 +301,7 @@ class Rows:
         chosen = isinstance(plant, Mapping) and "engine" in plant
         return chosen or any(axis.field in ("plant", ENGINE) for axis in self.study.axis)
 
-    def _follow(self, row: Row, scenario: Scenario, session: Session) -> Result:
+    def _follow(self, row: Row, scenario: Scenario, session: Session) -> RowResult:
         planned = PlannedRun(session.initial_scenario, session.actuator, scenario.ticks)
         gathered = Figures(planned, self.metrics)
         sinks: list[Sink] = [gathered]
@@ -323,7 +323,7 @@ class Rows:
                 own, complaints = own_values(self._own, run)
             figures |= own
         reason = session.reason.text if session.reason else None
-        return Result(str(status), reason, "; ".join(complaints) or None, figures)
+        return RowResult(str(status), reason, "; ".join(complaints) or None, figures)
 
     def _file(self, row: Row, session: Session) -> TelemetryFile | None:
         if self._telemetry is None or row.number not in self.study.telemetry:

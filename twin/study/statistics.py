@@ -30,7 +30,7 @@ MAIN, TILT = "max_abs_error_rad", "max_abs_tilt_error_rad"
 TEXTS = ("key", "law", "status", "reason", "error")
 
 
-class Rows(NamedTuple):
+class StudyTable(NamedTuple):
     """All rows of a table.
 
     Attributes
@@ -81,7 +81,7 @@ class Rows(NamedTuple):
         return MAIN if MAIN in self.figures else next(iter(self.figures), None)
 
 
-def read(table: Path) -> Rows:
+def read(table: Path) -> StudyTable:
     """Read the rows of a table.
 
     Raises
@@ -98,7 +98,7 @@ def read(table: Path) -> Rows:
         raise checksums.unreadable(table, error, "the table of a study") from None
 
 
-def _rows(file: pyarrow.parquet.ParquetFile) -> Rows:
+def _rows(file: pyarrow.parquet.ParquetFile) -> StudyTable:
     import pyarrow as pa
 
     schema = file.schema_arrow
@@ -114,7 +114,7 @@ def _rows(file: pyarrow.parquet.ParquetFile) -> Rows:
         return file.read(columns=[name], use_threads=False).column(0)
 
     texts = {name: _texts(column(name)) for name in TEXTS}
-    return Rows(
+    return StudyTable(
         study,
         column("row").to_numpy(),
         texts["key"],
@@ -324,7 +324,7 @@ def share_interval(cases: float, draws: int) -> tuple[float, float]:
     return float(low), float(high)
 
 
-def summary(rows: Rows) -> dict[str, Any]:
+def summary(rows: StudyTable) -> dict[str, Any]:
     """Summary of a study.
 
     Returns

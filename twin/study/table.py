@@ -16,7 +16,7 @@ from spheretwin.models.telemetry.status import Status
 from spheretwin.scenario import reading
 from spheretwin.study.grid import Grid, Row
 from spheretwin.study.journal import Journal
-from spheretwin.study.row import Result, Rows
+from spheretwin.study.row import RowResult, Rows
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -62,7 +62,7 @@ def write(path: Path, grid: Grid, journal: Journal, rows: Rows) -> int:
     def records() -> Iterator[dict[str, Any]]:
         nonlocal failed
         for number, (key, *record) in journal.records():
-            result = Result(*record)
+            result = RowResult(*record)
             failed += result.status != Status.COMPLETED or result.error is not None
             yield _record(grid.row(number, key), result, rows, base)
 
@@ -151,7 +151,7 @@ def _base(rows: Rows) -> dict[str, Any]:
     return reading.replace_files(fields, lambda path, _: os.path.relpath(path, folder))
 
 
-def _record(row: Row, result: Result, rows: Rows, base: dict[str, Any]) -> dict[str, Any]:
+def _record(row: Row, result: RowResult, rows: Rows, base: dict[str, Any]) -> dict[str, Any]:
     law = base["controller"]["law"] if row.law is None else law_text(row.law)
     return {
         "row": row.number,

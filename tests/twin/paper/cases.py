@@ -4,7 +4,7 @@ import numpy as np
 
 from spheretwin.models.telemetry.status import Status
 from spheretwin.paper.cells import Numbers, of_axis
-from spheretwin.paper.experiment import Case, Experiment, Outcome, Section
+from spheretwin.paper.experiment import Case, Experiment, ExperimentSection, RunOutcome
 from spheretwin.viz.pages.markdown import ResultTable
 
 SHORT = {"duration": 0.2, "plant.engine": "lagrangian"}
@@ -20,14 +20,14 @@ def sections(outcomes):
         (name, f"{Numbers(of_axis(runs, 'max_abs_error', 0)):.3f deg}") for name, runs in outcomes.items()
     ]
     tables = [ResultTable("Errors", ("case", "α"), rows)]
-    return [Section("What | was found", "In *words*, and <b>no tag</b>.", tables)]
+    return [ExperimentSection("What | was found", "In *words*, and <b>no tag</b>.", tables)]
 
 
 def outcome(error=0.0, status=Status.COMPLETED, data=None, **figures):
     """Outcome with an error (rad) of all hinges, or of each."""
     errors = (np.array(error) * np.ones(3)).tolist()
     names = ("max_abs_error_rad", "rms_error_rad", "tail_rms_error_rad")
-    return Outcome(status, {**dict.fromkeys(names, errors), **figures}, np.array(errors), data)
+    return RunOutcome(status, {**dict.fromkeys(names, errors), **figures}, np.array(errors), data)
 
 
 def experiment(*cases, **more):

@@ -12,7 +12,7 @@ from spheretwin.control.supervision.fault_detector import LEAST_SHARE
 from spheretwin.control.supervision.watchdog import Reason
 from spheretwin.models.telemetry.status import Status
 from spheretwin.paper import fault_cases, fault_latency, fault_sections, fault_study
-from spheretwin.paper.experiment import Outcome, Outcomes
+from spheretwin.paper.experiment import Outcomes, RunOutcome
 from spheretwin.paper.experiment_file import CaseRuns
 from spheretwin.paper.fault_cases import (
     DETECTING,
@@ -69,7 +69,7 @@ def outcome(ratio, status=Status.COMPLETED, **more_of_it):
     reported = {"is_reported": True, "least_norm": True, "remaining": None}
     detected = {"latencies_s": (), "driven_ticks": (), "false_detections": 0}
     data = FaultData(**{**errors, **ends, **reported, **detected, **more_of_it})
-    return Outcome(status, {"max_abs_error_rad": [0.0] * 3}, np.zeros(3), data)
+    return RunOutcome(status, {"max_abs_error_rad": [0.0] * 3}, np.zeros(3), data)
 
 
 def test_the_error_without_a_failure_is_the_median_of_its_seeds():

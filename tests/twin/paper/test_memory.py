@@ -18,7 +18,7 @@ from spheretwin.paper.runner import (
     scenario_of,
     summarise,
 )
-from spheretwin.study.row import Result, Rows
+from spheretwin.study.row import RowResult, Rows
 from tests.twin.paper.cases import IDEAL, NOISY, SHORT, experiment
 
 
@@ -90,7 +90,7 @@ FAULT = fault_outcomes.FaultData(
 )
 def test_the_data_of_a_run_are_the_same_from_plain_text(reduce, data):
     figures = {"rms_error_rad": [1 / 3] * 3, runner.MEASURED: [0.1, np.nan, 1.0]}
-    result = Result(
+    result = RowResult(
         "left_workspace",
         None,
         None,

@@ -5,7 +5,7 @@ import re
 from matplotlib.figure import Figure
 
 from spheretwin.paper import page
-from spheretwin.paper.experiment import Finding
+from spheretwin.paper.experiment import Statement
 from spheretwin.paper.page import Chapter
 from spheretwin.viz.pages.markdown import Drawing
 from tests.twin.paper.cases import IDEAL, experiment
@@ -30,7 +30,11 @@ def test_html_loads_nothing_and_shows_its_figure_in_dark_colours_too(tmp_path):
 
 
 def test_the_first_page_counts_what_was_reproduced(tmp_path):
-    findings = [Finding(True, "this was"), Finding(False, "that was not | at all"), Finding(None, "more")]
+    findings = [
+        Statement(True, "this was"),
+        Statement(False, "that was not | at all"),
+        Statement(None, "more"),
+    ]
     first = texts_of(tmp_path, *findings)[0].split("## A short one")[0]
     assert "1 of 2 results of the paper were reproduced." in first
     assert "| short | **reproduced** | this was. |" in first

@@ -20,7 +20,7 @@ from spheretwin.paper.runner import (
     unexpected_ends,
 )
 from spheretwin.simulation import simulate
-from spheretwin.study.row import Result
+from spheretwin.study.row import RowResult
 from tests.twin.paper.cases import IDEAL, LOST, NOISY, allowed, experiment
 
 
@@ -82,7 +82,7 @@ def test_a_run_without_a_tick_has_no_numbers():
     names = ("max_abs_error_rad", "rms_error_rad", "tail_rms_error_rad")
     figures = {**dict.fromkeys(names), MEASURED: [np.nan] * 3, DATA: None}
     plan = make_plan(experiment(IDEAL), seeds=1)
-    outcome = outcome_of(plan.experiment, Result("diverged", None, None, figures))
+    outcome = outcome_of(plan.experiment, RowResult("diverged", None, None, figures))
     for error in (outcome.max_abs_error, outcome.measured_max_abs_error, outcome.tail_rms_error):
         assert np.isnan(error).all()
     outcomes = plan.by_case([outcome])

@@ -9,14 +9,14 @@ from spheretwin.models.base.errors import InputError, SpheretwinError
 from spheretwin.study import journal
 from spheretwin.study.grid import Row
 from spheretwin.study.journal import Journal
-from spheretwin.study.row import Result
+from spheretwin.study.row import RowResult
 from tests.twin.study.cases import Full, loads, run_rows, study, table, values
 
 ROWS = [Row(number, f"{number:016x}", number, {}, None, 0) for number in range(6)]
 
 
 def result(number):
-    return Result("completed", None, None, {"rms_error_rad": [0.1 * number, None, float(number)]})
+    return RowResult("completed", None, None, {"rms_error_rad": [0.1 * number, None, float(number)]})
 
 
 @pytest.fixture

@@ -13,7 +13,7 @@ from spheretwin.scenario.fields import every_field, quantity_text, unit_of
 from spheretwin.scenario.sections import Scenario
 from spheretwin.study import conditions, report
 from spheretwin.study.statistics import (
-    Rows,
+    StudyTable,
     interval,
     largest,
     quantile_text,
@@ -37,7 +37,7 @@ def made(count, figures, axes, laws=("pd",), lost=()):
     texts, keys, named = np.full((3, count), "", dtype=object)
     keys[:] = [f"{place:016x}" for place in range(count)]
     named[:] = [laws[place % len(laws)] for place in range(count)]
-    return Rows(fields, np.arange(count), keys, named, statuses, texts, axes, figures)
+    return StudyTable(fields, np.arange(count), keys, named, statuses, texts, axes, figures)
 
 
 @given(st.lists(LISTS, max_size=8))

@@ -10,7 +10,7 @@ from typing import NamedTuple
 from spheretwin.models.base.errors import SpheretwinError
 from spheretwin.study import agreement
 from spheretwin.study.grid import Grid, Row
-from spheretwin.study.row import Result, Rows
+from spheretwin.study.row import RowResult, Rows
 
 
 class BatchResult(NamedTuple):
@@ -18,7 +18,7 @@ class BatchResult(NamedTuple):
 
     Attributes
     ----------
-    results : list of (int, Result)
+    results : list of (int, RowResult)
         Finished rows by number.
     checked : list of int
         Rows that were run on both plants.
@@ -28,7 +28,7 @@ class BatchResult(NamedTuple):
         Duration of the rows.
     """
 
-    results: list[tuple[int, Result]]
+    results: list[tuple[int, RowResult]]
     checked: list[int]
     fault: str | None
     wall_s: float
@@ -51,9 +51,9 @@ class Work:
         self.faults: list[SpheretwinError] = []
         self.checked: list[int] = []
 
-    def __call__(self, rows: Sequence[Row]) -> list[Result | None]:
+    def __call__(self, rows: Sequence[Row]) -> list[RowResult | None]:
         """Results of rows; None for a row with a fault, and for the checked ones behind it."""
-        results: dict[int, Result] = {}
+        results: dict[int, RowResult] = {}
         try:
             found = dict(zip((row.number for row in rows), self.rows.run(rows), strict=True))
             checked = [row for row in rows if self._is_checked(row, found[row.number])]
@@ -65,7 +65,7 @@ class Work:
             self.faults.append(error)
         return [results.get(row.number) for row in rows]
 
-    def _is_checked(self, row: Row, result: Result) -> bool:
+    def _is_checked(self, row: Row, result: RowResult) -> bool:
         return result.error is None and agreement.is_checked(row) and agreement.has_both(self.rows, row)
 
 
@@ -107,7 +107,7 @@ class Order(NamedTuple):
             else:
                 yield number
 
-    def landed(self, result: BatchResult) -> Iterator[tuple[Row, Result]]:
+    def landed(self, result: BatchResult) -> Iterator[tuple[Row, RowResult]]:
         """Take over the faults of a batch of another process; yield its rows with their results."""
         self.work.checked += result.checked
         for number, of_row in result.results:
@@ -133,7 +133,7 @@ class Engine(NamedTuple):
         Threads unless they are given; number of cores without it.
     """
 
-    run: Callable[[Order], Generator[tuple[Row, Result | None]]]
+    run: Callable[[Order], Generator[tuple[Row, RowResult | None]]]
     takes_address: bool = False
     prepare: Callable[[Rows], Rows] = lambda rows: rows
     in_process: bool = False

@@ -19,12 +19,12 @@ from spheretwin.models.base.errors import SpheretwinError
 from spheretwin.models.base.turns import outside_turn
 from spheretwin.study.engines import threads, worker
 from spheretwin.study.engines.engine import Batches, BatchResult, Engine, Order
-from spheretwin.study.engines.worker import Job
+from spheretwin.study.engines.worker import StudyJob
 from spheretwin.study.grid import Row
-from spheretwin.study.row import Result
+from spheretwin.study.row import RowResult
 
 
-def run(order: Order) -> Generator[tuple[Row, Result | None]]:
+def run(order: Order) -> Generator[tuple[Row, RowResult | None]]:
     """Yield the rows of an order with their results, those of a batch as it is finished.
 
     Raises
@@ -57,10 +57,10 @@ class _Crew:
 
     Parameters
     ----------
-    job : Job
+    job : StudyJob
     """
 
-    def __init__(self, job: Job) -> None:
+    def __init__(self, job: StudyJob) -> None:
         self._job, self._own = job, threading.local()
         self._all: list[_Process] = []
 

@@ -27,7 +27,7 @@ from spheretwin.models.base.extras import missing
 from spheretwin.study.engines import threads, worker
 from spheretwin.study.engines.engine import Batches, BatchResult, Engine, Order
 from spheretwin.study.grid import Row
-from spheretwin.study.row import Result
+from spheretwin.study.row import RowResult
 
 # No messages of Ray and no usage statistics.
 QUIET = {
@@ -60,7 +60,7 @@ CONNECT_S = 60.0
 PROBE = "import ray, sys; ray.init(address=sys.argv[1], log_to_driver=False, configure_logging=False)"
 
 
-def run(order: Order) -> Generator[tuple[Row, Result | None]]:
+def run(order: Order) -> Generator[tuple[Row, RowResult | None]]:
     """Yield the results of rows, each batch as it is finished.
 
     Raises
@@ -95,7 +95,7 @@ class _Cluster:
         (ours,) = (node for node in ray.nodes() if node["NodeID"] == context.get_node_id())
         self._lifelines = (context.gcs_address, f"{ours['NodeManagerAddress']}:{ours['NodeManagerPort']}")
 
-    def results(self) -> Iterator[tuple[Row, Result | None]]:
+    def results(self) -> Iterator[tuple[Row, RowResult | None]]:
         while True:
             if not self._order.stop_requested():
                 self._submit()
@@ -116,7 +116,7 @@ class _Cluster:
                 return
             self._running[self._task.remote(self._job, batch)] = batch
 
-    def _collect(self, task: Any) -> Iterator[tuple[Row, Result | None]]:
+    def _collect(self, task: Any) -> Iterator[tuple[Row, RowResult | None]]:
         batch, errors = self._running.pop(task), self._ray.exceptions
         try:
             result: BatchResult = self._ray.get(task)

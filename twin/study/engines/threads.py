@@ -12,7 +12,7 @@ from typing import TypeVar
 from spheretwin.models.base.turns import outside_turn, turn
 from spheretwin.study.engines.engine import MOST_ROWS, Batches, Engine, Order
 from spheretwin.study.grid import Row
-from spheretwin.study.row import Result
+from spheretwin.study.row import RowResult
 
 PAUSE_s = 0.02
 """Time in which results gather for the caller, which takes the interpreter lock from the thread that has the
@@ -95,13 +95,13 @@ def run_each(
                 thread.join()
 
 
-def run(order: Order, first: int = 1, most: int = MOST_ROWS) -> Generator[tuple[Row, Result | None]]:
+def run(order: Order, first: int = 1, most: int = MOST_ROWS) -> Generator[tuple[Row, RowResult | None]]:
     """Yield the rows of an order with their results; sizes of batches as in `Batches`."""
     threads = order.threads or os.cpu_count() or 1
     batches = Batches(order.numbers, order.rows, first, most)
     timed = iter(lambda: [order.grid[number] for number in batches.next(threads)], [])
 
-    def work(rows: list[Row]) -> tuple[list[Result | None], float]:
+    def work(rows: list[Row]) -> tuple[list[RowResult | None], float]:
         started = time.perf_counter()
         return order.work(rows), time.perf_counter() - started
 

@@ -25,7 +25,7 @@ from spheretwin.study.row import Rows
 from spheretwin.study.study import Study
 
 
-class Job(NamedTuple):
+class StudyJob(NamedTuple):
     """Study as text for other processes.
 
     Attributes
@@ -46,13 +46,15 @@ class Job(NamedTuple):
     provenance: tuple[tuple[str, str], ...]
 
 
-def job_of(rows: Rows) -> Job:
+def job_of(rows: Rows) -> StudyJob:
     """Job of the study of the driver."""
     study = rows.study
-    return Job(study.model_dump_json(), study.folder, os.getcwd(), tuple(sorted(provenance_of(rows).items())))
+    return StudyJob(
+        study.model_dump_json(), study.folder, os.getcwd(), tuple(sorted(provenance_of(rows).items()))
+    )
 
 
-def run_batch(job: Job, numbers: list[int]) -> BatchResult:
+def run_batch(job: StudyJob, numbers: list[int]) -> BatchResult:
     """Run rows of a job by their numbers, up to the first fault."""
     try:
         grid, rows = _prepared(job)
@@ -68,7 +70,7 @@ def run_batch(job: Job, numbers: list[int]) -> BatchResult:
 
 
 @lru_cache(maxsize=1)
-def _prepared(job: Job) -> tuple[Grid, Rows]:
+def _prepared(job: StudyJob) -> tuple[Grid, Rows]:
     """Rows of a job in this process.
 
     Raises

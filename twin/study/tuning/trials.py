@@ -10,7 +10,7 @@ from spheretwin.models.telemetry.status import Status
 from spheretwin.study import optimise
 from spheretwin.study.grid import Row
 from spheretwin.study.optimise import Objective
-from spheretwin.study.row import Result, Rows
+from spheretwin.study.row import RowResult, Rows
 
 
 class Ended(StrEnum):
@@ -88,7 +88,7 @@ def run_trials(
 
 def _ended(
     row: Row,
-    result: Result,
+    result: RowResult,
     by_row: list[list[float]],
     of: int,
     objectives: Sequence[Objective],
@@ -111,7 +111,7 @@ def with_fields(row: Row, fields: Mapping[str, float]) -> Row:
 
 
 def _reason_of_loss(
-    row: Row, result: Result, objectives: Sequence[Objective], numbers: Sequence[float | None]
+    row: Row, result: RowResult, objectives: Sequence[Objective], numbers: Sequence[float | None]
 ) -> str:
     if result.status != Status.COMPLETED:
         more = result.error or result.reason
