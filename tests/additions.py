@@ -212,7 +212,7 @@ def draw_names(evidence):
     return Drawing("names.svg", "Names of the checks.", figure)
 """,
         "twin/crosscheck/suite.py",
-        ("    draw_torque_free,\n", "    draw_torque_free,\n    draw_names,\n"),
+        ("    draw_convergence,\n", "    draw_convergence,\n    draw_names,\n"),
     ),
     "experiment": Addition(
         "twin/paper/holding.py",

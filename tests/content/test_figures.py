@@ -128,15 +128,6 @@ def convergence():
     return crosscheck.convergence(slopes, "Orders")
 
 
-def drifts():
-    t_s = np.linspace(0.0, 3.0, 30)
-    panels = {
-        "energy, relative": {"2π": (1e-9 * (1 + t_s), 1e-6), "30": (2e-9 * (1 + t_s), None)},
-        "momentum": {"2π": (5e-9 * (2 + t_s), 2e-7), "30": (-3e-9 * t_s, 3e-7)},
-    }
-    return crosscheck.drifts(t_s, panels, "Drifts")
-
-
 def map_lines():
     count = np.arange(5.0)
     line = maps.StudyLine(1 + count, 0.5 + count, 2 + 3 * count, count == 3)
@@ -323,7 +314,7 @@ FIGURES = {
     "by_condition": built.by_condition, "by_condition_of_three_hinges": built.by_condition_of_three_hinges,
     "margins_of_laws": margins_of_laws, "ratios": ratios, "estimators": built.estimators,
     "crosscheck_margins": built.margins, "crosscheck_spreads": spreads, "crosscheck_motion": motion,
-    "crosscheck_convergence": convergence, "crosscheck_drifts": drifts,
+    "crosscheck_convergence": convergence,
     "map": built.study_map, "map_narrow": narrow_map, "map_large": large_map, "map_lines": map_lines,
     "map_lines_of_names": map_lines_of_names, "heat": built.heat, "heat_of_many": heat_of_many,
     "workspace": workspace_figures, "distributions": spread_figures, "ranks": rank_figures,

@@ -6,7 +6,6 @@ from types import SimpleNamespace
 import numpy as np
 
 from spheretwin.crosscheck.dynamics import QUANTITIES, Dynamics
-from spheretwin.crosscheck.identities import BoundedDrift, FreeRotor
 from spheretwin.crosscheck.suite import CrosscheckResult
 from spheretwin.crosscheck.trajectories import Convergence, Trajectories
 from spheretwin.models import actuator as actuators
@@ -50,10 +49,6 @@ def evidence() -> CrosscheckResult:
         "RK4": Convergence(np.array([1e-3, 2e-3]), np.array([1e-9, 1.6e-8]), 4.0),
         "Euler": Convergence(np.array([1e-3, 2e-3]), np.array([1e-4, 2e-4]), 1.0),
     }
-    drifts = {
-        quantity: {spin: BoundedDrift(1e-12 * (place + 1) * COUNT, 1e-9) for spin in ("2π", "30")}
-        for place, quantity in enumerate(("energy", "angular momentum", "attitude"))
-    }
     findings = {
         "dynamics": Dynamics(
             checks("inertia", "bias"), differences, {each.name: each.bound for each in QUANTITIES}
@@ -61,7 +56,6 @@ def evidence() -> CrosscheckResult:
         "trajectories": Trajectories(
             checks("motion", "order", "slope"), T_s, three, 1e-9 * three, convergence
         ),
-        "torque-free rotor": FreeRotor(checks("energy", "momentum"), T_s, drifts),
     }
     return CrosscheckResult(findings)
 

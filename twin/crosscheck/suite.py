@@ -50,7 +50,6 @@ PARTS = (
     CheckPart("dynamics", lambda on: dynamics.compare(on.mjcf, on.actuator, on.states)),
     CheckPart("identities", lambda on: identities.check_identities(on.actuator, on.states)),
     CheckPart("trajectories", lambda on: trajectories.compare_trajectories(on.mjcf, on.actuator)),
-    CheckPart("torque-free rotor", lambda on: identities.check_free_rotor(on.mjcf, on.actuator)),
     CheckPart("coil-driven motion", lambda on: coil_driven.compare(on.mjcf, on.actuator)),
     CheckPart("prototype", lambda on: prototype.compare(on.mjcf, on.actuator)),
 )
@@ -135,26 +134,6 @@ def draw_margins(evidence: CrosscheckResult) -> Drawing:
     return Drawing("margins.svg", caption, figure)
 
 
-def draw_torque_free(evidence: CrosscheckResult) -> Drawing:
-    """Drift of what a torque-free rotor keeps."""
-    from spheretwin.viz.figures import crosscheck
-
-    rotor = evidence.of(identities.FreeRotor)
-    axis = {
-        "energy": "energy, relative",
-        "angular momentum": "angular momentum,\nrelative",
-        "attitude": "attitude, rad",
-    }
-    panels = {
-        axis[quantity]: {f"{spin} rad/s": (drift.values, drift.bound) for spin, drift in by_spin.items()}
-        for quantity, by_spin in rotor.drifts.items()
-    }
-    title = f"Torque-free rotor over {identities.DURATION_s:g} s, by spin rate"
-    figure = crosscheck.drifts(rotor.t_s, panels, title)
-    caption = "Drift of energy and angular momentum, and attitude against Euler's exact solution at J1 = J2."
-    return Drawing("torque_free.svg", caption, figure)
-
-
 def draw_trajectory(evidence: CrosscheckResult) -> Drawing:
     """A motion by given torques, and how far engine and reference part."""
     from spheretwin.viz.figures import crosscheck
@@ -177,7 +156,6 @@ FIGURES: tuple[Callable[[CrosscheckResult], Drawing], ...] = (
     draw_differences,
     draw_trajectory,
     draw_convergence,
-    draw_torque_free,
 )
 
 

@@ -1,4 +1,4 @@
-"""Figures of the cross-check: values over their bounds, spreads, differences, orders, drifts.
+"""Figures of the cross-check: values over their bounds, spreads, differences, orders.
 
 Every series is named, every axis has its unit, and a bound is a dashed line with its value.
 """
@@ -28,10 +28,6 @@ Array = NDArray[np.float64]
 
 LEAST_SHARE = 1e-14  # of a bound: less is drawn as this much
 NOTHING = 1e-18  # what a difference of exactly zero is drawn as, on a logarithmic axis
-
-
-Bounded = tuple[Array, float | None]
-"""Series that should stay below a bound, and the bound; None for one without."""
 
 
 def margins(values: Mapping[str, float], title: str) -> Figure:
@@ -111,7 +107,7 @@ def motion(t_s: Array, q_rad: Array, difference_rad: Array, bound_rad: float, ti
         where.plot(t_s, q_rad[:, axis], color=colour, label=name)
         apart.plot(t_s, _positive(difference_rad[:, axis]), color=colour, linewidth=1, label=name)
     apart.set_yscale("log")
-    _draw_bound(apart, bound_rad, "rad")
+    apart.axhline(bound_rad, color=INK, linestyle="--", linewidth=1.2, label=f"bound {bound_rad:.1e} rad")
     apart.set_xlabel("time, s")
     for axes, quantity in ((tilt, "tilt, rad"), (spin, "spin, rad"), (apart, "|difference|, rad")):
         _finish(axes, quantity)
@@ -145,35 +141,9 @@ def convergence(slopes: Mapping[str, tuple[Array, Array, float]], title: str) ->
     return figure
 
 
-def drifts(t_s: Array, panels: Mapping[str, Mapping[str, Bounded]], title: str) -> Figure:
-    """Draw quantities that should stay at zero, over time: a panel for each, each series with its bound.
-
-    Parameters
-    ----------
-    t_s : (n,) array, s
-    panels : mapping of quantity (with its unit) to mapping of series to Bounded
-    title : str
-    """
-    figure, grid = sheet(2.1 * len(panels), len(panels), title=title, sharex=True)
-    for axes, (quantity, series) in zip(grid[:, 0], panels.items(), strict=True):
-        for colour, (name, (values, bound)) in zip(SERIES, series.items(), strict=False):
-            axes.plot(t_s, _positive(values), color=colour, linewidth=1, label=name)
-            _draw_bound(axes, bound, "", colour)
-        axes.set_yscale("log")
-        _finish(axes, quantity)
-    axes.set_xlabel("time, s")
-    return figure
-
-
 def _positive(values: Array) -> Array:
     """Sizes for a logarithmic axis, with gaps where they are zero."""
     return np.where(values == 0, np.nan, np.abs(values))
-
-
-def _draw_bound(axes: Axes, bound: float | None, unit: str, colour: str = INK) -> None:
-    if bound is not None:
-        name = f"bound {bound:.1e} {unit}".strip()
-        axes.axhline(bound, color=colour, linestyle="--", linewidth=1.2, label=name)
 
 
 def _finish(axes: Axes, y: str) -> None:

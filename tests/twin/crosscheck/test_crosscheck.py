@@ -14,12 +14,11 @@ from spheretwin.models.base.errors import InputError
 from spheretwin.models.joint_chain import fill_ideal
 from spheretwin.models.kinematics import rotation
 from spheretwin.models.lagrangian import coriolis_matrix, coupling_torques
-from spheretwin.plant.mujoco_rotor import MujocoRotor
 from tests.twin.crosscheck.commands import FEW, ROWS, broken, crosscheck, fill_lagging
 
 QUANTITIES = [quantity.name for quantity in dynamics.QUANTITIES]
 ENGINES = ("MuJoCo", "Pinocchio")
-FIGURES = ("margins", "dynamics", "trajectory", "convergence", "torque_free")
+FIGURES = ("margins", "dynamics", "trajectory", "convergence")
 
 
 def of_both(*quantities):
@@ -165,32 +164,6 @@ def test_a_method_of_another_order_breaks_its_row(monkeypatch, actuator):
     monkeypatch.setattr(trajectories, "ORDERS", {"Euler": 4})
     result = broken(trajectories.compare_trajectories(actuators.MJCF_PATH, actuator).checks)
     assert result == {"order of convergence: MuJoCo Euler"}
-
-
-def test_another_integrator_breaks_every_row_of_the_free_rotor(monkeypatch, actuator):
-    monkeypatch.setattr(identities, "DURATION_s", 2.0)
-    monkeypatch.setattr(
-        identities,
-        "MujocoRotor",
-        lambda models, step_s, _: MujocoRotor(models, step_s, "implicitfast"),
-    )
-    checks = identities.check_free_rotor(actuators.MJCF_PATH, actuator).checks
-    assert broken(checks) == {check.name for check in checks}
-    assert len(checks) == 6
-
-
-def test_a_rotor_that_is_not_axisymmetric_does_not_move_as_euler_found(monkeypatch, actuator):
-    monkeypatch.setattr(identities, "DURATION_s", 2.0)
-    monkeypatch.setattr(identities, "SPINS_rad_s", {"2π": 2 * np.pi})
-    fly = identities.fly
-    nearly = np.array([1, 1 + 1e-7, 1])
-    monkeypatch.setattr(
-        identities,
-        "fly",
-        lambda mjcf, inertia, spin: fly(mjcf, inertia * nearly, spin)._replace(inertia=inertia),
-    )
-    checks = identities.check_free_rotor(actuators.MJCF_PATH, actuator).checks
-    assert "torque-free rotor at 2π rad/s: attitude" in broken(checks)
 
 
 @pytest.mark.release("1 to 2 s; other rows are broken in less")
