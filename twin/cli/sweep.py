@@ -17,6 +17,7 @@ from spheretwin.cli.common import interruptible, print_json, print_message
 from spheretwin.cli.options import verb, whole
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.base.extras import install_command
+from spheretwin.models.base.heap import return_large_arrays
 from spheretwin.models.base.mujoco_library import timers_stopped
 from spheretwin.models.base.user_code import is_reference
 from spheretwin.models.telemetry.run_record import versions
@@ -142,6 +143,7 @@ def _own_code(study: Study) -> str:
 @contextlib.contextmanager
 def _tracked(name: str, what: str) -> Iterator[dict[str, Callable[..., Any]]]:
     """Show progress until the end or an interruption; yield what reports both to a study."""
+    return_large_arrays()
     with (
         interruptible(GO_ON) as stop_requested,
         counted(name, what) as done,
