@@ -1,12 +1,16 @@
-"""Arrays of real numbers from values of a caller, which may be anything."""
+"""Types of arrays, and arrays of real numbers from values of a caller, which may be anything."""
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
 
+Array = NDArray[np.float64]
+Integers = NDArray[np.int64]
+Booleans = NDArray[np.bool_]
 
-def real_array(values: object) -> NDArray[np.float64] | None:
+
+def real_array(values: object) -> Array | None:
     """Return values as an array of real numbers, not copied if they are one; None for any others.
 
     Texts would be parsed, and complex numbers lose their imaginary part.
