@@ -8,25 +8,24 @@ from collections.abc import Callable
 from types import TracebackType
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
 from pydantic.fields import FieldInfo
 
 from spheretwin.bench.bench_state import BenchState
 from spheretwin.bench.command_queue import (
     By,
     Command,
-    Outcome,
+    CommandOutcome,
     Ticket,
     check_arguments,
     settled_ticket,
 )
 from spheretwin.bench.commands import documentation, find_command
-from spheretwin.bench.cycle import CommandProcessor, Cycle, Thread
+from spheretwin.bench.cycle import CommandProcessor, Cycle
 from spheretwin.bench.folder import Folder
 from spheretwin.bench.operators import Operators
 from spheretwin.bench.status import BenchStatus
 from spheretwin.models.actuator import Actuator
+from spheretwin.models.base.arrays import Array
 from spheretwin.models.base.errors import InputError, SpheretwinError
 from spheretwin.scenario.reading import described_fields
 from spheretwin.scenario.sections import Scenario
@@ -76,7 +75,6 @@ class Bench:
         self._bench_state = BenchState(scenario, operators or Operators(), folder, machine)
         self._processor = CommandProcessor(self._bench_state)
         self._cycle = Cycle(self._bench_state, self._processor)
-        self._thread = Thread(self._bench_state, self._processor, self._cycle)
 
     @property
     def actuator(self) -> Actuator:
@@ -149,12 +147,12 @@ class Bench:
             It was not executed in time; it may be executed later.
         """
         ticket = self.command(name, **arguments)
-        if not self._thread.started:
+        if not self._cycle.started:
             self.advance(0)
         match ticket.wait(timeout_s):
-            case Outcome.REFUSED:
+            case CommandOutcome.REFUSED:
                 raise InputError(f"{ticket.refused}")
-            case Outcome.TIMED_OUT:
+            case CommandOutcome.TIMED_OUT:
                 raise SpheretwinError(
                     f"bench: expected {name} to be executed within {timeout_s:g} s, received no outcome"
                 )
@@ -179,11 +177,11 @@ class Bench:
         status, end_s = self.state(), time.monotonic() + timeout_s
         end_tick = status.tick + round(timeout_s / status.period_s)
         while not condition(status):
-            in_time = time.monotonic() < end_s if self._thread.started else status.tick < end_tick
+            in_time = time.monotonic() < end_s if self._cycle.started else status.tick < end_tick
             if status.mode == "fault" or not in_time:
                 reason = status.reason or f"it was not within {timeout_s:g} s"
                 raise SpheretwinError(f"bench: expected the condition to become true, received: {reason}")
-            if self._thread.started:
+            if self._cycle.started:
                 time.sleep(POLL_s)
             elif not self.advance(1):
                 raise SpheretwinError("bench: expected time to run until the condition, received a pause")
@@ -214,7 +212,7 @@ class Bench:
         """
         return (self._bench_state.player or self._bench_state).history.read(after)
 
-    def captured(self) -> dict[str, NDArray[np.float64]]:
+    def captured(self) -> dict[str, Array]:
         """Return every row of the completed capture by signal, as `bins`; empty without one."""
         return self._bench_state.capture.read()
 
@@ -244,7 +242,7 @@ class Bench:
         SpheretwinError
             The bench runs in its thread, or is closed.
         """
-        if self._thread.started or not self._processor.open:
+        if self._cycle.started or not self._processor.open:
             raise SpheretwinError("bench: expected one that waits for advance, received one at work")
         return self._cycle.run_chunk(ticks, waits=True)
 
@@ -253,14 +251,14 @@ class Bench:
 
         Until `close`, the interpreter switches threads every millisecond.
         """
-        if not self._thread.started and self._processor.open:
-            self._thread.begin()
+        if not self._cycle.started and self._processor.open:
+            self._cycle.begin()
 
     def close(self) -> None:
         """End the thread and complete the recordings."""
         bench_state = self._bench_state
         self._processor.open = False
-        self._thread.end()
+        self._cycle.end()
         self._processor.close()
         bench_state.recording.end(bench_state.driver.session, None)
         bench_state.recording.join()

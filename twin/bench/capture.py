@@ -6,13 +6,11 @@ from collections import deque
 from typing import Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from spheretwin.bench.history import plotted_signals, plotted_values
+from spheretwin.models.base.arrays import Array, Booleans
 from spheretwin.models.base.errors import InputError, did_you_mean, shown
 from spheretwin.models.telemetry.table import Table, saturated
-
-Array = NDArray[np.float64]
 
 Event = Literal["off", "level", "fault", "saturation"]
 Edge = Literal["rising", "falling"]
@@ -120,7 +118,7 @@ class Capture:
         begins = np.flatnonzero(true & ~np.concatenate([[before], true[:-1]]))
         return int(begins[0]) if len(begins) else None
 
-    def _beyond(self, values: Array) -> NDArray[np.bool_]:
+    def _beyond(self, values: Array) -> Booleans:
         level = self.trigger.level
         return values > level if self.trigger.edge == "rising" else values < level
 

@@ -99,7 +99,7 @@ def check_arguments(command: Command, given: Mapping[str, Any]) -> dict[str, Any
 MOST_WAITING = 256
 
 
-class Outcome(StrEnum):
+class CommandOutcome(StrEnum):
     """Outcome of waiting for a command."""
 
     DONE = "done"
@@ -129,11 +129,11 @@ class Ticket:
         """True if it no longer waits."""
         return self._done.is_set()
 
-    def wait(self, timeout_s: float | None = 5.0) -> Outcome:
+    def wait(self, timeout_s: float | None = 5.0) -> CommandOutcome:
         """Wait until it is executed or refused, at most for a time; `refused` has the reason of a refusal."""
         if not self._done.wait(timeout_s):
-            return Outcome.TIMED_OUT
-        return Outcome.DONE if self.refused is None else Outcome.REFUSED
+            return CommandOutcome.TIMED_OUT
+        return CommandOutcome.DONE if self.refused is None else CommandOutcome.REFUSED
 
     def settle(self, refused: str | None = None) -> None:
         """Settle the ticket with the outcome."""

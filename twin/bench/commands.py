@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Generator
 from functools import partial, wraps
-from typing import Annotated, Any, Literal, NamedTuple
+from typing import Annotated, Any, Literal
 
 from pydantic import Field, JsonValue
 
@@ -122,17 +122,13 @@ def _stop_mode(bench_state: BenchState, mode: Literal["off", "hold"]) -> None:
     bench_state.stop_mode = mode
 
 
-class NewRun(NamedTuple):
-    """Run that begins: settings, session, and the record of its start."""
-
-    settings: Scenario
-    session: Session
-    record: RunRecord
+NewRun = tuple[Scenario, Session, RunRecord]
+"""Run that begins: settings, session, and the record of its start."""
 
 
 def _new_run(settings: Scenario) -> NewRun:
     session = compiled_session(settings)
-    return NewRun(settings, session, record_of(session))
+    return settings, session, record_of(session)
 
 
 def _restart(bench_state: BenchState, run: NewRun) -> None:

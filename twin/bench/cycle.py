@@ -19,48 +19,14 @@ from spheretwin.bench.supervisor import COMMAND_s, Supervisor, TICKS_s
 from spheretwin.models.base.errors import InputError, SpheretwinError, exception_text, one_line
 from spheretwin.models.base.user_code import only_loaded
 
+# Longest time that a thread may keep the interpreter from the loop: three of Python's 5 ms make a chunk late.
+SWITCH_s = 1e-3
 
-def run(bench_state: BenchState, ticks: int, supervisor: Supervisor) -> int:
-    """Run some ticks, while paused at most the requested steps; return how many were run."""
-    if not bench_state.running:
-        ticks = min(ticks, bench_state.steps)
-    if ticks < 1:
-        return 0
-    began = time.monotonic()
-    done = (
-        _play(bench_state, bench_state.player, ticks)
-        if bench_state.player
-        else _simulate(bench_state, ticks, supervisor)
-    )
-    bench_state.steps -= min(done, bench_state.steps)
-    bench_state.pace.record_chunk(done, bench_state.period_s, bench_state.t_s, time.monotonic() - began)
-    return done
+# Period at which an idle bench looks for silent clients.
+REST_s = 0.02
 
-
-def _play(bench_state: BenchState, player: Player, ticks: int) -> int:
-    done = player.advance(ticks)
-    if player.ended:
-        bench_state.pause()
-    return done
-
-
-def _simulate(bench_state: BenchState, ticks: int, supervisor: Supervisor) -> int:
-    driver, recording, done = bench_state.driver, bench_state.recording, 0
-    recording.note_changes(driver.session)
-    while done < ticks and driver.reason is None:
-        first = driver.session.tick
-        with supervisor.limited(f"the law {driver.session.scenario.controller.law}", TICKS_s):
-            rows = driver.advance(ticks - done)
-        if rows is not None and len(rows):
-            done += len(rows)
-            bench_state.history.write(first, rows)
-            bench_state.capture.write(rows)
-            recording.write(rows)
-        recording.note_changes(driver.session)
-    if driver.reason is not None:
-        bench_state.pause()
-        recording.end(driver.session, "the recording has ended: so has the run")
-    return done
+# Time between two chunks beyond which this process was too busy to hear its clients: a compilation.
+BUSY_s = 0.5
 
 
 class CommandProcessor:
@@ -173,7 +139,7 @@ def error_text(error: Exception) -> str:
 
 
 class Cycle:
-    """Cycle of one bench.
+    """Cycle of one bench, which runs in a thread of its own after `begin`.
 
     Parameters
     ----------
@@ -193,6 +159,7 @@ class Cycle:
         self._bench_state, self._processor = bench_state, processor
         self.state: BenchStatus = bench_status(bench_state)
         self.supervisor = Supervisor(self._on_stall, self._on_return)
+        self._thread: threading.Thread | None = None
 
     def run_chunk(self, ticks: int, waits: bool) -> int:
         """Execute the waiting commands, then run some ticks; return how many were run.
@@ -210,7 +177,7 @@ class Cycle:
             with self.supervisor.limited("a command", COMMAND_s):
                 self._processor.process(waits)
                 self._settle()
-            done = run(self._bench_state, ticks, self.supervisor)
+            done = self._run(ticks)
             self._hold_without_operator()
         # Any error: if the thread ended, STOP would no longer be executed.
         except Exception as error:
@@ -218,6 +185,44 @@ class Cycle:
             self._bench_state.pause()
         self._settle()
         self.show()
+        return done
+
+    def _run(self, ticks: int) -> int:
+        """Run some ticks, while paused at most the requested steps; return how many were run."""
+        bench_state = self._bench_state
+        if not bench_state.running:
+            ticks = min(ticks, bench_state.steps)
+        if ticks < 1:
+            return 0
+        began = time.monotonic()
+        done = self._play(bench_state.player, ticks) if bench_state.player else self._simulate(ticks)
+        bench_state.steps -= min(done, bench_state.steps)
+        bench_state.pace.record_chunk(done, bench_state.period_s, bench_state.t_s, time.monotonic() - began)
+        return done
+
+    def _play(self, player: Player, ticks: int) -> int:
+        done = player.advance(ticks)
+        if player.ended:
+            self._bench_state.pause()
+        return done
+
+    def _simulate(self, ticks: int) -> int:
+        bench_state, done = self._bench_state, 0
+        driver, recording = bench_state.driver, bench_state.recording
+        recording.note_changes(driver.session)
+        while done < ticks and driver.reason is None:
+            first = driver.session.tick
+            with self.supervisor.limited(f"the law {driver.session.scenario.controller.law}", TICKS_s):
+                rows = driver.advance(ticks - done)
+            if rows is not None and len(rows):
+                done += len(rows)
+                bench_state.history.write(first, rows)
+                bench_state.capture.write(rows)
+                recording.write(rows)
+            recording.note_changes(driver.session)
+        if driver.reason is not None:
+            bench_state.pause()
+            recording.end(driver.session, "the recording has ended: so has the run")
         return done
 
     def _on_stall(self, what: str) -> None:
@@ -266,34 +271,9 @@ class Cycle:
             bench_state.driver.hold()
             bench_state.note = "the operator is gone: the twin holds"
 
-
-# Longest time that a thread may keep the interpreter from the loop: three of Python's 5 ms make a chunk late.
-SWITCH_s = 1e-3
-
-# Period at which an idle bench looks for silent clients.
-REST_s = 0.02
-
-# Time between two chunks beyond which this process was too busy to hear its clients: a compilation.
-BUSY_s = 0.5
-
-
-class Thread:
-    """Thread of one bench; it is started once.
-
-    Parameters
-    ----------
-    bench_state : BenchState
-    processor : CommandProcessor
-    cycle : Cycle
-    """
-
-    def __init__(self, bench_state: BenchState, processor: CommandProcessor, cycle: Cycle) -> None:
-        self._bench_state, self._processor, self._cycle = bench_state, processor, cycle
-        self._thread: threading.Thread | None = None
-
     @property
     def started(self) -> bool:
-        """True if it was started."""
+        """True if its thread was started."""
         return self._thread is not None
 
     def begin(self) -> None:
@@ -303,7 +283,7 @@ class Thread:
         sys.setswitchinterval(SWITCH_s)
         self._thread = threading.Thread(target=self._loop, name="bench", daemon=True)
         self._thread.start()
-        self._cycle.supervisor.begin()
+        self.supervisor.begin()
 
     def end(self) -> None:
         """Wait for the last chunk, unless the loop has stalled; no more commands are accepted."""
@@ -312,7 +292,7 @@ class Thread:
             while self._thread.is_alive() and not self._processor.stalled:
                 self._thread.join(REST_s)
             sys.setswitchinterval(self._switch_s)
-        self._cycle.supervisor.end()
+        self.supervisor.end()
 
     def _loop(self) -> None:
         """Run chunk by chunk, each at its time; STOP wakes the thread."""
@@ -327,8 +307,8 @@ class Thread:
             wait_s = pace.wait_s() if moves else REST_s
             if wait_s > 0 and wake.wait(wait_s):
                 wake.clear()
-                self._cycle.run_chunk(0, waits=False)
+                self.run_chunk(0, waits=False)
                 continue
             if not moves:
                 pace.rest()
-            self._cycle.run_chunk(pace.ticks(bench_state.period_s) if moves else 0, waits=False)
+            self.run_chunk(pace.ticks(bench_state.period_s) if moves else 0, waits=False)

@@ -9,6 +9,7 @@ from spheretwin.bench import modes
 from spheretwin.bench.command_queue import Current, Place, Text
 from spheretwin.bench.modes import Limits
 from spheretwin.loop.snapshot import Snapshot
+from spheretwin.models.base.arrays import Array
 from spheretwin.models.base.errors import InputError, exception_text
 from spheretwin.models.telemetry.run_record import RunRecord
 from spheretwin.models.telemetry.table import Table
@@ -321,7 +322,7 @@ class Driver:
         return tuple((name, json.dumps(value, ensure_ascii=False)) for name, value in self.pending.items())
 
     @property
-    def _range(self) -> modes.Array:
+    def _range(self) -> Array:
         return self.session.actuator.hinge_range_rad
 
     def check_available(self, name: str) -> None:

@@ -7,13 +7,11 @@ from itertools import islice
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from spheretwin.models.base.arrays import Array
 from spheretwin.models.telemetry.signals import Signal, common_signals, width
 from spheretwin.models.telemetry.table import Table
 from spheretwin.viz.bench.protocols import Bins
-
-Array = NDArray[np.float64]
 
 RATE_Hz = 50.0
 LENGTH_s = 60.0

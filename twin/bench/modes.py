@@ -9,16 +9,14 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from spheretwin.models.base.arrays import Array
 from spheretwin.models.base.errors import InputError, distinct_texts
 from spheretwin.models.telemetry.signals import ANGLES
 from spheretwin.session import Session
 from spheretwin.trajectories.rounding import LARGEST, Approach, faded
 from spheretwin.trajectories.shapes import Hold, Jog
 from spheretwin.trajectories.trajectory import Shape
-
-Array = NDArray[np.float64]
 
 # Distance of poses and jogging from the ends of a hinge's range; the prototype's watchdog keeps 0.02 of it.
 EDGE_rad = 0.05

@@ -2,16 +2,16 @@
 
 import pytest
 
-from spheretwin.bench.command_queue import Outcome, Ticket, settled_ticket
+from spheretwin.bench.command_queue import CommandOutcome, Ticket, settled_ticket
 from spheretwin.models.base.errors import InputError, SpheretwinError
 from tests.twin.bench.cases import paused
 from tests.waiting import UNLIMITED_S
 
 
 def test_outcomes_of_waiting_are_distinct():
-    assert Ticket().wait(0.0) == Outcome.TIMED_OUT
-    assert settled_ticket().wait(0.0) == Outcome.DONE
-    assert settled_ticket("no").wait(0.0) == Outcome.REFUSED
+    assert Ticket().wait(0.0) == CommandOutcome.TIMED_OUT
+    assert settled_ticket().wait(0.0) == CommandOutcome.DONE
+    assert settled_ticket("no").wait(0.0) == CommandOutcome.REFUSED
     assert settled_ticket("no").refused == "no"
 
 
