@@ -13,7 +13,7 @@ from spheretwin.cli.options import from_zero, number, verb
 from spheretwin.machine.files import conditions_of
 from spheretwin.machine.link.admission import read_key
 from spheretwin.machine.link.controller_scenario import left_out
-from spheretwin.machine.link.limits import Limits, LinkSettings
+from spheretwin.machine.link.limits import LinkSettings, MachineLimits
 from spheretwin.machine.link.log_file import LogFile
 from spheretwin.machine.link.machine_link import Link
 from spheretwin.machine.link.stream import RunningShadow
@@ -24,7 +24,7 @@ from spheretwin.scenario.sections import ResolvedScenario, Scenario
 from spheretwin.session import Session
 
 DEFAULTS = LinkSettings()
-DEFAULT_LIMITS = Limits(current_A=1.0)
+DEFAULT_LIMITS = MachineLimits(current_A=1.0)
 LOCKSTEP_TIMEOUT_s = 1.0
 
 
@@ -136,7 +136,7 @@ def _settings(options: argparse.Namespace) -> LinkSettings:
     )
 
 
-def _limits(options: argparse.Namespace, scenario: ResolvedScenario) -> Limits:
+def _limits(options: argparse.Namespace, scenario: ResolvedScenario) -> MachineLimits:
     given = {
         "tilt_rad": None if options.limit_angle_deg is None else math.radians(options.limit_angle_deg),
         "temperature_degC": options.limit_temperature_degC,
@@ -144,7 +144,7 @@ def _limits(options: argparse.Namespace, scenario: ResolvedScenario) -> Limits:
         "chi2": options.limit_chi2,
         "current_A": options.limit_current_A or scenario.nominal.current_limit_A,
     }
-    return Limits(**{name: value for name, value in given.items() if value is not None})
+    return MachineLimits(**{name: value for name, value in given.items() if value is not None})
 
 
 def limited_rate(scenario: Scenario, rate_rad_s: float | None) -> Scenario:

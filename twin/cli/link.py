@@ -10,7 +10,7 @@ from spheretwin.cli.machine import FRAME
 from spheretwin.cli.options import verb
 from spheretwin.machine.link import frame_format
 from spheretwin.machine.link.admission import read_key
-from spheretwin.machine.link.channel import Channel
+from spheretwin.machine.link.channel import FrameChannel
 from spheretwin.machine.link.real_time import real_time
 from spheretwin.machine.link.round_trips import EDGES_ms, RateResult, RATES_Hz, measure_link
 from spheretwin.machine.link.transports import open_transport
@@ -39,7 +39,7 @@ def run_test(options: argparse.Namespace) -> bool:
     with interruptible() as stop_requested:
         transport = open_transport(options.address)
         try:
-            channel = Channel(
+            channel = FrameChannel(
                 transport, frames.command, frames.measurement, options.groups, key=read_key(options.key)
             )
             with real_time() as granted:

@@ -14,7 +14,7 @@ from spheretwin.cli.common import interruptible, print_json, print_message
 from spheretwin.cli.options import verb
 from spheretwin.machine.link import frame_format
 from spheretwin.machine.link.admission import LEAST_KEY_BYTES, read_key
-from spheretwin.machine.link.channel import Channel
+from spheretwin.machine.link.channel import FrameChannel
 from spheretwin.machine.link.frame_format import DEFAULT_FRAME
 from spheretwin.machine.link.machine_link import Link
 from spheretwin.machine.link.machine_server import MachineServer
@@ -79,7 +79,7 @@ def run(options: argparse.Namespace) -> bool:
             groups = len(Session(scenario).actuator.groups)
             transport.announce = print_message
             key = read_key(options.key)
-            channel = Channel(transport, frames.measurement, frames.command, groups, key=key)
+            channel = FrameChannel(transport, frames.measurement, frames.command, groups, key=key)
             server = MachineServer(
                 channel,
                 f"a controller at {options.listen}",

@@ -8,7 +8,7 @@ import pytest
 from spheretwin import scenario as scenarios
 from spheretwin.bench import Bench
 from spheretwin.bench.commands import COMMANDS
-from spheretwin.machine.link.limits import Limits, LinkSettings
+from spheretwin.machine.link.limits import LinkSettings, MachineLimits
 from spheretwin.machine.link.machine_link import Link
 from spheretwin.machine.link.machine_server import MachineServer
 from spheretwin.models.base.errors import InputError
@@ -36,7 +36,7 @@ def test_the_page_s_commands_drive_a_machine():
     thread.start()
     unlimited = {"timeout_s": UNLIMITED_S, "connect_s": UNLIMITED_S}
     settings = LinkSettings(armed=True, ramp_s=0.0, lockstep=True, **unlimited)
-    link = Link(controller_channel(line), "a test", settings, Limits(current_A=8.0), heat(), PERIOD_s)
+    link = Link(controller_channel(line), "a test", settings, MachineLimits(current_A=8.0), heat(), PERIOD_s)
     with Bench(scenario) as own, Bench(scenario, machine=link.session(scenario)) as bench:
         for one in (own, bench):
             one.do("start")

@@ -8,7 +8,7 @@ from spheretwin import cli
 from spheretwin import scenario as scenarios
 from spheretwin.config.active_config import initial_config
 from spheretwin.config.config_warnings import warnings_of
-from spheretwin.machine.link.limits import Limits, LinkSettings
+from spheretwin.machine.link.limits import LinkSettings, MachineLimits
 from spheretwin.machine.link.machine_link import Link
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.coil_group import HEAT
@@ -150,7 +150,7 @@ def test_a_torque_field_skips_the_errors_that_it_cannot_have_by_name():
 @pytest.mark.parametrize(("changes", "limit_A"), [({"nominal.current_limit_A": 9.0}, 9.0), ({}, 8.0)])
 def test_a_link_is_not_armed_with_a_limit_above_that_of_the_model_file(changes, limit_A):
     scenario = scenarios.load("hold", changes)
-    limits = Limits(current_A=9.0)
+    limits = MachineLimits(current_A=9.0)
     with Link.open("udp://127.0.0.1:9", scenario, LinkSettings(), limits):  # a dry run sends no current
         pass
     armed = LinkSettings(armed=True)
@@ -164,6 +164,6 @@ def test_a_link_is_not_armed_with_a_limit_above_that_of_the_model_file(changes, 
 @pytest.mark.parametrize(("highest_degC", "limit_degC"), [(120.0, 90.0), (80.0, 80.0)])
 def test_a_link_removes_the_currents_at_the_lowest_temperature_limit(tmp_path, highest_degC, limit_degC):
     path = model_file(tmp_path, group_temperature_limit_degC=[130.0] * 17 + [90.0])
-    limits = Limits(current_A=0.1, temperature_degC=highest_degC)
+    limits = MachineLimits(current_A=0.1, temperature_degC=highest_degC)
     with Link.open("udp://127.0.0.1:9", scenarios.load("hold", {"plant.mjcf": path}), limits=limits) as link:
         assert link._limits.temperature_degC == limit_degC

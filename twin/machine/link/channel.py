@@ -19,7 +19,7 @@ LONGEST_BACKLOG = 10_000
 """Texts that may have arrived before a run: some seconds of frames."""
 
 
-class Channel:
+class FrameChannel:
     """Frames of two directions over one transport.
 
     Parameters
@@ -64,7 +64,7 @@ class Channel:
         self.modulus = min(sends.modulus("sequence"), receives.modulus("echo"))
         self._shown = {"sent": 0, "received": 0}
 
-    def stand_in(self, values: Callable[[Values], Mapping[str, Any]]) -> tuple[Channel, StandIn]:
+    def stand_in(self, values: Callable[[Values], Mapping[str, Any]]) -> tuple[FrameChannel, StandIn]:
         """Return a channel to a stand-in of the peer, and the stand-in.
 
         Parameters
@@ -79,7 +79,7 @@ class Channel:
             return replies.encode(values(sent.decode(content) or {}))
 
         peer = StandIn(reply)
-        return Channel(peer, sends, receives, self.groups, key=self._key), peer
+        return FrameChannel(peer, sends, receives, self.groups, key=self._key), peer
 
     def admit_by(self, admission: Callable[[Values], Admission]) -> None:
         """Use the frames that belong to a session alone."""

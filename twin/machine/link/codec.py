@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 from spheretwin.machine.link.frame_format import QUANTITIES, FieldFormat, FrameFormat
 from spheretwin.models.base.errors import InputError
 
-Array = NDArray[np.float64]
 Values = dict[str, Any]
 """Values of a frame in SI units by field: an int for integers, a float for one number, else an array."""
 

@@ -9,10 +9,11 @@ from math import pi
 from typing import TYPE_CHECKING, Annotated, Literal, NamedTuple
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import Field, ValidationError, model_validator
 
 from spheretwin.models.base.errors import InputError
 from spheretwin.scenario.fields import explain
+from spheretwin.scenario.plant_sections import Section
 from spheretwin.scenario.reading import read_toml, toml_names
 
 FOLDER = resources.files("spheretwin.machine.link") / "shipped"
@@ -25,7 +26,7 @@ MOST_NUMBERS = 1024
 TYPES = ("uint8", "int8", "uint16", "int16", "uint32", "int32", "float32", "float64")
 
 
-class Quantity(NamedTuple):
+class FrameQuantity(NamedTuple):
     """Quantity that a field can carry."""
 
     units: dict[str, float]
@@ -39,16 +40,16 @@ _ANGLE = {"rad": 1.0, "mrad": 1e-3, "deg": pi / 180}
 _RATE = {f"{unit}/s": value for unit, value in _ANGLE.items()}
 _COUNT = {"1": 1.0}
 QUANTITIES = {
-    "sequence": Quantity(_COUNT, 1, True),
-    "echo": Quantity(_COUNT, 1, True),
-    "flags": Quantity(_COUNT, 1, True),
-    "session": Quantity(_COUNT, 1, True),
-    "time": Quantity({"s": 1.0, "ms": 1e-3, "us": 1e-6}, 1),
-    "angle": Quantity(_ANGLE, 3),
-    "rate": Quantity(_RATE, 3),
-    "current": Quantity({"A": 1.0, "mA": 1e-3}, "groups"),
-    "temperature": Quantity({"degC": 1.0}, 1),
-    "unused": Quantity(_COUNT, 1),
+    "sequence": FrameQuantity(_COUNT, 1, True),
+    "echo": FrameQuantity(_COUNT, 1, True),
+    "flags": FrameQuantity(_COUNT, 1, True),
+    "session": FrameQuantity(_COUNT, 1, True),
+    "time": FrameQuantity({"s": 1.0, "ms": 1e-3, "us": 1e-6}, 1),
+    "angle": FrameQuantity(_ANGLE, 3),
+    "rate": FrameQuantity(_RATE, 3),
+    "current": FrameQuantity({"A": 1.0, "mA": 1e-3}, "groups"),
+    "temperature": FrameQuantity({"degC": 1.0}, 1),
+    "unused": FrameQuantity(_COUNT, 1),
 }
 """Fields by name. `echo` is the sequence number of the last command that the machine received, `session` the
 number that `admission` describes."""
@@ -75,10 +76,8 @@ class Flags(IntFlag):
     """Measurement: the machine has switched off its currents."""
 
 
-class FieldFormat(BaseModel):
+class FieldFormat(Section):
     """Field of a frame: numbers of one type."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
 
     name: FieldName = Field(description="quantity")
     type: NumberType = Field("float64", description="type of each number")
@@ -125,10 +124,8 @@ class FieldFormat(BaseModel):
         return 1.0 if self.unit is None else QUANTITIES[self.name].units[self.unit]
 
 
-class FrameFormat(BaseModel):
+class FrameFormat(Section):
     """Format of the frames of one direction."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
 
     encoding: Literal["binary", "json"] = Field("binary", description="binary, or one JSON object a line")
     byte_order: Literal["little", "big"] = Field("little", description="of numbers and checksum")
@@ -162,10 +159,8 @@ class FrameFormat(BaseModel):
         return 256 ** (sizes[0] if sizes else 4)
 
 
-class Frames(BaseModel):
+class MachineFrames(Section):
     """Frames of a machine: what it sends, and what it receives."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
 
     description: str = Field("", description="machine and purpose")
     currents: Literal["commanded", "measured"] | None = Field(
@@ -176,7 +171,7 @@ class Frames(BaseModel):
     command: FrameFormat | None = Field(None, description="to the machine; none for one that only reports")
 
     @model_validator(mode="after")
-    def _fits(self) -> Frames:
+    def _fits(self) -> MachineFrames:
         if not self.measurement.has("angle"):
             raise ValueError("expected a measurement with the field angle, received one without")
         if self.command and not self.command.has("current"):
@@ -208,7 +203,7 @@ def shipped() -> list[str]:
     return toml_names(FOLDER)
 
 
-def load(source: str) -> Frames:
+def load(source: str) -> MachineFrames:
     """Read frame formats by a shipped name or from a TOML file.
 
     Raises
@@ -218,6 +213,6 @@ def load(source: str) -> Frames:
     """
     fields, _ = read_toml("frame", source, FOLDER)
     try:
-        return Frames.model_validate_json(json.dumps(fields, default=str))
+        return MachineFrames.model_validate_json(json.dumps(fields, default=str))
     except ValidationError as error:
-        raise InputError(f"frame {source}: {explain(error, Frames)}") from None
+        raise InputError(f"frame {source}: {explain(error, MachineFrames)}") from None

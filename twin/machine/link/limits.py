@@ -5,15 +5,13 @@ from __future__ import annotations
 from typing import Annotated
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import ConfigDict, Field
 
 from spheretwin.control.supervision.watchdog import Reason
 from spheretwin.electronics.drive_section import ResolvedDrive
 from spheretwin.loop.external import Measurement
+from spheretwin.models.base.arrays import Array
 from spheretwin.scenario.fields import SettingsModel
-
-Array = NDArray[np.float64]
 
 Positive = Annotated[float, Field(gt=0, le=1e6)]
 
@@ -38,7 +36,7 @@ class LinkSettings(SettingsModel):
     )
 
 
-class Limits(SettingsModel):
+class MachineLimits(SettingsModel):
     """Limits of the measurements of a machine."""
 
     model_config = ConfigDict(strict=True)
@@ -82,11 +80,11 @@ class CoilHeat:
     ----------
     drive : ResolvedDrive
         Resistance, heat capacity and thermal resistance of each group.
-    limits : Limits
+    limits : MachineLimits
     period_s : float
     """
 
-    def __init__(self, drive: ResolvedDrive, limits: Limits, period_s: float) -> None:
+    def __init__(self, drive: ResolvedDrive, limits: MachineLimits, period_s: float) -> None:
         hot = 1 + np.multiply(drive.resistance_per_K, max(limits.temperature_degC - drive.ambient_degC, 0.0))
         time_constants_s = np.multiply(drive.heat_capacity_J_K, drive.thermal_resistance_K_W)
         with np.errstate(divide="ignore"):

@@ -9,13 +9,12 @@ from copy import deepcopy
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from spheretwin.control.supervision.watchdog import Reason
 from spheretwin.loop.external import ExternalPlant, Measurement
 from spheretwin.machine.link import frame_format
 from spheretwin.machine.link.admission import ControllerAdmission
-from spheretwin.machine.link.channel import Channel
+from spheretwin.machine.link.channel import FrameChannel
 from spheretwin.machine.link.codec import Values
 from spheretwin.machine.link.controller_scenario import (
     check_measurement,
@@ -24,17 +23,16 @@ from spheretwin.machine.link.controller_scenario import (
     measurement_of,
 )
 from spheretwin.machine.link.frame_format import DEFAULT_FRAME, Flags
-from spheretwin.machine.link.limits import CoilHeat, Limits, LinkSettings
+from spheretwin.machine.link.limits import CoilHeat, LinkSettings, MachineLimits
 from spheretwin.machine.link.plausibility import Plausibility
-from spheretwin.machine.link.rehearsal import rehearse
+from spheretwin.machine.link.rehearsal import rehearse, still_machine
 from spheretwin.machine.link.stream import RunningShadow
 from spheretwin.machine.link.timing import Distribution
 from spheretwin.machine.link.transports import open_transport
+from spheretwin.models.base.arrays import Array
 from spheretwin.models.base.errors import InputError, SpheretwinError, distinct_texts
 from spheretwin.scenario.sections import ResolvedScenario, Scenario
 from spheretwin.session import Session
-
-Array = NDArray[np.float64]
 
 HELLO_s = 0.1
 """Time between two requests for a first measurement."""
@@ -61,12 +59,12 @@ class Link(ExternalPlant):
 
     Parameters
     ----------
-    channel : Channel
+    channel : FrameChannel
         Sends commands, receives measurements.
     name : str
         Entry of the journal.
     settings : LinkSettings
-    limits : Limits
+    limits : MachineLimits
     heat : CoilHeat
     period_s : float
         Control period.
@@ -94,10 +92,10 @@ class Link(ExternalPlant):
 
     def __init__(
         self,
-        channel: Channel,
+        channel: FrameChannel,
         name: str,
         settings: LinkSettings,
-        limits: Limits,
+        limits: MachineLimits,
         heat: CoilHeat,
         period_s: float,
         *,
@@ -131,7 +129,7 @@ class Link(ExternalPlant):
         address: str,
         scenario: Scenario,
         settings: LinkSettings | None = None,
-        limits: Limits | None = None,
+        limits: MachineLimits | None = None,
         *,
         frame: str = DEFAULT_FRAME,
         report: Callable[[str], None] | None = None,
@@ -148,7 +146,7 @@ class Link(ExternalPlant):
             Controller, and the data sheet of the coils.
         settings : LinkSettings, optional
             Default: a dry run.
-        limits : Limits, optional
+        limits : MachineLimits, optional
             Default: the nominal current limit of the scenario. A lower temperature limit of the model file
             holds.
         frame : str
@@ -168,7 +166,7 @@ class Link(ExternalPlant):
         """
         frames, complete = frame_format.load(frame).for_both_directions(frame), Session(scenario)
         resolved, groups = complete.initial_scenario, len(complete.actuator.groups)
-        limits = limits or Limits(current_A=resolved.nominal.current_limit_A)
+        limits = limits or MachineLimits(current_A=resolved.nominal.current_limit_A)
         settings = settings or LinkSettings()
         limit_A = min(limits.current_A, resolved.nominal.current_limit_A)
         most_A = complete.actuator.group.current_limit_A
@@ -182,7 +180,9 @@ class Link(ExternalPlant):
             highest_degC = min(limits.temperature_degC, float(np.min(stated_degC)))
             limits = limits.model_copy(update={"temperature_degC": highest_degC})
         period_s = resolved.controller.period_s
-        channel = Channel(open_transport(address), frames.command, frames.measurement, groups, report, key)
+        channel = FrameChannel(
+            open_transport(address), frames.command, frames.measurement, groups, report, key
+        )
         heat = CoilHeat(resolved.drive, limits, period_s)
         options["plausibility"] = Plausibility.of(scenario, resolved, limits)
         return cls(channel, f"a machine at {address}", settings, limits, heat, period_s, **options)
@@ -217,27 +217,9 @@ class Link(ExternalPlant):
 
     def _to_stand_in(self, resolved: ResolvedScenario) -> Link:
         """Return the same link to a stand-in of the machine, which stays at the initial pose."""
-        still = {
-            "angle": np.array(resolved.plant.initial_rad),
-            "rate": np.zeros(3),
-            "current": np.zeros(self.channel.groups),
-            "temperature": resolved.drive.ambient_degC,
-        }
-
-        def measure(command: Values) -> Values:
-            number = command.get("sequence")
-            return {"sequence": number, "echo": number, "session": command.get("session"), **still}
-
-        channel, peer = self.channel.stand_in(measure)
-        link = Link(
-            channel,
-            self.name,
-            self._settings,
-            self._limits,
-            deepcopy(self._heat),
-            self._period_s,
-            now=peer.now,
-        )
+        channel, peer = still_machine(self.channel, resolved)
+        settings, limits, heat = self._settings, self._limits, deepcopy(self._heat)
+        link = Link(channel, self.name, settings, limits, heat, self._period_s, now=peer.now)
         link._shadow = self._shadow and self._shadow.new()
         link._plausibility = self._plausibility and self._plausibility.unlimited()
         return link
@@ -304,7 +286,9 @@ class Link(ExternalPlant):
         if not self._is_new:
             self.channel.counts.late += 1
             self.late_ticks.add(round(t_s / self._period_s) + 1)
-        self._raise_authority(t_s + self._period_s)
+        if self._settings.armed:
+            ramp_s, next_s = self._settings.ramp_s, t_s + self._period_s
+            self.authority = 1.0 if next_s >= ramp_s else next_s / ramp_s
         measurement = measurement_of(self._newest)
         if not self._reason:
             reported = measurement.temperature_degC
@@ -347,12 +331,6 @@ class Link(ExternalPlant):
             return Reason.MEASUREMENT
         return self._limits.exceeded(measurement, temperature_degC)
 
-    def _raise_authority(self, t_s: float) -> None:
-        """Set the share of the commands of the tick at a time."""
-        if self._settings.armed:
-            ramp_s = self._settings.ramp_s
-            self.authority = 1.0 if t_s >= ramp_s else t_s / ramp_s
-
     def _send(self, flags: Flags, t_s: float, current_A: Array | None) -> None:
         self._sequence = (self._sequence + 1) % self.channel.modulus
         self._sent_s[self._sequence] = self._now()
@@ -361,15 +339,9 @@ class Link(ExternalPlant):
         if flags & Flags.HELLO:
             self._admission.request(self._sequence)
             session = self._admission.key
-        self._values = {
-            "sequence": self._sequence,
-            "session": session,
-            "flags": flags,
-            "time": t_s,
-            "current": current_A,
-        }
-        if current_A is None:
-            self._values["current"] = np.zeros(self.channel.groups)
+        current_A = np.zeros(self.channel.groups) if current_A is None else current_A
+        self._values: Values = {"sequence": self._sequence, "session": session, "flags": flags, "time": t_s}
+        self._values["current"] = current_A
         self.channel.send(self._values)
 
     def _receive(self, timeout_s: float) -> bool:

@@ -4,20 +4,18 @@ from __future__ import annotations
 
 import time
 from collections import deque
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from spheretwin.loop.external import ExternalController, Measurement
 from spheretwin.machine.link.admission import MachineAdmission
-from spheretwin.machine.link.channel import Channel
+from spheretwin.machine.link.channel import FrameChannel
 from spheretwin.machine.link.codec import Values
 from spheretwin.machine.link.frame_format import Flags
 from spheretwin.machine.link.timing import Distribution
-
-Array = NDArray[np.float64]
+from spheretwin.models.base.arrays import Array
 
 POLL_s = 0.1
 """Time between two checks for a stop."""
@@ -35,7 +33,7 @@ class MachineServer(ExternalController):
 
     Parameters
     ----------
-    channel : Channel
+    channel : FrameChannel
         Sends measurements, receives commands.
     name : str
         Entry of the journal.
@@ -66,7 +64,7 @@ class MachineServer(ExternalController):
 
     def __init__(
         self,
-        channel: Channel,
+        channel: FrameChannel,
         name: str,
         groups: int,
         period_s: float,
@@ -81,12 +79,8 @@ class MachineServer(ExternalController):
         self.channel, self.name, self.ending = channel, name, ""
         self.jitter, self.turnaround = Distribution(), Distribution()
         self._groups, self._period_s, self.real_time = groups, period_s, real_time
-        self._timeout_s, self._idle_s, self._stop_requested, self._now = (
-            timeout_s,
-            idle_s,
-            stop_requested,
-            now,
-        )
+        self._timeout_s, self._idle_s = timeout_s, idle_s
+        self._stop_requested, self._now = stop_requested, now
         self._admission = MachineAdmission(now, authenticated=authenticated)
         channel.admit_by(self._admission)
         self._pending: deque[Values] = deque()
@@ -94,7 +88,7 @@ class MachineServer(ExternalController):
         self._echo: int | None = None
         self._applied = np.zeros(groups)
         self._flags = Flags(0)
-        self._reply: Mapping[str, Any] = {}
+        self._reply: dict[str, Any] = {}
         self._start_s: float | None = None
         self._sent_s: float | None = None
         self._arrival_s = 0.0
@@ -113,13 +107,8 @@ class MachineServer(ExternalController):
 
     def command(self, t_s: float, measurement: Measurement) -> Array | None:
         """Return the currents for a measurement; None at the end of the run."""
-        self._sequence += 1
         self._reply = {
-            "sequence": self._sequence,
-            "echo": self._echo,
-            "session": self._admission.session,
-            "flags": self._flags,
-            "time": t_s,
+            **self._head(t_s),
             "angle": measurement.angle_rad,
             "rate": measurement.rate_rad_s,
             "current": measurement.current_A,
@@ -131,28 +120,29 @@ class MachineServer(ExternalController):
 
     def finish(self, t_s: float, angle_rad: Array) -> None:
         """Send the last measurement, with `Flags.END`."""
-        self._sequence += 1
-        flags = self._flags | Flags.END
-        self._reply = {
-            **self._reply,
-            "sequence": self._sequence,
-            "echo": self._echo,
-            "session": self._admission.session,
-            "flags": flags,
-            "time": t_s,
-            "angle": angle_rad,
-        }
+        self._reply = {**self._reply, **self._head(t_s), "angle": angle_rad}
+        self._reply["flags"] |= Flags.END
         self._send_reply()
 
     def figures(self) -> dict[str, Any]:
         """Return counts of frames and distributions of times."""
-        jitter = {"jitter": self.jitter.figures()} if self.real_time else {}
-        refused = {"refused_senders": dict(self.channel.transport.refused)}
         return {
             "frames": self.channel.figures(),
-            **refused,
+            "refused_senders": dict(self.channel.transport.refused),
             "turnaround": self.turnaround.figures(),
-            **jitter,
+            **({"jitter": self.jitter.figures()} if self.real_time else {}),
+        }
+
+    def _head(self, t_s: float) -> dict[str, Any]:
+        """Return the numbers and flags of the next measurement, and its time."""
+        self._sequence += 1
+        session, flags = self._admission.session, self._flags
+        return {
+            "sequence": self._sequence,
+            "echo": self._echo,
+            "session": session,
+            "flags": flags,
+            "time": t_s,
         }
 
     def _send_reply(self) -> None:

@@ -6,18 +6,16 @@ import math
 import sys
 
 import numpy as np
-from numpy.typing import NDArray
 
 from spheretwin.control.supervision.watchdog import Reason
-from spheretwin.machine.link.limits import Limits
+from spheretwin.machine.link.limits import MachineLimits
 from spheretwin.machine.link.stream import RunningShadow
 from spheretwin.machine.model import model_of
 from spheretwin.machine.state_estimation import Shadow
+from spheretwin.models.base.arrays import Array
 from spheretwin.models.telemetry.table import Table
 from spheretwin.scenario.plant_sections import ResolvedNominal
 from spheretwin.scenario.sections import ResolvedScenario, Scenario
-
-Array = NDArray[np.float64]
 
 UNLIKELY = 1e-12
 """Probability of identical measurements of a healthy sensor at rest, below which they are a fault."""
@@ -127,7 +125,7 @@ class Plausibility:
         self._missing = 0
 
     @classmethod
-    def of(cls, scenario: Scenario, resolved: ResolvedScenario, limits: Limits) -> Plausibility:
+    def of(cls, scenario: Scenario, resolved: ResolvedScenario, limits: MachineLimits) -> Plausibility:
         """Return the checks of the machine of a scenario."""
         model = model_of(scenario)
         shadow = Shadow(model._replace(noise_rad=np.maximum(model.noise_rad, LEAST_NOISE_rad)))

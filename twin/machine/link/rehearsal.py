@@ -9,8 +9,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 
+import numpy as np
+
+from spheretwin.machine.link.channel import FrameChannel
+from spheretwin.machine.link.codec import Values
+from spheretwin.machine.link.transports import StandIn
 from spheretwin.models.telemetry.status import Status
 from spheretwin.models.telemetry.table import Table
+from spheretwin.scenario.sections import ResolvedScenario
 from spheretwin.session import Session
 from spheretwin.simulation import Sink, follow
 
@@ -26,6 +32,22 @@ def rehearse(session: Session, sinks: Sequence[Sink]) -> None:
         if not session.ended:
             session.set(event.set, event.value)
             session.advance(1)
+
+
+def still_machine(channel: FrameChannel, scenario: ResolvedScenario) -> tuple[FrameChannel, StandIn]:
+    """Return a channel to a stand-in of the machine that stays at the initial pose, and the stand-in."""
+    still = {
+        "angle": np.array(scenario.plant.initial_rad),
+        "rate": np.zeros(3),
+        "current": np.zeros(channel.groups),
+        "temperature": scenario.drive.ambient_degC,
+    }
+
+    def measure(command: Values) -> Values:
+        number = command.get("sequence")
+        return {"sequence": number, "echo": number, "session": command.get("session"), **still}
+
+    return channel.stand_in(measure)
 
 
 class FileThread:

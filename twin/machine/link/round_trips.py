@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from spheretwin.machine.link.admission import Admission, new_session
-from spheretwin.machine.link.channel import Channel
+from spheretwin.machine.link.channel import FrameChannel
 from spheretwin.machine.link.frame_format import Flags
 from spheretwin.machine.link.timing import Distribution
 from spheretwin.models.base.errors import InputError, SpheretwinError
@@ -53,7 +53,7 @@ class RateResult(NamedTuple):
 
 
 def measure_link(
-    channel: Channel,
+    channel: FrameChannel,
     rates_Hz: Sequence[float] = RATES_Hz,
     seconds: float = 5.0,
     *,
@@ -91,7 +91,7 @@ def measure_link(
 class _Test:
     """Requests over a channel, numbered on from rate to rate."""
 
-    def __init__(self, channel: Channel, now: Callable[[], float]) -> None:
+    def __init__(self, channel: FrameChannel, now: Callable[[], float]) -> None:
         self._channel, self._now = channel, now
         self._session, self._sequence = new_session(), 0
         self._current_A = np.zeros(channel.groups)

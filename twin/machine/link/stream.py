@@ -7,21 +7,19 @@ from collections.abc import Callable, Iterator
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from spheretwin.machine.link import frame_format
 from spheretwin.machine.link.admission import StreamAdmission
-from spheretwin.machine.link.channel import Channel
+from spheretwin.machine.link.channel import FrameChannel
 from spheretwin.machine.link.codec import Values
 from spheretwin.machine.link.frame_format import DEFAULT_FRAME, Flags
 from spheretwin.machine.link.transports import open_transport
 from spheretwin.machine.log import COMMANDED, MEASURED, Log
 from spheretwin.machine.state_estimation import Shadow
+from spheretwin.models.base.arrays import Array
 from spheretwin.models.base.errors import InputError, SpheretwinError
 from spheretwin.models.telemetry.table import Table
 from spheretwin.simulation import sleep_until
-
-Array = NDArray[np.float64]
 
 ADDRESSES = ("udp://", "serial:")
 """Beginnings of addresses; ``-`` is standard input."""
@@ -74,7 +72,7 @@ def streamed(
     format_, kind = description.measurement, currents or description.currents or MEASURED
     if lacking := [name for name in ("time", "angle", "current") if not format_.has(name)]:
         raise InputError(f"frame {frame}: expected measurements with {', '.join(lacking)}, received none")
-    channel = Channel(open_transport(address, listening=True), format_, format_, groups, key=key)
+    channel = FrameChannel(open_transport(address, listening=True), format_, format_, groups, key=key)
     if key:
         channel.admit_by(StreamAdmission())
     frames: list[Values] = []

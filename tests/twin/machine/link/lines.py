@@ -6,13 +6,13 @@ import numpy as np
 
 from spheretwin.electronics.drive_section import ResolvedDrive
 from spheretwin.machine.link import frame_format
-from spheretwin.machine.link.channel import Channel
+from spheretwin.machine.link.channel import FrameChannel
 from spheretwin.machine.link.codec import Codec
-from spheretwin.machine.link.limits import CoilHeat, Limits
+from spheretwin.machine.link.limits import CoilHeat, MachineLimits
 from spheretwin.machine.link.transports import Transport
 
 GROUPS, PERIOD_s = 18, 1e-3
-OWN, LIMITS = frame_format.load("spheretwin"), Limits(current_A=8.0)
+OWN, LIMITS = frame_format.load("spheretwin"), MachineLimits(current_A=8.0)
 
 
 class Line(Transport):
@@ -67,11 +67,11 @@ class Script(Transport):
 
 def machine_channel(transport, frames=OWN):
     """The channel of a machine."""
-    return Channel(transport, frames.measurement, frames.command, GROUPS)
+    return FrameChannel(transport, frames.measurement, frames.command, GROUPS)
 
 
 def controller_channel(transport, frames=OWN, report=None):
-    return Channel(transport, frames.command, frames.measurement, GROUPS, report)
+    return FrameChannel(transport, frames.command, frames.measurement, GROUPS, report)
 
 
 MEASUREMENT, COMMAND = Codec(OWN.measurement, GROUPS), Codec(OWN.command, GROUPS)

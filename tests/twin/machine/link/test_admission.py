@@ -13,7 +13,7 @@ from spheretwin.machine.link.admission import (
     SILENCE_s,
     read_key,
 )
-from spheretwin.machine.link.channel import Channel
+from spheretwin.machine.link.channel import FrameChannel
 from spheretwin.machine.link.codec import HMAC_BYTES, Codec
 from spheretwin.machine.link.frame_format import Flags
 from spheretwin.machine.link.limits import LinkSettings
@@ -131,12 +131,12 @@ def peers(own_key=b"", their_key=b""):
     sent = []
     ours = Script(lambda content: (sent.append(content), theirs.plan(content)))
     theirs = Script(ours.plan)
-    channel = Channel(theirs, OWN.measurement, OWN.command, GROUPS, key=their_key)
+    channel = FrameChannel(theirs, OWN.measurement, OWN.command, GROUPS, key=their_key)
     server = MachineServer(
         channel, "test", GROUPS, PERIOD_s, authenticated=bool(their_key), idle_s=0.5, now=theirs.now
     )
     link = Link(
-        Channel(ours, OWN.command, OWN.measurement, GROUPS, key=own_key),
+        FrameChannel(ours, OWN.command, OWN.measurement, GROUPS, key=own_key),
         "test", LinkSettings(armed=True, ramp_s=0.0), LIMITS, lines.heat(), PERIOD_s, now=ours.now,
     )  # fmt: skip
     return link, server, sent
@@ -188,7 +188,7 @@ def test_one_changed_bit_breaks_the_authentication(name):
 def test_frames_without_a_session_are_not_authenticated():
     frames = frame_format.load("ventusff_pose").measurement
     with pytest.raises(InputError, match="expected frames with the field session"):
-        Channel(Script(), frames, frames, GROUPS, key=KEY)
+        FrameChannel(Script(), frames, frames, GROUPS, key=KEY)
 
 
 def test_a_key_is_read_from_a_file(tmp_path):

@@ -5,7 +5,7 @@ import pytest
 
 from spheretwin.control.supervision.watchdog import Reason
 from spheretwin.machine.link.frame_format import Flags
-from spheretwin.machine.link.limits import Limits, LinkSettings
+from spheretwin.machine.link.limits import LinkSettings, MachineLimits
 from spheretwin.machine.link.machine_link import Link
 from spheretwin.machine.link.timing import QUANTILES
 from spheretwin.models.base.errors import SpheretwinError
@@ -126,7 +126,7 @@ LIMIT_CASES = [
 @MODES
 @pytest.mark.parametrize(("values", "limits", "reason"), LIMIT_CASES)
 def test_each_limit_removes_the_currents_beyond_it(machine, values, limits, reason, lockstep):
-    link = linked(machine, limits=Limits(**{"current_A": 8.0, **limits}), lockstep=lockstep)
+    link = linked(machine, limits=MachineLimits(**{"current_A": 8.0, **limits}), lockstep=lockstep)
     assert reasons(link, 2) == [Reason.NONE] * 2
     machine.values = values
     answer, result = link.advance(2 * PERIOD_s, ONES)
@@ -141,7 +141,7 @@ def test_each_limit_removes_the_currents_beyond_it(machine, values, limits, reas
 def test_a_machine_without_a_thermometer_has_an_estimate(machine):
     # 6 A in 1.3 ohm heat 60 J/K by 46.8 W: 20 K above the ambient with a loss of 1 W per 4 K are
     # reached after t = -4·60 ln(1 - 20/(4·46.8)) s.
-    limits = Limits(current_A=8.0, temperature_degC=40.0)
+    limits = MachineLimits(current_A=8.0, temperature_degC=40.0)
     coil = lines.heat(limits)
     hot = next(tick for tick in range(30_000) if coil.advance(6 * ONES) > 40.0)
     exact_s = -240.0 * np.log(1 - 20.0 / (4 * 1.3 * 6.0**2))

@@ -5,7 +5,7 @@ import pytest
 
 from spheretwin import scenario as scenarios
 from spheretwin.control.supervision.watchdog import Reason
-from spheretwin.machine.link.limits import Limits
+from spheretwin.machine.link.limits import MachineLimits
 from spheretwin.machine.link.plausibility import MOST_MISSING, FrozenAngles, MotionCheck, Plausibility
 from spheretwin.machine.state_estimation import Shadow, signals
 from spheretwin.models.telemetry.table import Table
@@ -82,7 +82,7 @@ def test_chi2_is_the_largest_mean_square(prototype, rows, expected):
 def test_a_motion_without_a_cause_contradicts_the_model():
     """The rotor rests, then turns by 0.1 rad in a millisecond without currents: a hundred times the noise."""
     scenario = scenarios.load("hold")
-    limits = Limits(current_A=1.0)
+    limits = MachineLimits(current_A=1.0)
     check = Plausibility.of(scenario, resolved(), limits)
     rehearsed = check.unlimited()
     reasons = [
@@ -98,7 +98,7 @@ def test_a_motion_without_a_cause_contradicts_the_model():
 
 def jump_after(ticks, **flags):
     """Reasons for a rotor that is elsewhere after `ticks` without a measurement, or after a pause."""
-    check = Plausibility.of(scenarios.load("hold"), resolved(), Limits(current_A=1.0))
+    check = Plausibility.of(scenarios.load("hold"), resolved(), MachineLimits(current_A=1.0))
     found = [check.advance(1e-3 * tick, NO_CURRENT, STILL) for tick in range(40)]
     found += [check.advance(1e-3 * tick, NO_CURRENT, np.full(3, np.nan)) for tick in range(40, 40 + ticks)]
     found.append(check.advance(1e-3 * (40 + ticks), NO_CURRENT, STILL + 0.1, **flags))
@@ -116,7 +116,7 @@ def test_a_missing_measurement_is_not_frozen(prototype):
     check = Plausibility.of(
         scenarios.load("hold", {"hardware": "prototype"}),
         prototype,
-        Limits(current_A=1.0, frozen_ticks=6),
+        MachineLimits(current_A=1.0, frozen_ticks=6),
     )
     missing = np.full(3, np.nan)
     assert [check.advance(1e-3 * tick, NO_CURRENT, missing) for tick in range(5)] == [Reason.NONE] * 5

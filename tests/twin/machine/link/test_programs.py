@@ -12,7 +12,7 @@ import pytest
 from spheretwin import cli, machine, simulation
 from spheretwin.bench import Bench
 from spheretwin.machine.link import frame_format
-from spheretwin.machine.link.channel import Channel
+from spheretwin.machine.link.channel import FrameChannel
 from spheretwin.machine.link.frame_format import Flags
 from spheretwin.machine.link.transports import open_transport
 from spheretwin.models.telemetry.table import read_parquet
@@ -208,7 +208,7 @@ def test_the_link_to_the_firmware_is_measured(firmware, capsys):
         code = cli.main(["link", "test", address, "--frame", frame, "--seconds", "0.1", "--json"])
         frames = frame_format.load(frame)
         with contextlib.closing(open_transport(address)) as transport:
-            channel = Channel(transport, frames.command, frames.measurement, 18)
+            channel = FrameChannel(transport, frames.command, frames.measurement, 18)
             channel.send({"sequence": 9999, "flags": Flags.HELLO, "current": np.zeros(18)})
             while not (found := channel.receive(UNLIMITED_S)):
                 pass

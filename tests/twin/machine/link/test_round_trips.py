@@ -4,7 +4,7 @@ import pytest
 
 from spheretwin.cli.link import lines_of
 from spheretwin.machine.link import frame_format
-from spheretwin.machine.link.channel import Channel
+from spheretwin.machine.link.channel import FrameChannel
 from spheretwin.machine.link.frame_format import Flags
 from spheretwin.machine.link.round_trips import EDGES_ms, measure_link
 from spheretwin.models.base.errors import InputError, SpheretwinError
@@ -105,4 +105,4 @@ def test_a_stop_ends_the_test():
 def test_frames_without_echo_are_refused():
     pose = frame_format.load("ventusff_pose").measurement
     with pytest.raises(InputError, match="expected frames with the fields flags and echo"):
-        measure_link(Channel(Script(), pose, pose, GROUPS))
+        measure_link(FrameChannel(Script(), pose, pose, GROUPS))
