@@ -24,32 +24,20 @@ if TYPE_CHECKING:
     from spheretwin.machine.verdict import check
     from spheretwin.machine.watching import Alarm, Watch, WatchSettings
 
-_MODULES = {
-    "Alarm": "spheretwin.machine.watching",
-    "Design": "spheretwin.machine.excitation",
-    "DesignSettings": "spheretwin.machine.excitation",
-    "Identified": "spheretwin.machine.identification",
-    "IdentifySettings": "spheretwin.machine.identification",
-    "Link": "spheretwin.machine.link.machine_link",
-    "Log": "spheretwin.machine.log",
-    "Model": "spheretwin.machine.model",
-    "NoiseFit": "spheretwin.machine.noise_fit",
-    "Shadow": "spheretwin.machine.state_estimation",
-    "ShadowSettings": "spheretwin.machine.state_estimation",
-    "Shadowed": "spheretwin.machine.state_estimation",
-    "Validation": "spheretwin.machine.validation",
-    "Watch": "spheretwin.machine.watching",
-    "WatchSettings": "spheretwin.machine.watching",
-    "check": "spheretwin.machine.verdict",
-    "design": "spheretwin.machine.excitation",
-    "fit_noise": "spheretwin.machine.noise_fit",
-    "identify": "spheretwin.machine.identification",
-    "model_of": "spheretwin.machine.model",
-    "read": "spheretwin.machine.files",
-    "shadow": "spheretwin.machine.state_estimation",
-    "validate": "spheretwin.machine.validation",
-    "write": "spheretwin.machine.files",
+_NAMES = {
+    "excitation": ("Design", "DesignSettings", "design"),
+    "files": ("read", "write"),
+    "identification": ("Identified", "IdentifySettings", "identify"),
+    "link.machine_link": ("Link",),
+    "log": ("Log",),
+    "model": ("Model", "model_of"),
+    "noise_fit": ("NoiseFit", "fit_noise"),
+    "state_estimation": ("Shadow", "ShadowSettings", "Shadowed", "shadow"),
+    "validation": ("Validation", "validate"),
+    "verdict": ("check",),
+    "watching": ("Alarm", "Watch", "WatchSettings"),
 }
+_MODULES = {name: f"{__name__}.{module}" for module, names in _NAMES.items() for name in names}
 
 __all__ = [
     "Alarm", "Design", "DesignSettings", "Identified", "IdentifySettings", "Link", "Log", "Model", "NoiseFit",

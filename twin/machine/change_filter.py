@@ -9,17 +9,14 @@ residuals of unit variance.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from math import ceil
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from spheretwin.machine.parameters import Machine, Parameter, sensor_angles
-from spheretwin.machine.windows import START_STEP, STEP_SHARE, LONGEST_STEP_s, Window, angle_deviation
+from spheretwin.machine.parameters import Machine, Parameter
+from spheretwin.machine.windows import START_STEP, STEP_SHARE, Window, angle_deviation, comparable_angles
+from spheretwin.models.base.arrays import Array, Booleans, Integers
 from spheretwin.plant.plants import Plants
-
-Array = NDArray[np.float64]
 
 BLOCK_s = 0.01
 
@@ -27,29 +24,29 @@ MEMORY_s = 100.0
 """Time within which errors of the twin may drift by their tolerated size."""
 
 
-class Rows(NamedTuple):
+class BlockRows(NamedTuple):
     """Some rows of a log, with what was measured in them."""
 
     window: Window
     measured: Array
-    is_count: NDArray[np.bool_]
+    is_count: Booleans
 
-    def part(self, first: int, last: int) -> Rows:
+    def part(self, first: int, last: int) -> BlockRows:
         """Return some of these rows, counted from the first of them."""
         window = self.window._replace(first=self.window.first + first, rows=last - first)
-        return Rows(window, self.measured[first:last], self.is_count[first:last])
+        return BlockRows(window, self.measured[first:last], self.is_count[first:last])
 
-    def blocks(self) -> Iterator[Rows]:
+    def blocks(self) -> Iterator[BlockRows]:
         """Yield parts of the length of a block."""
         size = max(round(BLOCK_s / self.window.period_s), 1)
         for first in range(0, self.window.rows, size):
             yield self.part(first, min(first + size, self.window.rows))
 
 
-class Block(NamedTuple):
+class LinearBlock(NamedTuple):
     """Block of a log, linear in the errors of the state (6) and of the parameters (p)."""
 
-    rows: Rows
+    rows: BlockRows
     start: Array
     """(6,) state about which it is linear: angles and rates."""
     t_s: Array
@@ -59,9 +56,9 @@ class Block(NamedTuple):
     """(m,) measured minus computed angles over their deviation, of those that were measured."""
     slopes: Array
     """(m, 6 + p) of the computed angles over their deviation."""
-    row: NDArray[np.int64]
+    row: Integers
     """(m,) row of each."""
-    half: NDArray[np.bool_]
+    half: Booleans
     """(m,) True for the mean of two rows."""
     log_deviation: float
     """Sum of the logarithms of the deviations."""
@@ -76,7 +73,7 @@ class Block(NamedTuple):
         return self.period_s * len(self.t_s)
 
 
-class Estimate(NamedTuple):
+class FilterEstimate(NamedTuple):
     """Estimate of the filter; its arrays are not changed in place."""
 
     state: Array
@@ -87,10 +84,10 @@ class Estimate(NamedTuple):
     """(6 + p, 6 + p)"""
 
 
-class Step(NamedTuple):
+class FilterStep(NamedTuple):
     """Block after the filter has used it."""
 
-    block: Block
+    block: LinearBlock
     whitened: Array
     """(m,) residuals of unit variance."""
     cost: float
@@ -99,7 +96,7 @@ class Step(NamedTuple):
     """(m, m) inverse of the root of the covariance."""
     gain: Array
     """(6 + p, m) of the filter."""
-    before: Estimate
+    before: FilterEstimate
 
     @property
     def squares(self) -> float:
@@ -129,24 +126,25 @@ class Linearisation:
         setup, *others = [machine.setup(parameters, point) for point in [values, *(values + np.diag(steps))]]
         self._setups = [setup] * 7 + others
         self._plants = Plants([setup.plant for setup in self._setups])
-        self._counted = machine.model.half_count_rad > 0
         self._scale = np.concatenate([START_STEP, steps])
 
     def changed(self, change: Array) -> Linearisation:
         """Return that of the machine with a change (p,) of the parameters."""
         return Linearisation(self._machine, self._parameters, self._values + change, self.variance)
 
-    def block(self, rows: Rows, state: Array) -> Block:
+    def block(self, rows: BlockRows, state: Array) -> LinearBlock:
         """Return some rows from a state before them."""
         window, used = rows.window, np.isfinite(rows.measured)
-        path, ends = self._paths(window, state)
-        computed = np.where(self._counted, 0.5 * (path[1:] + path[:-1]), path[1:])
-        turned_rad = np.abs(np.diff(path[:, 0], axis=0))
+        starts = np.tile(state, (len(self._setups), 1))
+        starts[1:7] += np.diag(START_STEP)
+        path = window.reported_angles(self._setups, self._plants, starts)
+        ends = np.hstack([self._plants.q_rad, self._plants.qdot_rad_s])
+        turned_rad = np.abs(np.diff(path[0], axis=0))
         deviation_rad = angle_deviation(self._machine.model, turned_rad, rows.is_count)[used]
         deviation_rad *= np.sqrt(self.variance)
         row, hinge = np.nonzero(used)
-        angles_rad = computed[row, :, hinge]
-        return Block(
+        angles_rad = comparable_angles(self._machine.model, path)[:, row, hinge].T.copy()
+        return LinearBlock(
             rows,
             state,
             window.log.t_s[window.first + 1 : window.first + window.rows + 1],
@@ -154,29 +152,11 @@ class Linearisation:
             (rows.measured[used] - angles_rad[:, 0]) / deviation_rad,
             (angles_rad[:, 1:] - angles_rad[:, :1]) / self._scale / deviation_rad[:, None],
             row,
-            self._counted[hinge],
+            self._machine.model.half_count_rad[hinge] > 0,
             float(np.sum(np.log(deviation_rad))),
             ends[0],
             ((ends[1:] - ends[0]) / self._scale[:, None]).T,
         )
-
-    def _paths(self, window: Window, state: Array) -> tuple[Array, Array]:
-        """Return what the sensors report of each plant (rows + 1, plants, 3), and the states at the end."""
-        starts = np.tile(state, (len(self._setups), 1))
-        starts[1:7] += np.diag(START_STEP)
-        times = [(setup.delay_s, setup.lag_s) for setup in self._setups]
-        means = {time: window.currents(*time) for time in set(times)}
-        offsets_A = [setup.current_offset_A for setup in self._setups]
-        currents_A = [means[time] + offset_A for time, offset_A in zip(times, offsets_A, strict=True)]
-        self._plants.set_state(starts[:, :3], starts[:, 3:])
-        steps = ceil(window.period_s / LONGEST_STEP_s - 0.05)
-        angles_rad = self._plants.roll_out(
-            np.stack(currents_A, axis=1), np.zeros(3), window.period_s / steps, steps
-        )
-        path = np.concatenate([starts[None, :, :3], angles_rad])
-        first = window.log.angle_rad[window.first]
-        reported = [sensor_angles(setup, path[:, lane], first) for lane, setup in enumerate(self._setups)]
-        return np.stack(reported, axis=1), np.hstack([self._plants.q_rad, self._plants.qdot_rad_s])
 
 
 class ChangeFilter:
@@ -190,7 +170,7 @@ class ChangeFilter:
         Places of the torques on the hinges among the parameters.
     torque_noise_Nm_s : float
         White torque on each hinge, root of its density, N·m·√s.
-    estimate : Estimate, optional
+    estimate : FilterEstimate, optional
         Unless given, the state is awaited (`start`).
     """
 
@@ -199,13 +179,13 @@ class ChangeFilter:
         tolerated: Array,
         loads: Sequence[int],
         torque_noise_Nm_s: float,
-        estimate: Estimate | None = None,
+        estimate: FilterEstimate | None = None,
     ) -> None:
         self._tolerated, self._loads, self.torque_noise_Nm_s = tolerated, np.array(loads), torque_noise_Nm_s
         size = 6 + len(tolerated)
-        self.estimate = estimate or Estimate(np.zeros(6), np.zeros(size - 6), np.zeros((size, size)))
+        self.estimate = estimate or FilterEstimate(np.zeros(6), np.zeros(size - 6), np.zeros((size, size)))
 
-    def copy(self, estimate: Estimate) -> ChangeFilter:
+    def copy(self, estimate: FilterEstimate) -> ChangeFilter:
         """Return a filter like this one that goes on from an estimate."""
         return ChangeFilter(self._tolerated, self._loads.tolist(), self.torque_noise_Nm_s, estimate)
 
@@ -216,9 +196,9 @@ class ChangeFilter:
         known[:6, :6] = covariance
         places = 6 + np.arange(len(self._tolerated))
         known[places, places] = np.maximum(known[places, places], self._tolerated**2)
-        self.estimate = Estimate(state.copy(), self.estimate.errors, known)
+        self.estimate = FilterEstimate(state.copy(), self.estimate.errors, known)
 
-    def advance(self, block: Block) -> Step:
+    def advance(self, block: LinearBlock) -> FilterStep:
         """Use the next block."""
         before, P, C = self.estimate, self.estimate.covariance, block.slopes
         noise, keep = self.torque_noise_Nm_s**2 / block.length_s, remembered(block.length_s)
@@ -238,14 +218,16 @@ class ChangeFilter:
         places = np.arange(6, len(P))
         P[places, places] += (1 - keep**2) * self._tolerated**2
         move = gain @ innovation
-        self.estimate = Estimate(
+        self.estimate = FilterEstimate(
             block.reached + block.transition @ error + move[:6],
             keep * before.errors + move[6:],
             0.5 * (P + P.T),
         )
         whitened = whitener @ innovation
         log_root = block.log_deviation - float(np.sum(np.log(np.diag(whitener))))
-        return Step(block, whitened, 0.5 * float(whitened @ whitened) + log_root, whitener, gain, before)
+        return FilterStep(
+            block, whitened, 0.5 * float(whitened @ whitened) + log_root, whitener, gain, before
+        )
 
 
 def remembered(length_s: float) -> float:

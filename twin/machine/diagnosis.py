@@ -14,11 +14,11 @@ from itertools import permutations, product
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from spheretwin.machine import group_order
 from spheretwin.machine.group_order import Assignment
-from spheretwin.machine.torque_balance import Motion, TorqueBalance, effective_windows, fit
+from spheretwin.machine.torque_balance import Motion, TorqueBalance, effective_windows, unexplained_share
+from spheretwin.models.base.arrays import Array
 
 MARGIN = 4.0
 """Factor by which another reading must reduce the unexplained share of the torque."""
@@ -189,16 +189,16 @@ class Diagnosis:
             self._motions[key] = self._balance.motion(*key)
         return self._motions[key]
 
-    def _currents(self, reading: Reading) -> NDArray[np.float64]:
+    def _currents(self, reading: Reading) -> Array:
         currents = reading.current_factor * self._balance.currents(reading.offset_s)
         return currents @ reading.groups.matrix().T
 
-    def _applied(self, reading: Reading) -> NDArray[np.float64]:
+    def _applied(self, reading: Reading) -> Array:
         return self._balance.applied(self._motion(reading), self._currents(reading))
 
     def _share(self, reading: Reading) -> float:
         order, signs, groups, *others = reading
         key = order, signs, *map(tuple, groups), *others
         if key not in self._shares:
-            self._shares[key] = fit(self._motion(reading), self._applied(reading)).unexplained
+            self._shares[key] = unexplained_share(self._motion(reading), self._applied(reading))
         return self._shares[key]

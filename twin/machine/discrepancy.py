@@ -12,16 +12,15 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from spheretwin.machine.parameters import KINDS, Kind, Parameter, members
-from spheretwin.machine.windows import Shooting
+from spheretwin.machine.parameters import KINDS, Parameter, ParameterKind, members
+from spheretwin.machine.windows import Shooting, normal_equations
+from spheretwin.models.base.arrays import Array
 from spheretwin.models.base.errors import InputError
 
 if TYPE_CHECKING:
     from spheretwin.machine.identification import Problem
 
-Array = NDArray[np.float64]
 
 CREDIBLE, SHARE = 1.0, 0.6
 """Rise of the log likelihood from which a component counts, and the share of the largest that widens."""
@@ -32,7 +31,7 @@ _DEVIATIONS = np.exp(np.linspace(-12.0, 4.0, 161))
 _LEFT = 1e-5
 
 
-class Component(NamedTuple):
+class VarianceComponent(NamedTuple):
     """A kind of parameter that is not varied, with the departures of its members that data suggest."""
 
     parameters: tuple[Parameter, ...]
@@ -62,7 +61,7 @@ class Suggestion(NamedTuple):
     unit: str
 
 
-def components(problem: Problem, values: Array) -> list[Component]:
+def components(problem: Problem, values: Array) -> list[VarianceComponent]:
     """Return the kinds of parameters that are not varied, at the best values of those that are.
 
     Parameters
@@ -78,10 +77,10 @@ def components(problem: Problem, values: Array) -> list[Component]:
         np.append(values, fixed), slopes=True
     )
     count = len(values)
-    information = np.sum([part.information for part in parts], axis=0)
-    gradient = np.sum([part.gradient for part in parts], axis=0)
+    information, gradient = normal_equations(parts)
     weights = problem.deviations**-2
-    slopes = -np.linalg.solve(information[:count, :count] + np.diag(weights), information[:count, count:])
+    known = information[:count, :count] + np.diag(weights)
+    slopes = -np.asarray(np.linalg.solve(known, information[:count, count:]), np.float64)
     left = information[count:, count:] + information[count:, :count] @ slopes
     along = gradient[count:] + slopes.T @ (gradient[:count] + weights * (values - problem.initial))
     alone = np.diag(information)[count:]
@@ -94,12 +93,14 @@ def components(problem: Problem, values: Array) -> list[Component]:
             inner = block + np.eye(len(place)) / max(deviation, 1e-9 * kind.size) ** 2
             departures = -np.linalg.solve(inner, along[place])
             found.append(
-                Component(tuple(parameters), fixed[place], deviation, gain, departures, slopes[:, place])
+                VarianceComponent(
+                    tuple(parameters), fixed[place], deviation, gain, departures, slopes[:, place]
+                )
             )
     return found
 
 
-def _members(problem: Problem, kind: Kind) -> list[Parameter]:
+def _members(problem: Problem, kind: ParameterKind) -> list[Parameter]:
     """Return the parameters of a kind that are not varied, and are the same in all logs."""
     return [
         parameter
@@ -124,7 +125,7 @@ def _most_likely(gradient: Array, information: Array, size: float, least: float)
     return (float(deviations[best]), float(gains[best])) if gains[best] > 0 else (0.0, 0.0)
 
 
-def widening(found: Sequence[Component], covariance: Array) -> Array:
+def widening(found: Sequence[VarianceComponent], covariance: Array) -> Array:
     """Return the width of the interval of each parameter over that which noise alone gives, (p,).
 
     Of the components that explain most, that with the largest effect on a parameter counts.
@@ -138,7 +139,9 @@ def widening(found: Sequence[Component], covariance: Array) -> Array:
     return np.asarray(np.sqrt(1 + np.max([*effects, np.zeros(len(covariance))], axis=0)))
 
 
-def suggestions(problem: Problem, values: Array, found: Sequence[Component]) -> tuple[Suggestion, ...]:
+def suggestions(
+    problem: Problem, values: Array, found: Sequence[VarianceComponent]
+) -> tuple[Suggestion, ...]:
     """Return the kinds that improve the held-out windows, the best first; arguments as in `components`."""
     before = sum(part.squares for part in problem.held_out.parts(values, slopes=False))
     ranked = []

@@ -8,16 +8,14 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from spheretwin.machine.diagnosis import FEWEST_WINDOWS, MOST_UNEXPLAINED, Diagnosis
 from spheretwin.machine.log import COMMANDED, LARGEST, Log
 from spheretwin.machine.model import Model
 from spheretwin.machine.torque_balance import TorqueBalance
+from spheretwin.models.base.arrays import Array, Booleans
 from spheretwin.models.base.errors import InputError, did_you_mean
 from spheretwin.models.telemetry.joint_states import ANGLE_NAMES
-
-Array = NDArray[np.float64]
 
 ERROR, WARNING = "error", "warning"
 
@@ -33,7 +31,7 @@ MOST_PERIODS = 1e8  # from the first row to the last, with gaps: a day at 1 kHz
 AT_LIMIT, OVER_LIMIT, MOST_AT_LIMIT = 0.99, 1.01, 0.01
 
 
-class Finding(NamedTuple):
+class LogFinding(NamedTuple):
     """Finding of a check."""
 
     name: str
@@ -91,7 +89,7 @@ class Evidence:
         return Diagnosis(balance, self.model.delay_s if zero_order_hold else 0.0)
 
 
-def _complete(t_s: Array, values: Array) -> NDArray[np.bool_]:
+def _complete(t_s: Array, values: Array) -> Booleans:
     return np.isfinite(t_s) & np.all(np.isfinite(values), axis=1)
 
 
@@ -223,9 +221,7 @@ def _saturation(evidence: Evidence) -> Iterator[Stated]:
         yield (WARNING, where, "move slower or by smaller angles")
 
 
-def _axes(evidence: Evidence) -> Iterator[Stated]:
-    if (diagnosis := evidence.diagnosis) is None:
-        return
+def _axes(diagnosis: Diagnosis) -> Iterator[Stated]:
     order, signs = diagnosis.best.order, diagnosis.best.signs
     if (order, signs) != (diagnosis.logged.order, diagnosis.logged.signs):
         texts = [
@@ -238,9 +234,7 @@ def _axes(evidence: Evidence) -> Iterator[Stated]:
         yield (ERROR, "; ".join(texts), advice)
 
 
-def _groups(evidence: Evidence) -> Iterator[Stated]:
-    if (diagnosis := evidence.diagnosis) is None:
-        return
+def _groups(diagnosis: Diagnosis) -> Iterator[Stated]:
     order, signs = (values.tolist() for values in diagnosis.best.groups)
     wrong = [j for j, (column, sign) in enumerate(zip(order, signs, strict=True)) if (column, sign) != (j, 1)]
     if wrong:
@@ -249,18 +243,14 @@ def _groups(evidence: Evidence) -> Iterator[Stated]:
         yield (ERROR, f"group {', '.join(texts)}", advice)
 
 
-def _clock_offset(evidence: Evidence) -> Iterator[Stated]:
-    diagnosis = evidence.diagnosis
-    if diagnosis and diagnosis.best.offset_s != diagnosis.logged.offset_s:
+def _clock_offset(diagnosis: Diagnosis) -> Iterator[Stated]:
+    if diagnosis.best.offset_s != diagnosis.logged.offset_s:
         late_s = diagnosis.best.offset_s - diagnosis.logged.offset_s
         where = f"currents: {abs(late_s) * 1e3:.1f} ms {'before' if late_s > 0 else 'after'} the angles"
         yield (ERROR, where, "record both with one clock, or shift the times of one")
 
 
-def _excitation(evidence: Evidence) -> Iterator[Stated]:
-    diagnosis = evidence.diagnosis
-    if diagnosis is None:
-        return
+def _excitation(diagnosis: Diagnosis) -> Iterator[Stated]:
     if diagnosis.spread < FEWEST_WINDOWS:
         where = f"torque in {diagnosis.spread:.0f} independent windows, {FEWEST_WINDOWS} are the least"
         yield (ERROR, where, "move all axes for some seconds, such as by a multisine of 0.5 to 3 Hz")
@@ -272,9 +262,8 @@ def _excitation(evidence: Evidence) -> Iterator[Stated]:
             yield (WARNING, where, "move these axes, at 0.5 to 3 Hz and by several degrees")
 
 
-def _unverified(evidence: Evidence) -> Iterator[Stated]:
-    diagnosis = evidence.diagnosis
-    if diagnosis and diagnosis.decided:
+def _unverified(diagnosis: Diagnosis) -> Iterator[Stated]:
+    if diagnosis.decided:
         _, pairs = diagnosis.unverified_axes
         texts = [f"order of {ANGLE_NAMES[i]} and {ANGLE_NAMES[j]}" for i, j in pairs]
         if groups := diagnosis.unverified_groups():
@@ -284,9 +273,8 @@ def _unverified(evidence: Evidence) -> Iterator[Stated]:
             yield (WARNING, "; ".join(texts), advice)
 
 
-def _torque_balance(evidence: Evidence) -> Iterator[Stated]:
-    diagnosis = evidence.diagnosis
-    if diagnosis and diagnosis.spread >= FEWEST_WINDOWS and not diagnosis.decided:
+def _torque_balance(diagnosis: Diagnosis) -> Iterator[Stated]:
+    if diagnosis.spread >= FEWEST_WINDOWS and not diagnosis.decided:
         where = f"{diagnosis.unexplained:.2g} of the torque is unexplained, {MOST_UNEXPLAINED:g} is the most"
         advice = "check scenario, conditions and columns; record larger motions without external torques"
         yield (ERROR, where, advice)
@@ -302,6 +290,11 @@ def _largest_current(evidence: Evidence) -> float:
     return float(np.max(np.abs(np.nan_to_num(evidence.log.current_A)), initial=0.0))
 
 
+def _of(finding: Callable[[Diagnosis], Iterator[Stated]]) -> Callable[[Evidence], Iterator[Stated]]:
+    """Return a finding of the diagnosis as one of a log: nothing is found without a diagnosis."""
+    return lambda evidence: finding(evidence.diagnosis) if evidence.diagnosis else iter(())
+
+
 FINDINGS: Mapping[str, Callable[[Evidence], Iterator[Stated]]] = {
     "time-unit": _time_unit,
     "rate": _rate,
@@ -313,12 +306,12 @@ FINDINGS: Mapping[str, Callable[[Evidence], Iterator[Stated]]] = {
     "angle-unit": _angle_unit,
     "current-unit": _current_unit,
     "saturation": _saturation,
-    "axes": _axes,
-    "groups": _groups,
-    "clock-offset": _clock_offset,
-    "lack-of-excitation": _excitation,
-    "unverified": _unverified,
-    "torque-balance": _torque_balance,
+    "axes": _of(_axes),
+    "groups": _of(_groups),
+    "clock-offset": _of(_clock_offset),
+    "lack-of-excitation": _of(_excitation),
+    "unverified": _of(_unverified),
+    "torque-balance": _of(_torque_balance),
 }
 """Functions by the names of their findings, in the order of the report."""
 

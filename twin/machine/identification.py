@@ -3,27 +3,34 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from itertools import combinations, count
+from itertools import count
+from types import MappingProxyType
 from typing import Annotated, Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field
 from scipy.optimize import least_squares
 from scipy.stats import chi2
 
 from spheretwin.machine.discrepancy import Suggestion, components, suggestions, widening
-from spheretwin.machine.intervals import Cost, Uncertainty, interval
+from spheretwin.machine.intervals import LeastSquaresCost, Uncertainty, interval
 from spheretwin.machine.log import Log
 from spheretwin.machine.parameters import Machine, Parameter, priors, selected, short_names
-from spheretwin.machine.residuals import Fit, fit_of
+from spheretwin.machine.refusals import (
+    CORRELATED,
+    TELLING,
+    WORST,
+    Refusal,
+    correlation_sentences,
+    refusal_of,
+    unidentifiable,
+)
+from spheretwin.machine.residuals import ResidualFit, fit_of
 from spheretwin.machine.row_order import align_rows
 from spheretwin.machine.windows import Part, Shooting, Window, windows_of
+from spheretwin.models.base.arrays import Array
 from spheretwin.models.base.errors import InputError
 from spheretwin.scenario.fields import SettingsModel
-
-Array = NDArray[np.float64]
-
 
 _MOST_EVALUATIONS = 30
 
@@ -52,7 +59,7 @@ class IdentifySettings(SettingsModel):
     )
 
 
-class Estimate(NamedTuple):
+class IdentifiedValue(NamedTuple):
     """Value of a parameter."""
 
     value: float
@@ -63,35 +70,33 @@ class Estimate(NamedTuple):
     """Width of the interval over that which noise alone gives: what the model may lack widens it."""
 
 
-class Refusal(NamedTuple):
-    """Parameters that the data do not determine."""
-
-    parameters: tuple[str, ...]
-    why: str
-
-
 class Identified(NamedTuple):
     """Result of `identify`."""
 
     accepted: bool
-    parameters: dict[str, Estimate]
+    parameters: dict[str, IdentifiedValue]
     refused: tuple[Refusal, ...]
-    correlations: tuple[str, ...]
+    correlations: tuple[str, ...] = ()
     """Sentences on parameters that are nearly indistinguishable."""
-    train: Fit | None
-    held_out: Fit | None
-    held_out_before: Fit | None
-    improvement: float | None
+    train: ResidualFit | None = None
+    held_out: ResidualFit | None = None
+    held_out_before: ResidualFit | None = None
+    improvement: float | None = None
     """Relative decrease of the held-out error."""
-    reasons: tuple[str, ...]
-    """Why it is not accepted."""
-    covariance: Array | None
-    fields: dict[str, Any]
+    shortcomings: tuple[str, ...] = ()
+    """What the values lack to be accepted."""
+    covariance: Array | None = None
+    fields: Mapping[str, Any] = MappingProxyType({})
     """Fields of a scenario with the found values."""
     nothing_to_correct: bool = False
     """True if the values of the scenario do not differ from those found: the twin has these all the same."""
     suggestions: tuple[Suggestion, ...] = ()
     """Parameters that are not varied and would improve the held-out windows; empty unless requested."""
+
+    @property
+    def reasons(self) -> tuple[str, ...]:
+        """Why it is not accepted."""
+        return (*(one.why for one in self.refused), *self.shortcomings)
 
     @property
     def uncertainty(self) -> Uncertainty | None:
@@ -132,25 +137,13 @@ def identify(
     settings = settings or IdentifySettings()
     logs = [logs] if isinstance(logs, Log) else list(logs)
     problem = Problem(logs, scenario, parameters, changes or {}, settings)
-    refused = problem.refusals(problem.initial)
-    if refused:
-        return _refused(refused)
+    if refused := problem.refusals(problem.initial):
+        return Identified(False, {}, refused)
     values, information, train = problem.solve(report)
-    refused = problem.refusals(values)
-    if refused:
-        return _refused(refused)
+    if refused := problem.refusals(values):
+        return Identified(False, {}, refused)
     covariance = np.asarray(np.linalg.inv(information), np.float64)
     return problem.result(values, covariance, train)
-
-
-TELLING = (
-    "torque_scale",
-    "plant.modelling_error",
-    "plant.coulomb_Nm",
-    "plant.viscous_Nm_s",
-    "plant.payload_kg",
-)
-"""Parameters of which a check of a log says whether it determines them."""
 
 
 def identifiability(log: Log, scenario: str, changes: Mapping[str, Any] | None = None) -> tuple[str, ...]:
@@ -163,18 +156,13 @@ def identifiability(log: Log, scenario: str, changes: Mapping[str, Any] | None =
     """
     problem = Problem([log], scenario, TELLING, changes or {}, IdentifySettings(nuisance=False))
     information, _ = problem.normal(problem.initial)
-    alone = np.diag(information) * problem.sizes**2 >= _WORST
+    alone = np.diag(information) * problem.sizes**2 >= WORST
     lines = []
     for can, verb in ((True, "determines"), (False, "does not determine")):
         chosen = [one for one, known in zip(problem.requested, alone, strict=True) if known == can]
         if chosen:
             lines.append(f"each alone, the log {verb} {', '.join(short_names(chosen, problem.requested))}")
     return (*lines, *(one.why for one in problem.refusals(problem.initial)))
-
-
-def _refused(refused: tuple[Refusal, ...]) -> Identified:
-    reasons = tuple(one.why for one in refused)
-    return Identified(False, {}, refused, (), None, None, None, None, reasons, None, {})
 
 
 class Problem:
@@ -229,7 +217,7 @@ class Problem:
         if is_payload_known or not kinds.issuperset({"torque_scale", "plant.modelling_error"}):
             return ()
         together = [one for one in self.requested if one.kind.name in TELLING]
-        return (_refusal(together, self.requested),)
+        return (refusal_of(together, self.requested),)
 
     def information(self) -> tuple[Array, list[str]]:
         """Return the information of the training windows on the requested parameters, and their names.
@@ -303,10 +291,10 @@ class Problem:
         curvature, covariance = covariance, covariance * np.outer(widened, widened)
         is_right = self._is_right(after, values, covariance)
         reasons = [] if is_right else self._reasons(after, improvement)
-        cost = Cost(self._cost, self.normal, values, self._cost(values), self.least, self.most)
+        cost = LeastSquaresCost(self._cost, self.normal, values, self._cost(values), self.least, self.most)
         fields = self.machine.fields(self.requested, values[: len(self.requested)].tolist())
         estimates = {
-            one.name: Estimate(
+            one.name: IdentifiedValue(
                 float(values[i]),
                 interval(cost, curvature, i, float(widened[i])),
                 one.kind.unit,
@@ -318,19 +306,19 @@ class Problem:
             accepted=not reasons,
             parameters=estimates,
             refused=(),
-            correlations=tuple(correlation_sentences([*estimates], covariance, _CORRELATED)),
+            correlations=tuple(correlation_sentences([*estimates], covariance, CORRELATED)),
             train=fit_of(train, self.train),
             held_out=after,
             held_out_before=before,
             improvement=float(improvement),
-            reasons=tuple(reasons),
+            shortcomings=tuple(reasons),
             covariance=covariance[: len(self.requested), : len(self.requested)],
             fields=fields,
             nothing_to_correct=is_right and not improvement >= self.settings.least_improvement,
             suggestions=suggestions(self, values, lacking) if self.settings.suggest else (),
         )
 
-    def _is_right(self, after: Fit, values: Array, covariance: Array) -> bool:
+    def _is_right(self, after: ResidualFit, values: Array, covariance: Array) -> bool:
         """True if the model explains the held-out windows with values like those of the scenario."""
         if not abs(after.chi2 - 1) <= self.settings.chi2_limit:
             return False
@@ -339,7 +327,7 @@ class Problem:
         distance = departures @ np.linalg.solve(covariance[:count, :count], departures)
         return bool(distance <= chi2.isf(_BY_CHANCE, count))
 
-    def _reasons(self, after: Fit, improvement: float) -> list[str]:
+    def _reasons(self, after: ResidualFit, improvement: float) -> list[str]:
         reasons, limit = [], self.settings.chi2_limit
         if not improvement >= self.settings.least_improvement:
             reasons.append(
@@ -370,75 +358,3 @@ def _split(
             f" {len(train) + len(held_out)}"
         )
     return train, held_out
-
-
-# Information of a direction in which the data only determine changes that matter; with less it is refused. In
-# it, parameters with at least this share of the largest take part.
-_WORST, _SHARE = 1.0, 0.2
-
-# Information that is left of that of the parameters alone: less of it is the error of the slopes, which are
-# differences over a thousandth of a parameter's size.
-_LEFT = 1e-5
-
-
-def unidentifiable(information: Array, requested: Sequence[Parameter]) -> tuple[Refusal, ...]:
-    """Return the combinations of parameters that data do not determine.
-
-    Parameters
-    ----------
-    information : (p, p) array
-        Of the parameters in units of their sizes; requested ones first.
-    requested : sequence of Parameter
-    """
-    values, directions = np.linalg.eigh(information)
-    together: list[set[int]] = []
-    for value, direction in zip(values, directions.T, strict=True):
-        share = np.abs(direction[: len(requested)])
-        least = max(_WORST, _LEFT * float(direction**2 @ np.diag(information)))
-        if value >= least or share.max() < _SHARE:
-            continue
-        # Several such directions of the same parameters are any basis of these: one refusal.
-        named = {int(place) for place in np.flatnonzero(share >= _SHARE * share.max())}
-        named = named.union(*(others for others in together if others & named))
-        together = [others for others in together if not others & named] + [named]
-    return tuple(_refusal([requested[place] for place in sorted(places)], requested) for places in together)
-
-
-def _refusal(parameters: Sequence[Parameter], requested: Sequence[Parameter]) -> Refusal:
-    return Refusal(tuple(one.name for one in parameters), _why(short_names(parameters, requested)))
-
-
-def _why(names: Sequence[str]) -> str:
-    if len(names) == 1:
-        return f"{names[0]} cannot be determined from these data: they hardly depend on it"
-    listed = f"{', '.join(names[:-1])} and {names[-1]}"
-    return (
-        f"{listed} cannot be distinguished in these data: changed together, they give the same angles;"
-        " fix one, or add a log under another known condition, such as a payload"
-    )
-
-
-def correlation_sentences(names: Sequence[str], covariance: Array, least: float) -> list[str]:
-    """Return sentences on parameters whose errors go together, the closest first.
-
-    Parameters
-    ----------
-    names : sequence of str
-    covariance : (p, p) array
-        Those of the names first.
-    least : float
-        Correlation from which a pair is named. Above 0.95, the interval of a parameter is more than three
-        times as wide as with the other one known.
-    """
-    deviation = np.sqrt(np.diag(covariance))
-    correlation = covariance / np.outer(deviation, deviation)
-    pairs = sorted(combinations(range(len(names)), 2), key=lambda pair: -abs(correlation[pair]))
-    return [
-        f"{names[i]} and {names[j]} are {'hardly' if abs(correlation[i, j]) > _CORRELATED else 'not well'}"
-        f" distinguished in these data (correlation {correlation[i, j]:+.3f})"
-        for i, j in pairs
-        if abs(correlation[i, j]) > least
-    ]
-
-
-_CORRELATED = 0.95

@@ -7,7 +7,6 @@ from math import inf, sqrt
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from spheretwin.electronics.drive_section import drive_sheet
 from spheretwin.electronics.transducers import HARMONICS
@@ -15,16 +14,15 @@ from spheretwin.machine.log import Log
 from spheretwin.machine.model import Model, model_of
 from spheretwin.machine.row_order import OWN_STAMPS
 from spheretwin.models.actuator import Actuator
+from spheretwin.models.base.arrays import Array
 from spheretwin.models.base.errors import InputError, did_you_mean
 from spheretwin.models.coil_group import PerGroup
 from spheretwin.plant.plant_step import Parameters
 
-Array = NDArray[np.float64]
-
 HINGES = ("alpha", "beta", "gamma")
 
 
-class Kind(NamedTuple):
+class ParameterKind(NamedTuple):
     """A kind of parameter; a member for each part that has one."""
 
     name: str
@@ -45,47 +43,35 @@ _PER_GROUP = "groups"
 _PER_POLE = "poles"
 _PER_HARMONIC = "harmonics"
 
-KINDS = {
-    kind.name: kind
-    for kind in (
-        Kind("torque_scale", "1", 0.05, _WHOLE, "torque of all groups over that of the torque curve"),
-        Kind("plant.modelling_error", "1", 0.1, _WHOLE, "relative error of the inertia", -0.9),
-        Kind("plant.coulomb_Nm", "N·m", 2e-3, _PER_HINGE, "Coulomb friction", 0.0),
-        Kind(
-            "plant.coulomb_asymmetry",
-            "1",
-            0.1,
-            _PER_HINGE,
-            "excess of Coulomb friction to one side",
-            -1.0,
-            1.0,
-        ),
-        Kind("plant.viscous_Nm_s", "N·m·s", 2e-4, _PER_HINGE, "viscous friction", 0.0),
-        Kind("plant.modelling_torque_Nm", "N·m", 2e-3, _PER_HINGE, "constant torque"),
-        Kind("plant.cable.stiffness_Nm_rad", "N·m/rad", 5e-3, _PER_HINGE, "stiffness of the cable", 0.0),
-        Kind(
-            "plant.backlash_rad", "rad", 1e-3, _PER_HINGE, "play between rotor and measured shaft", 0.0, 0.5
-        ),
-        Kind("plant.mass.centre_m", "m", 2e-4, _PER_HINGE, "centre of mass of the rotor"),
-        Kind("plant.mass.products_kg_m2", "kg·m²", 5e-5, _PER_HINGE, "products of inertia xy, xz, yz"),
-        Kind("plant.payload_kg", "kg", 0.02, _WHOLE, "payload", 0.0),
-        Kind("plant.group_gain", "1", 0.05, _PER_GROUP, "torque of a group over that of the torque curve"),
-        Kind("pole_gain_error", "1", 0.03, _PER_POLE, "relative error of the remanence of a pole"),
-        Kind("current_offset_A", "A", 0.02, _PER_GROUP, "current of a group besides that of the log"),
-        Kind("sensors.angle_offset_rad", "rad", 2e-3, _PER_HINGE, "offset of an angle sensor"),
-        Kind("sensor_gain_error", "1", 5e-3, _PER_HINGE, "relative error of the slope of an angle sensor"),
-        Kind("sensor_residual_rad", "rad", 5e-4, _PER_HARMONIC, "harmonics of a potentiometer's residual"),
-        Kind("delay_s", "s", 3e-4, _WHOLE, "delay of the currents against the angles, clocks included"),
-        Kind("lag_s", "s", 3e-4, _WHOLE, "time constant of the currents, L/R without a current loop", 0.0),
-    )
-}
+_ROWS: tuple[tuple[Any, ...], ...] = (
+    ("torque_scale", "1", 0.05, _WHOLE, "torque of all groups over that of the torque curve"),
+    ("plant.modelling_error", "1", 0.1, _WHOLE, "relative error of the inertia", -0.9),
+    ("plant.coulomb_Nm", "N·m", 2e-3, _PER_HINGE, "Coulomb friction", 0.0),
+    ("plant.coulomb_asymmetry", "1", 0.1, _PER_HINGE, "excess of Coulomb friction to one side", -1.0, 1.0),
+    ("plant.viscous_Nm_s", "N·m·s", 2e-4, _PER_HINGE, "viscous friction", 0.0),
+    ("plant.modelling_torque_Nm", "N·m", 2e-3, _PER_HINGE, "constant torque"),
+    ("plant.cable.stiffness_Nm_rad", "N·m/rad", 5e-3, _PER_HINGE, "stiffness of the cable", 0.0),
+    ("plant.backlash_rad", "rad", 1e-3, _PER_HINGE, "play between rotor and measured shaft", 0.0, 0.5),
+    ("plant.mass.centre_m", "m", 2e-4, _PER_HINGE, "centre of mass of the rotor"),
+    ("plant.mass.products_kg_m2", "kg·m²", 5e-5, _PER_HINGE, "products of inertia xy, xz, yz"),
+    ("plant.payload_kg", "kg", 0.02, _WHOLE, "payload", 0.0),
+    ("plant.group_gain", "1", 0.05, _PER_GROUP, "torque of a group over that of the torque curve"),
+    ("pole_gain_error", "1", 0.03, _PER_POLE, "relative error of the remanence of a pole"),
+    ("current_offset_A", "A", 0.02, _PER_GROUP, "current of a group besides that of the log"),
+    ("sensors.angle_offset_rad", "rad", 2e-3, _PER_HINGE, "offset of an angle sensor"),
+    ("sensor_gain_error", "1", 5e-3, _PER_HINGE, "relative error of the slope of an angle sensor"),
+    ("sensor_residual_rad", "rad", 5e-4, _PER_HARMONIC, "harmonics of a potentiometer's residual"),
+    ("delay_s", "s", 3e-4, _WHOLE, "delay of the currents against the angles, clocks included"),
+    ("lag_s", "s", 3e-4, _WHOLE, "time constant of the currents, L/R without a current loop", 0.0),
+)
+KINDS = {row[0]: ParameterKind(*row) for row in _ROWS}
 """Kinds of parameters by name."""
 
 
 class Parameter(NamedTuple):
     """One number."""
 
-    kind: Kind
+    kind: ParameterKind
     place: int
 
     @property
@@ -137,7 +123,7 @@ def short_names(parameters: Sequence[Parameter], among: Sequence[Parameter]) -> 
     return names
 
 
-def members(kind: Kind, actuator: Actuator) -> list[Parameter]:
+def members(kind: ParameterKind, actuator: Actuator) -> list[Parameter]:
     """Return all parameters of a kind."""
     counts = {
         _WHOLE: 1,
@@ -179,7 +165,7 @@ class Machine:
         self._scenario, self._changes = scenario, dict(changes)
         self.model: Model = model_of(scenario, self._changes)
         self._plants: dict[tuple[Any, ...], Parameters] = {}
-        self._nominal: dict[Kind, Array] = {}
+        self._nominal: dict[ParameterKind, Array] = {}
 
     def nominal(self, parameter: Parameter) -> float:
         """Return the value of a parameter in the scenario."""
@@ -235,13 +221,13 @@ class Machine:
             given[gains] = scale[0] * given.get(gains, self._defaults(gains))
         return _as_fields(given)
 
-    def _defaults(self, kind: Kind) -> Array:
+    def _defaults(self, kind: ParameterKind) -> Array:
         if kind not in self._nominal:
             every = members(kind, self.model.actuator)
             self._nominal[kind] = np.array([self.nominal(parameter) for parameter in every])
         return self._nominal[kind]
 
-    def _plant(self, given: Mapping[Kind, Array], varied: set[Kind]) -> Parameters:
+    def _plant(self, given: Mapping[ParameterKind, Array], varied: set[ParameterKind]) -> Parameters:
         fields = _as_fields({kind: numbers for kind, numbers in given.items() if kind in varied})
         key = tuple((kind.name, *numbers.tolist()) for kind, numbers in given.items() if kind in varied)
         if key not in self._plants:
@@ -254,7 +240,7 @@ class Machine:
         return self._plants[key]
 
 
-def _as_fields(given: Mapping[Kind, Array]) -> dict[str, Any]:
+def _as_fields(given: Mapping[ParameterKind, Array]) -> dict[str, Any]:
     """Return values as fields of a scenario; those that no field states are left out."""
     fields: dict[str, Any] = {}
     for kind, numbers in given.items():

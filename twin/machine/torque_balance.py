@@ -11,14 +11,12 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import lsq_linear
 
 from spheretwin import plant
+from spheretwin.models.base.arrays import Array, Integers
 from spheretwin.models.kinematics import rate_jacobian
 from spheretwin.models.lagrangian import gravity_torque
-
-Array = NDArray[np.float64]
 
 # Standard deviation of the kernel: it leaves 0.1 mN·m of potentiometer noise of 0.02 degrees at 1 kHz, and
 # half of a sine of 7.5 Hz. The rotor turns little within a block.
@@ -43,20 +41,6 @@ class Motion(NamedTuple):
     """Torque on the hinges of one ampere in each group (blocks, 3, groups)."""
     unknown_Nm: Array
     """Torques of unit unknowns (windows, 3, 7): Coulomb and viscous friction of each hinge, weight moment."""
-
-
-class Fit(NamedTuple):
-    """Fit of the applied torque by the needed one."""
-
-    residual: float
-    """Sum of squares that no unknown explains, (N·m)²."""
-    total: float
-    """Sum of squares of the applied torque about its mean, (N·m)²."""
-
-    @property
-    def unexplained(self) -> float:
-        """Share of the applied torque that the motion does not explain."""
-        return self.residual / self.total if self.total > 0 else 1.0
 
 
 class TorqueBalance:
@@ -173,13 +157,14 @@ class TorqueBalance:
         return np.einsum("ewi,w->ei", blocks[self._windows], self._kernels[0])
 
 
-def fit(motion: Motion, applied_Nm: Array) -> Fit:
-    """Fit applied torques (windows, 3) by needed ones within the bounds of what may be unknown.
+def unexplained_share(motion: Motion, applied_Nm: Array) -> float:
+    """Return the share of applied torques (windows, 3) that needed ones do not explain.
 
-    Angles in a wrong unit pass the singular pose, where no torque is finite: they explain nothing.
+    What may be unknown is fitted within its bounds. Angles in a wrong unit pass the singular pose, where no
+    torque is finite: they explain nothing.
     """
     if not np.all(np.isfinite(motion.need_Nm)):
-        return Fit(1.0, 1.0)
+        return 1.0
     target = _centred(applied_Nm[:, :, None])[:, 0]
     regressors = _centred(np.concatenate([motion.need_Nm[:, :, None], motion.unknown_Nm], axis=2))
     size = np.maximum(np.linalg.norm(regressors, axis=0), 1e-9)
@@ -190,7 +175,7 @@ def fit(motion: Motion, applied_Nm: Array) -> Fit:
     solution = lsq_linear(triangle, coordinates, (low, high), method="bvls")
     total = float(target @ target)
     outside = max(0.0, total - float(coordinates @ coordinates))
-    return Fit(outside + 2 * float(solution.cost), total)
+    return (outside + 2 * float(solution.cost)) / total if total > 0 else 1.0
 
 
 def _centred(values: Array) -> Array:
@@ -226,7 +211,7 @@ class _Integral:
         return np.stack(columns, axis=1) / (ends - starts)[:, None]
 
 
-def _kernels(block_s: float) -> tuple[NDArray[np.int64], tuple[Array, Array, Array]]:
+def _kernels(block_s: float) -> tuple[Integers, tuple[Array, Array, Array]]:
     """Return the places of a kernel about its centre, and Gaussian kernels of value, rate and acceleration.
 
     They are exact for parabolas.

@@ -6,17 +6,15 @@ from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.stats import norm
 
 from spheretwin.machine.intervals import Uncertainty
 from spheretwin.machine.log import Log
 from spheretwin.machine.parameters import Machine, Parameter, priors, selected
-from spheretwin.machine.residuals import CHI2, Fit, fit_of
+from spheretwin.machine.residuals import CHI2, ResidualFit, fit_of
 from spheretwin.machine.row_order import align_rows
-from spheretwin.machine.windows import Shooting, windows_of
-
-Array = NDArray[np.float64]
+from spheretwin.machine.windows import Shooting, normal_equations, windows_of
+from spheretwin.models.base.arrays import Array
 
 SUSPECTS = (
     "torque_scale",
@@ -53,7 +51,7 @@ class Validation(NamedTuple):
     """Result of `validate`."""
 
     accepted: bool
-    fit: Fit
+    fit: ResidualFit
     """Of all windows."""
     structure: tuple[Structure, ...]
     """The most distant from 0 first; empty if noise explains all."""
@@ -95,8 +93,8 @@ def validate(
     values = np.array([machine.nominal(parameter) for parameter in varied])
     parts = shooting.parts(values, slopes=True)
     fit = fit_of(parts, shooting)
-    gradient = -np.sum([part.gradient for part in parts], axis=0)[: len(suspects)]
-    full = np.sum([part.information for part in parts], axis=0)
+    full, gradient = normal_equations(parts)
+    gradient = -gradient[: len(suspects)]
     information = np.diag(full)[: len(suspects)]
     shared = full[: len(suspects), [varied.index(one) for one in known]]
     variance = information * max(fit.chi2, 1.0) + np.einsum("ij,jk,ik->i", shared, covariance, shared)

@@ -18,18 +18,16 @@ from math import ceil
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from spheretwin.electronics.logged_currents import mean_currents
 from spheretwin.machine.log import MEASURED, Log, check_numbers
 from spheretwin.machine.model import EDGE_SHARE, Model
 from spheretwin.machine.parameters import Machine, Parameter, Setup, sensor_angles
 from spheretwin.machine.state_estimation import Shadow, hold_last_value
+from spheretwin.models.base.arrays import Array, Booleans
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.coil_group import PerGroup, of_each_group
 from spheretwin.plant.plants import Plants
-
-Array = NDArray[np.float64]
 
 # Rows may be this share of their distance from where they should be; the plant step assumes equal distances.
 _JITTER = 0.2
@@ -81,7 +79,7 @@ class Window(NamedTuple):
         turned_rad = 0.5 * np.abs(rates_rad_s[1:] + rates_rad_s[:-1]) * self.period_s
         return measured, angle_deviation(self.machine.model, turned_rad, is_count)
 
-    def measured(self) -> tuple[Array, NDArray[np.bool_]]:
+    def measured(self) -> tuple[Array, Booleans]:
         """Return measured angles (rows, 3), rad, and where a count is used for lack of an edge."""
         model, rows = self.machine.model, self.log.angle_rad[self.first : self.first + self.rows + 1]
         measured, is_count = rows[1:].copy(), np.zeros((self.rows, 3), bool)
@@ -110,11 +108,30 @@ class Window(NamedTuple):
         )
         return means[self.first - first :]
 
+    def reported_angles(self, setups: Sequence[Setup], plants: Plants, starts: Array) -> Array:
+        """Return what sensors report at starts and at the rows after them, (setups, rows + 1, 3).
+
+        Parameters
+        ----------
+        setups : sequence of Setup
+        plants : Plants
+            Theirs; left at the end of the window.
+        starts : (setups, 6) array
+        """
+        plants.set_state(starts[:, :3], starts[:, 3:])
+        means = {times: self.currents(*times) for times in {(one.delay_s, one.lag_s) for one in setups}}
+        currents = np.stack([means[one.delay_s, one.lag_s] + one.current_offset_A for one in setups], axis=1)
+        steps = ceil(self.period_s / LONGEST_STEP_s - 0.05)
+        angles_rad = plants.roll_out(currents, np.zeros(3), self.period_s / steps, steps)
+        reached = np.concatenate([starts[None, :, :3], angles_rad])
+        first = self.log.angle_rad[self.first]
+        return np.stack([sensor_angles(setup, reached[:, lane], first) for lane, setup in enumerate(setups)])
+
 
 _ROWS_BEFORE = 20
 
 
-def angle_deviation(model: Model, turned_rad: Array, is_count: NDArray[np.bool_]) -> Array:
+def angle_deviation(model: Model, turned_rad: Array, is_count: Booleans) -> Array:
     """Return the standard deviations of the errors of angles (rows, 3), rad.
 
     Parameters
@@ -128,6 +145,14 @@ def angle_deviation(model: Model, turned_rad: Array, is_count: NDArray[np.bool_]
     count_rad = 2 * model.half_count_rad
     spread_rad = np.clip(np.where(is_count, np.inf, turned_rad), EDGE_SHARE * count_rad, count_rad)
     return np.hypot(model.noise_rad, spread_rad / np.sqrt(12))
+
+
+def comparable_angles(model: Model, angles: Array) -> Array:
+    """Return computed angles (lanes, rows, 3) for comparison with measured ones, from (lanes, rows + 1, 3).
+
+    Of an angle that counts it is the mean of two rows, which is compared with the edge between counts.
+    """
+    return np.where(model.half_count_rad > 0, 0.5 * (angles[:, 1:] + angles[:, :-1]), angles[:, 1:])
 
 
 class Part(NamedTuple):
@@ -252,20 +277,18 @@ class Shooting:
 
     def _angles(self, number: int, setups: Sequence[Setup], starts: Array) -> Array:
         """Return what the sensors report at each start and after it, (lanes, rows + 1, 3)."""
-        window = self.windows[number]
         plants = Plants([setup.plant for setup in setups])
-        plants.set_state(starts[:, :3], starts[:, 3:])
-        means = {times: window.currents(*times) for times in {(one.delay_s, one.lag_s) for one in setups}}
-        currents = np.stack([means[one.delay_s, one.lag_s] + one.current_offset_A for one in setups], axis=1)
-        steps = ceil(window.period_s / LONGEST_STEP_s - 0.05)
-        angles_rad = plants.roll_out(currents, np.zeros(3), window.period_s / steps, steps)
-        reached = np.concatenate([starts[None, :, :3], angles_rad])
-        first = window.log.angle_rad[window.first]
-        return np.stack([sensor_angles(setup, reached[:, lane], first) for lane, setup in enumerate(setups)])
+        return self.windows[number].reported_angles(setups, plants, starts)
 
     def _residuals(self, number: int, angles: Array) -> Array:
         measured, deviation = self.observed[number]
-        counted = self.windows[number].machine.model.half_count_rad > 0
-        computed = np.where(counted, 0.5 * (angles[:, 1:] + angles[:, :-1]), angles[:, 1:])
+        computed = comparable_angles(self.windows[number].machine.model, angles)
         difference = (measured - computed) / deviation
         return np.where(np.isnan(difference), 0.0, difference).reshape(len(computed), -1)
+
+
+def normal_equations(parts: Sequence[Part]) -> tuple[Array, Array]:
+    """Return information and gradient of all windows."""
+    information: Array = np.sum([part.information for part in parts], axis=0)
+    gradient: Array = np.sum([part.gradient for part in parts], axis=0)
+    return information, gradient
