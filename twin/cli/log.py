@@ -14,7 +14,7 @@ from spheretwin.cli.options import verb
 from spheretwin.machine.findings import FINDINGS, check_names
 from spheretwin.machine.identification import identifiability
 from spheretwin.machine.log import Log
-from spheretwin.machine.verdict import Verdict
+from spheretwin.machine.verdict import LogVerdict
 from spheretwin.models.base.errors import InputError
 from spheretwin.viz.terminal.texts import print_findings
 
@@ -39,7 +39,7 @@ def run(options: argparse.Namespace) -> bool:
     accepted = check_names(options.accept)
     maps = for_each_log(options.columns, len(options.files), "--columns")
     scenario = scenarios.load(options.scenario)
-    verdicts: dict[str, Verdict] = {}
+    verdicts: dict[str, LogVerdict] = {}
     logs: dict[str, Log] = {}
     for path, column_map in zip(options.files, maps, strict=True):
         log = machine.read(path, column_map, accepted)
@@ -72,7 +72,7 @@ def _identifiability(log: Log, scenario: str) -> tuple[str, ...]:
         return (f"what it identifies is not known: {error}",)
 
 
-def _print_json(verdicts: dict[str, Verdict], logs: dict[str, Log]) -> None:
+def _print_json(verdicts: dict[str, LogVerdict], logs: dict[str, Log]) -> None:
     """Print the verdict; with several logs the common one, and that of each log."""
     entries = [
         {
@@ -95,7 +95,7 @@ def _print_json(verdicts: dict[str, Verdict], logs: dict[str, Log]) -> None:
     )
 
 
-def _report_unused(accepted: Sequence[str], verdicts: Sequence[Verdict]) -> None:
+def _report_unused(accepted: Sequence[str], verdicts: Sequence[LogVerdict]) -> None:
     """Report accepted findings that no log has."""
     names = {finding.name for verdict in verdicts for finding in verdict.findings}
     if unused := [name for name in accepted if name not in names]:

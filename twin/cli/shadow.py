@@ -24,9 +24,9 @@ from spheretwin.machine.log import Log
 from spheretwin.machine.model import model_of
 from spheretwin.machine.noise_fit import fit_noise
 from spheretwin.machine.state_estimation import (
+    Consistency,
     Shadowed,
     ShadowSettings,
-    Verdict,
     chi2_text,
     followed,
     shadow,
@@ -72,7 +72,7 @@ def run(options: argparse.Namespace) -> bool:
         live_view(options, model, signals(options.offsets), stop_requested) as view,
     ):
 
-        def show(part: Log, telemetry: Table, verdict: Verdict) -> None:
+        def show(part: Log, telemetry: Table, verdict: Consistency) -> None:
             if view:
                 text = verdict.markdown(part)
                 view.show(telemetry, part.current_A, text)
@@ -93,7 +93,7 @@ def run(options: argparse.Namespace) -> bool:
         from spheretwin.analysis.comparison import subject_of  # Rerun is slow to import
         from spheretwin.viz.comparison import shadow as recording
 
-        verdict = Verdict(result.chi2, result.consistent).markdown(log)
+        verdict = Consistency(result.chi2, result.consistent).markdown(log)
         text = f"{verdict}\n\nSHA-256 of the numbers of the log: {log.digest}"
         subject = subject_of(model.scenario, model.actuator)
         recording.write(options.record, result.telemetry, log.current_A, subject, text)

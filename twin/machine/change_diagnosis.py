@@ -11,10 +11,15 @@ from math import inf
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import logsumexp
 
-from spheretwin.machine.change_filter import ChangeFilter, Estimate, Linearisation, Rows, Step
+from spheretwin.machine.change_filter import (
+    BlockRows,
+    ChangeFilter,
+    FilterEstimate,
+    FilterStep,
+    Linearisation,
+)
 from spheretwin.machine.change_times import Begin, PUSH_s, Times
 from spheretwin.machine.explanations import (
     BEYOND,
@@ -27,8 +32,7 @@ from spheretwin.machine.explanations import (
     Candidate,
     evidence,
 )
-
-Array = NDArray[np.float64]
+from spheretwin.models.base.arrays import Array
 
 INEXACT = 0.005
 """Share of its evidence that a torque without a name gets from what the slopes of a named change miss."""
@@ -62,7 +66,7 @@ class Explanation(NamedTuple):
     """Squares of the residuals after the onset that it does not explain, less their expected value, over the
     standard deviation of that."""
     replayed_size: float = 0.0
-    estimate: Estimate | None = None
+    estimate: FilterEstimate | None = None
     """Of a filter in which the machine has changed by the replayed size."""
 
     @property
@@ -76,12 +80,12 @@ class Explanation(NamedTuple):
         assert self.candidate
         return self.candidate.direction * float(self.lasted_s is None)
 
-    def estimate_after(self, estimate: Estimate) -> Estimate:
+    def estimate_after(self, estimate: FilterEstimate) -> FilterEstimate:
         """Return the estimate of the changed machine from that without the change."""
         assert self.errors is not None
         estimate, move = self.estimate or estimate, self.size - self.replayed_size
         variance = self.variance + (NONLINEAR * self.size) ** 2
-        return Estimate(
+        return FilterEstimate(
             estimate.state + self.errors[:6] * move,
             estimate.errors + (self.errors[6:] - self.direction) * move,
             estimate.covariance + variance * np.outer(self.errors, self.errors),
@@ -104,11 +108,11 @@ class ChangeDiagnosis:
     Parameters
     ----------
     candidates : sequence of Candidate
-    steps : sequence of Step
+    steps : sequence of FilterStep
         In order; a change begins in one of them.
     """
 
-    def __init__(self, candidates: Sequence[Candidate], steps: Sequence[Step]) -> None:
+    def __init__(self, candidates: Sequence[Candidate], steps: Sequence[FilterStep]) -> None:
         self._candidates, self._steps = candidates, list(steps)
         self._rows = [len(step.block.t_s) for step in self._steps]
         self._squares = np.array([step.squares for step in self._steps])
@@ -294,8 +298,11 @@ def _excess(squares: float, angles: int) -> float:
 
 
 def _again(
-    steps: Sequence[Step], explanation: Explanation, plain: ChangeFilter, machines: Sequence[Linearisation]
-) -> tuple[list[int], list[Step], Estimate]:
+    steps: Sequence[FilterStep],
+    explanation: Explanation,
+    plain: ChangeFilter,
+    machines: Sequence[Linearisation],
+) -> tuple[list[int], list[FilterStep], FilterEstimate]:
     """Filter steps again, with machines before, during and after a change.
 
     Returns the number of the machine of each step, these steps, and the estimate at their end.
@@ -310,7 +317,7 @@ def _again(
     return parts, again, changed.estimate
 
 
-def _parts(step: Step, cuts_s: Sequence[float]) -> Iterator[tuple[int, Rows]]:
+def _parts(step: FilterStep, cuts_s: Sequence[float]) -> Iterator[tuple[int, BlockRows]]:
     """Yield the rows of a step between times, after how many of these."""
     times_s, first = step.block.t_s, 0
     edges = [int(np.searchsorted(times_s, cut_s + _ROUNDING_s)) for cut_s in cuts_s]

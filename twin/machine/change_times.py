@@ -5,14 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
-from spheretwin.machine.change_filter import Step
+from spheretwin.machine.change_filter import FilterStep
 from spheretwin.machine.explanations import LOADS, Candidate, evidence
 from spheretwin.machine.signatures import Places, Signatures
+from spheretwin.models.base.arrays import Array
 from spheretwin.models.base.matrices import product
 
-Array = NDArray[np.float64]
 Begin = tuple[int, int, int]
 """Number of a candidate, step in which it begins, rows of that step without it."""
 
@@ -26,7 +25,7 @@ class Times:
     Parameters
     ----------
     candidates : sequence of Candidate
-    steps : sequence of Step
+    steps : sequence of FilterStep
     begins : sequence of Begin
     push_s : (float, float, float)
         Shortest and longest time after which a load ends, and shortest time after that.
@@ -44,7 +43,7 @@ class Times:
     def __init__(
         self,
         candidates: Sequence[Candidate],
-        steps: Sequence[Step],
+        steps: Sequence[FilterStep],
         begins: Sequence[Begin],
         push_s: tuple[float, float, float] = (*PUSH_s, AFTER_s),
     ) -> None:

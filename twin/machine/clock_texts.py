@@ -8,7 +8,8 @@ from datetime import UTC, datetime
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
+
+from spheretwin.models.base.arrays import Array
 
 _UNITS_us = {"s": 1e6, "sec": 1e6, "seconds": 1e6, "ms": 1e3, "msec": 1e3, "us": 1.0, "µs": 1.0, "ns": 1e-3}
 
@@ -21,7 +22,7 @@ _CLOCK = re.compile(
 _DURATION = re.compile(r"([+-]?\d+(?:[.,]\d*)?(?:[eE][+-]?\d+)?) ?([a-zµ]+)$")
 
 
-def seconds_of_texts(texts: Sequence[str | None]) -> tuple[NDArray[np.float64], int | None, bool]:
+def seconds_of_texts(texts: Sequence[str | None]) -> tuple[Array, int | None, bool]:
     """Return times in µs, the first row that is no time or None, and True for a clock without a date."""
     values = np.full(len(texts), np.nan)
     is_clock = False

@@ -11,23 +11,22 @@ from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
-from numpy.typing import NDArray
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, model_validator
+from pydantic import BeforeValidator, Field, ValidationError, model_validator
 
 from spheretwin.machine.csv_files import CsvFormat
 from spheretwin.machine.log import COMMANDED, MEASURED, Log
 from spheretwin.machine.raw_table import RawTable, name_list
 from spheretwin.machine.row_order import align_rows, row_order
+from spheretwin.models.base.arrays import Array
 from spheretwin.models.base.errors import InputError, without_breaks
 from spheretwin.models.base.files import regular_file
 from spheretwin.models.telemetry.joint_states import ANGLE_NAMES
 from spheretwin.models.telemetry.signals import ANGLES
 from spheretwin.scenario.fields import explain
+from spheretwin.scenario.plant_sections import Section
 
-Array = NDArray[np.float64]
 Numbers = tuple[float, ...]
 
-CONFIG = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
 EVERY = "*"
 """Part of a name that stands for the numbers from 0 or 1 on that the file has, also with leading zeros."""
 
@@ -35,10 +34,8 @@ ANGLE_UNITS = {"rad": 1.0, "mrad": 1e-3, "deg": math.pi / 180, "turn": 2 * math.
 CURRENT_UNITS = {"A": 1.0, "mA": 1e-3}
 
 
-class TimeColumn(BaseModel):
+class TimeColumn(Section):
     """Column of the time."""
-
-    model_config = CONFIG
 
     column: str = Field(
         "t_s",
@@ -55,13 +52,11 @@ class TimeColumn(BaseModel):
     )
 
 
-class Channels(BaseModel):
+class Channels(Section):
     """Columns of one quantity: ``value = sign * unit * scale * (number - offset)``.
 
     Each list has an entry for each column, or one entry for all.
     """
-
-    model_config = CONFIG
 
     columns: Annotated[tuple[str, ...], Field(min_length=1)] = Field(
         description="names, in the order of the axes"
@@ -216,10 +211,8 @@ class CurrentColumns(Channels):
     )
 
 
-class ColumnMap(BaseModel):
+class ColumnMap(Section):
     """Map of a file's columns."""
-
-    model_config = CONFIG
 
     csv: CsvFormat = CsvFormat()
     time: TimeColumn = TimeColumn()

@@ -12,11 +12,12 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Annotated, Literal, NamedTuple
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
 from spheretwin.machine.raw_table import MISSING, RawTable, column_names, repeated_names
 from spheretwin.models.base.errors import InputError, shown
 from spheretwin.models.base.files import regular_file
+from spheretwin.scenario.plant_sections import Section
 
 _GZIP = b"\x1f\x8b"
 WHITESPACE = "whitespace"
@@ -35,10 +36,8 @@ _MOST_INVALID = 0.01
 """Share of lines of another length that are left out; with more of them the file is refused."""
 
 
-class CsvFormat(BaseModel):
+class CsvFormat(Section):
     """Section [csv] of a column map: each entry is guessed unless it is given."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid", strict=True)
 
     delimiter: Annotated[str, Field(pattern=r"^([^\n\r\"]|whitespace)$")] | None = Field(
         None, description="character between the columns, or whitespace for any number of blanks and tabs"

@@ -6,20 +6,18 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Annotated, Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field
 
 from spheretwin import scenario as scenarios
 from spheretwin.machine.identification import Problem
-from spheretwin.machine.log import Log
+from spheretwin.machine.log import log_of
+from spheretwin.models.base.arrays import Array
 from spheretwin.models.base.errors import SpheretwinError
 from spheretwin.models.telemetry.status import Status
 from spheretwin.models.telemetry.table import Table
 from spheretwin.scenario.fields import SettingsModel
 from spheretwin.scenario.sections import Scenario
 from spheretwin.simulation import simulate
-
-Array = NDArray[np.float64]
 
 REFERENCE = {"trajectory.shape": "nutation"}
 """Motion with which a design is compared."""
@@ -182,7 +180,8 @@ class _Experiment(NamedTuple):
 
     def information(self, runs: Sequence[Table]) -> tuple[Array, list[str]]:
         """Return the information of runs on the parameters, and their names."""
-        logs = [log_of(run, payload) for run, payload in zip(runs, self.settings.payloads_kg, strict=False)]
+        payloads = zip(runs, self.settings.payloads_kg, strict=False)
+        logs = [log_of(run, "experiment", {"plant.payload_kg": payload_kg}) for run, payload_kg in payloads]
         return Problem(logs, self.scenario, self.parameters, self.fields).information()
 
     def _is_within(self, run: Table) -> bool:
@@ -195,13 +194,6 @@ class _Experiment(NamedTuple):
         if "coil_temperature_degC" in run:
             limits.append((run["coil_temperature_degC"], settings.largest_temperature_degC))
         return all(np.max(np.abs(values)) <= limit for values, limit in limits)
-
-
-def log_of(run: Table, payload_kg: float, name: str = "experiment") -> Log:
-    """Return what a machine would log of a run: commanded currents and measured angles."""
-    angles = "q_measured_rad" if "q_measured_rad" in run else "q_rad"
-    conditions = {"plant.payload_kg": payload_kg}
-    return Log(run["t_s"], run["current_command_A"], run[angles], name=name, conditions=conditions)
 
 
 def _deviations(information: tuple[Array, list[str]]) -> dict[str, float]:

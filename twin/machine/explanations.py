@@ -11,12 +11,10 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import log_ndtr, logsumexp
 
-from spheretwin.machine.parameters import Kind, Parameter
-
-Array = NDArray[np.float64]
+from spheretwin.machine.parameters import Parameter, ParameterKind
+from spheretwin.models.base.arrays import Array, Integers
 
 UNNAMED = "unexplained"
 
@@ -56,7 +54,7 @@ class Candidate(NamedTuple):
     """Change that is watched for."""
 
     name: str
-    kind: Kind
+    kind: ParameterKind
     direction: Array
     """(p,) of the parameters."""
     size: float
@@ -70,7 +68,7 @@ class Candidate(NamedTuple):
         return self.kind.name.startswith("sensor")
 
 
-def size_of(kind: Kind) -> float:
+def size_of(kind: ParameterKind) -> float:
     """Return the size of a change that matters."""
     return SIZES.get(kind.name, kind.size)
 
@@ -122,7 +120,7 @@ def evidence(
     gradient: Array,
     information: Array,
     candidates: Sequence[Candidate],
-    number: NDArray[np.int64],
+    number: Integers,
     *,
     bounded: bool = True,
 ) -> Array:

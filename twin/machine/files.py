@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from spheretwin.machine import columns as column_maps
 from spheretwin.machine import csv_files
@@ -27,7 +26,6 @@ from spheretwin.models.telemetry.table import Table
 if TYPE_CHECKING:
     import pyarrow as pa
 
-Array = NDArray[np.float64]
 
 CURRENT_SIGNALS = {COMMANDED: "current_command_A", MEASURED: "current_measured_A"}
 CURRENTS, CONDITIONS, ACCEPTED = "currents", "conditions", "accepted"

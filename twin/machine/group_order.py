@@ -10,13 +10,10 @@ from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
 from spheretwin.machine.torque_balance import Motion, TorqueBalance
-
-Array = NDArray[np.float64]
-Integers = NDArray[np.int64]
+from spheretwin.models.base.arrays import Array, Integers
 
 REGULARISATION = 1e-3
 ROUNDING = 1e-9

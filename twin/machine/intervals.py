@@ -6,9 +6,8 @@ from collections.abc import Callable, Mapping
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from spheretwin.models.base.arrays import Array
 
 Z95 = 1.959963984540054
 """Standard deviations on each side of a 95 % interval."""
@@ -34,7 +33,7 @@ class Uncertainty(NamedTuple):
         return cls(tuple(values), covariance / np.outer(scale, scale))
 
 
-class Cost(NamedTuple):
+class LeastSquaresCost(NamedTuple):
     """Cost of a least-squares problem, half the sum of squares, about its best values."""
 
     at: Callable[[Array], float]
@@ -49,12 +48,14 @@ class Cost(NamedTuple):
     """Upper bounds."""
 
 
-def interval(cost: Cost, covariance: Array, place: int, wider: float = 1.0) -> tuple[float, float]:
+def interval(
+    cost: LeastSquaresCost, covariance: Array, place: int, wider: float = 1.0
+) -> tuple[float, float]:
     """Return the 95 % interval of one parameter.
 
     Parameters
     ----------
-    cost : Cost
+    cost : LeastSquaresCost
     covariance : (p, p) array
         Inverse of the information at the best values.
     place : int
@@ -67,7 +68,7 @@ def interval(cost: Cost, covariance: Array, place: int, wider: float = 1.0) -> t
     return float(max(low, cost.least[place])), float(min(high, cost.most[place]))
 
 
-def _end(cost: Cost, covariance: Array, place: int, half: float, sign: float) -> float:
+def _end(cost: LeastSquaresCost, covariance: Array, place: int, half: float, sign: float) -> float:
     """Return one end: where the cost, minimised over the other parameters, has risen by half of half²."""
     deviation = np.sqrt(covariance[place, place])
     # Along it the other parameters stay at their best, as far as the cost is quadratic.

@@ -9,11 +9,10 @@ from functools import cached_property
 from typing import Any, Final, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from spheretwin.models.base.arrays import Array
 from spheretwin.models.base.errors import InputError
-
-Array = NDArray[np.float64]
+from spheretwin.models.telemetry.table import Table
 
 COMMANDED: Final = "commanded"
 MEASURED: Final = "measured"
@@ -96,6 +95,13 @@ class Log:
 
 
 _COLUMNS = ("t_s", "current_A", "angle_rad")
+
+
+def log_of(run: Table, name: str = "log", conditions: Mapping[str, Any] | None = None) -> Log:
+    """Return what a machine would log of a run: commanded currents and measured angles."""
+    angles = "q_measured_rad" if "q_measured_rad" in run else "q_rad"
+    return Log(run["t_s"], run["current_command_A"], run[angles], name=name, conditions=conditions or {})
+
 
 LATEST_s, LARGEST = 1e12, 1e6
 """Largest time, and largest angle or current, rad or A: squares of larger numbers may overflow."""

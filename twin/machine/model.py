@@ -6,19 +6,17 @@ from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from spheretwin import scenario as scenarios
 from spheretwin.config.active_config import initial_config
 from spheretwin.config.plant_model import parameters_of
 from spheretwin.electronics.sensor_chain import SensorsSection
 from spheretwin.models.actuator import Actuator
+from spheretwin.models.base.arrays import Array
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.coil_group import PerGroup
 from spheretwin.plant.plant_step import Parameters
 from spheretwin.scenario.sections import ResolvedScenario, Scenario
-
-Array = NDArray[np.float64]
 
 # Ideal sensors: about the rounding of an angle in degrees with four decimals.
 _LEAST_NOISE_rad = 1e-6

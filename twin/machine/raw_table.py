@@ -12,12 +12,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spheretwin.machine.clock_texts import seconds_of_texts
+from spheretwin.models.base.arrays import Array, Integers
 from spheretwin.models.base.errors import InputError, did_you_mean, shown
 
 if TYPE_CHECKING:
     import pyarrow as pa
 
-Array = NDArray[np.float64]
 
 TIME_UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 
@@ -343,7 +343,7 @@ def _seconds(
     return np.where(missing, np.nan, _scaled(since, factor)), notes
 
 
-def _difference(values: NDArray[Any], first: int) -> NDArray[np.int64]:
+def _difference(values: NDArray[Any], first: int) -> Integers:
     return (values.astype(np.uint64) - np.uint64(first % 2**64)).view(np.int64)
 
 

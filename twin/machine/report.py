@@ -12,13 +12,14 @@ import numpy as np
 from spheretwin import scenario as scenarios
 from spheretwin.machine.discrepancy import Suggestion
 from spheretwin.machine.excitation import Design
-from spheretwin.machine.identification import Identified, correlation_sentences, identifiability
+from spheretwin.machine.identification import Identified, identifiability
 from spheretwin.machine.log import Log
-from spheretwin.machine.residuals import QUANTITIES, Fit
+from spheretwin.machine.refusals import correlation_sentences
+from spheretwin.machine.residuals import QUANTITIES, ResidualFit
 from spheretwin.machine.state_estimation import HINGE_NAMES, chi2_text
 from spheretwin.machine.twin_history import Identification, history_drawing
 from spheretwin.machine.validation import Structure
-from spheretwin.machine.verdict import Verdict, check
+from spheretwin.machine.verdict import LogVerdict, check
 from spheretwin.models.telemetry.signals import ANGLES
 from spheretwin.viz.pages.markdown import Drawing, PageSection, ReportPage, ResultTable, save_text
 
@@ -78,14 +79,14 @@ def design_table(design: Design) -> ResultTable:
     return ResultTable("design", head, rows)
 
 
-def fit_table(fits: Mapping[str, Fit]) -> ResultTable:
+def fit_table(fits: Mapping[str, ResidualFit]) -> ResultTable:
     """Return the mean squares of the residuals of each hinge, a column for each label."""
     rows = [("all", *(chi2_text(fit.chi2) for fit in fits.values()))]
     rows += [(name, *(chi2_text(fit.hinge_chi2[name]) for fit in fits.values())) for name in HINGE_NAMES]
     return ResultTable("residuals", ("hinge", *fits), rows)
 
 
-def bin_table(fit: Fit) -> ResultTable:
+def bin_table(fit: ResidualFit) -> ResultTable:
     """Return the clearest mean residuals."""
     clearest = sorted(fit.bins, key=lambda one: -abs(one.mean_rad) * one.rows**0.5 / one.rms_rad)
     rows = [
@@ -103,7 +104,7 @@ def bin_table(fit: Fit) -> ResultTable:
     return ResultTable("largest mean residuals", head, rows, 2)
 
 
-def log_table(logs: Sequence[Log], verdicts: Sequence[Verdict]) -> ResultTable:
+def log_table(logs: Sequence[Log], verdicts: Sequence[LogVerdict]) -> ResultTable:
     """Return length, rows and findings of logs."""
     rows = [
         (
@@ -120,7 +121,7 @@ def log_table(logs: Sequence[Log], verdicts: Sequence[Verdict]) -> ResultTable:
     )
 
 
-def residual_drawing(file: str, fits: Mapping[str, Fit], by: str, title: str) -> Drawing:
+def residual_drawing(file: str, fits: Mapping[str, ResidualFit], by: str, title: str) -> Drawing:
     """Return the figure of the mean residuals of each hinge by one of `QUANTITIES`."""
     from spheretwin.viz.figures import twin  # Matplotlib is optional
 
@@ -227,8 +228,7 @@ def _residuals(result: Identified) -> list[str | ResultTable | Drawing | PageSec
 
 
 def _refused(result: Identified) -> list[str]:
-    reasons = [reason for reason in result.reasons if reason not in {one.why for one in result.refused}]
-    return [*(f"{', '.join(one.parameters)}: {one.why}." for one in result.refused), *reasons]
+    return [*(f"{', '.join(one.parameters)}: {one.why}." for one in result.refused), *result.shortcomings]
 
 
 def _lacking(result: Identified) -> list[str | ResultTable | Drawing | PageSection]:

@@ -6,12 +6,10 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from spheretwin.machine.state_estimation import HINGE_NAMES
 from spheretwin.machine.windows import Part, Shooting
-
-Array = NDArray[np.float64]
+from spheretwin.models.base.arrays import Array
 
 BINS = 6
 
@@ -23,7 +21,7 @@ QUANTITIES = {"angle_rad": "angle, rad", "rate_rad_s": "rate, rad/s", "t_s": "ti
 """Quantities by which residuals are sorted, and their labels."""
 
 
-class Bin(NamedTuple):
+class ResidualBin(NamedTuple):
     """Residuals of one hinge in a range of its angle, of its rate, or of the time."""
 
     hinge: str
@@ -37,17 +35,17 @@ class Bin(NamedTuple):
     rms_rad: float
 
 
-class Fit(NamedTuple):
+class ResidualFit(NamedTuple):
     """Agreement of a machine with windows."""
 
     chi2: float
     """Mean square of the residuals in the noise of the sensors."""
     hinge_chi2: dict[str, float]
     """NaN for a hinge that is not informative: free starts explain whatever its sensor reports."""
-    bins: tuple[Bin, ...]
+    bins: tuple[ResidualBin, ...]
 
 
-def fit_of(parts: Sequence[Part], shooting: Shooting) -> Fit:
+def fit_of(parts: Sequence[Part], shooting: Shooting) -> ResidualFit:
     """Return the agreement of windows under some parameters, which `Shooting.parts` gave."""
     windows = shooting.windows
     measured, deviation = (np.concatenate(column) for column in zip(*shooting.observed, strict=True))
@@ -63,7 +61,7 @@ def fit_of(parts: Sequence[Part], shooting: Shooting) -> Fit:
         np.concatenate([window.rate_rad_s for window in windows]),
         np.vstack(times) + [0.0] * 3,
     )
-    return Fit(
+    return ResidualFit(
         sum(part.squares for part in parts) / sum(part.used for part in parts),
         dict(zip(HINGE_NAMES, map(float, hinge_chi2), strict=True)),
         tuple(
@@ -75,7 +73,7 @@ def fit_of(parts: Sequence[Part], shooting: Shooting) -> Fit:
     )
 
 
-def _bins(hinge: str, by: str, values: Array, residual_rad: Array) -> list[Bin]:
+def _bins(hinge: str, by: str, values: Array, residual_rad: Array) -> list[ResidualBin]:
     """Return the residuals of a hinge over some values."""
     if not len(values) or np.ptp(values) == 0:
         return []
@@ -86,5 +84,5 @@ def _bins(hinge: str, by: str, values: Array, residual_rad: Array) -> list[Bin]:
         chosen = residual_rad[place == number]
         mean, rms = float(chosen.mean()), float(np.sqrt(np.mean(chosen**2)))
         low, high = float(edges[number]), float(edges[number + 1])
-        bins.append(Bin(hinge, by, low, high, len(chosen), mean, rms))
+        bins.append(ResidualBin(hinge, by, low, high, len(chosen), mean, rms))
     return bins

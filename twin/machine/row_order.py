@@ -9,11 +9,9 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from spheretwin.machine.log import COMMANDED, Log
-
-Array = NDArray[np.float64]
+from spheretwin.models.base.arrays import Array, Booleans, Integers
 
 GAP_PERIODS = 2.5
 """Periods of a stream from which an interval is a gap."""
@@ -29,7 +27,7 @@ _UNEVEN, _MOST_UNEVEN = 0.2, 0.1  # departure of a step from the period; share o
 _MOST_SHORT = 0.01  # of the rows, more after sorting than before
 
 
-def row_order(t_s: Array, angles: Array, currents: Array) -> tuple[NDArray[np.int64], tuple[str, ...]]:
+def row_order(t_s: Array, angles: Array, currents: Array) -> tuple[Integers, tuple[str, ...]]:
     """Return the rows of a file in the order of time, and a note if it is another one.
 
     The order stays if sorting would leave more gaps or short intervals in the angles or the currents: then a
@@ -109,7 +107,7 @@ def align_rows(log: Log) -> Log:
     return replace(log, t_s=t_s, current_A=current_A, angle_rad=angle_rad, notes=notes)
 
 
-def _is_table(t_s: Array, has_angles: NDArray[np.bool_], has_currents: NDArray[np.bool_]) -> bool:
+def _is_table(t_s: Array, has_angles: Booleans, has_currents: Booleans) -> bool:
     """True for even rows that mostly have angles and currents together: a missing one is a lost sample."""
     steps = np.diff(t_s)
     even = np.mean(np.abs(steps / np.median(steps) - 1) < _UNEVEN)

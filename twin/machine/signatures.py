@@ -10,14 +10,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
-from spheretwin.machine.change_filter import Block, Step, remembered
+from spheretwin.machine.change_filter import FilterStep, LinearBlock, remembered
 from spheretwin.machine.explanations import Candidate
+from spheretwin.models.base.arrays import Array, Booleans, Integers
 from spheretwin.models.base.matrices import product
 
-Array = NDArray[np.float64]
-Places = NDArray[np.int64]
+Places = Integers
 
 
 class Signatures:
@@ -57,12 +56,12 @@ class Signatures:
         self.gradient, self.information = self.gradient[kept], self.information[kept]
         self.errors = self.errors[:, kept]
 
-    def advance(self, step: Step, candidates: Places, rows: Places) -> Array:
+    def advance(self, step: FilterStep, candidates: Places, rows: Places) -> Array:
         """Advance over a step, in which changes begin; return the signatures in it (m, n).
 
         Parameters
         ----------
-        step : Step
+        step : FilterStep
         candidates, rows : (k,) arrays of int
             Number of the candidate of each change that begins, and rows of the block without it.
         """
@@ -88,7 +87,7 @@ class Signatures:
         return signature
 
 
-def _shares(block: Block, sensor: NDArray[np.bool_], rows: Places) -> Array:
+def _shares(block: LinearBlock, sensor: Booleans, rows: Places) -> Array:
     """Return the shares of the complete signature that changes have which begin after some rows, (m, n).
 
     A torque moves the rotor by the square of its time. The mean of two angles has half of an offset that only

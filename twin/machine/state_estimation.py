@@ -7,13 +7,13 @@ from functools import cache
 from typing import Annotated, Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field
 
 from spheretwin.electronics.logged_currents import mean_currents
 from spheretwin.machine.log import MEASURED, Log, check_numbers, joined
 from spheretwin.machine.model import EDGE_SHARE, Model, model_of
 from spheretwin.machine.row_order import align_rows
+from spheretwin.models.base.arrays import Array
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.coil_group import of_each_group
 from spheretwin.models.telemetry.signals import ANGLES, Signal
@@ -21,8 +21,6 @@ from spheretwin.models.telemetry.table import Table
 from spheretwin.plant.state_filter import STATES, Estimates, StateFilter, run_filter
 from spheretwin.scenario.fields import SettingsModel
 from spheretwin.scenario.sections import Scenario
-
-Array = NDArray[np.float64]
 
 
 class ShadowSettings(SettingsModel):
@@ -143,14 +141,14 @@ class Shadow:
         self._add(normalised, angle_rad)
         return _table(log.t_s, angle_rad, estimates, normalised)
 
-    def verdict(self) -> Verdict:
+    def verdict(self) -> Consistency:
         """Return how well model and rows so far agree."""
         chi2 = np.divide(self._squares, self._counts, out=np.full(3, np.nan), where=self._counts > 0)
         low, high = CONSISTENT
         counted = self.model.half_count_rad > 0
         chi2[~self._changes & (chi2 <= high)] = np.nan
         within = np.isnan(chi2) | ((chi2 <= high) & (counted | (chi2 >= low)))
-        return Verdict(dict(zip(HINGE_NAMES, map(float, chi2), strict=True)), bool(np.all(within)))
+        return Consistency(dict(zip(HINGE_NAMES, map(float, chi2), strict=True)), bool(np.all(within)))
 
     def motion(self) -> tuple[Array, Array]:
         """Return mean and covariance of angles and rates at the last row, (6,) and (6, 6)."""
@@ -190,7 +188,7 @@ class Shadow:
         return mean_A
 
 
-class Verdict(NamedTuple):
+class Consistency(NamedTuple):
     """Agreement of a model with a log."""
 
     chi2: dict[str, float]
@@ -275,7 +273,7 @@ def followed(
     logs: Iterable[Log],
     model: Model,
     settings: ShadowSettings | None = None,
-    report: Callable[[Log, Table, Verdict], object] = lambda log, telemetry, verdict: None,
+    report: Callable[[Log, Table, Consistency], object] = lambda log, telemetry, verdict: None,
 ) -> tuple[Log, Shadowed]:
     """Return the whole of a log that arrives in parts, and the estimated states.
 

@@ -13,11 +13,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from spheretwin.machine.intervals import Uncertainty
 from spheretwin.machine.log import Log
-from spheretwin.machine.twin_history import Drift, Identification, drifts, history_of
+from spheretwin.machine.twin_history import Identification, ParameterDrift, drifts, history_of
+from spheretwin.models.base.arrays import Array
 from spheretwin.models.base.errors import InputError, shown, without_breaks
 from spheretwin.models.base.files import regular_file, whole_file
 
@@ -129,7 +129,7 @@ def read_history(path: Path) -> list[Identification]:
     return history_of(content, path)
 
 
-def read_drifts(path: Path) -> dict[str, Drift]:
+def read_drifts(path: Path) -> dict[str, ParameterDrift]:
     """Return the drift of each parameter of a twin that was identified at two times or more.
 
     Raises
@@ -187,7 +187,7 @@ def draw_fields(path: Path, count: int, seed: int = 0) -> dict[str, list[Any]]:
     return {name: [one[name] for one in machines] for name in machines[0]}
 
 
-def _identified(path: Path) -> tuple[str, dict[str, float], NDArray[np.float64]]:
+def _identified(path: Path) -> tuple[str, dict[str, float], Array]:
     """Return scenario, identified values by name, and their covariance."""
     content = _content(path)
     try:

@@ -26,7 +26,7 @@ class Identification(NamedTuple):
     """Value and 95 % interval of each parameter."""
 
 
-class Drift(NamedTuple):
+class ParameterDrift(NamedTuple):
     """Drift of a parameter: slope of the line through its values, weighted by their intervals."""
 
     per_day: float
@@ -69,7 +69,7 @@ def history_of(content: Mapping[str, Any], path: Path) -> list[Identification]:
         ) from None
 
 
-def drifts(history: Sequence[Identification], units: Mapping[str, str]) -> dict[str, Drift]:
+def drifts(history: Sequence[Identification], units: Mapping[str, str]) -> dict[str, ParameterDrift]:
     """Return the drift of each parameter that was identified at two times or more.
 
     Parameters
@@ -87,7 +87,7 @@ def drifts(history: Sequence[Identification], units: Mapping[str, str]) -> dict[
         days, weights = (times - times[0]) / DAY_s, (2 * Z95 / (high - low)) ** 2
         days = days - np.average(days, weights=weights)
         spread = float(weights @ days**2)
-        found[name] = Drift(float(weights @ (days * values)) / spread, Z95 / spread**0.5, unit)
+        found[name] = ParameterDrift(float(weights @ (days * values)) / spread, Z95 / spread**0.5, unit)
     return found
 
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from spheretwin import scenario as scenarios
-from spheretwin.machine.findings import ERROR, FINDINGS, Evidence, Finding
+from spheretwin.machine.findings import ERROR, FINDINGS, Evidence, LogFinding
 from spheretwin.machine.log import Log
 from spheretwin.machine.model import Model, model_of
 from spheretwin.models.base.errors import InputError
@@ -18,12 +18,12 @@ from spheretwin.scenario.sections import Scenario
 
 
 @dataclass(frozen=True)
-class Verdict:
+class LogVerdict:
     """Verdict on a log.
 
     Attributes
     ----------
-    findings : tuple of Finding
+    findings : tuple of LogFinding
         In the order of `FINDINGS`.
     rows : int
         Rows of the log.
@@ -35,7 +35,7 @@ class Verdict:
         Parameters that the log can and cannot identify, a line each; empty before that is analysed.
     """
 
-    findings: tuple[Finding, ...]
+    findings: tuple[LogFinding, ...]
     rows: int
     rate_Hz: float | None
     accepted_findings: tuple[str, ...] = ()
@@ -58,7 +58,7 @@ class Verdict:
         }
 
 
-def check(log: Log, scenario: Scenario | str | PathLike[str] = "hold") -> Verdict:
+def check(log: Log, scenario: Scenario | str | PathLike[str] = "hold") -> LogVerdict:
     """Check a log before anything is derived from it.
 
     Parameters
@@ -70,7 +70,7 @@ def check(log: Log, scenario: Scenario | str | PathLike[str] = "hold") -> Verdic
 
     Returns
     -------
-    Verdict
+    LogVerdict
         Findings with advice on what to record instead.
 
     Raises
@@ -80,10 +80,10 @@ def check(log: Log, scenario: Scenario | str | PathLike[str] = "hold") -> Verdic
     """
     evidence = Evidence(log, model_of_log(log, scenario))
     findings = [
-        Finding(name, *stated) for name, function in FINDINGS.items() for stated in function(evidence)
+        LogFinding(name, *stated) for name, function in FINDINGS.items() for stated in function(evidence)
     ]
     rate_Hz = 1 / evidence.period_s if np.isfinite(evidence.period_s) else None
-    return Verdict(tuple(findings), len(log), rate_Hz, log.accepted)
+    return LogVerdict(tuple(findings), len(log), rate_Hz, log.accepted)
 
 
 def model_of_log(log: Log, scenario: Scenario | str | PathLike[str]) -> Model:

@@ -14,12 +14,11 @@ from math import log as logarithm
 from typing import Annotated, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field
 from scipy.special import logsumexp
 
 from spheretwin.machine.change_diagnosis import ChangeDiagnosis, Explanation, evidence_of_noise, shares_of
-from spheretwin.machine.change_filter import ChangeFilter, Linearisation, Rows, Step
+from spheretwin.machine.change_filter import BlockRows, ChangeFilter, FilterStep, Linearisation
 from spheretwin.machine.explanations import (
     LOADS,
     NONLINEAR,
@@ -37,8 +36,6 @@ from spheretwin.machine.state_estimation import Shadow
 from spheretwin.machine.windows import Window
 from spheretwin.models.base.errors import InputError
 from spheretwin.scenario.fields import SettingsModel
-
-Array = NDArray[np.float64]
 
 WATCHED = (
     "torque_scale",
@@ -179,7 +176,7 @@ class Watch:
         """Start anew from the present values."""
         self._candidates = candidates_of(self._parameters, self._values, self._watched)
         self._linearisation = Linearisation(self._machine, self._parameters, self._values, self.variance)
-        self._steps: deque[Step] = deque()
+        self._steps: deque[FilterStep] = deque()
         self._signatures = Signatures(self._candidates)
         self._evidence = {one.name: 0.0 for one in self._candidates} | {UNNAMED: 0.0}
         self._waited: int | None = None  # windows since the evidence has exceeded the threshold
@@ -245,7 +242,7 @@ class Watch:
     def _judge(self, window: Window) -> list[Alarm]:
         """Judge a window; return new alarms."""
         squares = used = 0.0
-        for rows in Rows(window, *window.measured()).blocks():
+        for rows in BlockRows(window, *window.measured()).blocks():
             block = self._linearisation.block(rows, self._filters[0].estimate.state)
             for place, plain in enumerate(self._filters):
                 step = plain.advance(block)
@@ -271,7 +268,7 @@ class Watch:
         self._filters[0].torque_noise_Nm_s *= float(np.sqrt(variances[best]))
         self.variance = self._linearisation.variance = float(variances[best])
 
-    def _add(self, step: Step) -> None:
+    def _add(self, step: FilterStep) -> None:
         """Let signatures pass a step, and new ones begin in it."""
         self._steps.append(step)
         if self._waited is None and len(self._steps) * step.block.length_s > HORIZON_s + 1e-9:

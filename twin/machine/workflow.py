@@ -10,29 +10,27 @@ from collections.abc import Callable, Iterable, Mapping
 from typing import Annotated, Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field
 
 from spheretwin import scenario as scenarios
-from spheretwin.machine.excitation import Design, DesignSettings, design, log_of
+from spheretwin.machine.excitation import Design, DesignSettings, design
 from spheretwin.machine.identification import Identified, identify
 from spheretwin.machine.intervals import Uncertainty
-from spheretwin.machine.log import Log
+from spheretwin.machine.log import Log, log_of
 from spheretwin.machine.model import model_of
 from spheretwin.machine.noise_fit import fit_noise
 from spheretwin.machine.parameters import Machine, selected
 from spheretwin.machine.state_estimation import Shadowed, shadow
 from spheretwin.machine.validation import Validation, validate
-from spheretwin.machine.verdict import Verdict, check
+from spheretwin.machine.verdict import LogVerdict, check
 from spheretwin.machine.watching import Alarm, Watch
 from spheretwin.models import actuator as actuators
+from spheretwin.models.base.arrays import Array
 from spheretwin.models.base.errors import SpheretwinError
 from spheretwin.models.telemetry.status import Status
 from spheretwin.models.telemetry.table import Table
 from spheretwin.scenario.fields import SettingsModel
 from spheretwin.simulation import simulate
-
-Array = NDArray[np.float64]
 
 SCENARIO = "sinusoid"
 CALIBRATED: dict[str, Any] = {
@@ -147,7 +145,7 @@ class Workflow(NamedTuple):
     design: Design
     logs: tuple[Played, ...]
     """Of the designed experiment under each payload, then the one that judges the twin."""
-    verdicts: tuple[Verdict, ...]
+    verdicts: tuple[LogVerdict, ...]
     without_payload: Identified
     """From the first log alone."""
     identified: Identified
@@ -248,7 +246,8 @@ def _play(
             f"workflow: expected a run of {duration_s:g} s, received {run.status} after"
             f" {run.telemetry['t_s'][-1]:.3g} s"
         )
-    return Played(log_of(run.telemetry, payload_kg, f"payload {1e3 * payload_kg:g} g"), run.telemetry)
+    name, conditions = f"payload {1e3 * payload_kg:g} g", {"plant.payload_kg": payload_kg}
+    return Played(log_of(run.telemetry, name, conditions), run.telemetry)
 
 
 _FIT_s = 1.0  # rows for the noise of the shadow

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from spheretwin.machine.intervals import Z95
 from spheretwin.machine.residuals import CHI2
 from spheretwin.machine.workflow import Judged, Workflow
+from spheretwin.models.base.arrays import Array
 from spheretwin.models.base.checks import Check
-
-Array = NDArray[np.float64]
 
 SETTLED_s = 0.3
 """Time after which the shadow is judged: it starts without knowing the state."""

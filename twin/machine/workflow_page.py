@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from spheretwin.machine.report import (
     LABELS,
@@ -23,8 +22,6 @@ from spheretwin.machine.workflow_checks import TRUE_COLUMNS, checks_of, rms_erro
 from spheretwin.models.telemetry.signals import ANGLES
 from spheretwin.viz.pages import markdown
 from spheretwin.viz.pages.markdown import Drawing, PageSection, ReportPage, ResultTable
-
-Array = NDArray[np.float64]
 
 NAME = "twin"
 TITLE = "Digital twin of a hidden machine"

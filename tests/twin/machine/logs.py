@@ -5,7 +5,7 @@ from functools import cache
 import numpy as np
 
 import spheretwin as st
-from spheretwin.machine import Log
+from spheretwin.machine.log import log_of
 
 # Different frequencies on each axis: no exchange of axes leaves the motion as it is.
 MULTISINE = {
@@ -31,15 +31,7 @@ def run(scenario="hold", hardware="electronics", changes=()):
 def multisine(hardware="electronics"):
     """Log of a multisine on three axes."""
     changes = {"hardware": hardware, "plant.engine": ENGINES[hardware], **MULTISINE}
-    return log_of(st.simulate("hold", changes))
-
-
-def log_of(run):
-    """Commanded currents, and angles after the sensors."""
-    table = run.telemetry
-    names = [signal.name for signal in table.signals]
-    angles = table["q_measured_rad" if "q_measured_rad" in names else "q_rad"]
-    return Log(table["t_s"], table["current_command_A"], angles)
+    return log_of(st.simulate("hold", changes).telemetry)
 
 
 def relabelled(log, order, signs):

@@ -4,12 +4,14 @@ Nothing lies on a grid of the watch. MuJoCo plays the machine, in its own steps;
 `HELD_OUT` are kinds that were not used while the watch was built.
 """
 
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
 import spheretwin
 from spheretwin.machine import Alarm, Log, Watch
+from spheretwin.machine.log import log_of
 from spheretwin.machine.workflow import NOMINAL
 
 SCENARIO, FRICTION_Nm, VISCOUS_Nm_s = "sinusoid", 2e-3, 1e-4
@@ -177,15 +179,13 @@ def random_case(seed, kind=None, duration_s=3.9):
     known = {**NOMINAL, **_motion(generator), "plant.payload_kg": float(generator.choice([0.0, 0.05, 0.1]))}
     changed_s = float(generator.uniform(2.2, 2.9))
     name, size, changes = change(generator, known["plant.payload_kg"])
-    scenario = spheretwin.load(SCENARIO, {**known, "duration": duration_s, "seed": seed})
-    parts = []
-    with spheretwin.Session(scenario) as session:
-        for after_s, field, value in (*changes, (duration_s - changed_s, None, None)):
-            rows = session.advance(round((changed_s + after_s) / 1e-3) - session.tick)
-            parts.append([rows[one].copy() for one in ("t_s", "current_command_A", "q_measured_rad")])
-            if field:
-                session.set(field, value)
-    t_s, current_A, angle_rad = (np.concatenate(columns) for columns in zip(*parts, strict=True))
+    events = [
+        {"t_s": round(changed_s + after_s, 3), "set": field, "value": value}
+        for after_s, field, value in changes
+    ]
+    fields = {**known, "duration": duration_s, "seed": seed, "event": events}
+    log = log_of(spheretwin.simulate(SCENARIO, fields).telemetry, f"case {seed}")
+    t_s, angle_rad = log.t_s, log.angle_rad.copy()
     after = np.flatnonzero(t_s > changed_s)
     if kind == "noise of a sensor":
         deviation_rad = 3.6e-4 * _log_uniform(generator, 2.0, 6.0)
@@ -195,7 +195,7 @@ def random_case(seed, kind=None, duration_s=3.9):
         angle_rad[spikes, generator.integers(2)] += _log_uniform(generator, 3e-3, 3e-2)
     if kind == "gain of a sensor":
         angle_rad[after, generator.integers(2)] *= 1 + _sign(generator) * _log_uniform(generator, 0.01, 0.04)
-    return Case(kind, name, size, changed_s, known, Log(t_s, current_A, angle_rad, name=f"case {seed}"))
+    return Case(kind, name, size, changed_s, known, replace(log, angle_rad=angle_rad))
 
 
 class Outcome(NamedTuple):

@@ -5,7 +5,7 @@ import pytest
 
 import spheretwin
 from spheretwin.machine import IdentifySettings, Log, identify
-from spheretwin.machine.discrepancy import Component, _most_likely, widening
+from spheretwin.machine.discrepancy import VarianceComponent, _most_likely, widening
 from spheretwin.machine.workflow import CALIBRATED
 
 
@@ -27,7 +27,7 @@ def test_the_largest_effect_of_what_explains_most_widens_an_interval():
     covariance = np.diag([4.0, 1.0])
 
     def component(gain, slopes):
-        return Component((), np.zeros(1), 2.0, gain, np.zeros(1), np.array(slopes))
+        return VarianceComponent((), np.zeros(1), 2.0, gain, np.zeros(1), np.array(slopes))
 
     strong, likely, other = (
         component(9.0, [[3.0], [0.0]]), component(8.0, [[1.0], [1.0]]), component(5.0, [[50.0], [50.0]])

@@ -5,7 +5,7 @@ import pytest
 
 import spheretwin
 from spheretwin.machine import DesignSettings, design, identify
-from spheretwin.machine.excitation import log_of
+from spheretwin.machine.log import log_of
 from spheretwin.models.base.errors import SpheretwinError
 from tests.twin.machine.machine_logs import KNOWN, SCENARIO
 
@@ -31,7 +31,8 @@ def test_the_scenario_is_that_of_the_experiment(experiment):
 
 
 def test_the_expected_deviation_is_that_of_the_identification(experiment):
-    logs = [log_of(run, payload) for run, payload in zip(experiment.runs, SMALL.payloads_kg, strict=True)]
+    known = [{"plant.payload_kg": payload_kg} for payload_kg in SMALL.payloads_kg]
+    logs = [log_of(run, conditions=one) for run, one in zip(experiment.runs, known, strict=True)]
     result = identify(logs, SCENARIO, WANTED, KNOWN)
     for name, deviation in experiment.deviations.items():
         low, high = result.parameters[name].interval

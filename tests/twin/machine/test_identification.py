@@ -11,6 +11,7 @@ import spheretwin
 from spheretwin.config.plant_model import parameters
 from spheretwin.machine import Log, identify
 from spheretwin.machine.identification import Problem, unidentifiable
+from spheretwin.machine.log import log_of
 from spheretwin.machine.parameters import KINDS, Machine, members, selected, sensor_angles
 from spheretwin.machine.twin_file import draw_fields, write_twin
 from spheretwin.machine.windows import Shooting, Window, windows_of
@@ -28,21 +29,20 @@ TRUE = {
 FRICTION = [f"plant.coulomb_Nm.{i}" for i in range(3)]
 
 
-def log_of(payload_kg=0.0, **more):
+def played(payload_kg=0.0, **more):
     conditions = {"plant.payload_kg": payload_kg}
-    table = spheretwin.simulate(SCENARIO, {**KNOWN, **TRUE, **conditions, **more}).telemetry
-    columns = (table[name] for name in ("t_s", "current_command_A", "q_measured_rad"))
-    return Log(*columns, name="log", conditions=conditions)
+    run = spheretwin.simulate(SCENARIO, {**KNOWN, **TRUE, **conditions, **more})
+    return log_of(run.telemetry, conditions=conditions)
 
 
 @pytest.fixture(scope="module")
 def empty():
-    return log_of()
+    return played()
 
 
 @pytest.fixture(scope="module")
 def loaded():
-    return log_of(0.05, seed=1)
+    return played(0.05, seed=1)
 
 
 @pytest.fixture(scope="module")
@@ -159,7 +159,7 @@ def test_a_dead_group_is_never_accepted(empty):
     group = int(np.argmax(np.std(empty.current_A, axis=0)))
     dead = [0.97] * 18
     dead[group] = 0.0
-    log = log_of(**{"plant.group_gain": dead})
+    log = played(**{"plant.group_gain": dead})
     known = {**KNOWN, "plant.modelling_error": 0.06}
     outcome = identify(log, SCENARIO, ["torque_scale", "plant.coulomb_Nm"], known)
     assert not outcome.accepted
@@ -255,14 +255,8 @@ def test_a_play_is_what_remains_of_a_motion_between_its_ends():
     machine = Machine(SCENARIO, KNOWN)
     setup = machine.setup(selected(["plant.backlash_rad.1"], machine.model.actuator), [0.2])
     q = np.zeros((6, 3))
-    q[:, 1] = [
-        0.0,
-        0.3,
-        0.5,
-        0.4,
-        0.25,
-        0.4,
-    ]  # pushed up, back within the play, pushed down, and up within it
+    # Pushed up, back within the play, pushed down, and up within it.
+    q[:, 1] = [0.0, 0.3, 0.5, 0.4, 0.25, 0.4]
     for start, expected in (
         (None, [0.0, 0.2, 0.4, 0.4, 0.35, 0.35]),
         (np.full(3, -0.05), [-0.05, 0.2, 0.4, 0.4, 0.35, 0.35]),

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from spheretwin.machine.intervals import Z95, Cost, interval
+from spheretwin.machine.intervals import Z95, LeastSquaresCost, interval
 
 FREE = np.full(2, -np.inf)
 
@@ -12,7 +12,7 @@ FREE = np.full(2, -np.inf)
 def quadratic():
     information = np.array([[4.0, 1.0], [1.0, 2.0]])
     best = np.array([0.3, -0.2])
-    return Cost(
+    return LeastSquaresCost(
         lambda x: 0.5 * (x - best) @ information @ (x - best),
         lambda x: (information, information @ (x - best)),
         best,
@@ -48,7 +48,9 @@ def test_another_cost_has_the_interval_of_its_profile():
         slopes = np.array([[3 * np.exp(v[0]), 0.0], [1.0, 1.0]])
         return slopes.T @ slopes, slopes.T @ residuals(v)
 
-    cost = Cost(lambda v: 0.5 * residuals(v) @ residuals(v), normal, np.zeros(2), 0.0, FREE, -FREE)
+    cost = LeastSquaresCost(
+        lambda v: 0.5 * residuals(v) @ residuals(v), normal, np.zeros(2), 0.0, FREE, -FREE
+    )
     low, high = interval(cost, np.linalg.inv(normal(np.zeros(2))[0]), 0)
     ends = [brentq(lambda x: 3 * abs(np.expm1(x)) - Z95, *sorted([0.0, far])) for far in (-2.0, 2.0)]
     # The search stops within 2 % of a deviation.

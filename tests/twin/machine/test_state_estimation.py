@@ -5,11 +5,11 @@ import pytest
 
 import spheretwin as st
 from spheretwin.machine import Log, ShadowSettings, fit_noise, shadow
+from spheretwin.machine.log import log_of
 from spheretwin.machine.model import model_of
 from spheretwin.machine.state_estimation import Shadow
 from spheretwin.machine.workflow import NOMINAL
 from spheretwin.models.base.errors import InputError
-from tests.twin.machine.logs import log_of
 from tests.twin.machine.machine_logs import KNOWN, SCENARIO
 
 
@@ -20,7 +20,7 @@ def run():
 
 @pytest.fixture(scope="module")
 def log(run):
-    return log_of(run)
+    return log_of(run.telemetry)
 
 
 @pytest.fixture(scope="module")

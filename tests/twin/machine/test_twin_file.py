@@ -9,8 +9,8 @@ import pytest
 from scipy.stats import norm
 
 from spheretwin.machine import Log
-from spheretwin.machine.identification import Estimate, Identified
-from spheretwin.machine.residuals import Fit
+from spheretwin.machine.identification import Identified, IdentifiedValue
+from spheretwin.machine.residuals import ResidualFit
 from spheretwin.machine.twin_file import (
     UNSIGNED,
     read_drifts,
@@ -23,11 +23,11 @@ from spheretwin.machine.twin_history import history_drawing
 from spheretwin.models.base.errors import InputError
 
 FIELDS = {"plant.coulomb_Nm": [0.003, 0.003, 0.004], "plant.modelling_error": 0.1}
-FIT = Fit(1.0, {}, ())
+FIT = ResidualFit(1.0, {}, ())
 RESULT = Identified(
     accepted=True,
-    parameters={"torque_scale": Estimate(0.97, (0.96, 0.98), "1")},
-    refused=(), correlations=(), train=FIT, held_out=FIT, held_out_before=FIT, improvement=0.5, reasons=(),
+    parameters={"torque_scale": IdentifiedValue(0.97, (0.96, 0.98), "1")},
+    refused=(), correlations=(), train=FIT, held_out=FIT, held_out_before=FIT, improvement=0.5,
     covariance=np.array([[2.5e-5]]),
     fields=FIELDS,
 )  # fmt: skip
@@ -61,7 +61,7 @@ def test_each_changed_character_and_each_cut_is_refused_by_name(path):
 
 def test_only_an_accepted_result_is_written_and_only_this_format_is_read(path):
     with pytest.raises(InputError, match="expected an accepted identification"):
-        write_twin(path, RESULT._replace(accepted=False, reasons=("why",)), "hold", {}, [LOG])
+        write_twin(path, RESULT._replace(accepted=False, shortcomings=("why",)), "hold", {}, [LOG])
     path.write_text("format = 2")
     with pytest.raises(InputError, match=r"expected format = 1 and a table \[fields\], received format 2"):
         read_twin(path)
@@ -72,7 +72,7 @@ def test_the_history_of_a_twin_goes_on_and_its_drift_is_the_weighted_slope(tmp_p
     days, values, halves = np.array([0.0, 1.5, 4.0]), [0.97, 0.955, 0.94], np.array([0.01, 0.02, 0.01])
     path.write_text("format = 2")  # no twin: it is overwritten
     for day, value, half in zip(days, values, halves, strict=True):
-        parameters = {"torque_scale": Estimate(value, (value - half, value + half), "1")}
+        parameters = {"torque_scale": IdentifiedValue(value, (value - half, value + half), "1")}
         result = RESULT._replace(parameters=parameters)
         write_twin(path, result, "hold", {}, [LOG], start + timedelta(days=day))
     history = read_history(path)

@@ -8,9 +8,9 @@ import pytest
 import spheretwin
 from spheretwin.machine import shadow, validate
 from spheretwin.machine.intervals import Uncertainty
+from spheretwin.machine.log import log_of
 from spheretwin.machine.model import model_of
 from spheretwin.machine.state_estimation import Shadow
-from tests.twin.machine.logs import log_of
 from tests.twin.machine.machine_logs import KNOWN, SCENARIO, changing_log
 
 
@@ -77,7 +77,7 @@ def test_a_hinge_whose_count_does_not_change_is_not_informative():
     """No innovation and no residual of it is an agreement: its chi-squared was 0.000, and consistent."""
     motion = {"trajectory.amplitude_rad": [0.2, 0.2, 0.0], "duration": 1.0}
     run = spheretwin.simulate(SCENARIO, {**KNOWN, **motion})
-    log = log_of(run)
+    log = log_of(run.telemetry)
     assert np.ptp(log.angle_rad[:, 2]) == 0.0
     for chi2 in (validate(log, SCENARIO, KNOWN).fit.hinge_chi2, shadow(log, SCENARIO, KNOWN).chi2):
         assert np.isnan(chi2["gamma"])

@@ -11,9 +11,10 @@ import spheretwin as st
 from spheretwin import machine
 from spheretwin.machine.diagnosis import AXES, FEWEST_WINDOWS
 from spheretwin.machine.findings import FINDINGS, Evidence, check_names
+from spheretwin.machine.log import log_of
 from spheretwin.machine.verdict import model_of_log
 from spheretwin.models.base.errors import InputError
-from tests.twin.machine.logs import MULTISINE, log_of, multisine, relabelled, run
+from tests.twin.machine.logs import MULTISINE, multisine, relabelled, run
 
 RANDOM = np.random.default_rng(0)
 
@@ -51,13 +52,13 @@ def test_a_correct_log_has_no_finding(hardware):
 )
 def test_correct_logs_of_shipped_scenarios_are_accepted(scenario, hardware, duration):
     """Under loads and random torques that the check does not know."""
-    verdict = machine.check(log_of(run(scenario, hardware, (("duration", duration),))), scenario)
+    verdict = machine.check(log_of(run(scenario, hardware, (("duration", duration),)).telemetry), scenario)
     assert verdict.accepted, verdict.findings
     assert {f.name for f in verdict.findings} <= {"saturation", "lack-of-excitation", "unverified"}
 
 
 def test_an_unknown_payload_is_no_error():
-    log = log_of(run("tilt", "electronics", (("duration", 2.5),)))
+    log = log_of(run("tilt", "electronics", (("duration", 2.5),)).telemetry)
     assert machine.check(log, "hold").accepted  # the tilt has a payload, hold has none
 
 
@@ -118,7 +119,7 @@ def test_degrees_are_found(amplitude, log):
     if amplitude == "within it":
         # A motion that stays within the range of the hinges in either unit: 1 degree.
         small = {"trajectory.components": [{"amplitude_rad": [0.01] * 3, "frequency_Hz": [3.1, 2.3, 4.3]}]}
-        log = log_of(st.simulate("hold", {**MULTISINE, **small}))
+        log = log_of(st.simulate("hold", {**MULTISINE, **small}).telemetry)
     result = errors(replace(log, angle_rad=np.degrees(log.angle_rad)))
     assert list(result) == ["angle-unit"]
     assert "angles.unit to deg" in result["angle-unit"].advice
@@ -239,12 +240,12 @@ def test_a_log_without_motion_lacks_excitation(log):
     noise = RANDOM.normal(scale=3e-4, size=(1500, 3))
     assert list(errors(replace(log, angle_rad=noise))) == ["lack-of-excitation"]
     # A single transient fits wrong readings by chance: none is tried.
-    result = errors(log_of(run("hold", "electronics", (("duration", 1.0),))))
+    result = errors(log_of(run("hold", "electronics", (("duration", 1.0),)).telemetry))
     assert f"{FEWEST_WINDOWS} are the least" in result["lack-of-excitation"].where
 
 
 def test_axes_that_do_not_move_are_named():
-    result = errors(log_of(run("tilt", "electronics", (("duration", 2.5),))), "tilt", "warning")
+    result = errors(log_of(run("tilt", "electronics", (("duration", 2.5),)).telemetry), "tilt", "warning")
     assert result["lack-of-excitation"].where.startswith("beta, gamma:")
     assert "order of beta and gamma" in result["unverified"].where
 
