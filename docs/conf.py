@@ -5,7 +5,10 @@ from importlib.metadata import version as version_of
 from pathlib import Path
 
 import jupyter_client
+from docutils import nodes
+from latex2mathml.converter import convert
 from sphinx.application import Sphinx
+from sphinx.util.docutils import SphinxTranslator
 from traitlets import default
 
 HERE = Path(__file__).parent
@@ -22,7 +25,8 @@ release = version = version_of("spheretwin")
 extensions = [
     "myst_nb", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "sphinx_design",
 ]  # fmt: skip
-myst_enable_extensions = ["colon_fence", "deflist", "fieldlist"]
+myst_enable_extensions = ["colon_fence", "deflist", "dollarmath", "fieldlist"]
+html_math_renderer = "mathml"
 myst_heading_anchors = 4
 nb_execution_in_temp = True
 nb_execution_raise_on_error = True
@@ -61,6 +65,16 @@ def setup(app: Sphinx) -> None:
     """Write the pages that follow from the sources; links to those sources lead to the pages."""
     generate.write_pages(generate.ROOT / generate.GENERATED)
     app.connect("source-read", lead_to_pages)
+    # Browsers draw MathML themselves: no script, no font and no other host is needed.
+    app.add_html_math_renderer("mathml", inline_renderers=(equation, None), block_renderers=(equation, None))
+
+
+def equation(visitor: SphinxTranslator, node: nodes.Element) -> None:
+    """Write an equation as MathML."""
+    block = isinstance(node, nodes.math_block)
+    drawn = convert(node.astext(), display="block" if block else "inline")
+    visitor.body.append(f'<div class="equation" tabindex="0">{drawn}</div>' if block else drawn)
+    raise nodes.SkipNode
 
 
 def lead_to_pages(app: Sphinx, page: str, source: list[str]) -> None:
