@@ -74,13 +74,15 @@ class _CellFormatter(Formatter):
         item = args[0]
         if key in kwargs:
             return kwargs[str(key)](item)
-        return item[key] if hasattr(item, "case") else getattr(item, str(key))
+        return item[key] if isinstance(key, int) or hasattr(item, "case") else getattr(item, key)
 
     def format_field(self, value: Any, format_spec: str) -> str:
         if value is None:
             return NONE
         if isinstance(value, list | tuple):
             return " / ".join(self.format_field(entry, format_spec) for entry in value)
+        if isinstance(value, str):
+            return value
         if isinstance(value, float):
             form, scale, _ = _parts(format_spec)
             unit = " %" * format_spec.endswith("%")

@@ -13,8 +13,7 @@ from spheretwin.models import actuator
 from spheretwin.models.telemetry.signals import ANGLES
 from spheretwin.paper.cells import Numbers, of_axis, table
 from spheretwin.paper.experiment import Array, Case, ExperimentSection, Outcomes, RunOutcome, Statement
-from spheretwin.paper.experiment_file import ExperimentFile
-from spheretwin.paper.laws import BY_LAW
+from spheretwin.paper.experiment_file import BY_LAW, ExperimentFile
 from spheretwin.scenario.hardware import HARDWARE, MACHINE
 from spheretwin.viz.pages.markdown import Drawing
 

@@ -13,10 +13,10 @@ import numpy as np
 from spheretwin.paper import fault_cases as cases
 from spheretwin.paper.cells import NONE, Numbers, table
 from spheretwin.paper.experiment import ExperimentSection, RunOutcome
+from spheretwin.paper.experiment_file import BY_LAW
 from spheretwin.paper.fault_cases import FEW, FILE, FaultRuns
 from spheretwin.paper.fault_outcomes import tracks
 from spheretwin.paper.fault_sections import percent
-from spheretwin.paper.laws import BY_LAW
 from spheretwin.study.statistics import quantile_text, share_interval
 from spheretwin.viz.pages.markdown import Drawing
 

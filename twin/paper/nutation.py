@@ -20,8 +20,7 @@ from spheretwin.paper.experiment import (
     padded,
     window_maxima,
 )
-from spheretwin.paper.experiment_file import CaseRuns, ExperimentFile
-from spheretwin.paper.laws import PAPER_LAWS
+from spheretwin.paper.experiment_file import PAPER_LAWS, CaseRuns, ExperimentFile
 from spheretwin.run import Run
 from spheretwin.viz.pages.markdown import Drawing
 

@@ -9,8 +9,7 @@ import numpy as np
 
 from spheretwin.paper.cells import table
 from spheretwin.paper.experiment import Array, Case, ExperimentSection, Outcomes, RunOutcome, Statement
-from spheretwin.paper.experiment_file import ExperimentFile
-from spheretwin.paper.laws import PAPER_LAWS, PRINTED_rad, printed_rad
+from spheretwin.paper.experiment_file import PAPER_LAWS, ExperimentFile, PRINTED_rad, printed_rad
 from spheretwin.viz.pages.markdown import Drawing, ResultTable
 
 FILE = ExperimentFile("readings")

@@ -15,8 +15,7 @@ from spheretwin.casadi import nmpc_file
 from spheretwin.control.laws.afsm_eso import PRESETS
 from spheretwin.models import actuator
 from spheretwin.paper.experiment import Case
-from spheretwin.paper.experiment_file import ExperimentFile
-from spheretwin.paper.laws import BY_LAW
+from spheretwin.paper.experiment_file import BY_LAW, ExperimentFile
 from spheretwin.study.optimise import Optimise
 from spheretwin.study.study import load
 

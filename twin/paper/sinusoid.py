@@ -11,8 +11,14 @@ import numpy as np
 from spheretwin.models.telemetry.signals import ANGLES
 from spheretwin.paper.cells import of_axis
 from spheretwin.paper.experiment import Array, ExperimentSection, Outcomes, RunOutcome, Statement
-from spheretwin.paper.experiment_file import CaseRuns, ExperimentFile
-from spheretwin.paper.laws import COMPARED_LAWS, PAPER_LAWS, ComparedLaw, printed_rad
+from spheretwin.paper.experiment_file import (
+    COMPARED_LAWS,
+    PAPER_LAWS,
+    CaseRuns,
+    ComparedLaw,
+    ExperimentFile,
+    printed_rad,
+)
 from spheretwin.viz.pages.markdown import Drawing
 
 FIGURE6, FIGURE7 = (ExperimentFile("sinusoid", figure) for figure in ("figure6", "figure7"))

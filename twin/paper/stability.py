@@ -10,10 +10,9 @@ import numpy as np
 from spheretwin import scenario as scenarios
 from spheretwin.models.telemetry.table import Table
 from spheretwin.paper import frequency_response as responses
-from spheretwin.paper.cells import NONE, table
+from spheretwin.paper.cells import Cell, table
 from spheretwin.paper.experiment import Array, Case, ExperimentSection, Outcomes, RunOutcome, Statement
-from spheretwin.paper.experiment_file import CaseRuns, ExperimentFile
-from spheretwin.paper.laws import BY_LAW
+from spheretwin.paper.experiment_file import BY_LAW, CaseRuns, ExperimentFile
 from spheretwin.paper.lyapunov import Descent, descent
 from spheretwin.run import Run
 from spheretwin.viz.pages.markdown import Drawing, ResultTable
@@ -142,12 +141,18 @@ def _response_section(items: Sequence[CaseRuns]) -> list[ExperimentSection]:
         return []
     by_law = {item["law"]: (_measured(item), _linear(item.case)) for item in items}
     rows = [
-        (BY_LAW[law].label, source, *_response_cells(responses.margins(responses.LINES_Hz, response)))
+        (BY_LAW[law].label, source, responses.margins(responses.LINES_Hz, response))
         for law, both in by_law.items()
         for source, response in zip(("measured", "linear"), both, strict=True)
     ]
-    head = ("law", "response", "crossover, Hz", "phase margin, degrees", "gain margin, dB")
-    margins = ResultTable("Gain and phase margins of the sampled loop", head, rows, 2)
+    cells: dict[str, Cell[tuple[str, str, responses.Margins]]] = {
+        "law": "{0}",
+        "response": "{1}",
+        "crossover, Hz": "{2.crossover_Hz:.1f}",
+        "phase margin, degrees": "{2.phase_deg:.1f}",
+        "gain margin, dB": "{2.gain_dB:.1f}",
+    }
+    margins = table("Gain and phase margins of the sampled loop", rows, cells, 2)
     values: dict[str, Any] = {"lines": len(responses.LINES_Hz), "amplitude_mNm": 1e3 * responses.AMPLITUDE_Nm}
     values |= {"first": responses.LINES_Hz[0], "last": responses.LINES_Hz[-1]}
     return [FILE.section("response", [margins], [lambda: _bode(by_law)], **values)]
@@ -162,10 +167,6 @@ def _measured(item: CaseRuns) -> responses.Response:
 def _linear(case: Case) -> responses.Response:
     scenario = scenarios.load(case.scenario, with_multisine(case).fields)
     return responses.linear_loop(scenario).response(responses.LINES_Hz)
-
-
-def _response_cells(margins: responses.Margins) -> tuple[str, ...]:
-    return tuple(NONE if np.isnan(value) else f"{value:.1f}" for value in margins)
 
 
 def _bode(by_law: dict[str, tuple[responses.Response, responses.Response]]) -> Drawing:
@@ -223,26 +224,23 @@ def _reached(item: CaseRuns) -> str:
     return "not within the run" if reached_s is None else f"{reached_s:.2f} s"
 
 
+class Minute(NamedTuple):
+    """First or last minute of a long run."""
+
+    law: str
+    name: str
+    span: Span
+    gains: Any
+    """At its end, for the last minute; an empty text for the first one."""
+
+
 def _drift(outcomes: Outcomes) -> ResultTable:
-    rows = []
-    for law, data, early, late in _drift_runs(outcomes):
-        gains = NONE if data.gains is None else " / ".join(f"{gain:.0f}" for gain in data.gains)
-        rows.append((law, "first", *_span_cells(early), ""))
-        rows.append((law, "last", *_span_cells(late), gains))
-    head = (
-        "law", "minute", "RMS error, mrad", "torque, N·m", "variation, A/s", "at the limit",
-        "ξ̂ / ζ̂ at the end",
-    )  # fmt: skip
-    return ResultTable(f"First and last minute of {LONG_s:g} s", head, rows, 2)
-
-
-def _span_cells(span: Span) -> tuple[str, ...]:
-    return (
-        f"{1e3 * span.rms_error_rad:.2f}",
-        f"{span.rms_torque_Nm:.3f}",
-        f"{span.variation_A_s:.1f}",
-        f"{100 * span.at_limit:.0f} %",
-    )
+    minutes = [
+        minute
+        for law, data, early, late in _drift_runs(outcomes)
+        for minute in (Minute(law, "first", early, ""), Minute(law, "last", late, data.gains))
+    ]
+    return FILE.table("drift", minutes)
 
 
 Tested = dict[str, dict[str, list[CaseRuns]]]

@@ -19,9 +19,8 @@ from spheretwin.models.base.errors import InputError, shown
 from spheretwin.models.telemetry.status import Status
 from spheretwin.scenario.fields import flat
 from spheretwin.study.grid import Row
-from spheretwin.study.row import Rows
+from spheretwin.study.row import Rows, is_number
 from spheretwin.study.study import Study
-from spheretwin.study.template import is_number
 
 PLACES = (1.0, -1.0, 0.5, -0.5)
 """Steps from the scenario of the runs of a field."""

@@ -6,7 +6,7 @@ import pytest
 from spheretwin.models.telemetry.status import Status
 from spheretwin.paper import nutation
 from spheretwin.paper.experiment import Outcomes, padded
-from spheretwin.paper.laws import COMPARED_LAWS
+from spheretwin.paper.experiment_file import COMPARED_LAWS
 from spheretwin.paper.runner import make_plan, run_plan, scenario_of
 
 

@@ -5,7 +5,7 @@ import pytest
 
 from spheretwin.paper import readings
 from spheretwin.paper.experiment import Outcomes
-from spheretwin.paper.laws import PAPER_LAWS, PRINTED_rad, printed_rad
+from spheretwin.paper.experiment_file import PAPER_LAWS, PRINTED_rad, printed_rad
 from spheretwin.paper.readings import READINGS, case
 from spheretwin.paper.runner import scenario_of
 from spheretwin.paper.sinusoid import FIGURE6, FIGURE7

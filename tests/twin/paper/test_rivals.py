@@ -9,12 +9,11 @@ import pytest
 
 from spheretwin.control.laws import LAWS
 from spheretwin.models.telemetry.status import Status
-from spheretwin.paper import rival_conditions, rival_results
+from spheretwin.paper import rival_conditions, rivals
 from spheretwin.paper.experiment import Outcomes
-from spheretwin.paper.laws import BY_LAW
+from spheretwin.paper.experiment_file import BY_LAW
 from spheretwin.paper.rival_conditions import ELECTRONICS, FILE, FOLDER, HARDWARE, IDEAL
-from spheretwin.paper.rival_results import results, start_error, within
-from spheretwin.paper.rivals import EXPERIMENT
+from spheretwin.paper.rivals import EXPERIMENT, results, start_error, within
 from spheretwin.paper.runner import make_plan, run_plan, scenario_of
 from spheretwin.study.grid import Grid
 from spheretwin.study.row import Rows
@@ -171,18 +170,18 @@ def seeds_about(median):
 )
 def test_findings_rank_no_laws_whose_intervals_overlap(errors, expected):
     outcomes = made_up(30.0, {law: seeds_about(error) for law, error in errors.items()})
-    (finding,) = rival_results.findings(outcomes)
+    (finding,) = rivals.findings(outcomes)
     assert finding.text == f"{IDEAL.title}, {LIGHT}: within 30 A/s {expected}"
 
 
 def test_too_few_seeds_rank_nothing():
-    (finding,) = rival_results.findings(made_up(30.0, {"afsm_eso": (1e-3,) * 5, "adrc": (9e-3,) * 5}))
+    (finding,) = rivals.findings(made_up(30.0, {"afsm_eso": (1e-3,) * 5, "adrc": (9e-3,) * 5}))
     assert finding.text.endswith("AFSM-ESO is level with ADRC")
 
 
 def test_tables_have_the_interval_of_each_error():
     outcomes = made_up(30.0, {"pid": seeds_about(1e-3), "adrc": (2e-3, 2e-3)})
-    (largest, *_) = rival_results.errors(IDEAL, outcomes)
+    (largest, *_) = rivals.errors(IDEAL, outcomes)
     cells = {row[1]: row[2] for row in largest.rows}
     assert cells["tuned PID"] == "1.000 [0.980, 1.020]"
     assert cells["ADRC"] == "2.000 [–, –]"
@@ -196,7 +195,7 @@ def test_laws_with_sensors_have_more_seeds():
 
 def test_nothing_is_found_where_nothing_or_not_our_law_ran():
     without_our_law = made_up(30.0, {"adrc": (0.9e-3,)})
-    assert rival_results.findings(without_our_law) == rival_results.findings(Outcomes()) == []
+    assert rivals.findings(without_our_law) == rivals.findings(Outcomes()) == []
     assert EXPERIMENT.sections(Outcomes()) == []
 
 
@@ -245,7 +244,7 @@ def test_full_current_is_below_what_any_law_reaches_with_bounded_allocation():
         if "limit_A_s" not in case.details or case.fields["controller.law"] in ("afsm_eso", "pid")
     ]
     outcomes = run_plan(make_plan(EXPERIMENT._replace(cases=lambda: short), seeds=1))
-    for condition in rival_results.conditions(IDEAL, perturbed=False):
+    for condition in rivals.conditions(IDEAL, perturbed=False):
         limits = {
             allocation: np.max(
                 outcomes.runs(FILE.case(setting="ideal", condition=condition, limit=allocation))[0].data

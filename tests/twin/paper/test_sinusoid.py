@@ -6,7 +6,7 @@ import pytest
 from spheretwin import scenario as scenarios
 from spheretwin.paper import sinusoid
 from spheretwin.paper.experiment import Outcomes
-from spheretwin.paper.laws import COMPARED_LAWS, PAPER_LAWS, PRINTED_rad, printed_rad
+from spheretwin.paper.experiment_file import COMPARED_LAWS, PAPER_LAWS, PRINTED_rad, printed_rad
 from spheretwin.paper.page import rows
 from spheretwin.paper.runner import make_plan, run_plan, unexpected_ends
 from spheretwin.paper.sinusoid import EXPERIMENT_6, EXPERIMENT_7, FIGURE6, FIGURE7

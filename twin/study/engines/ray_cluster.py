@@ -3,7 +3,7 @@
 A process a core, and not threads within fewer: laws and metrics in plain Python run in all of them at a time.
 Only numbers of rows travel to the nodes, and only results back, into the same journal. Files that a
 study names must be on every node, under the same paths, and so must the same sources and versions: a node
-that has others is refused by `spheretwin.study.engines.worker`. The driver runs the rows whose telemetry
+that has others is refused by `spheretwin.study.engines.processes`. The driver runs the rows whose telemetry
 is stored, as it belongs next to the journal.
 """
 
@@ -24,7 +24,7 @@ from typing import Any
 
 from spheretwin.models.base.errors import InputError, SpheretwinError, shown, without_breaks
 from spheretwin.models.base.extras import missing
-from spheretwin.study.engines import threads, worker
+from spheretwin.study.engines import processes, threads
 from spheretwin.study.engines.engine import Batches, BatchResult, Engine, Order
 from spheretwin.study.grid import Row
 from spheretwin.study.row import RowResult
@@ -85,9 +85,9 @@ class _Cluster:
     def __init__(self, ray: Any, order: Order, here: list[int]) -> None:
         self._ray, self._order = ray, order
         self._batches = Batches(order.elsewhere(here), order.rows)
-        self._job = ray.put(worker.job_of(order.work.rows))
+        self._job = ray.put(processes.job_of(order.work.rows))
         # `Batches` counts and repeats lost batches; Ray itself repeats nothing.
-        self._task = ray.remote(num_cpus=1, max_retries=0)(worker.run_batch)
+        self._task = ray.remote(num_cpus=1, max_retries=0)(processes.run_batch)
         self._running: dict[Any, list[int]] = {}
         self._silences, self._checked_s = 0, time.monotonic()
         self._cores = self._most()

@@ -6,7 +6,7 @@ import pytest
 
 from spheretwin.models.base.errors import InputError, SpheretwinError
 from spheretwin.study import journal, runner
-from spheretwin.study.engines import engine, worker
+from spheretwin.study.engines import engine, processes
 from tests.package_copy import copy_package
 from tests.twin.study.cases import table
 from tests.twin.study.engines.clusters import LONG_STUDY, ROWS, goes_on_locally, run, started
@@ -31,14 +31,12 @@ def blocked_on(node_id, folder):
 
         import ray
 
-        from spheretwin.study.engines import worker
-
         is_blocked = ray.get_runtime_context().get_node_id() == node_id
         if is_blocked:
             (folder / "at_work").touch()
         while is_blocked or not (folder / "at_work").exists():
             time.sleep(0.01)
-        return worker.run_batch(job, numbers)
+        return processes.run_batch(job, numbers)
 
     return run_unless_blocked
 
@@ -50,7 +48,7 @@ def test_a_node_that_is_killed_half_way_loses_nothing(study, machines, wanted, t
         engine.Batches, "lost", lambda self, batch: (lost.append(list(batch)), back(self, batch))[1]
     )
     (node,) = machines.worker_nodes
-    monkeypatch.setattr(worker, "run_batch", blocked_on(node.node_id, tmp_path))
+    monkeypatch.setattr(processes, "run_batch", blocked_on(node.node_id, tmp_path))
     killed = []
 
     def kill(done, of):
@@ -76,12 +74,11 @@ def test_a_node_that_is_killed_half_way_loses_nothing(study, machines, wanted, t
 def test_a_fault_on_a_node_stops_the_study_and_keeps_what_is_finished(study, machines, tmp_path, monkeypatch):
     def of_plants_that_differ(job, numbers):
         from spheretwin.study import agreement
-        from spheretwin.study.engines import worker
 
         agreement.BOUND = -1.0  # in the process of a node
-        return worker.run_batch(job, numbers)
+        return processes.run_batch(job, numbers)
 
-    monkeypatch.setattr(worker, "run_batch", of_plants_that_differ)
+    monkeypatch.setattr(processes, "run_batch", of_plants_that_differ)
     with pytest.raises(SpheretwinError, match="to be the same on both plants"):
         run(study, tmp_path, machines)
     assert (tmp_path / "table.parquet").exists()

@@ -2,7 +2,7 @@
 
 import sys
 
-from spheretwin.study.engines import ray_cluster, worker
+from spheretwin.study.engines import processes, ray_cluster
 
 
 def test_a_silenced_driver_prints_no_message_of_a_node(monkeypatch, capsys):
@@ -20,6 +20,6 @@ def test_a_silenced_driver_prints_no_message_of_a_node(monkeypatch, capsys):
 
 def test_what_one_node_lacks_is_a_difference():
     version = {"a package": "1"}
-    assert worker._differ("a package", version, {})
-    assert worker._differ("a package", {}, version)
-    assert not worker._differ("a package", version, dict(version))
+    assert processes._differ("a package", version, {})
+    assert processes._differ("a package", {}, version)
+    assert not processes._differ("a package", version, dict(version))
