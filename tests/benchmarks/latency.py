@@ -12,8 +12,7 @@ import sys
 import time
 from contextlib import nullcontext
 
-from spheretwin.machine.link.real_time import real_time
-from spheretwin.machine.link.timing import Distribution
+from spheretwin.machine.link.real_time import Distribution, real_time
 
 PERIOD_s, IDLE_s = 1e-3, 1000.0
 VERB = [sys.executable, "-m", "spheretwin"]

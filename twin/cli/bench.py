@@ -21,8 +21,7 @@ from pydantic_core import PydanticUndefined
 from spheretwin import outputs
 from spheretwin import scenario as scenarios
 from spheretwin.bench import Bench
-from spheretwin.bench.folder import Folder
-from spheretwin.bench.folder_files import FolderFiles
+from spheretwin.bench.folder import Folder, FolderFiles
 from spheretwin.bench.modes import Limits
 from spheretwin.bench.operators import GONE_s, Operators
 from spheretwin.cli.common import interruptible, print_message, warn

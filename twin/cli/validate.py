@@ -8,9 +8,8 @@ from spheretwin.cli.common import print_message, print_result
 from spheretwin.cli.log_options import LOG, ONE, changes_of, read_logs, scenario_of
 from spheretwin.cli.options import verb
 from spheretwin.machine.report import bin_table, fit_table, structure_table
-from spheretwin.machine.residuals import CHI2
 from spheretwin.machine.twin_file import read_uncertainty
-from spheretwin.machine.validation import Validation, validate
+from spheretwin.machine.validation import CHI2, Validation, validate
 
 
 @verb(f"{LOG}    --json", has_fields=True, **ONE)

@@ -20,7 +20,6 @@ from spheretwin.machine.change_filter import (
     FilterStep,
     Linearisation,
 )
-from spheretwin.machine.change_times import Begin, PUSH_s, Times
 from spheretwin.machine.explanations import (
     BEYOND,
     LOADS,
@@ -32,6 +31,7 @@ from spheretwin.machine.explanations import (
     Candidate,
     evidence,
 )
+from spheretwin.machine.signatures import Begin, PUSH_s, Times
 from spheretwin.models.base.arrays import Array
 
 INEXACT = 0.005

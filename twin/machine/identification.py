@@ -25,8 +25,8 @@ from spheretwin.machine.refusals import (
     refusal_of,
     unidentifiable,
 )
-from spheretwin.machine.residuals import ResidualFit, fit_of
 from spheretwin.machine.row_order import align_rows
+from spheretwin.machine.validation import ResidualFit, fit_of
 from spheretwin.machine.windows import Part, Shooting, Window, windows_of
 from spheretwin.models.base.arrays import Array
 from spheretwin.models.base.errors import InputError

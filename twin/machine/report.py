@@ -15,10 +15,9 @@ from spheretwin.machine.excitation import Design
 from spheretwin.machine.identification import Identified, identifiability
 from spheretwin.machine.log import Log
 from spheretwin.machine.refusals import correlation_sentences
-from spheretwin.machine.residuals import QUANTITIES, ResidualFit
 from spheretwin.machine.state_estimation import HINGE_NAMES, chi2_text
-from spheretwin.machine.twin_history import Identification, history_drawing
-from spheretwin.machine.validation import Structure
+from spheretwin.machine.twin_file import Identification, history_drawing
+from spheretwin.machine.validation import QUANTITIES, ResidualFit, Structure
 from spheretwin.machine.verdict import LogVerdict, check
 from spheretwin.models.telemetry.signals import ANGLES
 from spheretwin.viz.pages.markdown import Drawing, PageSection, ReportPage, ResultTable, save_text

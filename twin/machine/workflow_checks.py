@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from spheretwin.machine.intervals import Z95
-from spheretwin.machine.residuals import CHI2
+from spheretwin.machine.validation import CHI2
 from spheretwin.machine.workflow import Judged, Workflow
 from spheretwin.models.base.arrays import Array
 from spheretwin.models.base.checks import Check

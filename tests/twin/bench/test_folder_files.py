@@ -2,7 +2,7 @@
 
 import os
 
-from spheretwin.bench.folder_files import FolderFiles
+from spheretwin.bench.folder import FolderFiles
 
 
 def test_scenarios_are_toml_files_with_a_section_of_a_scenario(tmp_path):

@@ -10,16 +10,16 @@ from scipy.stats import norm
 
 from spheretwin.machine import Log
 from spheretwin.machine.identification import Identified, IdentifiedValue
-from spheretwin.machine.residuals import ResidualFit
 from spheretwin.machine.twin_file import (
     UNSIGNED,
+    history_drawing,
     read_drifts,
     read_history,
     read_twin,
     read_uncertainty,
     write_twin,
 )
-from spheretwin.machine.twin_history import history_drawing
+from spheretwin.machine.validation import ResidualFit
 from spheretwin.models.base.errors import InputError
 
 FIELDS = {"plant.coulomb_Nm": [0.003, 0.003, 0.004], "plant.modelling_error": 0.1}

@@ -23,11 +23,10 @@ from spheretwin.machine.link.controller_scenario import (
     measurement_of,
 )
 from spheretwin.machine.link.frame_format import DEFAULT_FRAME, Flags
-from spheretwin.machine.link.limits import CoilHeat, LinkSettings, MachineLimits
-from spheretwin.machine.link.plausibility import Plausibility
+from spheretwin.machine.link.limits import CoilHeat, LinkSettings, MachineLimits, Plausibility
+from spheretwin.machine.link.real_time import Distribution
 from spheretwin.machine.link.rehearsal import rehearse, still_machine
 from spheretwin.machine.link.stream import RunningShadow
-from spheretwin.machine.link.timing import Distribution
 from spheretwin.machine.link.transports import open_transport
 from spheretwin.models.base.arrays import Array
 from spheretwin.models.base.errors import InputError, SpheretwinError, distinct_texts

@@ -14,7 +14,7 @@ from spheretwin.machine.link.admission import MachineAdmission
 from spheretwin.machine.link.channel import FrameChannel
 from spheretwin.machine.link.codec import Values
 from spheretwin.machine.link.frame_format import Flags
-from spheretwin.machine.link.timing import Distribution
+from spheretwin.machine.link.real_time import Distribution
 from spheretwin.models.base.arrays import Array
 
 POLL_s = 0.1

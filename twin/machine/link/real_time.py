@@ -1,4 +1,4 @@
-"""Real time: what the system permits to keep pauses out of a loop."""
+"""Real time: what the system permits to keep pauses out of a loop, and distributions of times."""
 
 from __future__ import annotations
 
@@ -6,10 +6,13 @@ import ctypes
 import gc
 import os
 import sys
+from array import array
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import NamedTuple
+
+import numpy as np
 
 PRIORITY = 50
 """Of SCHED_FIFO, from 1 to 99; interrupt threads of Linux have 50, too."""
@@ -82,3 +85,25 @@ def _raise_priority() -> bool:
     except OSError:
         return False
     return True
+
+
+QUANTILES = {"p50_ms": 50.0, "p99_ms": 99.0, "p999_ms": 99.9, "max_ms": 100.0}
+"""Percentages by name."""
+
+
+class Distribution:
+    """Times, s, of which quantiles are reported."""
+
+    def __init__(self) -> None:
+        self._times_s = array("d")
+
+    def add(self, time_s: float) -> None:
+        """Add a time."""
+        self._times_s.append(time_s)
+
+    def figures(self) -> dict[str, float | None]:
+        """Return quantiles and maximum in ms; None without times."""
+        if not self._times_s:
+            return dict.fromkeys(QUANTILES)
+        times_ms = 1e3 * np.array(self._times_s)
+        return dict(zip(QUANTILES, np.percentile(times_ms, list(QUANTILES.values())).tolist(), strict=True))

@@ -12,7 +12,7 @@ import numpy as np
 from spheretwin.machine.link.admission import Admission, new_session
 from spheretwin.machine.link.channel import FrameChannel
 from spheretwin.machine.link.frame_format import Flags
-from spheretwin.machine.link.timing import Distribution
+from spheretwin.machine.link.real_time import Distribution
 from spheretwin.models.base.errors import InputError, SpheretwinError
 
 RATES_Hz = (1000, 2000, 5000)

@@ -7,7 +7,7 @@ from spheretwin.control.supervision.watchdog import Reason
 from spheretwin.machine.link.frame_format import Flags
 from spheretwin.machine.link.limits import LinkSettings, MachineLimits
 from spheretwin.machine.link.machine_link import Link
-from spheretwin.machine.link.timing import QUANTILES
+from spheretwin.machine.link.real_time import QUANTILES
 from spheretwin.models.base.errors import SpheretwinError
 from tests.twin.machine.link import lines
 from tests.twin.machine.link.lines import COMMAND, GROUPS, LIMITS, PERIOD_s, Script, measurement

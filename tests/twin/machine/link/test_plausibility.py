@@ -5,8 +5,13 @@ import pytest
 
 from spheretwin import scenario as scenarios
 from spheretwin.control.supervision.watchdog import Reason
-from spheretwin.machine.link.limits import MachineLimits
-from spheretwin.machine.link.plausibility import MOST_MISSING, FrozenAngles, MotionCheck, Plausibility
+from spheretwin.machine.link.limits import (
+    MOST_MISSING,
+    FrozenAngles,
+    MachineLimits,
+    MotionCheck,
+    Plausibility,
+)
 from spheretwin.machine.state_estimation import Shadow, signals
 from spheretwin.models.telemetry.table import Table
 from spheretwin.session import Session
