@@ -8,11 +8,10 @@ from pathlib import Path
 import numpy as np
 
 from spheretwin.analysis import recorded_run as reviewed
-from spheretwin.bench.capture import Capture, Trigger
 from spheretwin.bench.command_queue import Queue
 from spheretwin.bench.driver import Driver, compiled_session, with_end_stops
 from spheretwin.bench.folder import Folder
-from spheretwin.bench.history import History
+from spheretwin.bench.history import Capture, History, Trigger
 from spheretwin.bench.operators import Operators
 from spheretwin.bench.pace import Pace
 from spheretwin.bench.recording import Recording

@@ -14,10 +14,10 @@ from pydantic import Field, JsonValue
 
 from spheretwin import scenario as scenarios
 from spheretwin.bench.bench_state import BenchState, Player
-from spheretwin.bench.capture import Edge, Event, Trigger
 from spheretwin.bench.command_queue import By, Command, Place, Text, Work, command_of
 from spheretwin.bench.driver import Driver, Trial, compiled_session, with_end_stops, with_field
 from spheretwin.bench.folder import release
+from spheretwin.bench.history import Edge, Event, Trigger
 from spheretwin.bench.modes import Limits
 from spheretwin.bench.operators import Operators
 from spheretwin.bench.pace import FASTEST, SLOWEST

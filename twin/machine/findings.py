@@ -12,6 +12,7 @@ import numpy as np
 from spheretwin.machine.diagnosis import FEWEST_WINDOWS, MOST_UNEXPLAINED, Diagnosis
 from spheretwin.machine.log import COMMANDED, LARGEST, Log
 from spheretwin.machine.model import Model
+from spheretwin.machine.row_order import GAP_PERIODS
 from spheretwin.machine.torque_balance import TorqueBalance
 from spheretwin.models.base.arrays import Array, Booleans
 from spheretwin.models.base.errors import InputError, did_you_mean
@@ -22,7 +23,6 @@ ERROR, WARNING = "error", "warning"
 LOWEST_RATE_Hz = 100.0  # the torque balance needs two samples in its smoothing time and more
 SLOWEST_CLOCK_Hz = 20.0  # fewer rows a second are rather a wrong unit of the time
 RATE_TOLERANCE = 0.02
-GAP_PERIODS = 2.5
 MOST_LOST, LONGEST_GAP_s = 0.01, 0.1
 JITTER, LARGE_JITTER = 0.05, 0.5
 BEYOND_RANGE = 1.2  # sensors have offsets, ends of a range are soft

@@ -17,9 +17,8 @@ from spheretwin.models.actuator import Actuator
 from spheretwin.models.base.arrays import Array
 from spheretwin.models.base.errors import InputError, did_you_mean
 from spheretwin.models.coil_group import PerGroup
+from spheretwin.models.mjcf_reader import HINGES
 from spheretwin.plant.plant_step import Parameters
-
-HINGES = ("alpha", "beta", "gamma")
 
 
 class ParameterKind(NamedTuple):

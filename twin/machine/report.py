@@ -15,10 +15,11 @@ from spheretwin.machine.excitation import Design
 from spheretwin.machine.identification import Identified, identifiability
 from spheretwin.machine.log import Log
 from spheretwin.machine.refusals import correlation_sentences
-from spheretwin.machine.state_estimation import HINGE_NAMES, chi2_text
+from spheretwin.machine.state_estimation import chi2_text
 from spheretwin.machine.twin_file import Identification, history_drawing
 from spheretwin.machine.validation import QUANTITIES, ResidualFit, Structure
 from spheretwin.machine.verdict import LogVerdict, check
+from spheretwin.models.mjcf_reader import HINGES
 from spheretwin.models.telemetry.signals import ANGLES
 from spheretwin.viz.pages.markdown import Drawing, PageSection, ReportPage, ResultTable, save_text
 
@@ -81,7 +82,7 @@ def design_table(design: Design) -> ResultTable:
 def fit_table(fits: Mapping[str, ResidualFit]) -> ResultTable:
     """Return the mean squares of the residuals of each hinge, a column for each label."""
     rows = [("all", *(chi2_text(fit.chi2) for fit in fits.values()))]
-    rows += [(name, *(chi2_text(fit.hinge_chi2[name]) for fit in fits.values())) for name in HINGE_NAMES]
+    rows += [(name, *(chi2_text(fit.hinge_chi2[name]) for fit in fits.values())) for name in HINGES]
     return ResultTable("residuals", ("hinge", *fits), rows)
 
 
@@ -125,7 +126,7 @@ def residual_drawing(file: str, fits: Mapping[str, ResidualFit], by: str, title:
     from spheretwin.viz.figures import twin  # Matplotlib is optional
 
     panels: dict[str, dict[str, Any]] = {}
-    for hinge, name in zip(ANGLES, HINGE_NAMES, strict=True):
+    for hinge, name in zip(ANGLES, HINGES, strict=True):
         panels[hinge] = {}
         for label, fit in fits.items():
             bins = [one for one in fit.bins if (one.hinge, one.by) == (name, by)]

@@ -154,13 +154,30 @@ def _interval_means(sample_s: Array, samples: Array, starts: Array, ends: Array,
         longest_s = GAP_PERIODS * float(np.median(steps))
         at = np.concatenate([[at[0] - longest_s], at, [at[-1] + longest_s]])
         values = np.concatenate([values[:1], values, values[-1:]])
-        areas = np.diff(at) * (values[:-1] if held else 0.5 * (values[1:] + values[:-1]))
-        integral = np.concatenate([[0.0], np.cumsum(areas)])
-        means = (np.interp(ends, at, integral) - np.interp(starts, at, integral)) / (ends - starts)
+        means = Integral(at, values[:, None], held).mean(starts, ends)[:, 0]
         after = np.clip(np.searchsorted(at, starts, side="right"), 1, len(at) - 1)
         is_gap = (at[after] - at[after - 1] > longest_s * (1 + 1e-9)) | (starts < at[0]) | (ends > at[-1])
         columns.append(np.where(is_gap, np.nan, means))
     return np.stack(columns, axis=1)
+
+
+class Integral:
+    """Integral of samples over time, from which the mean of any interval follows."""
+
+    def __init__(self, t_s: Array, values: Array, zero_order_hold: bool) -> None:
+        steps = np.diff(t_s)[:, None] * (values[:-1] if zero_order_hold else (values[1:] + values[:-1]) / 2)
+        self._t_s = t_s
+        # A row for each column: `interp` copies what is not contiguous.
+        self._integral = np.zeros((values.shape[1], len(t_s)))
+        np.cumsum(steps.T, axis=1, out=self._integral[:, 1:])
+
+    def mean(self, starts: Array, ends: Array) -> Array:
+        """Return the mean of each column in each interval; outside the samples they are zero."""
+        columns = [
+            np.interp(ends, self._t_s, column) - np.interp(starts, self._t_s, column)
+            for column in self._integral
+        ]
+        return np.stack(columns, axis=1) / (ends - starts)[:, None]
 
 
 def _merge_rows(log: Log) -> Log:

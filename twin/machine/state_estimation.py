@@ -16,6 +16,7 @@ from spheretwin.machine.row_order import align_rows
 from spheretwin.models.base.arrays import Array
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.coil_group import of_each_group
+from spheretwin.models.mjcf_reader import HINGES
 from spheretwin.models.telemetry.signals import ANGLES, Signal
 from spheretwin.models.telemetry.table import Table
 from spheretwin.plant.state_filter import STATES, Estimates, StateFilter, run_filter
@@ -148,7 +149,7 @@ class Shadow:
         counted = self.model.half_count_rad > 0
         chi2[~self._changes & (chi2 <= high)] = np.nan
         within = np.isnan(chi2) | ((chi2 <= high) & (counted | (chi2 >= low)))
-        return Consistency(dict(zip(HINGE_NAMES, map(float, chi2), strict=True)), bool(np.all(within)))
+        return Consistency(dict(zip(HINGES, map(float, chi2), strict=True)), bool(np.all(within)))
 
     def motion(self) -> tuple[Array, Array]:
         """Return mean and covariance of angles and rates at the last row, (6,) and (6, 6)."""
@@ -218,9 +219,6 @@ class Consistency(NamedTuple):
                 *accepted,
             ]
         )
-
-
-HINGE_NAMES = ("alpha", "beta", "gamma")
 
 
 def chi2_text(chi2: float) -> str:

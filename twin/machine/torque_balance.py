@@ -14,6 +14,7 @@ import numpy as np
 from scipy.optimize import lsq_linear
 
 from spheretwin import plant
+from spheretwin.machine.row_order import Integral
 from spheretwin.models.base.arrays import Array, Integers
 from spheretwin.models.kinematics import rate_jacobian
 from spheretwin.models.lagrangian import gravity_torque
@@ -70,7 +71,7 @@ class TorqueBalance:
         parameters: plant.Parameters,
         gaps: Sequence[tuple[float, float]] = (),
     ) -> None:
-        self._current = _Integral(current_s, current_A, zero_order_hold)
+        self._current = Integral(current_s, current_A, zero_order_hold)
         none = np.zeros(3)
         self._parameters = parameters._replace(coulomb_Nm=none, viscous_Nm_s=none)
         period_s = float(np.median(np.diff(angle_s)))
@@ -89,7 +90,7 @@ class TorqueBalance:
         blocks, windows = np.unique(centres[:, None] + places, return_inverse=True)
         self._windows = windows.reshape(len(centres), len(places))
         self._starts, self._ends = edges[blocks], edges[blocks + 1] if len(blocks) else edges[:0]
-        self._angle_rad = _Integral(angle_s, angle_rad, zero_order_hold=False).mean(self._starts, self._ends)
+        self._angle_rad = Integral(angle_s, angle_rad, zero_order_hold=False).mean(self._starts, self._ends)
         self.windows = len(centres)
 
     def currents(self, offset_s: float = 0.0) -> Array:
@@ -190,25 +191,6 @@ def effective_windows(torque_Nm: Array) -> float:
     if not 0 < largest < np.inf:
         return 0.0
     return float(np.sum(energy / largest) ** 2 / np.sum((energy / largest) ** 2))
-
-
-class _Integral:
-    """Integral of samples over time, from which the mean of any interval follows."""
-
-    def __init__(self, t_s: Array, values: Array, zero_order_hold: bool) -> None:
-        steps = np.diff(t_s)[:, None] * (values[:-1] if zero_order_hold else (values[1:] + values[:-1]) / 2)
-        self._t_s = t_s
-        # A row for each column: `interp` copies what is not contiguous.
-        self._integral = np.zeros((values.shape[1], len(t_s)))
-        np.cumsum(steps.T, axis=1, out=self._integral[:, 1:])
-
-    def mean(self, starts: Array, ends: Array) -> Array:
-        """Return the mean of each column in each interval; outside the samples they are zero."""
-        columns = [
-            np.interp(ends, self._t_s, column) - np.interp(starts, self._t_s, column)
-            for column in self._integral
-        ]
-        return np.stack(columns, axis=1) / (ends - starts)[:, None]
 
 
 def _kernels(block_s: float) -> tuple[Integers, tuple[Array, Array, Array]]:

@@ -12,9 +12,9 @@ from spheretwin.machine.intervals import Uncertainty
 from spheretwin.machine.log import Log
 from spheretwin.machine.parameters import Machine, Parameter, priors, selected
 from spheretwin.machine.row_order import align_rows
-from spheretwin.machine.state_estimation import HINGE_NAMES
 from spheretwin.machine.windows import Part, Shooting, normal_equations, windows_of
 from spheretwin.models.base.arrays import Array
+from spheretwin.models.mjcf_reader import HINGES
 
 BINS = 6
 
@@ -68,10 +68,10 @@ def fit_of(parts: Sequence[Part], shooting: Shooting) -> ResidualFit:
     )
     return ResidualFit(
         sum(part.squares for part in parts) / sum(part.used for part in parts),
-        dict(zip(HINGE_NAMES, map(float, hinge_chi2), strict=True)),
+        dict(zip(HINGES, map(float, hinge_chi2), strict=True)),
         tuple(
             one
-            for hinge, name in enumerate(HINGE_NAMES)
+            for hinge, name in enumerate(HINGES)
             for by, values in zip(QUANTITIES, columns, strict=True)
             for one in _bins(name, by, values[valid[:, hinge], hinge], residual_rad[valid[:, hinge], hinge])
         ),

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from spheretwin.bench.capture import Capture, Trigger
+from spheretwin.bench.history import Capture, Trigger
 from spheretwin.models.telemetry.signals import Signal
 from tests.twin.bench.cases import GROUPS, done, said, table
 

@@ -1,4 +1,4 @@
-"""Settings of a link, and what removes the currents: limits of a machine, and a motion that is not plausible."""
+"""Settings of a link, and what removes the currents: limits of a machine, and an implausible motion."""
 
 from __future__ import annotations
 

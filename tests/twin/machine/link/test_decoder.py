@@ -8,8 +8,8 @@ from hypothesis import strategies as st
 
 from spheretwin.machine.link import frame_format
 from spheretwin.machine.link.admission import Admission
+from spheretwin.machine.link.channel import Counts, Decoder, SequenceCheck
 from spheretwin.machine.link.codec import Codec
-from spheretwin.machine.link.decoder import Counts, Decoder, SequenceCheck
 from tests.twin.machine.link.lines import COMMAND, GROUPS, MEASUREMENT, command, measurement
 
 

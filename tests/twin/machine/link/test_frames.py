@@ -8,8 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from spheretwin.machine.link import frame_format
+from spheretwin.machine.link.channel import Decoder
 from spheretwin.machine.link.codec import Codec, crc16
-from spheretwin.machine.link.decoder import Decoder
 from spheretwin.models.base.errors import InputError
 from tests.twin.machine.link.lines import COMMAND, GROUPS, MEASUREMENT, command, measurement
 
