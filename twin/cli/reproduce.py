@@ -98,14 +98,13 @@ def _twin(options: argparse.Namespace) -> bool:
         )
     from spheretwin.machine import workflow_page  # SciPy's optimiser is slow to import
     from spheretwin.machine.workflow import run_workflow
-    from spheretwin.machine.workflow_checks import checks_of
 
     if options.out:
         prepare(options.out)
     started = time.perf_counter()
     result = run_workflow(track=tracked("design"))
     wall_s = time.perf_counter() - started
-    checks = checks_of(result)
+    checks = workflow_page.checks_of(result)
     command = f"spheretwin reproduce {TWIN}"
     written = workflow_page.write(options.out, result, command, options.figure_format) if options.out else []
     figures = {"checks": checks, **workflow_page.figures(result), "wall_s": wall_s, "versions": versions()}

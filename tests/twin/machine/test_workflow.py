@@ -8,7 +8,6 @@ import pytest
 from spheretwin import cli
 from spheretwin.machine import DesignSettings, workflow, workflow_page
 from spheretwin.machine.workflow import PAYLOADS_kg, WorkflowSettings, run_workflow
-from spheretwin.machine.workflow_checks import checks_of
 
 QUICK = WorkflowSettings(
     seed=3,
@@ -25,7 +24,7 @@ def result():
 
 
 def broken(result):
-    return {check.name for check in checks_of(result) if not check.ok} - SHORT
+    return {check.name for check in workflow_page.checks_of(result) if not check.ok} - SHORT
 
 
 WHOLE = pytest.mark.release("the whole workflow for 7 s; each of its verbs has tests")
