@@ -9,7 +9,7 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from spheretwin.config.active_config import initial_config
+from spheretwin.config.active_config import check_pose, initial_config
 from spheretwin.config.plant_model import parameters_of
 from spheretwin.models.actuator import Actuator
 from spheretwin.models.base import extras
@@ -390,10 +390,5 @@ def _pose(given: Any, actuator: Actuator) -> Array:
     if pose.shape != (3,) or not np.all(np.isfinite(pose)):
         raise InputError(f"linear model: expected a pose of three finite angles, received {shown(given)}")
     # No model of an actuator has a range of beta up to +-90 degrees, where the joint locks.
-    for hinge, angle, (low, high) in zip(HINGES, pose, actuator.hinge_range_rad, strict=True):
-        if not low <= angle <= high:
-            least, most, received = distinct_texts(low, high, angle)
-            raise InputError(
-                f"linear model: expected a pose with {hinge} from {least} to {most} rad, received {received}"
-            )
+    check_pose(pose, actuator, "linear model")
     return pose

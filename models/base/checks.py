@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from math import inf, isfinite
-from typing import Any
+from typing import Any, NamedTuple
 
 
 @dataclass(frozen=True)
@@ -91,6 +91,12 @@ class Check:
     def _digits(self) -> int:
         """Digits of value and bounds: rounded alike, a value within two bounds is printed within them."""
         return 3 if self.at_least is None else 6
+
+
+class Checks(NamedTuple):
+    """Checks of a part without data for figures."""
+
+    checks: list[Check]
 
 
 def broken(checks: Iterable[Check]) -> list[str]:

@@ -31,8 +31,8 @@ MOST_STATES = 1_000_000  # some three minutes and a gigabyte
 def run(options: argparse.Namespace) -> bool:
     """Compare the engine (MuJoCo) with the Lagrangian model and, if it is installed, with Pinocchio.
 
-    They are compared state by state, along trajectories, without torque, driven by coils, and in the
-    closed loop. Exit code 1 when a bound is broken.
+    They are compared state by state, along trajectories and driven by coils, and the shipped prototype at
+    two physics steps. Exit code 1 when a bound is broken.
     """
     actuators.load(options.mjcf)  # before the folder is created
     warn_about_model(options.mjcf)

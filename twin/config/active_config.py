@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple, TypeVar, cast
 
 import numpy as np
+from numpy.typing import NDArray
 from pydantic import BaseModel
 
 from spheretwin.control.law import Law
@@ -245,13 +246,15 @@ def _ranges(actuator: Actuator) -> list[tuple[float, float]]:
     return [(low, high) for low, high in actuator.hinge_range_rad.tolist()]
 
 
-def check_pose(pose: Triple, actuator: Actuator) -> None:
+def check_pose(
+    pose: Sequence[float] | NDArray[np.float64], actuator: Actuator, what: str = "scenario"
+) -> None:
     """Raise InputError for a pose beyond the workspace."""
     for hinge, angle, (low, high) in zip(HINGES, pose, _ranges(actuator), strict=True):
         if not low <= angle <= high:
             least, most, received = distinct_texts(low, high, angle)
             raise InputError(
-                f"scenario: expected a pose with {hinge} from {least} to {most} rad, received {received}"
+                f"{what}: expected a pose with {hinge} from {least} to {most} rad, received {received}"
             )
 
 

@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from functools import partial
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,7 +31,7 @@ from spheretwin.linear import Magnetics
 from spheretwin.loop import assembly
 from spheretwin.loop.stages import PlantStage, call_advance, plant_stage
 from spheretwin.models.actuator import Actuator
-from spheretwin.models.base.checks import Check
+from spheretwin.models.base.checks import Check, Checks
 from spheretwin.models.base.compiled import compiled
 from spheretwin.models.mjcf import read
 from spheretwin.plant.plant_tick import GOING, PlantOutput, TickInput
@@ -61,14 +61,7 @@ RESISTANCE_ohm, INDUCTANCE_H = 1.3, 9e-4
 DISTURBANCE_Nm = (0.01, -0.005, 0.002)
 
 
-class CoilDriven(NamedTuple):
-    """Checks, and the convergence by motion and engine."""
-
-    checks: list[Check]
-    convergence: dict[str, Convergence]
-
-
-def compare(mjcf: Path, actuator: Actuator) -> CoilDriven:
+def compare(mjcf: Path, actuator: Actuator) -> Checks:
     """Compare coil-driven motions with DOP853, and measure the order of the complete plant.
 
     Parameters
@@ -82,25 +75,15 @@ def compare(mjcf: Path, actuator: Actuator) -> CoilDriven:
     reference = integrate(mjcf, actuator, scale)
     acceleration = float(np.abs(np.diff(reference[:, 3:], axis=0)).max()) / SAMPLE_s
     bound = MARGIN * STEP_s**2 / 8 * acceleration
-    currents = {
-        name: convergence(partial(by_plant, mjcf, scale, engine), reference, STEPS_s)
-        for name, engine in ENGINES.items()
-    }
-    complete = {
-        name: convergence(
-            partial(by_complete_plant, mjcf, scale, engine),
-            by_complete_plant(mjcf, scale, engine, FINE_s),
-            COMPLETE_STEPS_s,
-        )
-        for name, engine in ENGINES.items()
-    }
-    checks = [
-        *(_motion(name, measured, bound) for name, measured in currents.items()),
-        *(_order(f"coil-driven, {name}", _DRIVEN, measured) for name, measured in currents.items()),
-        *(_order(f"complete plant, {name}", _COMPLETE, measured) for name, measured in complete.items()),
-    ]
-    by_name = {f"coil-driven, {name}": measured for name, measured in currents.items()}
-    return CoilDriven(checks, by_name | {f"complete plant, {name}": each for name, each in complete.items()})
+    motions, driven, complete = [], [], []
+    for name, engine in ENGINES.items():
+        measured = convergence(partial(by_plant, mjcf, scale, engine), reference, STEPS_s)
+        motions.append(_motion(name, measured, bound))
+        driven.append(_order(f"coil-driven, {name}", _DRIVEN, measured))
+        fine = by_complete_plant(mjcf, scale, engine, FINE_s)
+        measured = convergence(partial(by_complete_plant, mjcf, scale, engine), fine, COMPLETE_STEPS_s)
+        complete.append(_order(f"complete plant, {name}", _COMPLETE, measured))
+    return Checks([*motions, *driven, *complete])
 
 
 def fitting_scale(mjcf: Path, actuator: Actuator) -> Scale:

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 from numpy.typing import NDArray
 
 from spheretwin.crosscheck.dynamics import random_states
 from spheretwin.models.actuator import Actuator
-from spheretwin.models.base.checks import Check
+from spheretwin.models.base.checks import Check, Checks
 from spheretwin.models.kinematics import rotor_rate_jacobian
 from spheretwin.models.lagrangian import coriolis_matrix, coupling_torques, inertia_matrix
 
@@ -21,16 +19,10 @@ BOUND = 1e-14
 _WHY_EXACT = "rounding alone, near 1e-16: both sides are exact"
 
 
-class Identities(NamedTuple):
-    """Checks without a figure."""
-
-    checks: list[Check]
-
-
-def check_identities(actuator: Actuator, count: int) -> Identities:
+def check_identities(actuator: Actuator, count: int) -> Checks:
     """Check the identities at random states."""
     states = random_states(count)
-    return Identities(
+    return Checks(
         [
             _skew_symmetry(actuator.inertia, states.q, states.qdot),
             _coupling(float(np.mean(actuator.inertia)), states.q, states.qdot, states.qddot),

@@ -7,7 +7,7 @@ within a second and stay apart by the same amount at any step. Figures over some
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from spheretwin import scenario as scenarios
 from spheretwin.crosscheck.scale import nutation_fields, scale_of
 from spheretwin.models.actuator import Actuator
-from spheretwin.models.base.checks import Check
+from spheretwin.models.base.checks import Check, Checks
 from spheretwin.models.base.errors import InputError
 from spheretwin.run import Run
 from spheretwin.simulation import simulate
@@ -39,13 +39,7 @@ LEAST_TILT = 0.1
 """Share of the angles of the shipped actuator below which noise is most of the motion: no bound then."""
 
 
-class Prototype(NamedTuple):
-    """Checks of the prototype."""
-
-    checks: list[Check]
-
-
-def compare(mjcf: Path, actuator: Actuator) -> Prototype:
+def compare(mjcf: Path, actuator: Actuator) -> Checks:
     """Compare runs of the prototype at two physics steps, seed by seed.
 
     Parameters
@@ -60,11 +54,11 @@ def compare(mjcf: Path, actuator: Actuator) -> Prototype:
     try:
         coarse, fine = ([_run(fields, step_s, seed) for seed in SEEDS] for step_s in (STEP_s, FINE_s))
     except InputError as error:
-        return Prototype([_check(name, None, str(error)) for name in (*FIGURES, "trace")])
+        return Checks([_check(name, None, str(error)) for name in (*FIGURES, "trace")])
     ends = {run.status for run in (*coarse, *fine)} - {"completed"}
     end = ", ".join(STATUS.get(str(status), str(status)) for status in sorted(ends))
     checks = [_check(name, _difference(coarse, fine, figure), end, bound) for name, figure in FIGURES.items()]
-    return Prototype([*checks, _check("trace", _apart_rad(coarse, fine), end)])
+    return Checks([*checks, _check("trace", _apart_rad(coarse, fine), end)])
 
 
 def _run(fields: dict[str, Any], step_s: float, seed: int) -> Run:

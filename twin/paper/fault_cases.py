@@ -221,25 +221,22 @@ def shorted(groups: Groups, way: Way) -> Case:
 
 def of_latency(groups: Groups, law: str) -> Case:
     """Case of open groups under a law, with many starts."""
-    case = of_groups(groups, DETECTING)
-    return case._replace(
-        name=f"{case.name}, {law}, latency",
-        fields={**case.fields, "controller.law": law},
-        details={**case.details, "kind": "latency"},
-        columns={**case.columns, "kind": "latency", "law": law},
-        seeds=SEEDS,
-    )
+    case = _of_kind("latency", of_groups(groups, DETECTING), f"{law}, latency", {"controller.law": law})
+    return case._replace(columns={**case.columns, "law": law}, seeds=SEEDS)
 
 
 def on_other_engine(groups: Groups, way: Way) -> Case:
     """Case of open groups in one way, on MuJoCo."""
-    case = of_groups(groups, way)
+    return _of_kind("MuJoCo", of_groups(groups, way), "MuJoCo", OTHER_ENGINE)._replace(single_run=True)
+
+
+def _of_kind(kind: str, case: Case, name: str, fields: Mapping[str, Any]) -> Case:
+    """Case of another kind, with further fields."""
     return case._replace(
-        name=f"{case.name}, MuJoCo",
-        fields={**case.fields, **OTHER_ENGINE},
-        details={**case.details, "kind": "MuJoCo"},
-        columns={**case.columns, "kind": "MuJoCo"},
-        single_run=True,
+        name=f"{case.name}, {name}",
+        fields={**case.fields, **fields},
+        details={**case.details, "kind": kind},
+        columns={**case.columns, "kind": kind},
     )
 
 
