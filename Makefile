@@ -7,7 +7,7 @@ BIN := .venv/bin
 WHEEL := .venv-wheel/bin
 SYNC = $(UV) sync --quiet --frozen --no-default-groups --python $(PYTHON)
 
-.PHONY: demo test test-all compiled check format benchmark gpu peers reproduce tune-rivals screenshots docs docs-snippets fuzz results extras dist setup clean
+.PHONY: demo test test-all compiled check format benchmark gpu peers reproduce tune-rivals screenshots docs docs-snippets fuzz results extras dist audit publish setup clean
 
 demo: .venv/demo ## run the nutation under AFSM and leave a recording and its telemetry
 	$(BIN)/spheretwin simulate nutation --record nutation.rrd --telemetry nutation.parquet
@@ -86,13 +86,21 @@ results: setup ## remake the pages of the results in build/results; conditions.t
 	$(BIN)/spheretwin magnetics map --out build/results/magnetics_map
 	@echo "here:      build/results (make peers prints the comparison with other programs)"
 
-dist: $(TOOLS)/uv ## build wheel and source distribution, check them, and run a scenario from a clean environment
+dist: $(TOOLS)/uv ## build wheel, source distribution and build/sbom.json, check them, and run a scenario from a clean environment
 	rm -rf dist build/clean
 	$(UV) build --quiet --out-dir dist .
 	$(UV) tool run --quiet twine check --strict dist/*
 	$(UV) venv --quiet --python $(PYTHON) build/clean
 	$(UV) pip install --quiet --python build/clean dist/*.whl
+	$(UV) export --quiet --frozen --no-default-groups --all-extras --format cyclonedx1.5 --output-file build/sbom.json
 	cd build/clean && bin/spheretwin doctor && bin/spheretwin simulate hold --duration 0.5 --controller.law pid --json
+
+# Addresses of other hosts are asked for known weaknesses of the locked versions.
+audit: $(TOOLS)/uv ## look the locked dependencies up in the database of known vulnerabilities (needs the network)
+	$(UV) audit --frozen
+
+publish: $(TOOLS)/uv ## publish what make dist has built; for the workflow of a release, which needs no token
+	$(UV) publish --trusted-publishing always dist/*
 
 extras: .venv/demo ## add optional packages: EXTRAS="bench plots", or all of them
 	$(SYNC) --inexact --compile-bytecode $(if $(EXTRAS),$(EXTRAS:%=--extra %),--all-extras)

@@ -11,11 +11,11 @@ PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
 def test_citation_and_recipe_have_the_version():
     version = PROJECT["version"]
     assert f"\nversion: {version}\n" in (ROOT / "CITATION.cff").read_text()
-    assert f'version: "{version}"' in (ROOT / "conda" / "recipe.yaml").read_text()
+    assert f'version: "{version}"' in (ROOT / "docs" / "project" / "conda" / "recipe.yaml").read_text()
 
 
 def test_the_recipe_has_the_dependencies_of_the_package():
-    listed = re.findall(r"^    - (\S+) (\S+)$", (ROOT / "conda" / "recipe.yaml").read_text(), re.MULTILINE)
+    listed = re.findall(r"^    - (\S+) (\S+)$", (ROOT / "docs" / "project" / "conda" / "recipe.yaml").read_text(), re.MULTILINE)
     recipe = {
         name.removesuffix("-python"): bounds
         for name, bounds in listed
