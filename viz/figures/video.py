@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 from mpl_toolkits.mplot3d.art3d import Line3D
 from numpy.typing import NDArray
 
-from spheretwin.models.base.errors import SpheretwinError, without_breaks
+from spheretwin.models.base.errors import SpheretwinError
 from spheretwin.models.base.files import make_folder, whole_file
 from spheretwin.viz.comparison.runs import ComparedRun
 from spheretwin.viz.figures.style import FAINT, INK, draw_line, name_runs, plain, run_styles
@@ -89,8 +89,8 @@ def frames(runs: Sequence[ComparedRun], title: str) -> Iterator[Image]:
     canvas = FigureCanvasAgg(clip.figure)
     for t_s in np.arange(0.0, clip.end_s + 0.5 / FRAMES_s, 1 / FRAMES_s):
         clip.show(float(t_s))
-        canvas.draw()
-        yield np.asarray(canvas.buffer_rgba())
+        canvas.draw()  # type: ignore[no-untyped-call]
+        yield np.asarray(canvas.buffer_rgba())  # type: ignore[no-untyped-call]
 
 
 def _limits(paths: Sequence[Array]) -> Array:
@@ -146,7 +146,7 @@ def write(path: Path, runs: Sequence[ComparedRun], title: str) -> Path:
                     process.stdin.write(frame.tobytes())
             _, message = process.communicate()
         if process.returncode:
-            reason = without_breaks(message.decode(errors="replace"))
+            reason = " ".join(message.decode(errors="replace").split())
             raise SpheretwinError(f"video: {path} could not be written, {program}: {reason}")
     return path
 
