@@ -15,7 +15,11 @@ def test_citation_and_recipe_have_the_version():
 
 
 def test_the_recipe_has_the_dependencies_of_the_package():
-    listed = re.findall(r"^    - (\S+) (\S+)$", (ROOT / "docs" / "project" / "conda" / "recipe.yaml").read_text(), re.MULTILINE)
+    listed = re.findall(
+        r"^    - (\S+) (\S+)$",
+        (ROOT / "docs" / "project" / "conda" / "recipe.yaml").read_text(),
+        re.MULTILINE,
+    )
     recipe = {
         name.removesuffix("-python"): bounds
         for name, bounds in listed

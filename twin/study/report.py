@@ -204,6 +204,12 @@ def _distributions(rows: StudyTable) -> Drawing:
     }
     numbers = {name: by_law for name, by_law in numbers.items() if _differ(by_law.values())}
     totals = {law: int(np.count_nonzero(rows.laws == law)) for law in rows.law_names}
+    steps = {law: 1 + total // MOST_RANKED for law, total in totals.items()}
+    numbers = {
+        name: {law: np.sort(values)[steps[law] // 2 :: steps[law]] for law, values in by_law.items()}
+        for name, by_law in numbers.items()
+    }
+    totals = {law: total / steps[law] for law, total in totals.items()}
     numbers = {quantity_text(name): by_law for name, by_law in numbers.items()}
     figure = distributions.distributions(numbers, totals, f"{rows.study['name']}: distributions")
     caption = (

@@ -33,7 +33,7 @@ class Rank(NamedTuple):
 
 
 def distributions(
-    figures: Mapping[str, Mapping[str, Array]], totals: Mapping[str, int], title: str
+    figures: Mapping[str, Mapping[str, Array]], totals: Mapping[str, float], title: str
 ) -> Figure:
     """Share of the rows at or below each value: a panel a figure, a colour a law.
 
@@ -43,8 +43,8 @@ def distributions(
     ----------
     figures : mapping of figure to mapping of law to (n,) array
         Finite numbers only.
-    totals : mapping of law to int
-        All rows.
+    totals : mapping of law to float
+        All rows, those without a figure included; their share if the numbers are every n-th of many.
     title : str
     """
     down, colours = -(-len(figures) // ACROSS), law_colours(list(totals))
