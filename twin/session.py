@@ -23,7 +23,6 @@ from spheretwin.loop import closed_loop as loops
 from spheretwin.loop.external import ExternalController, ExternalPlant, name_of
 from spheretwin.loop.inputs import InputGenerator
 from spheretwin.loop.runtime import Runtime
-from spheretwin.loop.snapshot import Snapshot, UserLaws
 from spheretwin.models.actuator import Actuator
 from spheretwin.models.base.arrays import real_array
 from spheretwin.models.base.errors import InputError, LawError, SpheretwinError, shown
@@ -37,6 +36,7 @@ from spheretwin.scenario.fields import explain
 from spheretwin.scenario.files import Files
 from spheretwin.scenario.reading import is_dotted
 from spheretwin.scenario.sections import ResolvedScenario, Scenario, UserPath
+from spheretwin.snapshot import Snapshot, UserLaws
 from spheretwin.trajectories.trajectory import Sampled
 
 

@@ -7,7 +7,7 @@ import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +16,7 @@ from spheretwin.control.law import Law
 from spheretwin.models.telemetry.run_record import Change
 from spheretwin.models.telemetry.signals import width
 from spheretwin.models.telemetry.status import Status
-from spheretwin.models.telemetry.table import Table, TelemetryBuffer, allocated
+from spheretwin.models.telemetry.table import Sink, Table, TelemetryBuffer, allocated
 from spheretwin.records.provenance import change_text, record_of
 from spheretwin.run import Run
 from spheretwin.scenario import load
@@ -28,19 +28,6 @@ from spheretwin.trajectories.trajectory import Sampled
 # Long enough to make the calls between chunks cheap, short enough for a progress bar and for Ctrl-C.
 CHUNK_STEPS = 2000
 LIVE_CHUNK_S = 0.02
-
-
-class Sink(Protocol):
-    """Receiver of a run while it runs: a recorder, a progress bar, a file."""
-
-    def write(self, rows: Table) -> None:
-        """Receive the rows of one chunk, which do not change later."""
-
-    def note(self, t_s: float, text: str) -> None:
-        """Receive a message about a change before the tick at `t_s`; the rows show all other events."""
-
-    def finish(self, status: Status) -> None:
-        """Receive the final status."""
 
 
 def simulate(

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +16,8 @@ from spheretwin.models.telemetry.signals import Signal, merged, offsets, width
 
 if TYPE_CHECKING:
     import pyarrow as pa
+
+    from spheretwin.models.telemetry.status import Status
 
 
 # The numbers change little from row to row: their bytes are split by significance, then compressed. That
@@ -268,3 +270,16 @@ def rank_lost(rows: Table) -> NDArray[np.bool_]:
     Such a pose has a direction without torque. No currents are commanded then, whatever the limit.
     """
     return np.equal(rows["allocation_scale"], 0)
+
+
+class Sink(Protocol):
+    """Receiver of a run while it runs: a recorder, a progress bar, a file."""
+
+    def write(self, rows: Table) -> None:
+        """Receive the rows of one chunk, which do not change later."""
+
+    def note(self, t_s: float, text: str) -> None:
+        """Receive a message about a change before the tick at `t_s`; the rows show all other events."""
+
+    def finish(self, status: Status) -> None:
+        """Receive the final status."""

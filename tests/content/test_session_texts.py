@@ -4,7 +4,6 @@ from dataclasses import replace
 
 import pytest
 
-from spheretwin import outputs
 from spheretwin import run as run_module
 from spheretwin import scenario as scenarios
 from spheretwin.config.active_config import initial_config
@@ -13,7 +12,7 @@ from spheretwin.models import actuator as actuators
 from spheretwin.models.base.errors import SpheretwinError
 from spheretwin.models.telemetry.run_record import Change, RunRecord
 from spheretwin.models.telemetry.table import read_parquet
-from spheretwin.records import replay
+from spheretwin.records import outputs, replay
 from spheretwin.records.provenance import facts_of
 from spheretwin.session import Session
 from spheretwin.simulation import follow, simulate

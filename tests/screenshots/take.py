@@ -21,7 +21,7 @@ import numpy as np
 from PIL import Image
 
 from spheretwin import scenario as scenarios
-from spheretwin.outputs import Outputs
+from spheretwin.records.outputs import Outputs
 from spheretwin.scenario import reading
 from spheretwin.session import Session
 from spheretwin.simulation import follow

@@ -14,7 +14,7 @@ from spheretwin.cli.common import interruptible
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.telemetry.run_record import Change
 from spheretwin.models.telemetry.table import read_parquet
-from spheretwin.outputs import Outputs
+from spheretwin.records.outputs import Outputs
 from spheretwin.session import Session
 from spheretwin.simulation import follow
 from spheretwin.viz.recording import live

@@ -11,8 +11,8 @@ from spheretwin import scenario as scenarios
 from spheretwin.models import actuator as actuators
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.telemetry.table import read_parquet
-from spheretwin.outputs import Outputs
 from spheretwin.records import replay
+from spheretwin.records.outputs import Outputs
 from spheretwin.session import Session
 from spheretwin.simulation import follow
 

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from spheretwin import scenario as scenarios
+from spheretwin import snapshot as snapshots
 from spheretwin.control.law import Law
-from spheretwin.loop import snapshot as snapshots
 from spheretwin.models.base.errors import InputError
 from spheretwin.scenario import reading
 from spheretwin.session import Session

@@ -9,7 +9,7 @@ from spheretwin.models.base.errors import InputError
 from spheretwin.models.telemetry.signals import Signal, width
 from spheretwin.models.telemetry.status import QUIET_S
 from spheretwin.models.telemetry.table import Table
-from spheretwin.outputs import check_rate
+from spheretwin.records.outputs import check_rate
 from spheretwin.viz.decimation import WINDOW_S, FirstAndExtremeRows, FirstRows
 
 SIGNALS = (

@@ -26,7 +26,7 @@ from spheretwin.models.base.errors import InputError, did_you_mean, shown
 from spheretwin.models.base.files import whole_file
 from spheretwin.models.base.user_code import is_reference
 from spheretwin.models.telemetry.run_record import RunRecord
-from spheretwin.outputs import Outputs
+from spheretwin.records.outputs import Outputs
 from spheretwin.records.provenance import record_of
 from spheretwin.scenario import reading
 from spheretwin.scenario.changes import FAULT, is_fixed

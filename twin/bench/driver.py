@@ -8,7 +8,6 @@ from typing import Any, NamedTuple
 from spheretwin.bench import modes
 from spheretwin.bench.command_queue import Current, Place, Text
 from spheretwin.bench.modes import Limits
-from spheretwin.loop.snapshot import Snapshot
 from spheretwin.models.base.arrays import Array
 from spheretwin.models.base.errors import InputError, exception_text
 from spheretwin.models.telemetry.run_record import RunRecord
@@ -20,6 +19,7 @@ from spheretwin.scenario.hardware import hardware_fields
 from spheretwin.scenario.reading import override, validated
 from spheretwin.scenario.sections import Scenario
 from spheretwin.session import Session
+from spheretwin.snapshot import Snapshot
 from spheretwin.trajectories.rounding import Triple
 from spheretwin.trajectories.trajectory import Shape
 

@@ -13,7 +13,7 @@ from spheretwin.bench.folder import release
 from spheretwin.models.base.errors import without_breaks
 from spheretwin.models.telemetry.status import Status
 from spheretwin.models.telemetry.table import Table
-from spheretwin.outputs import Outputs
+from spheretwin.records.outputs import Outputs
 from spheretwin.records.provenance import change_text
 from spheretwin.session import Session
 

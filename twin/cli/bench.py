@@ -18,7 +18,6 @@ from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
 
-from spheretwin import outputs
 from spheretwin import scenario as scenarios
 from spheretwin.bench import Bench
 from spheretwin.bench.folder import Folder, FolderFiles
@@ -34,6 +33,7 @@ from spheretwin.machine.link.controller_scenario import left_out
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.base.extras import missing
 from spheretwin.models.base.mujoco_library import timers_stopped
+from spheretwin.records import outputs
 from spheretwin.scenario import reading
 from spheretwin.scenario.fields import families, without_indices
 from spheretwin.scenario.reading import shipped, value_text

@@ -8,7 +8,6 @@ from contextlib import nullcontext
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from spheretwin import outputs
 from spheretwin import scenario as scenarios
 from spheretwin.cli.common import interruptible, print_json, print_message
 from spheretwin.cli.options import verb
@@ -28,13 +27,15 @@ from spheretwin.models.base.errors import InputError
 from spheretwin.models.base.files import check_writable
 from spheretwin.models.base.mujoco_library import timers_stopped
 from spheretwin.models.telemetry.status import Status
-from spheretwin.outputs import Outputs
+from spheretwin.models.telemetry.table import Sink
+from spheretwin.records import outputs
+from spheretwin.records.outputs import Outputs
 from spheretwin.run import summary
 from spheretwin.scenario import reading
 from spheretwin.scenario.reading import shipped
 from spheretwin.scenario.sections import Scenario
 from spheretwin.session import Session
-from spheretwin.simulation import Sink, follow
+from spheretwin.simulation import follow
 from spheretwin.viz.terminal import runs
 
 STANDARD_STREAMS = "-"

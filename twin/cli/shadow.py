@@ -8,7 +8,6 @@ import time
 
 import numpy as np
 
-from spheretwin import outputs
 from spheretwin.cli.common import interruptible, print_json, print_message
 from spheretwin.cli.log_options import (
     STREAM,
@@ -35,6 +34,7 @@ from spheretwin.machine.state_estimation import (
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.telemetry.signals import ANGLES
 from spheretwin.models.telemetry.table import Table
+from spheretwin.records import outputs
 from spheretwin.viz.terminal import runs
 
 

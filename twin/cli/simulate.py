@@ -10,7 +10,6 @@ from typing import Any
 
 import numpy as np
 
-from spheretwin import outputs
 from spheretwin import scenario as scenarios
 from spheretwin.cli.common import interruptible, keep_viewer, print_json, print_message, warn
 from spheretwin.cli.options import verb
@@ -26,15 +25,15 @@ from spheretwin.models.telemetry.checksums import NO_CHECKSUMS, has_checksums
 from spheretwin.models.telemetry.fault_log import FaultLog
 from spheretwin.models.telemetry.signals import ANGLES
 from spheretwin.models.telemetry.status import Status
-from spheretwin.models.telemetry.table import TelemetryBuffer
-from spheretwin.outputs import Outputs
-from spheretwin.records import replay
+from spheretwin.models.telemetry.table import Sink, TelemetryBuffer
+from spheretwin.records import outputs, replay
+from spheretwin.records.outputs import Outputs
 from spheretwin.records.replay import RunPlan
 from spheretwin.run import Run, summary
 from spheretwin.scenario import reading
 from spheretwin.scenario.reading import shipped
 from spheretwin.session import Session
-from spheretwin.simulation import Sink, follow
+from spheretwin.simulation import follow
 from spheretwin.viz.layout.view import LIVE_WINDOW_S, OVERVIEW, VIEW_NAMES
 from spheretwin.viz.terminal import runs
 from spheretwin.viz.terminal.progress import Progress

@@ -32,7 +32,7 @@ from spheretwin.models.base.errors import (
 from spheretwin.models.base.turns import outside_turn
 from spheretwin.models.base.user_code import is_reference
 from spheretwin.models.telemetry.parquet import TelemetryFile
-from spheretwin.models.telemetry.table import TelemetryBuffer
+from spheretwin.models.telemetry.table import Sink, TelemetryBuffer
 from spheretwin.records.provenance import record_of
 from spheretwin.run import Run
 from spheretwin.scenario import reading
@@ -42,7 +42,7 @@ from spheretwin.scenario.files import FilesCache
 from spheretwin.scenario.sections import Scenario, scenario_with
 from spheretwin.scenario.writing import command_words
 from spheretwin.session import Session
-from spheretwin.simulation import Sink, follow
+from spheretwin.simulation import follow
 from spheretwin.study.axes import Axis, DrawnAxis
 from spheretwin.study.grid import Row
 from spheretwin.study.study import FAST, Study, fast_engine

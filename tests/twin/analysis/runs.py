@@ -11,7 +11,7 @@ from spheretwin.models.telemetry.run_record import RunRecord
 from spheretwin.models.telemetry.signals import Signal, width
 from spheretwin.models.telemetry.status import Status
 from spheretwin.models.telemetry.table import Table
-from spheretwin.outputs import Outputs
+from spheretwin.records.outputs import Outputs
 from spheretwin.session import Session
 from spheretwin.simulation import follow
 

@@ -17,8 +17,8 @@ from spheretwin.analysis.run_summary import figures
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.telemetry.checksums import METADATA, NO_CHECKSUMS
 from spheretwin.models.telemetry.parquet import TelemetryFile
-from spheretwin.outputs import Outputs
 from spheretwin.records import replay
+from spheretwin.records.outputs import Outputs
 from spheretwin.records.provenance import record_of
 from spheretwin.session import Session
 from spheretwin.simulation import follow

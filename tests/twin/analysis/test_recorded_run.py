@@ -18,7 +18,7 @@ from spheretwin.analysis.run_summary import figures, peaks
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.telemetry.parquet import TelemetryFile
 from spheretwin.models.telemetry.table import read_parquet
-from spheretwin.outputs import Outputs
+from spheretwin.records.outputs import Outputs
 from spheretwin.records.provenance import record_of
 from spheretwin.run import figures_of
 from spheretwin.session import Session
@@ -120,7 +120,7 @@ KILLED = """
 import os, signal, sys, time
 from pathlib import Path
 from spheretwin import scenario as scenarios
-from spheretwin.outputs import Outputs
+from spheretwin.records.outputs import Outputs
 from spheretwin.session import Session
 from spheretwin.simulation import follow
 

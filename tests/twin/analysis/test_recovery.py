@@ -12,7 +12,7 @@ from spheretwin.models.telemetry.run_record import Change
 from spheretwin.models.telemetry.signals import Signal
 from spheretwin.models.telemetry.status import Level
 from spheretwin.models.telemetry.table import Table
-from spheretwin.outputs import Outputs
+from spheretwin.records.outputs import Outputs
 from spheretwin.session import Session
 from spheretwin.simulation import follow
 from tests.twin.analysis.runs import WITH_EVENTS

@@ -15,7 +15,7 @@ import pytest
 from spheretwin import scenario as scenarios
 from spheretwin.models.telemetry.signals import common_signals
 from spheretwin.models.telemetry.table import read_parquet
-from spheretwin.outputs import Outputs
+from spheretwin.records.outputs import Outputs
 from spheretwin.session import Session
 from spheretwin.simulation import follow
 from spheretwin.viz.layout.plots import Plots

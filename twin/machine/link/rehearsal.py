@@ -15,10 +15,10 @@ from spheretwin.machine.link.channel import FrameChannel
 from spheretwin.machine.link.codec import Values
 from spheretwin.machine.link.transports import StandIn
 from spheretwin.models.telemetry.status import Status
-from spheretwin.models.telemetry.table import Table
+from spheretwin.models.telemetry.table import Sink, Table
 from spheretwin.scenario.sections import ResolvedScenario
 from spheretwin.session import Session
-from spheretwin.simulation import Sink, follow
+from spheretwin.simulation import follow
 
 TICKS = 60
 """Control ticks of a rehearsal: three chunks, and three blocks of the shadow."""

@@ -13,10 +13,9 @@ from spheretwin.models.base.files import check_writable
 from spheretwin.models.telemetry.parquet import TelemetryFile
 from spheretwin.models.telemetry.run_record import RunFacts, RunRecord
 from spheretwin.models.telemetry.status import Status
-from spheretwin.models.telemetry.table import Table
+from spheretwin.models.telemetry.table import Sink, Table
 from spheretwin.records.provenance import facts_of, record_of
 from spheretwin.session import Session
-from spheretwin.simulation import Sink
 from spheretwin.viz.layout.view import LIVE_WINDOW_S, OVERVIEW
 
 if TYPE_CHECKING:
