@@ -1,4 +1,4 @@
-"""Sensitivities: derivatives of the figures of a run by numbers of its scenario.
+"""Sensitivities: derivatives of figures and telemetry of a run by numbers of its scenario.
 
 The loop holds its state in records of one kind of number, calls laws by address, and switches: dual numbers
 do not pass through it. The runs of a block are differenced instead, all with the seed of the scenario.
@@ -15,9 +15,13 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from spheretwin.loop.channels import CHANNELS
 from spheretwin.models.base.errors import InputError, shown
+from spheretwin.models.telemetry.signals import common_signals
 from spheretwin.models.telemetry.status import Status
 from spheretwin.scenario.fields import flat
+from spheretwin.simulation import simulate
+from spheretwin.study.engines import engine_in_process
 from spheretwin.study.grid import Row
 from spheretwin.study.row import Rows, is_number
 from spheretwin.study.study import Study
@@ -27,7 +31,7 @@ PLACES = (1.0, -1.0, 0.5, -0.5)
 
 
 class Sensitivities(NamedTuple):
-    """Figures of a run, and their derivatives by some fields of its scenario."""
+    """Figures and telemetry of a run, and their derivatives by some fields of its scenario."""
 
     figures: dict[str, Any]
     derivatives: dict[str, dict[str, NDArray[np.float64]]]
@@ -41,8 +45,10 @@ def sensitivities(
     steps: Mapping[str, float],
     changes: Mapping[str, Any] | None = None,
     figures: Sequence[str] = ("rms_error_rad",),
+    *,
+    engine: str = "local",
 ) -> Sensitivities:
-    """Return the derivatives of the figures of a run.
+    """Return the derivatives of figures and telemetry of a run.
 
     Parameters
     ----------
@@ -53,7 +59,10 @@ def sensitivities(
     changes : mapping, optional
         Values by dotted name, such as ``{"controller.law": "pd"}``.
     figures : sequence of str
-        Metrics whose value is a number in each of the runs.
+        Metrics whose value is a number in each of the runs, and columns of the telemetry, such as ``q_rad``:
+        their derivatives at every tick, the last one that of the final state.
+    engine : str
+        Of the runs with metrics: ``local``, or ``cuda``, a GPU.
 
     Raises
     ------
@@ -61,9 +70,10 @@ def sensitivities(
         A step is not a number above 0, a field has no number, a run does not complete, or a figure has no
         value in it.
     """
-    rows = Rows(
-        Study(name="sensitivities", scenario=scenario, fields=dict(changes or {}), metrics=tuple(figures))
-    )
+    signals = _signal_names()
+    metrics = tuple(name for name in figures if name not in signals)
+    study = Study(name="sensitivities", scenario=scenario, fields=dict(changes or {}), metrics=metrics)
+    rows = engine_in_process(engine, "sensitivities").prepare(Rows(study))
     points: list[dict[str, Any]] = [{}]
     for name, step in steps.items():
         if not (is_number(step) and isfinite(step) and step > 0):
@@ -71,13 +81,20 @@ def sensitivities(
         value = _number(rows, name)
         points += [{name: value + place * step} for place in PLACES]
     runs = [Row(number, str(number), rows.base.seed, point, None, 0) for number, point in enumerate(points)]
-    columns = _columns(rows, runs, figures)
+    columns = _columns(rows, runs, metrics) if metrics else {}
+    columns |= _telemetry(rows, runs, [name for name in figures if name not in metrics])
     both = {figure: _derivatives(values, list(steps.values())) for figure, values in columns.items()}
     derivatives, errors = (
         {figure: dict(zip(steps, parts[kind], strict=True)) for figure, parts in both.items()}
         for kind in (0, 1)
     )
-    return Sensitivities({name: values[0].tolist() for name, values in columns.items()}, derivatives, errors)
+    first = {name: values[0].tolist() if name in metrics else values[0] for name, values in columns.items()}
+    return Sensitivities(first, derivatives, errors)
+
+
+def _signal_names() -> set[str]:
+    logged = (channel.signals(1) for channel in CHANNELS)
+    return {signal.name for signals in (common_signals(1), *logged) for signal in signals}
 
 
 def _number(rows: Rows, name: str) -> float:
@@ -103,6 +120,20 @@ def _columns(rows: Rows, runs: Sequence[Row], figures: Sequence[str]) -> dict[st
             what = f"no {missing[0]}" if result.status == Status.COMPLETED else result.error or result.status
             raise InputError(f"sensitivities: expected runs that complete, received {what} at {run.values}")
     return {figure: np.array([result.figures[figure] for result in results]) for figure in figures}
+
+
+def _telemetry(rows: Rows, runs: Sequence[Row], names: Sequence[str]) -> dict[str, NDArray[np.float64]]:
+    """Return columns of the telemetry of all runs, (runs, ticks, …)."""
+    kept: dict[str, list[NDArray[np.float64]]] = {name: [] for name in names}
+    for row in runs if names else ():
+        run = simulate(rows.scenario(row))
+        missing = [name for name in names if name not in run.telemetry]
+        if run.status != Status.COMPLETED or missing:
+            what = f"no {missing[0]}" if missing else run.status
+            raise InputError(f"sensitivities: expected runs that complete, received {what} at {row.values}")
+        for name, columns in kept.items():
+            columns.append(run.telemetry[name])
+    return {name: np.array(columns) for name, columns in kept.items()}
 
 
 def _derivatives(

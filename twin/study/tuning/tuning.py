@@ -11,12 +11,11 @@ from contextlib import closing
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from spheretwin.models.base.errors import InputError
 from spheretwin.models.base.files import make_folder
 from spheretwin.models.telemetry import checksums
 from spheretwin.study import agreement
 from spheretwin.study import optimise as objectives
-from spheretwin.study.engines import ENGINES
+from spheretwin.study.engines import engine_in_process
 from spheretwin.study.engines.threads import run_each
 from spheretwin.study.grid import Grid, Row
 from spheretwin.study.journal import Journal, digest_of
@@ -252,11 +251,8 @@ def tune(
     """
     started = time.perf_counter()
     optimise = gains.section_of(study)
-    engines = {name: own for name, own in ENGINES.items() if own.in_process}
-    if engine not in engines:
-        raise InputError(f"tuning: expected engine {' or '.join(engines)}, received {engine}")
-    rows = engines[engine].prepare(Rows(gains.judged(study)))
-    threads = threads or engines[engine].threads
+    chosen = engine_in_process(engine, "tuning")
+    rows, threads = chosen.prepare(Rows(gains.judged(study))), threads or chosen.threads
     laws = [_Law(study, rows, law) for law in study.law or (None,)]
     gains.check(study, rows, [(law.gains, law.conditions[0]) for law in laws])
     make_folder(folder)
