@@ -8,12 +8,10 @@ from itertools import pairwise
 from spheretwin.cli.common import interruptible, print_json
 from spheretwin.cli.machine import FRAME
 from spheretwin.cli.options import verb
-from spheretwin.machine.link import frame_format
 from spheretwin.machine.link.admission import read_key
 from spheretwin.machine.link.channel import FrameChannel
 from spheretwin.machine.link.real_time import real_time
 from spheretwin.machine.link.round_trips import EDGES_ms, RateResult, RATES_Hz, measure_link
-from spheretwin.machine.link.transports import open_transport
 
 GROUPS = 18
 BAR = 40
@@ -35,19 +33,16 @@ def run_test(options: argparse.Namespace) -> bool:
     trips are below a period, at most 0.1 % of the requests are lost, and 99 % of the delays of this computer
     are below half a period. Exit code 1 if it does not suffice for the first rate.
     """
-    frames = frame_format.load(options.frame).for_both_directions(options.frame)
+    frame, groups, key = options.frame, options.groups, read_key(options.key)
     with interruptible() as stop_requested:
-        transport = open_transport(options.address)
+        channel = FrameChannel.open(options.address, frame, groups, key=key)
         try:
-            channel = FrameChannel(
-                transport, frames.command, frames.measurement, options.groups, key=read_key(options.key)
-            )
             with real_time() as granted:
                 results = measure_link(
                     channel, options.rate or RATES_Hz, options.seconds, stop_requested=stop_requested
                 )
         finally:
-            transport.close()
+            channel.transport.close()
     if options.json:
         rows = [result.row() for result in results]
         print_json({"rates": rows, "edges_ms": list(EDGES_ms), "real_time": granted._asdict()})

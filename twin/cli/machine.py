@@ -19,7 +19,7 @@ from spheretwin.machine.link.machine_link import Link
 from spheretwin.machine.link.machine_server import MachineServer
 from spheretwin.machine.link.real_time import real_time
 from spheretwin.machine.link.rehearsal import FileThread, rehearse
-from spheretwin.machine.link.transports import Transport, Udp, open_transport
+from spheretwin.machine.link.transports import Transport, Udp
 from spheretwin.metrics.figures import Figures
 from spheretwin.metrics.reduction import PlannedRun
 from spheretwin.metrics.tracking import BAND_rad
@@ -73,14 +73,11 @@ def run(options: argparse.Namespace) -> bool:
         raise InputError(
             "machine: expected no manual currents, which an external controller replaces, received some"
         )
-    frames = frame_format.load(options.frame).for_both_directions(options.frame)
+    groups, key = len(Session(scenario).actuator.groups), read_key(options.key)
     with interruptible() as stop_requested:
-        transport = open_transport(options.listen, listening=True)
+        channel = FrameChannel.open(options.listen, options.frame, groups, listening=True, key=key)
+        channel.transport.announce = print_message
         try:
-            groups = len(Session(scenario).actuator.groups)
-            transport.announce = print_message
-            key = read_key(options.key)
-            channel = FrameChannel(transport, frames.measurement, frames.command, groups, key=key)
             server = MachineServer(
                 channel,
                 f"a controller at {options.listen}",
@@ -95,7 +92,7 @@ def run(options: argparse.Namespace) -> bool:
             with Session(scenario, external=server.to_stand_in()) as rehearsal:
                 rehearse_run(rehearsal, options)  # the controller does not wait for what is done first
             with Session(scenario, external=server) as session:
-                print_message(f"listening at {_address(options.listen, transport)}")
+                print_message(f"listening at {_address(options.listen, channel.transport)}")
                 return run_session(
                     session,
                     options,
@@ -104,7 +101,7 @@ def run(options: argparse.Namespace) -> bool:
                     lambda: server.finish(session.t_s, session.q_rad),
                 )
         finally:
-            transport.close()
+            channel.transport.close()
 
 
 def read_scenario(options: argparse.Namespace, address: str) -> Scenario:

@@ -7,10 +7,12 @@ from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
 from typing import Any
 
+from spheretwin.machine.link import frame_format
 from spheretwin.machine.link.admission import Admission
 from spheretwin.machine.link.codec import LARGEST_FRAME, Codec, Values
 from spheretwin.machine.link.frame_format import Flags, FrameFormat
-from spheretwin.machine.link.transports import StandIn, Transport
+from spheretwin.machine.link.transports import StandIn, Transport, open_transport
+from spheretwin.models.base.errors import InputError
 
 REMEMBERED = 1024
 """Missing frames that are recognised if they arrive later."""
@@ -240,6 +242,37 @@ class FrameChannel:
         self.has_echo, self.has_flags = receives.has("echo"), sends.has("flags")
         self.modulus = min(sends.modulus("sequence"), receives.modulus("echo"))
         self._shown = {"sent": 0, "received": 0}
+
+    @classmethod
+    def open(
+        cls,
+        address: str,
+        frame: str,
+        groups: int,
+        *,
+        listening: bool = False,
+        report: Callable[[str], None] | None = None,
+        key: bytes = b"",
+    ) -> FrameChannel:
+        """Open the channel of a controller to a machine; if it listens, that of a machine to a controller.
+
+        Raises
+        ------
+        InputError
+            The address or the frames cannot be used, or the machine receives no commands.
+        """
+        frames = frame_format.load(frame)
+        if frames.command is None:
+            raise InputError(f"frame {frame}: expected a description with a command, received none")
+        sends, receives = frames.command, frames.measurement
+        if listening:
+            sends, receives = receives, sends
+        transport = open_transport(address, listening=listening)
+        try:
+            return cls(transport, sends, receives, groups, report, key)
+        except InputError:
+            transport.close()
+            raise
 
     def stand_in(self, values: Callable[[Values], Mapping[str, Any]]) -> tuple[FrameChannel, StandIn]:
         """Return a channel to a stand-in of the peer, and the stand-in.

@@ -178,25 +178,6 @@ class MachineFrames(Section):
             raise ValueError("expected a command with the field current, received one without")
         return self
 
-    def for_both_directions(self, name: str) -> FramePair:
-        """Return the frames of both directions.
-
-        Raises
-        ------
-        InputError
-            The machine receives no commands.
-        """
-        if self.command is None:
-            raise InputError(f"frame {name}: expected a description with a command, received none")
-        return FramePair(self.measurement, self.command)
-
-
-class FramePair(NamedTuple):
-    """Frames of both directions."""
-
-    measurement: FrameFormat
-    command: FrameFormat
-
 
 def shipped() -> list[str]:
     """Return the names of the frame descriptions of the package."""

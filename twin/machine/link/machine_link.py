@@ -12,7 +12,6 @@ import numpy as np
 
 from spheretwin.control.supervision.watchdog import Reason
 from spheretwin.loop.external import ExternalPlant, Measurement
-from spheretwin.machine.link import frame_format
 from spheretwin.machine.link.admission import ControllerAdmission
 from spheretwin.machine.link.channel import FrameChannel
 from spheretwin.machine.link.codec import Values
@@ -27,7 +26,6 @@ from spheretwin.machine.link.limits import CoilHeat, LinkSettings, MachineLimits
 from spheretwin.machine.link.real_time import Distribution
 from spheretwin.machine.link.rehearsal import rehearse, still_machine
 from spheretwin.machine.link.stream import RunningShadow
-from spheretwin.machine.link.transports import open_transport
 from spheretwin.models.base.arrays import Array
 from spheretwin.models.base.errors import InputError, SpheretwinError, distinct_texts
 from spheretwin.scenario.sections import ResolvedScenario, Scenario
@@ -163,7 +161,7 @@ class Link(ExternalPlant):
             The address or the frames cannot be used, the frames have no command, or the link is armed with a
             current limit above that of the model file.
         """
-        frames, complete = frame_format.load(frame).for_both_directions(frame), Session(scenario)
+        complete = Session(scenario)
         resolved, groups = complete.initial_scenario, len(complete.actuator.groups)
         limits = limits or MachineLimits(current_A=resolved.nominal.current_limit_A)
         settings = settings or LinkSettings()
@@ -179,9 +177,7 @@ class Link(ExternalPlant):
             highest_degC = min(limits.temperature_degC, float(np.min(stated_degC)))
             limits = limits.model_copy(update={"temperature_degC": highest_degC})
         period_s = resolved.controller.period_s
-        channel = FrameChannel(
-            open_transport(address), frames.command, frames.measurement, groups, report, key
-        )
+        channel = FrameChannel.open(address, frame, groups, report=report, key=key)
         heat = CoilHeat(resolved.drive, limits, period_s)
         options["plausibility"] = Plausibility.of(scenario, resolved, limits)
         return cls(channel, f"a machine at {address}", settings, limits, heat, period_s, **options)
