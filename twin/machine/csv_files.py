@@ -156,7 +156,7 @@ def _layout(path: Path, lines: Sequence[str], given: CsvFormat) -> _Layout:
         first = _first_row(lines, skipped, best, _Columns(numeric, decimal), comment)
     if share < _LEAST_SHARE or first is None:
         raise InputError(
-            f"log {path}: expected rows of numbers between {_shown_delimiters(candidates)},"
+            f"log {path}: expected rows of numbers between {' or '.join(map(_shown_delimiter, candidates))},"
             f" received {shown(sample[-1]) if sample else 'no line'}: state csv.delimiter and csv.decimal in"
             " the column map"
         )
@@ -391,7 +391,3 @@ def _notes(layout: _Layout, encoding: str) -> Iterator[str]:
 
 def _shown_delimiter(delimiter: str) -> str:
     return _NAMES_OF_DELIMITERS.get(delimiter, repr(delimiter))
-
-
-def _shown_delimiters(delimiters: Sequence[str]) -> str:
-    return " or ".join(map(_shown_delimiter, delimiters))

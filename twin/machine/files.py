@@ -113,7 +113,7 @@ def write(log: Log, path: str | Path) -> None:
             writer.writerow(table)
             writer.writerows(map(repr, row) for row in table.values.tolist())
     else:
-        raise _unknown_kind(path)
+        raise InputError(f"log: expected a file .parquet, .csv or .mcap, received {shown(str(path))}")
 
 
 def log_signals(groups: int, kinds: tuple[str, ...]) -> tuple[Signal, ...]:
@@ -256,10 +256,6 @@ def _scalars(field: pa.Field, column: pa.ChunkedArray) -> Iterator[tuple[str, An
         yield from zip(names, values.T, strict=True)
     else:
         yield field.name, column
-
-
-def _unknown_kind(path: Path) -> InputError:
-    return InputError(f"log: expected a file .parquet, .csv or .mcap, received {shown(str(path))}")
 
 
 class LogFile:

@@ -102,9 +102,7 @@ class TorqueBalance:
     ) -> Motion:
         """Return the motion if hinge i has the angle ``factor * signs[i] * angle[order[i]]``."""
         angles = factor * self._angle_rad[:, list(order)] * np.array(signs)
-        smooth, first, second = self._kernels
-        in_windows = angles[self._windows]
-        q, qdot, qddot = (np.einsum("ewi,w->ei", in_windows, kernel) for kernel in (smooth, first, second))
+        q, qdot, qddot = (self._filtered(angles, kernel) for kernel in self._kernels)
         columns = [rate_jacobian(pose).T @ plant.torque_matrix(pose, self._parameters) for pose in angles]
         unknown = np.zeros((len(q), 3, 7))
         for hinge in range(3):
@@ -118,8 +116,7 @@ class TorqueBalance:
         third = np.diff(self._angle_rad, 3, axis=0)[self._windows[:, 0]]
         noise_rad = np.sqrt(np.mean(third**2, axis=0) / 20)  # of a third difference: 1 + 9 + 9 + 1
         second = self._kernels[2]
-        acceleration = np.einsum("ewi,w->ei", self._angle_rad[self._windows], second)
-        rms = np.sqrt(np.mean(acceleration**2, axis=0))
+        rms = np.sqrt(np.mean(self._filtered(self._angle_rad, second) ** 2, axis=0))
         return bool(np.any(rms > NOISE_MARGIN * np.linalg.norm(second) * noise_rad))
 
     def _need(self, q: Array, qdot: Array, qddot: Array) -> Array:
@@ -143,7 +140,8 @@ class TorqueBalance:
 
     def applied(self, motion: Motion, currents: Array) -> Array:
         """Return the torque of currents on the hinges, (windows, 3), N·m."""
-        return self._smooth(np.einsum("bij,bj->bi", motion.columns_Nm_A, currents))
+        torques = np.einsum("bij,bj->bi", motion.columns_Nm_A, currents)
+        return self._filtered(torques, self._kernels[0])
 
     def group_torques(self, motion: Motion, currents: Array) -> Array:
         """Return the torque of each logged current in each group, (windows, 3, groups, logged), N·m."""
@@ -154,8 +152,8 @@ class TorqueBalance:
         ]
         return np.array(torques)
 
-    def _smooth(self, blocks: Array) -> Array:
-        return np.einsum("ewi,w->ei", blocks[self._windows], self._kernels[0])
+    def _filtered(self, blocks: Array, kernel: Array) -> Array:
+        return np.einsum("ewi,w->ei", blocks[self._windows], kernel)
 
 
 def unexplained_share(motion: Motion, applied_Nm: Array) -> float:

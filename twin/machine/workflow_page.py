@@ -245,7 +245,7 @@ def write(folder: Path, result: Workflow, command: str, figure_format: str = "sv
                 residuals,
             ],
         ),
-        PageSection("6. Watch", [WATCH_TEXT, _watch_rows(result), sums]),
+        PageSection("6. Watch", [WATCH_TEXT, _table(WATCH_HEAD, map(_watch_row, result.watched)), sums]),
         markdown.checks_section(checks),
     ]
     return ReportPage(NAME, TITLE, lead, sections, command).write(folder, figure_format)
@@ -271,9 +271,8 @@ WATCH_TEXT = (
     " states; a further alarm corrects it."
 )
 
-WORDS = (
-    "parameter", "hinge", "unit", "change", "named as", "further alarms",
-)  # fmt: skip
+WATCH_HEAD = ("change", "named as", "true size", "size", "unit", "after, s", "confidence", "further alarms")
+WORDS = ("parameter", "hinge", "unit", "change", "named as", "further alarms")
 """Headings of columns of words; the others are numbers."""
 
 
@@ -315,32 +314,19 @@ def _validation_text(result: Workflow) -> str:
     )
 
 
-def _watch_rows(result: Workflow) -> ResultTable:
-    head = ("change", "named as", "true size", "size", "unit", "after, s", "confidence", "further alarms")
-    return _table(head, map(_watch_row, result.watched))
-
-
-def _watch_row(watched: Watched) -> tuple[str, ...]:
+def _watch_row(watched: Watched) -> list[str]:
     change, named = watched.change, watched.named
     further = [one for one in watched.alarms if one is not named]
     alarms = "; ".join(
         f"{one.what}{'' if one.size is None else f' {one.size:+.2g}'} at {one.t_s:.2f} s" for one in further
     )
-    if change is None:
-        return "none", "–", "–", "–", "–", "–", "–", alarms or "none"
-    size = f"{change.size:+.3g}"
-    if named is None:
-        return change.label, "**not named**", size, "–", "–", "–", "–", alarms or "none"
-    return (
-        change.label,
-        named.what,
-        size,
-        "–" if named.size is None else f"{named.size:+.3g}",
-        named.unit,
-        f"{named.t_s - change.t_s:.2f}",
-        f"{named.confidence:.3f}",
-        alarms or "none",
-    )
+    row = [change.label if change else "none", *["–"] * 6, alarms or "none"]
+    if change:
+        row[1:3] = named.what if named else "**not named**", f"{change.size:+.3g}"
+    if change and named:
+        size = "–" if named.size is None else f"{named.size:+.3g}"
+        row[3:7] = size, named.unit, f"{named.t_s - change.t_s:.2f}", f"{named.confidence:.3f}"
+    return row
 
 
 def _drawings(result: Workflow) -> list[Drawing]:
