@@ -1,8 +1,8 @@
 """Agreement of the plants: the first row and a hundredth of the others run on MuJoCo too.
 
-Both plants run the same loop, so that the root mean square of the error of a run is the same but for
-rounding where the law is smooth. Where sgn(s) chatters, a sign that rounding decides moves it by some
-thousandths; where a run is lost, both lose it, but not at the same tick.
+Both plants run the same loop, so that the RMS error of a run under a smooth law differs by rounding
+alone. If sgn(s) chatters, rounding may decide a sign, which moves it by some thousandths. If a run is lost,
+both plants lose it, at different ticks.
 """
 
 from __future__ import annotations

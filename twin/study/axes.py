@@ -29,7 +29,7 @@ class Axis(BaseModel):
 
     kind: str
     field: Annotated[str, Field(min_length=1)] = Field(
-        description="dotted name of the field; with a place behind it, an entry of a list"
+        description="dotted name of the field; with an index behind it, an entry of a list"
     )
     zip: str | None = Field(
         None, description="axes of the same name go together, value by value; all others are crossed"
@@ -41,7 +41,7 @@ class ListedAxis(Axis):
 
     @abstractmethod
     def listed(self) -> list[Any]:
-        """Its values."""
+        """Values of the axis."""
 
 
 class DrawnAxis(Axis):
@@ -53,15 +53,15 @@ class DrawnAxis(Axis):
 
 
 class Linspace(ListedAxis):
-    """From one value to another, both included."""
+    """Values from one to another, both included."""
 
-    kind: Literal["linspace"] = Field("linspace", description="how the values are chosen")
+    kind: Literal["linspace"] = Field("linspace", description="choice of the values")
     first: Number = Field(description="first value")
     last: Number = Field(description="last value")
-    count: Count = Field(description="how many")
+    count: Count = Field(description="number of values")
 
     def listed(self) -> list[Any]:
-        """At equal distances."""
+        """Values at equal distances."""
         return list(np.linspace(self.first, self.last, self.count).tolist())
 
 
@@ -69,30 +69,32 @@ Positive = Annotated[float, Field(gt=0, le=LARGEST)]
 
 
 class Logspace(ListedAxis):
-    """From one value to another, both included."""
+    """Values from one to another, both included."""
 
-    kind: Literal["logspace"] = Field("logspace", description="how the values are chosen")
+    kind: Literal["logspace"] = Field("logspace", description="choice of the values")
     first: Positive = Field(description="first value, not its exponent")
     last: Positive = Field(description="last value")
-    count: Count = Field(description="how many")
+    count: Count = Field(description="number of values")
 
     def listed(self) -> list[Any]:
-        """At equal ratios."""
+        """Values at equal ratios."""
         return list(np.geomspace(self.first, self.last, self.count).tolist())
 
 
 class Normal(DrawnAxis):
     """Normal distribution, truncated at some standard deviations."""
 
-    kind: Literal["normal"] = Field("normal", description="how the values are chosen")
+    kind: Literal["normal"] = Field("normal", description="choice of the values")
     mean: Number = Field(description="mean")
-    deviation: Annotated[float, Field(gt=0, le=LARGEST)] = Field(description="standard deviation, uncut")
+    deviation: Annotated[float, Field(gt=0, le=LARGEST)] = Field(
+        description="standard deviation before truncation"
+    )
     most_deviations: Annotated[float, Field(gt=0, le=8)] = Field(
-        3.0, description="where it is cut off, in standard deviations"
+        3.0, description="truncation, in standard deviations"
     )
 
     def quantile(self, uniform: NDArray[np.float64]) -> NDArray[np.float64]:
-        """By the inverse of its distribution."""
+        """Inverse of the cumulative distribution."""
         from scipy.special import ndtr, ndtri  # slow to import
 
         least = ndtr(-self.most_deviations)
@@ -100,9 +102,9 @@ class Normal(DrawnAxis):
 
 
 class Uniform(DrawnAxis):
-    """Evenly between two bounds."""
+    """Uniform distribution between two bounds."""
 
-    kind: Literal["uniform"] = Field("uniform", description="how the values are chosen")
+    kind: Literal["uniform"] = Field("uniform", description="choice of the values")
     low: Number = Field(description="lower bound")
     high: Number = Field(description="upper bound")
 
@@ -113,16 +115,16 @@ class Uniform(DrawnAxis):
         return self
 
     def quantile(self, uniform: NDArray[np.float64]) -> NDArray[np.float64]:
-        """By the inverse of its distribution."""
+        """Inverse of the cumulative distribution."""
         return self.low + (self.high - self.low) * uniform
 
 
 class Values(ListedAxis):
-    """Listed."""
+    """Listed values."""
 
-    kind: Literal["values"] = Field("values", description="how the values are chosen")
+    kind: Literal["values"] = Field("values", description="choice of the values")
     values: Annotated[tuple[JsonValue, ...], Field(max_length=MOST_VALUES)] = Field(
-        description="the values, one after the other"
+        description="values in their order"
     )
 
     @field_validator("values")
@@ -133,7 +135,7 @@ class Values(ListedAxis):
         return values
 
     def listed(self) -> list[Any]:
-        """As they are."""
+        """Given values."""
         return list(self.values)
 
 

@@ -148,7 +148,7 @@ def _check_lengths(study: Study, group: Mapping[str, list[Any]]) -> None:
 
 
 def _check_values(study: Study, group: Mapping[str, list[Any]]) -> None:
-    """Check that no two values are equal: their rows would be."""
+    """Check that no two values are equal, as their rows would be equal too."""
     if twice := repeated(zip(*group.values(), strict=True)):
         listed = ", ".join(map(shown, twice[0]))
         raise InputError(

@@ -25,34 +25,34 @@ Name = Annotated[str, Field(min_length=1, max_length=100)]
 
 
 class Setting(BaseModel):
-    """A field that a gain sets: ``factor gain^power``; where several gains set one field, their product."""
+    """A field that a gain sets: ``factor gain^power``; if several gains set one field, their product."""
 
     model_config = CONFIG
 
     field: Name = Field(description="dotted name, as on a command line")
-    factor: float = Field(1.0, description="what the power of the gain is multiplied by")
+    factor: float = Field(1.0, description="factor of the power of the gain")
     power: float = Field(1.0, description="power of the gain")
 
 
 class Gain(BaseModel):
-    """Number that is tuned, and the fields that follow from it."""
+    """Tuned number, and the fields that it sets."""
 
     model_config = CONFIG
 
-    name: str = Field("", max_length=100, description="name of the gain; its field's unless given")
-    field: str = Field("", description="field that it is the value of; instead of sets")
+    name: str = Field("", max_length=100, description="name of the gain; that of its field unless given")
+    field: str = Field("", description="field whose value it is; instead of sets")
     sets: tuple[Setting, ...] = Field((), description="fields that it sets, [[optimise.gain.sets]] each")
-    law: str = Field("", description="law that has it; all unless given")
+    law: str = Field("", description="law of the gain; all laws unless given")
     low: float = Field(description="least value")
     high: float = Field(description="largest value")
-    log: bool = Field(False, description="whether its logarithm is drawn evenly")
+    log: bool = Field(False, description="whether its logarithm is uniform")
     start: float | None = Field(
-        None, description="value in the first trial, which all others are held against"
+        None, description="value in the first trial, with which all others are compared"
     )
     optional: bool = Field(
-        False, description="whether a trial may leave it off: the fields that it sets keep their values then"
+        False, description="whether a trial may switch it off: then its fields keep their values"
     )
-    reason: str = Field("", max_length=200, description="why the range is as it is, for the report")
+    reason: str = Field("", max_length=200, description="reason for the range, for the report")
 
     @model_validator(mode="after")
     def _fits(self) -> Gain:
@@ -72,7 +72,7 @@ class Gain(BaseModel):
 
     @property
     def called(self) -> str:
-        """Its name."""
+        """Name of the gain."""
         return self.name or self.field
 
     @property
@@ -87,15 +87,15 @@ class Gain(BaseModel):
 
 
 class Objective(BaseModel):
-    """A figure that is to be as small, or as large, as can be."""
+    """Figure that is minimised or maximised."""
 
     model_config = CONFIG
 
     metric: Name = Field(description="figure of a run; NAME for FILE.py:NAME among the study's metrics")
     of: tuple[Literal["alpha", "beta", "gamma"], ...] = Field(
-        (), description="entries whose worst is taken, of a figure of each hinge; all unless given"
+        (), description="hinges whose worst value counts, for a figure of each hinge; all unless given"
     )
-    direction: Literal["minimise", "maximise"] = Field("minimise", description="which way is better")
+    direction: Literal["minimise", "maximise"] = Field("minimise", description="direction of improvement")
     over: Literal["worst", "median", "geometric_mean", "first"] = Field(
         "worst", description="statistic over the rows of a trial; first is the first row alone"
     )
@@ -121,7 +121,7 @@ class Objective(BaseModel):
 
     @property
     def called(self) -> str:
-        """Name of the objective, as tables have it."""
+        """Name of the objective in tables."""
         entries = f" of {', '.join(self.of)}" if self.of else ""
         return f"{self.over} {self.metric}{entries}"
 
@@ -146,10 +146,10 @@ class Optimise(BaseModel):
 
     gain: Annotated[tuple[Gain, ...], Field(min_length=1)] = Field(description="[[optimise.gain]] each")
     objective: Annotated[tuple[Objective, ...], Field(min_length=1, max_length=2)] = Field(
-        description="[[optimise.objective]] each; of two, the front is found"
+        description="[[optimise.objective]] each; with two, the result is a Pareto front"
     )
     trials: Annotated[int, Field(ge=1, le=MOST_TRIALS)] = Field(
-        100, description="of each law; of the sampler local, draws and perturbations"
+        100, description="trials of each law; the sampler local has draws and perturbations instead"
     )
     sampler: Literal["tpe", "nsga2", "random", "local"] = Field(
         "tpe",
@@ -167,9 +167,9 @@ class Optimise(BaseModel):
         description="trials that are proposed before the first of them is known: they run side by side, and"
         " what is found depends on it, not on the threads",
     )
-    prune: bool = Field(True, description="whether to end a trial that can no longer be among the best")
+    prune: bool = Field(True, description="whether to end trials that can no longer be among the best")
     fresh: Annotated[int, Field(ge=0, le=MOST_FRESH)] = Field(
-        0, description="further seeds that the best are run under, which no trial was chosen by"
+        0, description="further seeds for the best trials, which the choice of the trials did not use"
     )
 
     @model_validator(mode="after")
@@ -206,7 +206,7 @@ BEST = -math.inf
 
 
 def of_row(objective: Objective, figure: Any) -> float | None:
-    """A figure of one run as one number to be minimised; None where it is none."""
+    """Return a figure of one run as a number to be minimised; None if it is no number."""
     entries = figure if isinstance(figure, list) else [figure]
     chosen = [entries[place] for place in objective.places] if objective.of and len(entries) == 3 else entries
     if not chosen or not all(_is_number(value) for value in chosen):
@@ -215,7 +215,7 @@ def of_row(objective: Objective, figure: Any) -> float | None:
 
 
 def of_rows(objective: Objective, known: Sequence[float], rows: int) -> float:
-    """Objective of a trial, or the least that it can be while some of its rows are still to come.
+    """Objective of a trial, or its lower bound as long as rows are missing.
 
     Parameters
     ----------

@@ -43,43 +43,46 @@ class Study(BaseModel):
     name: Annotated[str, Field(min_length=1, max_length=100)] = Field(
         description="name of the study, and of its folder"
     )
-    description: str = Field("", description="what it shows")
+    description: str = Field("", description="purpose of the study")
     scenario: Annotated[str, Field(min_length=1)] = Field(description="base: a shipped name or a TOML file")
     folder: str = Field(
-        "", exclude=True, description="where the paths in it are taken from; no part of what it is"
+        "",
+        exclude=True,
+        description="folder to which the paths of the study are relative; not part of its digest",
     )
     fields: dict[str, JsonValue] = Field({}, description="fields of all rows, by dotted name")
     law: tuple[dict[str, JsonValue], ...] = Field(
         (), description="controllers, [[law]] each, with their gains, instead of the scenario's"
     )
-    axis: tuple[AnyAxis, ...] = Field((), description="what differs from row to row, [[axis]] each")
+    axis: tuple[AnyAxis, ...] = Field((), description="fields that differ from row to row, [[axis]] each")
     design: Literal["random", "latin_hypercube", "sobol"] = Field(
-        "latin_hypercube", description="how drawn axes fill their space together"
+        "latin_hypercube", description="design of the points of random axes"
     )
     samples: Annotated[int, Field(ge=1, le=MOST_VALUES)] | None = Field(
-        None, description="points of the drawn axes, each crossed with all else"
+        None,
+        description="number of points of the random axes, each crossed with all other axes, laws and seeds",
     )
     seed: Annotated[int, Field(ge=0)] = Field(
         0,
-        description="of what is drawn, and of the rows, each of which has its own instead of the scenario's",
+        description="seed of the random axes and of the rows, whose seeds replace that of the scenario",
     )
     seeds: Annotated[int, Field(ge=1, le=MOST_VALUES)] = Field(
-        1, description="runs of each point, each with a seed of its own"
+        1, description="runs of each point, each with another seed"
     )
     common_seeds: bool = Field(
-        False, description="whether all points and laws run under the same seeds, so that they are paired"
+        False, description="whether all points and laws have the same seeds, so that they are paired"
     )
     metrics: tuple[str, ...] = Field(
-        (), description="figures to keep, FILE.py:NAME for one of your own; all unless given"
+        (), description="figures of the table, FILE.py:NAME for your own metric; all unless given"
     )
     telemetry: tuple[Annotated[int, Field(ge=0)], ...] = Field(
-        (), description="rows whose telemetry is kept, by number"
+        (), description="numbers of the rows whose telemetry is stored"
     )
     optimise: Optimise | None = Field(
-        None, exclude=True, description="gains that --optimise looks for; no part of what a sweep runs"
+        None, exclude=True, description="gains that --optimise tunes; without effect on a sweep"
     )
     fast: bool = Field(
-        True, description="whether to run on the Lagrangian plant where the model is a free rotor"
+        True, description="whether to run on the Lagrangian plant if the model is a free rotor"
     )
 
     @field_validator("name")
@@ -160,7 +163,7 @@ class Study(BaseModel):
 def repeated(values: Iterable[Any]) -> list[Any]:
     """Values that occur more than once; an integer equals a float of the same value."""
     listed = list(values)
-    with suppress(TypeError):  # lists and tables, which need a closer look
+    with suppress(TypeError):  # lists and tables are not hashable
         if len(set(listed)) == len(listed):
             return []
     by_text = [(json.dumps(_alike(value), sort_keys=True), value) for value in listed]
@@ -169,7 +172,7 @@ def repeated(values: Iterable[Any]) -> list[Any]:
 
 
 def _alike(value: Any) -> Any:
-    """A number as a broken one, lists and tables through."""
+    """Convert whole numbers to floats, also in lists and tables."""
     if isinstance(value, list | tuple):
         return [_alike(item) for item in value]
     if isinstance(value, Mapping):
@@ -184,7 +187,7 @@ def shipped() -> list[str]:
 
 
 def load(source: str) -> Study:
-    """Study of a shipped name, or of a TOML file; paths in it are taken from where the file is.
+    """Study of a shipped name, or of a TOML file; paths are relative to the folder of the file.
 
     Raises
     ------
@@ -198,7 +201,7 @@ def load(source: str) -> Study:
 
 
 def made(fields: dict[str, Any], source: str) -> Study:
-    """Study of fields as TOML has them.
+    """Study of fields in the types of TOML.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""The table of a study: one Parquet file, a row a run, its configuration and its figures."""
+"""Table of a study: a Parquet file with configuration and figures of each run as a row."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ LARGEST_WHOLE = 2**63 - 1
 
 
 def check_names(rows: Rows) -> None:
-    """Find out before the first row whether all columns have names of their own.
+    """Check before the first row that all columns have different names.
 
     Raises
     ------
@@ -47,12 +47,12 @@ def check_names(rows: Rows) -> None:
 
 
 def write(path: Path, grid: Grid, journal: Journal, rows: Rows) -> int:
-    """Write all finished rows, in the order of the study, whole or not at all; return how many have failed.
+    """Write all finished rows in the order of the study, completely or not at all; return how many failed.
 
     Raises
     ------
     SpheretwinError
-        It could not be written; what was there before is untouched.
+        It could not be written; an earlier table is unchanged.
     """
     schema = _schema(grid, journal, rows)
     base = _base(rows)
@@ -99,7 +99,7 @@ def _schema(grid: Grid, journal: Journal, rows: Rows) -> pa.Schema:
 
 
 def _kind_of(values: Iterable[Any] | None) -> pa.DataType:
-    """Type of a column that holds some values: their own where all have one, text of JSON else."""
+    """Type of a column of some values: their common type, or JSON as text if they have none."""
     import pyarrow as pa
 
     if values is None:
@@ -114,7 +114,7 @@ def _kind_of(values: Iterable[Any] | None) -> pa.DataType:
 
 
 def _own_kinds(journal: Journal, rows: Rows) -> dict[str, pa.DataType]:
-    """Types of the user's figures: numbers where all rows have numbers, text of JSON else."""
+    """Types of user metrics: numbers if all rows have numbers, otherwise JSON as text."""
     import pyarrow as pa
 
     may_be = dict.fromkeys(rows.own_metrics, True)
@@ -145,7 +145,7 @@ def _figure_kind(name: str) -> pa.DataType:
 
 
 def _base(rows: Rows) -> dict[str, Any]:
-    """The base scenario, its paths as they are from where the study is, so that it is one from anywhere."""
+    """Fields of the base scenario with paths relative to the folder of the study."""
     folder = rows.study.folder or os.curdir
     fields = rows.base.model_dump(mode="json")
     return reading.replace_files(fields, lambda path, _: os.path.relpath(path, folder))
@@ -168,7 +168,7 @@ def _record(row: Row, result: RowResult, rows: Rows, base: dict[str, Any]) -> di
 
 
 def law_text(law: Any) -> str:
-    """Its name alone, where nothing else is said of it."""
+    """Text of a law: its name, or all fields as JSON if it has others."""
     return str(law["law"]) if set(law) == {"law"} else json.dumps(law, sort_keys=True)
 
 
@@ -182,7 +182,7 @@ def _columns(schema: pa.Schema, records: list[dict[str, Any]]) -> dict[str, Any]
 
 
 def _cells(values: list[Any], kind: pa.DataType) -> list[Any]:
-    """Values as a column holds them: text of JSON, and whole numbers as floats, where its type needs them."""
+    """Convert values to the type of a column: JSON as text, whole numbers as floats."""
     import pyarrow as pa
 
     if pa.types.is_string(kind):
