@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 import rerun as rr
-import rerun.blueprint as rrb
 from rerun.components import MarkerShape
 
-from spheretwin.models.base.files import whole_file
 from spheretwin.viz import theme
 from spheretwin.viz.comparison.ghosts import Array, Ghost, Line, Tip, below, send_lines, write_part
 from spheretwin.viz.comparison.merged_layout import (
@@ -55,47 +52,11 @@ from spheretwin.viz.recording.part import (
     scalars,
     time_index,
 )
-from spheretwin.viz.recording.recorder import PIPE_PATHS, FilePipe
+from spheretwin.viz.recording.recorder import recorded
 from spheretwin.viz.recording.scene3d import MovingActuator
 from spheretwin.viz.recording.signals import Signals
 from spheretwin.viz.recording.status import StateChanges, StateLanes, log_lines
 from spheretwin.viz.scene.entities import size_of
-
-
-@contextmanager
-def recorded(path: Path, application: str, layout: rrb.Blueprint) -> Iterator[rr.RecordingStream]:
-    """Give a stream whose recording takes the name `path` when the block ends well.
-
-    Parameters
-    ----------
-    path : Path
-    application : str
-        Application id: a viewer keeps one layout for each.
-    layout : Blueprint
-
-    Raises
-    ------
-    InputError
-        No file can be made there.
-    SpheretwinError
-        Writing failed; the previous file is unchanged.
-    """
-    rr.set_strict_mode(True)  # otherwise a mistake is a warning, and its data are dropped
-    with whole_file(path, ".rrd") as temporary:
-        pipe = FilePipe(temporary) if PIPE_PATHS.is_dir() else None
-        stream = rr.RecordingStream(application)
-        try:
-            stream.set_log_time_enabled(False)  # simulated time is the only one that means anything
-            stream.set_sinks(rr.FileSink(pipe.path if pipe else temporary), default_blueprint=layout)
-            yield stream
-            stream.flush()
-        finally:
-            stream.disconnect()
-            if pipe:
-                pipe.close()
-        if pipe and pipe.error:
-            raise pipe.error
-
 
 STEPS = 6
 """Steps that can be labelled in the lowest of the plots."""

@@ -20,7 +20,6 @@ from spheretwin.models.telemetry.status import Level
 from spheretwin.models.telemetry.table import Table
 from spheretwin.viz import theme
 from spheretwin.viz.comparison.ghosts import ROTOR, Ghost, Line, PartBelow, send_lines, write_part
-from spheretwin.viz.comparison.merged_recording import recorded
 from spheretwin.viz.decimation import FirstRows
 from spheretwin.viz.layout.extents import labelled
 from spheretwin.viz.layout.layout import blueprint, eye
@@ -30,6 +29,7 @@ from spheretwin.viz.layout.view import LIVE_WINDOW_S, application_of
 from spheretwin.viz.recording.currents import CoilCurrents
 from spheretwin.viz.recording.live import LiveStream
 from spheretwin.viz.recording.part import RecordingPart, RecordingSubject, drawable, log_markdown, time_index
+from spheretwin.viz.recording.recorder import recorded
 from spheretwin.viz.recording.scene3d import MovingActuator
 from spheretwin.viz.scene.entities import FRAME_RATE_Hz, size_of
 from spheretwin.viz.scene.meshes import WORLD

@@ -15,10 +15,10 @@ from spheretwin.models.actuator import Actuator
 from spheretwin.models.telemetry.signals import ANGLES
 from spheretwin.viz import theme
 from spheretwin.viz.comparison.ghosts import Line, send_lines, send_point, style_point
-from spheretwin.viz.comparison.merged_recording import recorded
 from spheretwin.viz.layout.layout import blueprint
 from spheretwin.viz.layout.plots import time_axis, time_range
 from spheretwin.viz.layout.view import application_of
+from spheretwin.viz.recording.recorder import recorded
 from spheretwin.viz.recording.scene3d import send_path, style_path
 from spheretwin.viz.scene.entities import TRAIL_S, shaft_tip
 from spheretwin.viz.scene.meshes import WORLD

@@ -19,7 +19,6 @@ from numpy.typing import NDArray
 from rerun.chunk import Chunk, RrdReader
 
 from spheretwin.models.base.errors import LONGEST_WORD, InputError, SpheretwinError, shortened, without_breaks
-from spheretwin.models.base.files import whole_file
 from spheretwin.models.telemetry.run_record import RunFacts
 from spheretwin.models.telemetry.signals import COMMON_NAMES, Signal
 from spheretwin.models.telemetry.status import Event, Level
@@ -42,6 +41,7 @@ from spheretwin.viz.recording.contents import Contents
 from spheretwin.viz.recording.currents import CoilColours, CurrentMap
 from spheretwin.viz.recording.part import log_markdown, total
 from spheretwin.viz.recording.plots import ENVELOPE_RATE_Hz, Marks, PlottedColumns, log_times
+from spheretwin.viz.recording.recorder import recorded
 from spheretwin.viz.recording.signals import RATE
 from spheretwin.viz.recording.summary import Summary
 from spheretwin.viz.rerun_internals import check_readable, whole_messages
@@ -100,25 +100,20 @@ def rewrite(path: Path, target: Path) -> Recorded:
     InputError, SpheretwinError
         It cannot be read; the file cannot be written.
     """
-    recorded, contents = _read(path)
-    facts, signals = recorded.facts, contents.signals_at_start()
+    content, contents = _read(path)
+    facts, signals = content.facts, contents.signals_at_start()
     own = tuple(signal for signal in signals if signal.name not in COMMON_NAMES)
     groups = next(signal.size for signal in signals if signal.name == "current_A")
     decimated = facts.get(RATE) is not None
     view = View(facts["duration_s"], facts["current_limit_A"], groups, own, live=False, decimated=decimated)
-    with _chunks(path) as (chunks, _), whole_file(target, ".rrd") as temporary:
-        recording = rr.RecordingStream(application(view))
-        recording.set_log_time_enabled(False)
-        recording.set_sinks(rr.FileSink(temporary))
+    with _chunks(path) as (chunks, _), recorded(target, application(view)) as recording:
         plots = RecoveredPlots()
         recording.send_chunks(plots.gather(chunks))
-        plots.complete(recording, view, facts, recorded.table, signals)
-        if recorded.checked:  # a closed recording states its numbers of rows and lines
+        plots.complete(recording, view, facts, content.table, signals)
+        if content.checked:  # a closed recording states its numbers of rows and lines
             for entity, count in contents.counts.items():
                 recording.log(entity, [total(count)], static=True)
-        recording.flush()
-        recording.disconnect()
-    return recorded
+    return content
 
 
 @contextmanager

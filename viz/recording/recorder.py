@@ -5,18 +5,19 @@ from __future__ import annotations
 import os
 import select
 import time
-from collections.abc import Sequence
-from contextlib import suppress
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, suppress
 from io import FileIO
 from pathlib import Path
 from threading import Lock, Thread
 from uuid import uuid4
 
 import rerun as rr
+import rerun.blueprint as rrb
 
 from spheretwin.models.actuator import Actuator
 from spheretwin.models.base.errors import InputError, SpheretwinError, without_breaks
-from spheretwin.models.base.files import OPEN_FILES, OutputFile, PartialFile
+from spheretwin.models.base.files import OPEN_FILES, OutputFile, PartialFile, whole_file
 from spheretwin.models.telemetry.run_record import RunFacts
 from spheretwin.models.telemetry.signals import Signal
 from spheretwin.models.telemetry.table import Table
@@ -120,6 +121,44 @@ def _write_all(file: FileIO, block: bytes) -> None:
     rest = memoryview(block)
     while rest:
         rest = rest[file.write(rest) :]
+
+
+@contextmanager
+def recorded(
+    path: Path, application: str, layout: rrb.Blueprint | None = None
+) -> Iterator[rr.RecordingStream]:
+    """Give a stream whose recording takes the name `path` when the block ends well.
+
+    Parameters
+    ----------
+    path : Path
+    application : str
+        Application id: a viewer keeps one layout for each.
+    layout : Blueprint, optional
+        The block sends one unless given.
+
+    Raises
+    ------
+    InputError
+        No file can be made there.
+    SpheretwinError
+        Writing failed; the previous file is unchanged.
+    """
+    rr.set_strict_mode(True)  # otherwise a mistake is a warning, and its data are dropped
+    with whole_file(path, ".rrd") as temporary:
+        pipe = FilePipe(temporary) if PIPE_PATHS.is_dir() else None
+        stream = rr.RecordingStream(application)
+        try:
+            stream.set_log_time_enabled(False)  # simulated time is the only one that means anything
+            stream.set_sinks(rr.FileSink(pipe.path if pipe else temporary), default_blueprint=layout)
+            yield stream
+            stream.flush()
+        finally:
+            stream.disconnect()
+            if pipe:
+                pipe.close()
+        if pipe and pipe.error:
+            raise pipe.error
 
 
 # Each chunk of each entity costs some time and bytes, whatever its length. Chunks therefore grow.
