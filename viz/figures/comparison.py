@@ -31,6 +31,7 @@ from spheretwin.viz.figures.style import (
     FAINT,
     INK,
     MOST_BINS,
+    REFERENCE,
     draw_line,
     legend_below,
     name_runs,
@@ -202,15 +203,8 @@ def over_time(
         for place in leading:
             if quantity.desired:
                 name = "reference" if len(leading) == 1 else f"reference of {runs[place].label}"
-                look: dict[str, Any] = {
-                    "label": name,
-                    "color": INK,
-                    "linewidth": 0.7,
-                    "linestyle": (0, (4, 3)),
-                }
-                draw_line(
-                    panel, runs[place].table["t_s"], quantity.desired(runs[place].rows), *detail, **look
-                )
+                t_s, desired = runs[place].table["t_s"], quantity.desired(runs[place].rows)
+                draw_line(panel, t_s, desired, *detail, label=name, **REFERENCE)
         panel.set_ylim(*limits)
         unit = f"{quantity.unit}, logarithmic" if logarithmic else quantity.unit
         plain(panel, f"{quantity.title},\n{unit}")
@@ -262,9 +256,8 @@ def overview(table: Table, title: str) -> Figure:
         ):
             draw_line(panel, t_s, values, label=name, **look)
     for i in range(len(ANGLES)):
-        look = {"color": INK, "linewidth": 0.7, "linestyle": (0, (4, 3))}
         label = None if i else "references"
-        draw_line(angles, t_s, np.degrees(table["q_ref_rad"][:, i]), label=label, **look)
+        draw_line(angles, t_s, np.degrees(table["q_ref_rad"][:, i]), label=label, **REFERENCE)
     largest = np.abs(table["current_A"]).max(axis=1)
     draw_line(currents, t_s, largest, color=INK, linewidth=1.1)
     for panel, heading in ((angles, "angle, °"), (errors, "error, mrad"), (currents, "largest current, A")):

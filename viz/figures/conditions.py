@@ -17,6 +17,7 @@ from spheretwin.viz.figures.style import (
     SERIES,
     LawStyle,
     WIDTH_in,
+    draw_hollow,
     faint_grid,
     law_keys,
     legend_below,
@@ -84,10 +85,7 @@ def _series(
     panel.plot(x, middle, label=label, linewidth=1.5, **style.line())
     panel.errorbar(x, middle, [middle - low, high - middle], fmt="none", ecolor=style.colour, capsize=2.5,
                    elinewidth=1)  # fmt: skip
-    for whole, inside in ((True, style.colour), (False, "white")):
-        chosen = series.whole == whole
-        panel.plot(x[chosen], middle[chosen], style.marker, color=style.colour, markerfacecolor=inside,
-                   markersize=6)  # fmt: skip
+    draw_hollow(panel, x, middle, series.whole, style)
     for value, printed in series.paper_rad.items():
         at = value + shift * step
         ours = middle[np.isclose(series.values, value)]
@@ -99,11 +97,7 @@ def _series(
 
 
 def _legend(figure: Figure, panel: Axes, by_label: Mapping[str, ErrorsByCondition]) -> None:
-    looks = styles([series.law for series in by_label.values()])
-    handles = [
-        panel.plot([], [], style.marker, markersize=6, label=label, **style.line())[0]
-        for label, style in zip(by_label, looks.values(), strict=True)
-    ]
+    handles = law_keys(panel, {series.law: label for label, series in by_label.items()})
     if any(series.paper_rad for series in by_label.values()):
         handles += panel.plot([], [], "_", color=INK, markersize=15, markeredgewidth=3, label="printed")
     if not all(series.whole.all() for series in by_label.values()):
@@ -143,9 +137,7 @@ def margins(
             step, error_mrad, within_bound = values[:, 0], 1e3 * values[:, 1], values[:, 2] > 0
             style = looks[law]
             axes.plot(step, error_mrad, linewidth=1.4, **style.line())
-            for chosen, inside in ((within_bound, style.colour), (~within_bound, "white")):
-                axes.plot(step[chosen], error_mrad[chosen], style.marker, color=style.colour,
-                          markerfacecolor=inside, markersize=6)  # fmt: skip
+            draw_hollow(axes, step, error_mrad, within_bound, style)
         axes.axhline(1e3 * bound_rad, color=INK, linestyle="--", linewidth=1)
         axes.set_yscale("log")
         steps = np.concatenate([values[:, 0] for values in by_law.values()])

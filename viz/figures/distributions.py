@@ -13,7 +13,7 @@ from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 from spheretwin.viz.figures.maps import fit_scale
-from spheretwin.viz.figures.style import FAINT, INK, WIDTH_in, faint_grid, legend_below, sheet
+from spheretwin.viz.figures.style import FAINT, INK, WIDTH_in, legend_below, plain, sheet
 from spheretwin.viz.theme import law_colours
 
 Array = NDArray[np.float64]
@@ -56,7 +56,7 @@ def distributions(
             axes.step(numbers, share, where="post", color=colours[law], linewidth=1.3)
         fit_scale(axes, "x", np.concatenate(list(by_law.values())))
         axes.set_ylim(0, 1.02)
-        _plain(axes, name)
+        plain(axes, x=name, alpha=0.3)
     for axes in grid[:, 0]:
         axes.set_ylabel("share of rows", fontsize="small")
     for law in totals:
@@ -90,7 +90,7 @@ def ranks(names: Sequence[str], by_law: Mapping[str, Rank], title: str) -> Figur
     axes.set_yticks(range(len(names)), list(names))
     axes.set_ylim(len(names) - 0.5, -0.5)
     partial = all(rank.is_partial for rank in by_law.values())
-    _plain(axes, "partial rank correlation" if partial else "rank correlation")
+    plain(axes, x="partial rank correlation" if partial else "rank correlation", alpha=0.3)
     legend_below(figure, [axes], fontsize="small")
     return figure
 
@@ -118,7 +118,7 @@ def scatters(
             _scatter(axes, x, figure_values[law], colours[law], law)
         fit_scale(axes, "y", np.concatenate(list(figure_values.values())))
         axes.xaxis.set_major_locator(MaxNLocator(4))
-        _plain(axes, name)
+        plain(axes, x=name, alpha=0.3)
     for axes in grid[:, 0]:
         axes.set_ylabel(quantity, fontsize="small")
     legend_below(figure, [grid[0, 0]], fontsize="small")
@@ -133,9 +133,3 @@ def _scatter(axes: Axes, x: Array, y: Array, colour: str, law: str) -> None:
         inside = [(x >= low) & (x <= high) for low, high in pairwise(edges)]
         middles = [(np.median(x[rows]), np.median(y[rows])) for rows in inside]
         axes.plot(*zip(*middles, strict=True), color=colour, linewidth=2, label=f"{law}, median")
-
-
-def _plain(axes: Axes, x: str) -> None:
-    axes.set_xlabel(x, fontsize="small")
-    axes.tick_params(labelsize="small")
-    faint_grid(axes, 0.3)

@@ -8,7 +8,6 @@ from typing import NamedTuple
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import FixedLocator, NullLocator
 from numpy.typing import NDArray
 
 from spheretwin.viz.figures.style import (
@@ -20,6 +19,7 @@ from spheretwin.viz.figures.style import (
     law_keys,
     legend_below,
     name_axes,
+    plain_ticks,
     sheet,
     styles,
 )
@@ -97,10 +97,7 @@ def _set_limits(axes: Axes, panel: FrontPanel) -> None:
     for axis in (axes.xaxis, axes.yaxis):
         low, high = axis.get_view_interval()
         steps = (1, 2, 5) if high > 10 * low else (1, 1.5, 2, 3, 4, 5, 6, 7, 8, 9)
-        ticks = [step * 10.0**power for power in range(-4, 5) for step in steps]
-        axis.set_major_locator(FixedLocator([tick for tick in ticks if low <= tick <= high]))
-        axis.set_major_formatter("{x:g}")
-        axis.set_minor_locator(NullLocator())
+        plain_ticks(axis, steps)
 
 
 def _size(style: LawStyle) -> float:

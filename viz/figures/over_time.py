@@ -166,7 +166,7 @@ def errors(by_label: Mapping[str, ErrorBand], window_s: float, hinges: Sequence[
             values, style = np.maximum(1e3 * course.error_rad[:, :, hinge], LEAST_mrad), looks[course.law]
             t_s, middle = _band(panel, label, values, style, window_s, place / len(by_label))
             if len(t_s) < longest and len(t_s):
-                panel.plot(t_s[-1], middle[-1], "x", color=style.colour, markersize=9, markeredgewidth=2)
+                panel.plot(t_s[-1], middle[-1], **{**ENDED, "color": style.colour})
             if hinge in course.paper_hinges:
                 panel.axhline(1e3 * course.paper_rad, color=style.colour, linestyle=":", linewidth=1.4)
         on_errors([panel], LEAST_mrad, 1.3 * highest)
@@ -201,8 +201,7 @@ def angles(by_label: Mapping[str, AngleTraces], hinges: Sequence[str], title: st
             panel.plot(motion.desired_t_s, motion.desired_rad[:, hinge], color=INK, linewidth=1,
                        linestyle=(0, (4, 2)), path_effects=OUTLINED)  # fmt: skip
             if not motion.whole:
-                panel.plot(motion.t_s[-1], motion.q_rad[-1, hinge], "x", color=colour, markersize=9,
-                           markeredgewidth=2)  # fmt: skip
+                panel.plot(motion.t_s[-1], motion.q_rad[-1, hinge], **{**ENDED, "color": colour})
             faint_grid(panel)
         column[0].set_title(f"({chr(ord('a') + place)}) {label}", fontsize="medium")
         column[-1].set_xlabel("time, s")
@@ -297,4 +296,4 @@ def _ends(axes: Axes, path: TipPath, colour: str, which: slice) -> None:
     """Mark the start of a path, and an early end."""
     axes.plot(*path.tip_mm[:1, which].T, "o", color=INK, markersize=5)
     if not path.whole:
-        axes.plot(*path.tip_mm[-1:, which].T, "x", color=colour, markersize=9, markeredgewidth=2)
+        axes.plot(*path.tip_mm[-1:, which].T, **{**ENDED, "color": colour})

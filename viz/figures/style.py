@@ -13,6 +13,7 @@ import numpy as np
 from matplotlib import rc_context
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
+from matplotlib.axis import Axis
 from matplotlib.figure import Figure
 from matplotlib.legend import Legend
 from matplotlib.text import Text
@@ -229,11 +230,17 @@ def run_styles(runs: Sequence[ComparedRun]) -> list[RunStyle]:
     return [RunStyle(colour, DASHES[place % len(DASHES)]) for place, colour in enumerate(colours)]
 
 
-def plain(axes: Axes, y: str) -> None:
-    """Set a quantity with its unit as the label, a faint grid, and no box."""
+def plain(axes: Axes, y: str = "", x: str = "", alpha: float = 0.35) -> None:
+    """Set quantities with their units as small labels, a faint grid, and no box."""
     axes.set_ylabel(y, fontsize="small")
+    if x:
+        axes.set_xlabel(x, fontsize="small")
     axes.tick_params(labelsize="small")
-    faint_grid(axes)
+    faint_grid(axes, alpha)
+
+
+REFERENCE: dict[str, Any] = {"color": INK, "linewidth": 0.7, "linestyle": (0, (4, 3))}
+"""Properties of the line of a reference, thin and dark over the others."""
 
 
 def name_axes(axes: Axes, title: str, x: str = "", y: str = "") -> None:
@@ -273,6 +280,14 @@ def styles(laws: Sequence[str]) -> dict[str, LawStyle]:
     return {law: LawStyle(colours[law], *marks[law]) for law in laws}
 
 
+def draw_hollow(axes: Axes, x: Array, y: Array, is_whole: NDArray[np.bool_], style: LawStyle) -> None:
+    """Draw the markers of a law, filled or hollow."""
+    for whole, inside in ((True, style.colour), (False, "white")):
+        chosen = is_whole == whole
+        axes.plot(x[chosen], y[chosen], style.marker, color=style.colour, markerfacecolor=inside,
+                  markersize=6)  # fmt: skip
+
+
 def law_keys(
     axes: Axes, labels: Mapping[str, str], size: Callable[[LawStyle], float] | float = 6.0
 ) -> list[Any]:
@@ -286,24 +301,22 @@ def law_keys(
 
 def on_errors(panels: Sequence[Axes], lowest_mrad: float, highest_mrad: float) -> None:
     """Make the y axis of panels in a row one of errors, logarithmic, degrees at the right of the last."""
-    for panel in panels:
-        panel.set_yscale("log")
-        panel.set_ylim(lowest_mrad, highest_mrad)
-        _ticks(panel, lowest_mrad, highest_mrad)
-        faint_grid(panel)
     degrees = panels[-1].twinx()
-    degrees.set_yscale("log")
-    degrees.set_ylim(lowest_mrad / mrad_per_degree, highest_mrad / mrad_per_degree)
-    _ticks(degrees, *degrees.get_ylim())
+    for axes, unit_mrad in (*((panel, 1.0) for panel in panels), (degrees, mrad_per_degree)):
+        axes.set_yscale("log")
+        axes.set_ylim(lowest_mrad / unit_mrad, highest_mrad / unit_mrad)
+        plain_ticks(axes.yaxis, (1,) if highest_mrad > MANY * lowest_mrad else (1, 2, 5))
+    for panel in panels:
+        faint_grid(panel)
     degrees.set_ylabel("degrees")
     degrees.spines[["top"]].set_visible(False)
 
 
-def _ticks(axes: Axes, lowest: float, highest: float) -> None:
-    steps = (1,) if highest > MANY * lowest else (1, 2, 5)
+def plain_ticks(axis: Axis, steps: Sequence[float]) -> None:
+    """Set ticks at some multiples of the powers of ten within a logarithmic axis, as plain numbers."""
+    low, high = axis.get_view_interval()
     ticks = [step * 10.0**power for power in range(-4, 5) for step in steps]
-    shown = [tick for tick in ticks if lowest <= tick <= highest]
-    axes.yaxis.set_major_locator(FixedLocator(shown))
-    axes.yaxis.set_major_formatter("{x:g}")
-    axes.yaxis.set_minor_locator(NullLocator())
-    axes.yaxis.set_minor_formatter(NullFormatter())
+    axis.set_major_locator(FixedLocator([tick for tick in ticks if low <= tick <= high]))
+    axis.set_major_formatter("{x:g}")
+    axis.set_minor_locator(NullLocator())
+    axis.set_minor_formatter(NullFormatter())

@@ -81,8 +81,7 @@ def residuals(panels: Mapping[str, Mapping[str, tuple[Array, Array]]], x: str, y
         for (label, (middle, mean)), colour, marker in zip(by_label.items(), COLOURS, "os", strict=False):
             panel.plot(middle, mean, color=colour, marker=marker, markersize=4, label=label)
         panel.axhline(0.0, color=INK, linewidth=0.8)
-        plain(panel, "")
-        panel.set_xlabel(f"{name}: {x}", fontsize="small")
+        plain(panel, x=f"{name}: {x}")
     row[0].set_ylabel(y, fontsize="small")
     legend_below(figure, row, 2)
     return figure
