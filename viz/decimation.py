@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from spheretwin.models.telemetry.fault_log import ColumnChanges
 from spheretwin.models.telemetry.status import QUIET_S
 from spheretwin.models.telemetry.table import Table
 
@@ -148,7 +149,7 @@ class FirstAndExtremeRows(RowSelection):
         self._firsts = FirstRows(rate_Hz)
         self._window = -1.0
         self._waiting: list[Table] = []
-        self._states: dict[str, Array] = {}
+        self._changes = ColumnChanges()
         self._last_saturated_s = -np.inf
 
     def add(self, rows: Table) -> list[Table]:
@@ -186,16 +187,8 @@ class FirstAndExtremeRows(RowSelection):
 
     def _state_changes(self, rows: Table) -> Places:
         """Return the places of the first rows in which a part has another state."""
-        changed = [np.empty(0, np.intp)]
-        for signal in rows.signals:
-            if signal.states:
-                values = rows[signal.name].reshape(len(rows), -1)
-                before = self._states.get(signal.name, values[0])
-                changed.append(
-                    np.flatnonzero((np.diff(values, axis=0, prepend=before[None]) != 0).any(axis=1))
-                )
-                self._states[signal.name] = values[-1].copy()
-        return np.concatenate(changed)
+        states = [signal.name for signal in rows.signals if signal.states]
+        return np.array([tick for name in states for tick, *_ in self._changes.of(rows, name)], np.intp)
 
     def _saturation_ends(self, rows: Table) -> Places:
         """Return the places of the first and last row of each saturation; short pauses belong to it."""

@@ -159,10 +159,11 @@ _READABLE = 0.275
 
 
 def _luminance(colour: Colour) -> float:
-    return float(_linear(np.array(colour) / 255) @ _LUMINANCE)
+    return float(linear_light(np.array(colour) / 255) @ _LUMINANCE)
 
 
-def _linear(shares: NDArray[np.float64]) -> NDArray[np.float64]:
+def linear_light(shares: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the light of a screen's numbers (sRGB), 0 to 1."""
     return np.where(shares <= 0.04045, shares / 12.92, ((shares + 0.055) / 1.055) ** 2.4)
 
 
@@ -176,7 +177,7 @@ def _spaced_hues(count: int) -> list[str]:
     colours = []
     for place in range(count):
         shares = np.array([colorsys.hls_to_rgb(place / count, value, 0.8) for value in lightness])
-        middle = shares[np.searchsorted(_linear(shares) @ _LUMINANCE, _MIDDLE)]
+        middle = shares[np.searchsorted(linear_light(shares) @ _LUMINANCE, _MIDDLE)]
         colours.append("#{:02x}{:02x}{:02x}".format(*np.round(255 * middle).astype(int)))
     return colours
 

@@ -42,7 +42,7 @@ def mesh_colour(colour: ArrayLike) -> tuple[int, int, int]:
 
 def _albedo(colours: ArrayLike) -> NDArray[np.float64]:
     """Share of the light that a surface gives back, (..., 3)."""
-    shown = np.clip(_linear(np.asarray(colours) / 255) @ np.linalg.inv(_OUT_OF).T, 0.0, BRIGHTEST)
+    shown = np.clip(theme.linear_light(np.asarray(colours) / 255) @ np.linalg.inv(_OUT_OF).T, 0.0, BRIGHTEST)
     # v (v + 0.0245786) - 0.000090537 = shown (v (0.983729 v + 0.4329510) + 0.238081)
     a, b, c = (
         1 - 0.983729 * shown,
@@ -51,11 +51,6 @@ def _albedo(colours: ArrayLike) -> NDArray[np.float64]:
     )
     before = (-b + np.sqrt(b**2 - 4 * a * c)) / (2 * a)
     return np.clip(before @ np.linalg.inv(_INTO).T / (_EXPOSURE * LIGHT), 0.0, 1.0)
-
-
-def _linear(encoded: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Light of a screen's numbers (sRGB), 0 to 1."""
-    return np.where(encoded <= 0.04045, encoded / 12.92, ((encoded + 0.055) / 1.055) ** 2.4)
 
 
 def _encoded(linear: NDArray[np.float64]) -> NDArray[np.float64]:

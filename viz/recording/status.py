@@ -9,6 +9,7 @@ import rerun as rr
 from numpy.typing import NDArray
 
 from spheretwin.models.telemetry.checksums import line_checksums
+from spheretwin.models.telemetry.fault_log import ColumnChanges
 from spheretwin.models.telemetry.signals import Signal
 from spheretwin.models.telemetry.status import QUIET_S, Event, Events, Level, Status
 from spheretwin.models.telemetry.table import Table, rank_lost, saturated
@@ -29,7 +30,7 @@ class Lane(NamedTuple):
     """Changes of one part's state."""
 
     entity: str
-    t_s: NDArray[np.float64]
+    t_s: list[float]
     states: list[str]
     possible: tuple[str, ...]
 
@@ -38,26 +39,17 @@ class StateChanges:
     """Finds changes of states in a run's telemetry, chunk by chunk; before the first row all are 0."""
 
     def __init__(self) -> None:
-        self._last: dict[str, NDArray[np.float64]] = {}
+        self._changes = ColumnChanges()
 
     def of(self, rows: Table) -> list[Lane]:
-        """Lanes that have changes in one chunk."""
-        return [lane for signal in rows.signals if signal.states for lane in self._lanes(rows, signal)]
-
-    def _lanes(self, rows: Table, signal: Signal) -> list[Lane]:
-        values = rows[signal.name].reshape(len(rows), -1)
-        last = self._last.get(signal.name, np.zeros(signal.size))
-        changed = values != np.concatenate([last[None], values[:-1]])
-        self._last[signal.name] = values[-1].copy()
-        return [
-            Lane(
-                _entity(signal, int(place)),
-                rows["t_s"][changed[:, place]],
-                [signal.states[int(value)] for value in values[changed[:, place], place]],
-                signal.states,
-            )
-            for place in np.flatnonzero(changed.any(axis=0))
-        ]
+        """Return the lanes that have changes in one chunk, at least one row."""
+        lanes: dict[str, Lane] = {}
+        for signal in (signal for signal in rows.signals if signal.states):
+            for _, t_s, entry, state in self._changes.of(rows, signal.name):
+                lane = lanes.setdefault(name := _entity(signal, entry), Lane(name, [], [], signal.states))
+                lane.t_s.append(t_s)
+                lane.states.append(signal.states[state])
+        return list(lanes.values())
 
 
 def _entity(signal: Signal, place: int) -> str:
@@ -82,7 +74,7 @@ class StateLanes(RecordingPart):
                 colours = [theme.FINE, *[theme.FAILURE] * len(others)]
                 style = rr.StateConfiguration(values=[fine, *others], colors=colours)
                 recording.log(entity, style, static=True)
-            recording.send_columns(entity, time_index(t_s), rr.StateChange.columns(state=states))
+            recording.send_columns(entity, time_index(np.array(t_s)), rr.StateChange.columns(state=states))
 
 
 class Log(RecordingPart):

@@ -27,7 +27,7 @@ def lanes(whole, cuts):
     changes, result = StateChanges(), {}
     for first, last in zip([0, *cuts], [*cuts, len(whole)], strict=True):
         for lane in changes.of(whole.rows(first, last)):
-            result.setdefault(lane.entity, []).extend(zip(lane.t_s.tolist(), lane.states, strict=True))
+            result.setdefault(lane.entity, []).extend(zip(lane.t_s, lane.states, strict=True))
     return result
 
 
