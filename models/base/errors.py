@@ -132,6 +132,25 @@ def did_you_mean(received: str, valid: Iterable[str]) -> str:
     return f"; did you mean {near}?" if near else ""
 
 
+def unknown_name(what: str, name: object, valid: Iterable[str], expected: str = "{}") -> InputError:
+    """Return the error for a name that is not valid.
+
+    Parameters
+    ----------
+    what : str
+        Beginning of the message.
+    name : object
+        Received name.
+    valid : iterable of str
+        Valid names.
+    expected : str
+        Expected value; braces stand for the valid names.
+    """
+    names = list(valid)
+    listed = expected.format(", ".join(names))
+    return InputError(f"{what}: expected {listed}, received {shown(name)}{did_you_mean(f'{name}', names)}")
+
+
 def nearest(received: str, valid: Iterable[str]) -> str | None:
     """Return the valid name nearest to the received one; None if none is similar."""
     # A longer text is not a name, and the comparison would take seconds.

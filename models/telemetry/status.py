@@ -6,7 +6,7 @@ from enum import StrEnum
 
 import numpy as np
 
-from spheretwin.models.base.errors import InputError, did_you_mean, shown
+from spheretwin.models.base.errors import unknown_name
 from spheretwin.models.telemetry.fault_log import FAULT, GROUP_OUT, REPORTED, TIME_TO_DETECTION, ColumnChanges
 from spheretwin.models.telemetry.table import Table, rank_lost, saturated
 
@@ -76,9 +76,7 @@ def named(name: str) -> Status:
     for status in Status:
         if status == name:
             return status
-    raise InputError(
-        f"status: expected one of {', '.join(Status)}, received {shown(name)}{did_you_mean(name, Status)}"
-    )
+    raise unknown_name("status", name, Status, "one of {}")
 
 
 Event = tuple[float, Level, str]

@@ -11,7 +11,7 @@ from spheretwin.cli.common import print_json
 from spheretwin.cli.options import verb
 from spheretwin.config.active_config import initial_config
 from spheretwin.models.actuator import Actuator
-from spheretwin.models.base.errors import InputError, did_you_mean, shown
+from spheretwin.models.base.errors import InputError, shown, unknown_name
 from spheretwin.scenario import reading
 from spheretwin.scenario.fields import every_field, unit_of
 from spheretwin.scenario.hardware import HARDWARE, MACHINE, MODEL_FILE, ORIGINS, Origin, stated_value
@@ -70,10 +70,7 @@ def _facts(subject: list[str], everything: bool) -> Iterator[FieldFacts]:
 
 def _of_hardware(name: str) -> Iterator[FieldFacts]:
     if name not in HARDWARE:
-        raise InputError(
-            f"explain: expected a hardware set of {', '.join(HARDWARE)}, received {shown(name)}"
-            f"{did_you_mean(name, HARDWARE)}"
-        )
+        raise unknown_name("explain", name, HARDWARE, "a hardware set of {}")
     fields = dict(every_field(Scenario))
     for dotted, value in HARDWARE[name].items():
         yield _fact(dotted, value, fields[dotted], ORIGINS[name][dotted])
@@ -131,10 +128,7 @@ def _of_field(name: str) -> Iterator[FieldFacts]:
     fields = dict(every_field(Scenario))
     wanted = [dotted for dotted in fields if dotted == name or dotted.startswith(f"{name}.")]
     if not wanted:
-        raise InputError(
-            f"explain: expected a field, such as plant.coulomb_Nm, received {shown(name)}"
-            f"{did_you_mean(name, fields)}"
-        )
+        raise unknown_name("explain", name, fields, "a field, such as plant.coulomb_Nm")
     for dotted in wanted:
         field = fields[dotted]
         if field.description:

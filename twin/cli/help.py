@@ -6,7 +6,7 @@ import argparse
 from collections.abc import Iterator, Sequence
 
 from spheretwin import scenario as scenarios
-from spheretwin.models.base.errors import InputError, did_you_mean, shown
+from spheretwin.models.base.errors import unknown_name
 from spheretwin.scenario import reading
 from spheretwin.scenario.fields import INDEX, every_field, fields_of, kind_of
 from spheretwin.scenario.sections import Scenario
@@ -60,10 +60,7 @@ def _requested(name: str, rows: Sequence[FieldText], sections: Sequence[str]) ->
     requested = [row for row in rows if _section(row) == name or f"{row.flag}.".startswith(f"{flag}.")]
     if requested:
         return requested
-    valid = [*sections, ALL]
-    raise InputError(
-        f"command line: expected --help {', '.join(valid)}, received {shown(name)}{did_you_mean(name, valid)}"
-    )
+    raise unknown_name("command line", name, [*sections, ALL], "--help {}")
 
 
 def _rows(scenario: Scenario) -> Iterator[FieldText]:

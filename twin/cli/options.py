@@ -11,7 +11,7 @@ from pathlib import Path
 from textwrap import dedent
 from typing import Any, NamedTuple, NoReturn
 
-from spheretwin.models.base.errors import InputError, did_you_mean, shown
+from spheretwin.models.base.errors import InputError, unknown_name
 
 FIGURE_FORMATS = ("svg", "pdf", "png", "pdf-one-column", "pdf-two-columns")
 
@@ -264,12 +264,8 @@ class Parser(argparse.ArgumentParser):
     def _check_value(self, action: argparse.Action, value: Any) -> None:
         """Refuse a value that is not a valid choice, with the nearest valid one."""
         if action.choices is not None and value not in action.choices:
-            valid = list(map(str, action.choices))
             name = action.metavar or "/".join(action.option_strings)
-            raise InputError(
-                f"command line: expected {name} {', '.join(valid)},"
-                f" received {shown(value)}{did_you_mean(f'{value}', valid)}"
-            )
+            raise unknown_name("command line", value, map(str, action.choices), f"{name} {{}}")
 
 
 def _description(verb: Verb) -> str:

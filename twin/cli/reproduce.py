@@ -8,7 +8,7 @@ from collections.abc import Sequence
 
 from spheretwin.cli.common import print_json, print_message, print_result
 from spheretwin.cli.options import verb, whole
-from spheretwin.models.base.errors import InputError, did_you_mean, shown
+from spheretwin.models.base.errors import InputError, unknown_name
 from spheretwin.models.base.mujoco_library import timers_stopped
 from spheretwin.models.telemetry.run_record import versions
 from spheretwin.paper import EXPERIMENTS, page
@@ -122,10 +122,7 @@ def _named(names: Sequence[str]) -> list[str]:
     """
     for name in names:
         if name != ALL and name not in EXPERIMENTS:
-            valid = [*EXPERIMENTS, ALL, TWIN]
-            raise InputError(
-                f"reproduce: expected {', '.join(valid)}, received {shown(name)}{did_you_mean(name, valid)}"
-            )
+            raise unknown_name("reproduce", name, [*EXPERIMENTS, ALL, TWIN])
     return [name for name in EXPERIMENTS if name in names or ALL in names]
 
 

@@ -16,7 +16,13 @@ import numpy as np
 from pydantic import BaseModel, ValidationError
 from pydantic.fields import FieldInfo
 
-from spheretwin.models.base.errors import InputError, did_you_mean, is_plain, shown, without_breaks
+from spheretwin.models.base.errors import (
+    InputError,
+    is_plain,
+    shown,
+    unknown_name,
+    without_breaks,
+)
 from spheretwin.models.base.files import regular_file
 from spheretwin.models.base.user_code import file_of, is_reference
 from spheretwin.scenario.fields import (
@@ -84,10 +90,7 @@ def read_toml(what: str, source: str, shipped_folder: Traversable) -> tuple[dict
                 f"{what} {source}: expected a readable TOML file, {without_breaks(error)}"
             ) from None
     else:
-        raise InputError(
-            f"{what}: expected {', '.join(names)} or a .toml file,"
-            f" received {shown(source)}{did_you_mean(source, names)}"
-        )
+        raise unknown_name(what, source, names, "{} or a .toml file")
     try:
         return tomllib.loads(text), os.path.dirname(path)
     except (ValueError, RecursionError) as error:

@@ -209,9 +209,9 @@ def _distributions(rows: StudyTable) -> Drawing:
         name: {law: np.sort(values)[steps[law] // 2 :: steps[law]] for law, values in by_law.items()}
         for name, by_law in numbers.items()
     }
-    totals = {law: total / steps[law] for law, total in totals.items()}
+    shares = {law: total / steps[law] for law, total in totals.items()}
     numbers = {quantity_text(name): by_law for name, by_law in numbers.items()}
-    figure = distributions.distributions(numbers, totals, f"{rows.study['name']}: distributions")
+    figure = distributions.distributions(numbers, shares, f"{rows.study['name']}: distributions")
     caption = (
         "Share of all rows that completed with at most this value. A curve ends below 1 if some rows did not"
         " complete or never settled. Of a metric of each hinge, the largest of the three values is shown."

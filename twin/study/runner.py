@@ -8,7 +8,7 @@ from contextlib import closing, suppress
 from pathlib import Path
 from typing import NamedTuple
 
-from spheretwin.models.base.errors import InputError, SpheretwinError, did_you_mean, shown
+from spheretwin.models.base.errors import InputError, SpheretwinError, shown, unknown_name
 from spheretwin.models.base.files import make_folder
 from spheretwin.study import journal, table
 from spheretwin.study.engines import ENGINES
@@ -214,10 +214,7 @@ def _fill(
 
 def _engine(name: str, address: str | None) -> Engine:
     if name not in ENGINES:
-        raise InputError(
-            f"sweep: expected {', '.join(ENGINES)} as engine,"
-            f" received {shown(name)}{did_you_mean(name, ENGINES)}"
-        )
+        raise unknown_name("sweep", name, ENGINES, "{} as engine")
     if address is not None and not ENGINES[name].takes_address:
         able = [other for other, engine in ENGINES.items() if engine.takes_address]
         raise InputError(f"sweep: expected engine {', '.join(able)} for an address, received {name}")

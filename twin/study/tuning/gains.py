@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from spheretwin.metrics import METRICS
-from spheretwin.models.base.errors import InputError, did_you_mean, shown
+from spheretwin.models.base.errors import InputError, did_you_mean, unknown_name
 from spheretwin.models.base.user_code import is_reference
 from spheretwin.study.grid import Row
 from spheretwin.study.optimise import ON, Gain, Optimise
@@ -130,10 +130,7 @@ def judged(study: Study) -> Study:
     for objective in section_of(study).objective:
         if objective.metric not in METRICS and objective.metric not in own:
             valid = [*METRICS, *own]
-            raise InputError(
-                f"study {study.name}: expected {', '.join(valid)} as an objective,"
-                f" received {shown(objective.metric)}{did_you_mean(objective.metric, valid)}"
-            )
+            raise unknown_name(f"study {study.name}", objective.metric, valid, "{} as an objective")
         names[own.get(objective.metric, objective.metric)] = None
     return study.model_copy(
         update={"metrics": tuple(names), "telemetry": (), "optimise": None, "description": ""}
