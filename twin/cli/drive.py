@@ -10,12 +10,13 @@ from typing import Any
 from spheretwin.cli.common import interruptible, print_message, warn
 from spheretwin.cli.machine import OUTPUTS, read_scenario, rehearse_run, run_session
 from spheretwin.cli.options import from_zero, number, verb
-from spheretwin.machine.files import LogFile, conditions_of
+from spheretwin.machine.export import LogFile
 from spheretwin.machine.link.admission import read_key
 from spheretwin.machine.link.controller_scenario import left_out
 from spheretwin.machine.link.limits import LinkSettings, MachineLimits
 from spheretwin.machine.link.machine_link import Link
 from spheretwin.machine.link.stream import RunningShadow
+from spheretwin.machine.log import conditions_of
 from spheretwin.machine.state_estimation import Shadow
 from spheretwin.models.base.files import check_writable
 from spheretwin.scenario.reading import shipped

@@ -12,6 +12,8 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Annotated, Literal, NamedTuple
 
+import pyarrow as pa
+import pyarrow.csv
 from pydantic import Field
 
 from spheretwin.machine.raw_table import MISSING, RawTable, column_names, repeated_names
@@ -336,9 +338,6 @@ def _complete_rows(rows: Sequence[str], layout: _Layout) -> tuple[list[int], lis
 
 def _columns(path: Path, rows: Sequence[str], layout: _Layout) -> dict[str, object]:
     """Return the texts of the columns by name."""
-    import pyarrow as pa
-    import pyarrow.csv
-
     delimiter = layout.delimiter
     if delimiter == WHITESPACE:
         rows, delimiter = [" ".join(line.split()) for line in rows], " "

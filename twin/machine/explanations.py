@@ -97,22 +97,10 @@ def candidates_of(
         low, high = RANGES.get(kind.name, (kind.least, kind.most))
         for name, direction in directions.items():
             own = values[direction > 0]
-            named = any(
-                one.kind is kind and direction[place]
-                for place, one in enumerate(parameters)
-                if one in watched
-            )
-            candidates.append(
-                Candidate(
-                    name if named else UNNAMED,
-                    kind,
-                    direction,
-                    size_of(kind),
-                    float(np.max(low - own)),
-                    float(np.min(high - own)),
-                    log_prior,
-                )
-            )
+            changed = {one for one, share in zip(parameters, direction, strict=True) if share}
+            label = name if changed & set(watched) else UNNAMED
+            least, most = float(np.max(low - own)), float(np.min(high - own))
+            candidates.append(Candidate(label, kind, direction, size_of(kind), least, most, log_prior))
     return candidates
 
 

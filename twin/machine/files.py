@@ -6,34 +6,25 @@ import csv
 import json
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import pyarrow as pa
+import pyarrow.compute as pc
+from pyarrow import types
 
 from spheretwin.machine import columns as column_maps
 from spheretwin.machine import csv_files
 from spheretwin.machine.columns import ColumnMap
-from spheretwin.machine.log import COMMANDED, MEASURED, Log
+from spheretwin.machine.log import ACCEPTED, CONDITIONS, CURRENTS, Log, conditions_of, log_signals
 from spheretwin.machine.raw_table import RawTable, repeated_names
 from spheretwin.models.base.errors import InputError, shown
 from spheretwin.models.base.files import regular_file, whole_file
 from spheretwin.models.telemetry import joint_states
 from spheretwin.models.telemetry.checksums import METADATA, open_parquet, unreadable
 from spheretwin.models.telemetry.joint_states import ANGLE_NAMES, Topic, group_names
-from spheretwin.models.telemetry.signals import ANGLES, Signal
+from spheretwin.models.telemetry.signals import Signal
 from spheretwin.models.telemetry.table import Table
-
-if TYPE_CHECKING:
-    import pyarrow as pa
-
-
-from collections.abc import Container
-
-from spheretwin.models.base.files import check_writable
-
-CURRENT_SIGNALS = {COMMANDED: "current_command_A", MEASURED: "current_measured_A"}
-CURRENTS, CONDITIONS, ACCEPTED = "currents", "conditions", "accepted"
-"""Metadata of a log in Parquet and MCAP."""
 
 
 def read(
@@ -59,7 +50,7 @@ def read(
     InputError
         The file cannot be read, lacks a column, or a name is no finding.
     """
-    from spheretwin.machine.findings import check_names  # imports an optimiser, which an export does not need
+    from spheretwin.machine.findings import check_names  # imports an optimiser, which is slow
 
     if columns is None or isinstance(columns, ColumnMap):
         column_map = columns
@@ -114,25 +105,6 @@ def write(log: Log, path: str | Path) -> None:
             writer.writerows(map(repr, row) for row in table.values.tolist())
     else:
         raise InputError(f"log: expected a file .parquet, .csv or .mcap, received {shown(str(path))}")
-
-
-def log_signals(groups: int, kinds: tuple[str, ...]) -> tuple[Signal, ...]:
-    """Return the signals of a log with the given kinds of currents."""
-    labels = tuple(group_names(groups))
-    meanings = {
-        COMMANDED: "group currents commanded to the amplifiers",
-        MEASURED: "group currents as measured",
-    }
-    return (
-        Signal("t_s", "s", 1, "time of the sample"),
-        Signal("angle_rad", "rad", 3, "hinge angles as measured", ANGLES),
-        *(Signal(CURRENT_SIGNALS[kind], "A", groups, meanings[kind], labels) for kind in kinds),
-    )
-
-
-def conditions_of(payload_kg: float) -> dict[str, Any]:
-    """Return the conditions of a run with a payload."""
-    return {"plant.payload_kg": payload_kg} if payload_kg else {}
 
 
 def _conditions(metadata: Mapping[str, str]) -> dict[str, Any]:
@@ -196,8 +168,6 @@ def _read_mcap(path: Path, column_map: ColumnMap | None) -> RawTable:
 
 
 def _read_parquet(path: Path) -> RawTable:
-    import pyarrow as pa
-
     try:
         with open_parquet(path) as file:
             table = file.read(use_threads=False)
@@ -230,10 +200,6 @@ MOST_ENTRIES = 1024
 
 def _scalars(field: pa.Field, column: pa.ChunkedArray) -> Iterator[tuple[str, Any]]:
     """Yield name and content of a column; a column for each entry of a vector or a structure."""
-    import pyarrow as pa
-    import pyarrow.compute as pc
-    import pyarrow.types as types
-
     kind = field.type
     if types.is_struct(kind):
         for entry in kind:
@@ -256,51 +222,3 @@ def _scalars(field: pa.Field, column: pa.ChunkedArray) -> Iterator[tuple[str, An
         yield from zip(names, values.T, strict=True)
     else:
         yield field.name, column
-
-
-class LogFile:
-    """Sink that writes a log as Parquet: time, measured angles, commanded currents.
-
-    Parameters
-    ----------
-    path : Path
-    late_ticks : container of int
-        Ticks without a new measurement: their angles are NaN.
-    period_s : float
-        Control period.
-    conditions : mapping
-        Known fields of the scenario during the run.
-
-    Raises
-    ------
-    InputError
-        The file cannot be written.
-    """
-
-    def __init__(
-        self, path: Path, late_ticks: Container[int], period_s: float, conditions: Mapping[str, Any]
-    ) -> None:
-        check_writable(path, ".parquet")
-        self._path, self._late_ticks, self._period_s = path, late_ticks, period_s
-        self._metadata = {CURRENTS: COMMANDED, CONDITIONS: json.dumps(dict(conditions))}
-        self._parts: list[np.ndarray] = []
-
-    def write(self, rows: Table) -> None:
-        """Add the rows of one chunk."""
-        angle_rad = rows["q_rad"].copy()
-        ticks = np.rint(rows["t_s"] / self._period_s).astype(int).tolist()
-        angle_rad[[tick in self._late_ticks for tick in ticks]] = np.nan
-        self._parts.append(np.column_stack([rows["t_s"], angle_rad, rows["current_A"]]))
-
-    def note(self, t_s: float, text: str) -> None:
-        """Ignore a message: a log has numbers alone."""
-
-    def finish(self, status: str) -> None:
-        """Ignore the final status: `close` writes the file."""
-
-    def close(self) -> None:
-        """Write the file, also after an error; no file without a tick."""
-        if self._parts:
-            rows = np.concatenate(self._parts)
-            signals = log_signals(rows.shape[1] - 4, (COMMANDED,))
-            Table(signals, rows).scalars().write_parquet(self._path, self._metadata)

@@ -12,10 +12,17 @@ import numpy as np
 
 from spheretwin.models.base.arrays import Array
 from spheretwin.models.base.errors import InputError
+from spheretwin.models.telemetry.joint_states import group_names
+from spheretwin.models.telemetry.signals import ANGLES, Signal
 from spheretwin.models.telemetry.table import Table
 
 COMMANDED: Final = "commanded"
 MEASURED: Final = "measured"
+
+
+CURRENT_SIGNALS = {COMMANDED: "current_command_A", MEASURED: "current_measured_A"}
+CURRENTS, CONDITIONS, ACCEPTED = "currents", "conditions", "accepted"
+"""Metadata of a log in Parquet and MCAP."""
 
 
 @dataclass(frozen=True)
@@ -146,3 +153,22 @@ def joined(logs: Sequence[Log]) -> Log:
         name: np.concatenate([getattr(log, name) for log in logs]) for name in _COLUMNS
     }
     return replace(first, **columns)
+
+
+def log_signals(groups: int, kinds: tuple[str, ...]) -> tuple[Signal, ...]:
+    """Return the signals of a log with the given kinds of currents."""
+    labels = tuple(group_names(groups))
+    meanings = {
+        COMMANDED: "group currents commanded to the amplifiers",
+        MEASURED: "group currents as measured",
+    }
+    return (
+        Signal("t_s", "s", 1, "time of the sample"),
+        Signal("angle_rad", "rad", 3, "hinge angles as measured", ANGLES),
+        *(Signal(CURRENT_SIGNALS[kind], "A", groups, meanings[kind], labels) for kind in kinds),
+    )
+
+
+def conditions_of(payload_kg: float) -> dict[str, Any]:
+    """Return the conditions of a run with a payload."""
+    return {"plant.payload_kg": payload_kg} if payload_kg else {}

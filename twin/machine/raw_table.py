@@ -6,18 +6,17 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import UTC, datetime, timedelta
 from itertools import count
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import pyarrow as pa
+import pyarrow.compute as pc
 from numpy.typing import NDArray
+from pyarrow import types
 
 from spheretwin.machine.clock_texts import seconds_of_texts
 from spheretwin.models.base.arrays import Array, Integers
 from spheretwin.models.base.errors import InputError, did_you_mean, shown
-
-if TYPE_CHECKING:
-    import pyarrow as pa
-
 
 TIME_UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 
@@ -123,8 +122,6 @@ class RawTable:
         column = self.column(name)
         if isinstance(column, np.ndarray):
             return column.astype(np.float64)
-        import pyarrow.types as types
-
         if _is_text(column.type):
             return self._numbers_of_texts(name, _texts(column))
         is_number = (types.is_integer, types.is_floating, types.is_decimal, types.is_boolean, types.is_null)
@@ -135,9 +132,6 @@ class RawTable:
         return _as_float(column)
 
     def _numbers_of_texts(self, name: str, texts: pa.ChunkedArray) -> Array:
-        import pyarrow as pa
-        import pyarrow.compute as pc
-
         plain = pc.utf8_ltrim(texts, "+")
         if self.decimal == ",":
             plain = pc.replace_substring(plain, ",", ".")
@@ -179,8 +173,6 @@ class RawTable:
         column = self.column(name)
         if isinstance(column, np.ndarray):
             return _seconds(column, self._time_unit(name, unit), wrap)
-        import pyarrow.types as types
-
         if types.is_temporal(column.type) and not types.is_date(column.type):
             is_clock = types.is_time(column.type)
             ticks = _ticks(column)
@@ -203,9 +195,6 @@ class RawTable:
 
     def _exact(self, column: Any, unit: str | None, wrap: float) -> tuple[Array, tuple[str, ...]]:
         """Return the times of decimals: the digits beyond those of a float64 count."""
-        import pyarrow as pa
-        import pyarrow.compute as pc
-
         values = _as_float(column)
         finite = np.flatnonzero(np.isfinite(values))
         if not len(finite) or wrap:
@@ -222,9 +211,6 @@ class RawTable:
     def _times_of_texts(
         self, name: str, texts: pa.ChunkedArray, unit: str | None, wrap: float
     ) -> tuple[Array, tuple[str, ...]]:
-        import pyarrow as pa
-        import pyarrow.compute as pc
-
         plain = pc.replace_substring(texts, ",", ".") if self.decimal == "," else texts
         try:
             ticks = _ticks(plain.cast(pa.int64()))
@@ -259,16 +245,11 @@ def name_list(names: Sequence[str]) -> str:
 
 
 def _is_text(kind: pa.DataType) -> bool:
-    import pyarrow.types as types
-
     return types.is_string(kind) or types.is_large_string(kind) or types.is_dictionary(kind)
 
 
 def _texts(column: pa.ChunkedArray) -> pa.ChunkedArray:
     """Return texts without blanks around them; null where one stands for a missing number."""
-    import pyarrow as pa
-    import pyarrow.compute as pc
-
     texts = pc.utf8_trim_whitespace(column.cast(pa.string()))
     is_missing = pc.is_in(pc.utf8_lower(texts), value_set=pa.array(MISSING))
     return pc.if_else(is_missing, None, texts)
@@ -276,24 +257,17 @@ def _texts(column: pa.ChunkedArray) -> pa.ChunkedArray:
 
 def _of_fortran(texts: pa.ChunkedArray) -> pa.ChunkedArray:
     """Return numbers such as 1.0D-3 with the exponent of other languages."""
-    import pyarrow.compute as pc
-
     return pc.replace_substring_regex(texts, r"^([+-]?[0-9.]+)[dD]([+-]?[0-9]+)$", r"\1e\2")
 
 
 def _as_float(column: pa.ChunkedArray) -> Array:
     """Return an Arrow array as float64; null becomes NaN."""
-    import pyarrow as pa
-    import pyarrow.compute as pc
-
     values = pc.cast(column, pa.float64(), safe=_is_text(column.type)).to_numpy(zero_copy_only=False)
     return np.asarray(values, np.float64)
 
 
 def _not_numbers(texts: pa.ChunkedArray) -> Any:
     """Yield row and text of each text that is not a number."""
-    import pyarrow as pa
-
     for row, text in enumerate(texts.to_pylist()):
         try:
             pa.scalar(text).cast(pa.float64())
@@ -303,10 +277,6 @@ def _not_numbers(texts: pa.ChunkedArray) -> Any:
 
 def _ticks(column: pa.ChunkedArray) -> NDArray[Any]:
     """Return integers, also those of times, as int64 or uint64; a missing one is masked."""
-    import pyarrow as pa
-    import pyarrow.compute as pc
-    import pyarrow.types as types
-
     if types.is_time32(column.type):
         column = column.cast(pa.int32())
     kind = pa.uint64() if types.is_uint64(column.type) else pa.int64()

@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 import spheretwin
-from spheretwin.machine import IdentifySettings, Log, identify
+from spheretwin.machine import IdentifySettings, identify
 from spheretwin.machine.discrepancy import VarianceComponent, _most_likely, widening
+from spheretwin.machine.log import log_of
 from spheretwin.machine.workflow import CALIBRATED
 
 
@@ -44,9 +45,8 @@ def test_a_scatter_of_the_groups_widens_the_intervals_and_is_suggested():
     known, logs = {**CALIBRATED, "controller.law": "pid", "duration": 2.0}, []
     for seed, payload_kg in enumerate((0.0, 0.1)):
         conditions = {"plant.payload_kg": payload_kg}
-        run = spheretwin.simulate("sinusoid", {**known, **true, **conditions, "seed": seed}).telemetry
-        columns = (run[name] for name in ("t_s", "current_command_A", "q_measured_rad"))
-        logs.append(Log(*columns, conditions=conditions))
+        run = spheretwin.simulate("sinusoid", {**known, **true, **conditions, "seed": seed})
+        logs.append(log_of(run.telemetry, conditions=conditions))
     wanted = ["torque_scale", "plant.modelling_error", "plant.coulomb_Nm"]
     result = identify(logs, "sinusoid", wanted, known, IdentifySettings(suggest=True))
     assert result.accepted, result.reasons
@@ -72,9 +72,8 @@ def test_what_a_hinge_has_besides_friction_is_suggested_and_then_found(field, va
     true = {"plant.coulomb_Nm": [3e-3, 2e-3, 1.5e-3], field: (value * np.eye(3)[place]).tolist()}
     conditions = {"plant.payload_kg": 0.1}
     known = {**CALIBRATED, "controller.law": "pid", "duration": 2.0}
-    run = spheretwin.simulate("sinusoid", {**known, **true, **conditions, "seed": 1}).telemetry
-    columns = (run[name] for name in ("t_s", "current_command_A", "q_measured_rad"))
-    log, wanted = Log(*columns, conditions=conditions), ["torque_scale", "plant.coulomb_Nm"]
+    run = spheretwin.simulate("sinusoid", {**known, **true, **conditions, "seed": 1})
+    log, wanted = log_of(run.telemetry, conditions=conditions), ["torque_scale", "plant.coulomb_Nm"]
     lacking = identify(log, "sinusoid", wanted, known, IdentifySettings(suggest=True))
     assert not lacking.accepted
     assert lacking.suggestions[0].member == f"{field}.{place}"

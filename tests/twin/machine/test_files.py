@@ -14,7 +14,8 @@ import pytest
 import spheretwin as st
 from spheretwin import machine
 from spheretwin.machine import Log
-from spheretwin.machine.files import OTHER_FORMATS, log_signals
+from spheretwin.machine.files import OTHER_FORMATS
+from spheretwin.machine.log import log_signals
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.telemetry import joint_states
 from spheretwin.models.telemetry.joint_states import Topic

@@ -6,7 +6,7 @@ import pyarrow.parquet
 import pytest
 
 from spheretwin import machine
-from spheretwin.machine.files import LogFile
+from spheretwin.machine.export import LogFile
 from spheretwin.models.telemetry.signals import Signal
 from spheretwin.models.telemetry.table import Table
 
