@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import shlex
 from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import replace
 from itertools import groupby
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -15,14 +16,14 @@ from spheretwin.analysis.recorded_run import Reviewed, events, of_the_actuator
 from spheretwin.analysis.review import LONGEST_VALUE, common_conditions, scenario_differences
 from spheretwin.analysis.run_summary import amplitudes, peaks
 from spheretwin.metrics.tracking import BAND_rad
-from spheretwin.models.actuator import MJCF_PATH, Actuator
+from spheretwin.models.actuator import Actuator
 from spheretwin.models.base.errors import InputError, shortened, shown, without_breaks
 from spheretwin.models.base.files import check_writable
 from spheretwin.models.base.user_code import short_names
-from spheretwin.models.telemetry.run_record import RunFacts
 from spheretwin.models.telemetry.signals import ANGLES
 from spheretwin.models.telemetry.status import Event, Status
 from spheretwin.models.telemetry.table import Table
+from spheretwin.records.provenance import facts_of
 from spheretwin.scenario.sections import ResolvedScenario
 from spheretwin.viz.comparison.runs import ComparedRun, EarlyEnd, Spectrum, leaders
 from spheretwin.viz.layout.extents import number
@@ -117,7 +118,7 @@ def merge(runs: Sequence[Reviewed], path: Path) -> None:
                 f" received one of {count}"
             )
     subjects = [
-        RecordingSubject(of.files.actuator, run.table.signals, _facts(of.scenario, _law(run)))
+        RecordingSubject(of.files.actuator, run.table.signals, replace(facts_of(of.scenario), law=_law(run)))
         for run, of in zip(runs, map(of_the_actuator, runs), strict=True)
     ]
     with np.errstate(all="ignore"):  # numbers in damaged files may have any size
@@ -209,21 +210,7 @@ def subject_of(scenario: ResolvedScenario, actuator: Actuator) -> RecordingSubje
     """Return what is drawn of a machine without a run."""
     from spheretwin.viz.recording.part import RecordingSubject  # Rerun is slow to import
 
-    return RecordingSubject(actuator, (), _facts(scenario, ""))
-
-
-def _facts(scenario: ResolvedScenario, law: str) -> RunFacts:
-    return RunFacts(
-        name=scenario.name,
-        description=scenario.description,
-        law=law,
-        duration_s=scenario.duration,
-        current_limit_A=scenario.drive.current_limit_A,
-        payload_kg=scenario.plant.payload_kg,
-        gravity_m_s2=scenario.plant.gravity_m_s2,
-        mjcf=Path(scenario.plant.mjcf or MJCF_PATH),
-        sections={},
-    )
+    return RecordingSubject(actuator, (), facts_of(scenario))
 
 
 def _law(run: Reviewed) -> str:
