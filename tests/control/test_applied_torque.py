@@ -13,7 +13,6 @@ from spheretwin.control.applied_torque import (
     fill_applied_torque,
 )
 from spheretwin.control.law import Law
-from spheretwin.models.base.columns import column_of
 from spheretwin.models.kinematics import rate_jacobian
 from spheretwin.models.magnetics import torque_matrix
 from spheretwin.models.telemetry.signals import ANGLES, Signal
@@ -50,22 +49,6 @@ def test_mean_current_is_that_of_the_delayed_and_lagged_command(delay, lag_s):
         inside = 1e-13
         mean = sum(quad(current, a + inside, b - inside, epsabs=0, epsrel=1e-11)[0] for a, b in parts)
         np.testing.assert_allclose(mine.mean_current[1], mean / PERIOD_S, rtol=1e-8, atol=1e-9)
-
-
-@pytest.mark.uncompiled
-@pytest.mark.parametrize("constants_s", [1e-3, (1e-3, 0.0), [0.0, 1e-3, 2e-3], [1e-3, 0.0, (2e-3, 3e-4)]])
-def test_every_row_is_that_of_a_single_controller(constants_s):
-    on, periods_s, delays_s = [True, False, True], [1e-3, 2e-3, 5e-4], [2.3e-3, 1e-3, 4e-2]
-    constants_s = constants_s if isinstance(constants_s, list) else [constants_s] * 3
-    settings = on, periods_s, delays_s, constants_s
-    sizes = {"groups": 2, "delays": delay_capacity(column_of(delays_s), column_of(periods_s))}
-    rows = AppliedTorque.zeros(3, **sizes)
-    fill_applied_torque(rows, *map(column_of, settings))
-    singles = (
-        AppliedTorque.filled(fill_applied_torque, *row, **sizes) for row in zip(*settings, strict=True)
-    )
-    assert rows.tobytes() == b"".join(row.tobytes() for row in singles)
-    assert sizes["delays"] == delay_capacity(4e-2, 5e-4)
 
 
 @numba.njit

@@ -92,3 +92,10 @@ def test_with_all_in_use_no_bit_of_the_matrix_is_another(actuator):
     made = without((), G)
     assert made.G.tobytes() == np.ascontiguousarray(G).tobytes()
     assert not made.out.any()
+
+
+def test_faulty_groups_are_marked_in_each_row():
+    rows = EnabledGroups.zeros(2, groups=3)
+    mark_faulty_groups(rows, np.array([[False, True, False], [True, False, False]]), np.float64(0.5))
+    np.testing.assert_array_equal(rows["out"], [[0, REPORTED, 0], [REPORTED, 0, 0]])
+    np.testing.assert_array_equal(rows["out_s"], [[0.0, 0.5, 0.0], [0.5, 0.0, 0.0]])

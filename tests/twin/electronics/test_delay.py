@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 
 from spheretwin.electronics.delay import Delay, DelaySection, due, latch, steps_of
 from spheretwin.electronics.drive_chain import stored_delays
+from spheretwin.models.base.columns import Columns
 
 STEP_S = 5e-4
 
@@ -65,3 +66,13 @@ def test_the_history_holds_the_longest_delay_by_faults(steps, more_steps, subste
     section = DelaySection(delay_s=steps * STEP_S)
     stored = stored_delays(section, STEP_S, substeps, more_steps)
     assert stored * substeps >= steps + more_steps + substeps  # entry 0 is the command of this period
+
+
+def test_histories_of_many_rows_hold_the_longest_delay():
+    columns = Columns([DelaySection(delay_s=steps * STEP_S) for steps in (0, 100, 3)])
+    np.testing.assert_array_equal(steps_of(columns, STEP_S, 2), [[0], [100], [3]])
+    assert stored_delays(columns, STEP_S, 2) == 64
+    assert stored_delays(columns, STEP_S, np.array([[2], [1], [2]]), 28) == 256
+    wrong = Columns([DelaySection(delay_s=delay_s) for delay_s in (0.0, 7e-4, 1e-7)])
+    with pytest.raises(ValueError, match=r"received 0\.0007 and 0\.0005 s"):
+        steps_of(wrong, STEP_S, 2)

@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 from scipy.optimize import brentq
 
 from spheretwin import scenario as scenarios
+from spheretwin.models.base.columns import Columns
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.lagrangian import inertia_matrix
 from spheretwin.plant.bristle_friction import (
@@ -187,3 +188,6 @@ def test_there_are_no_stops_unless_they_are_on(actuator):
         assert not EndStops.filled(fill_end_stops, section, RANGE_rad, actuator.inertia, STEP_s)["on"]
     with pytest.raises(InputError, match="expected a travel_rad below half of each hinge's range"):
         stopped(actuator, ON.model_copy(update={"travel_rad": 0.6}))
+    rows = Columns([EndStopsSection(on=on, travel_rad=travel) for on, travel in ((False, 0.6), (True, 0.7))])
+    with pytest.raises(InputError, match=r"received 0\.7"):
+        fill_end_stops(EndStops.zeros(2), rows, RANGE_rad, actuator.inertia, STEP_s)
