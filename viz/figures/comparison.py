@@ -225,15 +225,8 @@ def _mark_end(panel: Axes, run: ComparedRun, values: Array, limits: tuple[float,
     finite = values[np.isfinite(values)]
     if len(finite):
         last = np.clip(finite[-1], *limits)
-        mark: dict[str, Any] = {
-            "color": colour,
-            "label": f"_{run.legend}",
-            "markersize": 8,
-            "markeredgecolor": INK,
-            "clip_on": False,
-            "zorder": 5,
-        }
-        panel.plot(run.table["t_s"][-1], last, "X", **mark)
+        panel.plot(run.table["t_s"][-1], last, "X", color=colour, label=f"_{run.legend}", markersize=8,
+                   markeredgecolor=INK, clip_on=False, zorder=5)  # fmt: skip
 
 
 def overview(table: Table, title: str) -> Figure:

@@ -9,7 +9,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from spheretwin.models.telemetry.signals import ANGLES, COMMON_NAMES, Signal, offsets
+from spheretwin.models.telemetry.signals import ANGLES, COMMON_NAMES, Signal
 from spheretwin.models.telemetry.table import Table
 
 Array = NDArray[np.float64]
@@ -263,32 +263,10 @@ _OF_FIXED_RANGE = frozenset(
 """Signals with a fixed range, and those that are not plotted."""
 
 
-class ColumnSelector:
-    """Columns of the watched signals side by side.
-
-    Parameters
-    ----------
-    sizes : mapping of name to int
-        The signals.
-    """
-
-    def __init__(self, sizes: Mapping[str, int]) -> None:
-        self._sizes = dict(sizes)
-        self._signals: tuple[Signal, ...] | None = None
-        self._places = self._missing = np.empty(0, dtype=np.int64)
-
-    def of(self, rows: Table) -> Array:
-        """Return the columns of the rows of a chunk; NaN if they are missing, after a change of law."""
-        if rows.signals is not self._signals:
-            self._signals = rows.signals
-            self._find(rows.signals)
-        columns = rows.values[:, self._places]
-        columns[:, self._missing] = np.nan
-        return columns
-
-    def _find(self, signals: tuple[Signal, ...]) -> None:
-        first, places = offsets(signals), []
-        for name, size in self._sizes.items():
-            places += list(range(first[name], first[name] + size)) if name in first else [-1] * size
-        columns = np.array(places, dtype=np.int64)
-        self._places, self._missing = np.maximum(columns, 0), np.flatnonzero(columns < 0)
+def selected_columns(rows: Table, sizes: Mapping[str, int]) -> list[Array]:
+    """Return the columns of some signals in a chunk; NaN if they are missing, after a change of law."""
+    names = {signal.name for signal in rows.signals}
+    return [
+        rows[name].reshape(len(rows), -1) if name in names else np.full((len(rows), size), np.nan)
+        for name, size in sizes.items()
+    ]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from functools import lru_cache
+from functools import lru_cache, partial
 
 import rerun.blueprint as rrb
 
@@ -31,6 +31,7 @@ from spheretwin.viz.quantities import (
     MEASURED_ANGLE,
     MOST,
     TIP_DISTANCE,
+    Quantity,
 )
 from spheretwin.viz.rerun_internals import EncodedLayout
 from spheretwin.viz.scene import meshes as scene
@@ -220,35 +221,32 @@ LEAST_W = 1.0
 
 def hardware(plots: Plots) -> rrb.Container:
     """States and events next to the signals of sensors, amplifiers and coils."""
-    names = plots.view.names
-    shown = []
-    if "coil_temperature_degC" in names:
-        line = plots.signal("coil_temperature_degC")
-        shown.append(plots.whole("coil temperature", "°C", line, least=LEAST_degC))
-    if "voltage_limited" in names:
-        title = "time at voltage limit [1]"
-        shown.append(plots.fixed(title, plots.signal("voltage_limited"), low=-0.02, high=1.05))
-    if "supply_power_W" in names:
-        line = plots.signal("supply_power_W")
-        shown.append(plots.whole("supply power", "W", line, least=LEAST_W))
-    if "q_measured_rad" in names:
-        title = f"measured - true: {AXIS_KEY}"
-        shown.append(plots.about_zero(title, "mrad", quantity(MEASURED_ANGLE), least=MEASURED_ANGLE.floor))
-    if "qdot_estimated_rad_s" in names:
-        title = f"estimated - true: {AXIS_KEY}"
-        shown.append(plots.about_zero(title, "rad/s", quantity(ESTIMATED_RATE), least=ESTIMATED_RATE.floor))
-    if "rotor_temperature_degC" in names:
-        lines = [plots.signal(f"{body}_temperature_degC") for body in ("stator", "rotor")]
-        shown.append(plots.whole("stator and rotor temperature", "°C", *lines, least=LEAST_degC))
-    shown += [
-        plots.whole(title, unit, plots.signal(name), least=least)
-        for title, unit, name, least in (
-            ("friction", "N·m", "friction_Nm", 0.002),
-            ("elastic rotation in static friction", "rad", "presliding_rad", 1e-4),
-            ("cable", "N·m", "cable_Nm", 0.002),
-        )
-        if name in names
-    ]
+
+    def whole(title: str, unit: str, least: float, *names: str) -> rrb.TimeSeriesView:
+        return plots.whole(title, unit, *map(plots.signal, names), least=least)
+
+    def error(title: str, of: Quantity) -> rrb.TimeSeriesView:
+        return plots.about_zero(f"{title}: {AXIS_KEY}", of.unit, quantity(of), least=of.floor)
+
+    bodies = ("stator_temperature_degC", "rotor_temperature_degC")
+    plots_by_signal: dict[str, Callable[[], rrb.TimeSeriesView]] = {
+        "coil_temperature_degC": partial(
+            whole, "coil temperature", "°C", LEAST_degC, "coil_temperature_degC"
+        ),
+        "voltage_limited": lambda: plots.fixed(
+            "time at voltage limit [1]", plots.signal("voltage_limited"), low=-0.02, high=1.05
+        ),
+        "supply_power_W": partial(whole, "supply power", "W", LEAST_W, "supply_power_W"),
+        "q_measured_rad": partial(error, "measured - true", MEASURED_ANGLE),
+        "qdot_estimated_rad_s": partial(error, "estimated - true", ESTIMATED_RATE),
+        "rotor_temperature_degC": partial(whole, "stator and rotor temperature", "°C", LEAST_degC, *bodies),
+        "friction_Nm": partial(whole, "friction", "N·m", 0.002, "friction_Nm"),
+        "presliding_rad": partial(
+            whole, "elastic rotation in static friction", "rad", 1e-4, "presliding_rad"
+        ),
+        "cable_Nm": partial(whole, "cable", "N·m", 0.002, "cable_Nm"),
+    }
+    shown = [plot() for name, plot in plots_by_signal.items() if name in plots.view.names]
     state_views = [plots.states("states of the components"), log()]
     if not shown:
         return rrb.Vertical(*state_views, name="hardware")

@@ -34,9 +34,27 @@ _SECONDARY = (
     "rotor_temperature_degC",  # in a plot with that of the stator
 )
 
+_ACTUAL = ("q_rad", "qdot_rad_s", "torque_delivered_Nm")
+
+
+class _Role(NamedTuple):
+    """Style of the lines with one role in a plot, besides their own colours and markers."""
+
+    names: Sequence[str]
+    colour: theme.Colour | None
+    marker: MarkerShape | None
+    width: float
+
+
 # Lines are drawn in the order of their names: estimates first, as a rim of the true values,
 # and commands last and thin.
-_ACTUAL = ("q_rad", "qdot_rad_s", "torque_delivered_Nm")
+_ROLES = (
+    _Role(_COMMANDED, theme.COMMAND, MarkerShape.Cross, THIN),
+    _Role(_ESTIMATED, theme.ESTIMATE, MarkerShape.Square, WIDEST),
+    _Role(_SECONDARY, theme.DESIRED_TRACE, MarkerShape.Plus, MIDDLE),
+    _Role(_ACTUAL, None, MarkerShape.Circle, THICK),  # with its command in a plot for each hinge
+)
+_NO_ROLE = _Role((), None, None, MIDDLE)
 
 AXES_ONLY = (
     "error_mrad",
@@ -95,7 +113,7 @@ def mark_style(styles: Sequence[LineStyle]) -> rr.SeriesPoints:
 def signal_style(signal: Signal) -> LineStyle:
     """Return the style of a signal's lines."""
     names = _names(signal.name, signal.labels or ("",), signal.unit)
-    return LineStyle(names, _colours(signal), _markers(signal.name, signal.size), _width(signal.name))
+    return LineStyle(names, _colours(signal), _markers(signal.name, signal.size), _role(signal.name).width)
 
 
 @cache
@@ -103,7 +121,7 @@ def quantity_style(quantity: Quantity) -> LineStyle:
     """Return the style of the lines of a derived quantity."""
     names = _names(quantity.name, quantity.labels, quantity.unit)
     markers = _markers(quantity.name, quantity.size)
-    return LineStyle(names, list(quantity.colours), markers, _width(quantity.name))
+    return LineStyle(names, list(quantity.colours), markers, _role(quantity.name).width)
 
 
 def as_struct(lines: rr.SeriesLines) -> pa.Array:
@@ -129,35 +147,20 @@ def _short(name: str) -> str:
     return name
 
 
+def _role(name: str) -> _Role:
+    return next((role for role in _ROLES if name in role.names), _NO_ROLE)
+
+
 def _colours(signal: Signal) -> list[theme.Colour]:
-    for names, colour in (
-        (_COMMANDED, theme.COMMAND),
-        (_ESTIMATED, theme.ESTIMATE),
-        (_SECONDARY, theme.DESIRED_TRACE),
-    ):
-        if signal.name in names:
-            return [colour] * signal.size
+    if colour := _role(signal.name).colour:
+        return [colour] * signal.size
     if signal.size == len(ANGLES) and signal.labels in ((), ANGLES, AXES):
         return list(theme.AXIS_COLOURS)
     return [theme.PLAIN if signal.size == 1 else theme.GROUP] * signal.size
 
 
 def _markers(name: str, size: int) -> list[MarkerShape]:
-    for names, marker in (
-        (_COMMANDED, MarkerShape.Cross),
-        (_ESTIMATED, MarkerShape.Square),
-        (_SECONDARY, MarkerShape.Plus),
-    ):
-        if name in names:
-            return [marker] * size
-    is_actual = name in _ACTUAL  # with its command in a plot for each hinge
-    return (
-        list(_AXIS_MARKERS) if size == len(_AXIS_MARKERS) and not is_actual else [MarkerShape.Circle] * size
-    )
-
-
-def _width(name: str) -> float:
-    for names, width in ((_ESTIMATED, WIDEST), (_ACTUAL, THICK), (_COMMANDED, THIN)):
-        if name in names:
-            return width
-    return MIDDLE
+    own = _role(name).marker
+    if own is None and size == len(_AXIS_MARKERS):
+        return list(_AXIS_MARKERS)
+    return [own or MarkerShape.Circle] * size

@@ -14,7 +14,7 @@ from spheretwin.models.telemetry.status import Status
 from spheretwin.models.telemetry.table import Table
 from spheretwin.viz import theme
 from spheretwin.viz.decimation import CompletedBins, FirstRows, TimeBins
-from spheretwin.viz.layout.extents import ColumnSelector, ExtentTracker, plotted_signals
+from spheretwin.viz.layout.extents import ExtentTracker, plotted_signals, selected_columns
 from spheretwin.viz.layout.layout import layout, marked_lines, opening_layout
 from spheretwin.viz.layout.styles import (
     as_struct,
@@ -143,7 +143,6 @@ class PlotData(RecordingPart):
     def __init__(self, subject: RecordingSubject) -> None:
         super().__init__(subject)
         self._columns = PlottedColumns(subject.signals)
-        self._column_selector = ColumnSelector(self._columns.signals)
         self._extent_tracker = ExtentTracker(self._columns.sizes)
         self._bins = TimeBins(ENVELOPE_RATE_Hz, immediate=subject.live)
         self._marks = Marks(subject.view, self._columns)
@@ -180,7 +179,7 @@ class PlotData(RecordingPart):
         self._summary.add(rows, values[ERROR_ANGLE.name][:, 0])
         if not self.subject.view.decimated:
             _send(recording, DERIVED, rows["t_s"], values)
-        columns = np.concatenate([*values.values(), self._column_selector.of(rows)], axis=1)
+        columns = np.concatenate([*values.values(), *selected_columns(rows, self._columns.signals)], axis=1)
         self._record(recording, self._bins.add(rows["t_s"], columns))
         self._marks.add(recording, rows["t_s"], columns)
         self._current_map.add(recording, rows)
