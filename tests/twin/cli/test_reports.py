@@ -63,8 +63,8 @@ def test_the_time_of_a_run_does_not_contain_that_of_its_compilation(monkeypatch)
     ids=["none", "files", "live"],
 )
 def test_the_outputs_of_a_run_are_those_of_its_options(tmp_path, monkeypatch, options, expected):
-    def refuse(session, *settings):
-        assert settings == expected
+    def refuse(session, *settings, replay_of):
+        assert (settings, replay_of) == (expected, "")
         raise InputError("outputs: expected others")
 
     monkeypatch.chdir(tmp_path)
