@@ -12,3 +12,9 @@ def table_of(signals, t_s, **columns):
     for name, values in {"t_s": t_s, **columns}.items():
         table[name][:] = values
     return table
+
+
+def chunks(table, cuts):
+    """Rows of a table, cut at some places."""
+    ends = sorted(cuts)
+    return [table.rows(first, last) for first, last in zip([0, *ends], [*ends, len(table)], strict=True)]

@@ -11,6 +11,7 @@ from spheretwin.models.telemetry.status import QUIET_S
 from spheretwin.models.telemetry.table import Table
 from spheretwin.records.outputs import check_rate
 from spheretwin.viz.decimation import WINDOW_S, FirstAndExtremeRows, FirstRows
+from tests.viz.tables import chunks
 
 SIGNALS = (
     Signal("t_s", "s", 1, "time"),
@@ -79,9 +80,9 @@ def test_the_first_rows_of_bins_and_those_that_stand_out_are_kept_and_no_others(
 
 @given(st.lists(st.integers(1, 25_299), max_size=12))
 def test_the_same_rows_however_they_come_in_chunks(long, thinned_rows, places):
-    ends = sorted({*places, len(long)})
-    chunks = [long.rows(first, last) for first, last in zip([0, *ends], ends, strict=False)]
-    assert thinned(FirstAndExtremeRows(RATE_Hz), chunks).tobytes() == thinned_rows.tobytes()
+    assert (
+        thinned(FirstAndExtremeRows(RATE_Hz), chunks(long, set(places))).tobytes() == thinned_rows.tobytes()
+    )
 
 
 def test_a_change_of_columns_ends_a_window():
@@ -96,8 +97,7 @@ def test_a_change_of_columns_ends_a_window():
 
 @pytest.mark.parametrize("rate_Hz", [7.3, 60.0, 100.0, 1000.0])
 def test_firsts_are_one_of_each_bin_and_every_row_at_the_rate_of_the_rows(long, rate_Hz):
-    chunks = [long.rows(first, first + 37) for first in range(0, len(long), 37)]
-    t_s = thinned(FirstRows(rate_Hz), chunks)[:, 0]
+    t_s = thinned(FirstRows(rate_Hz), chunks(long, range(37, len(long), 37)))[:, 0]
     bins = np.floor(t_s * rate_Hz + 1e-6)
     np.testing.assert_array_equal(bins, np.arange(int(np.floor(25.299 * rate_Hz + 1e-6)) + 1))
     # The first of its bin: the row before it, 1 ms earlier, is of the bin before.

@@ -25,6 +25,15 @@ def page(bench):
 
 
 @pytest.fixture
+def tabs(browser, page):
+    """Two tabs of the page, of which the first operates."""
+    result = [opened(browser, page), opened(browser, page)]
+    yield result
+    for tab in result:
+        tab.close()
+
+
+@pytest.fixture
 def tab(browser, page):
     """The page in the browser, which has no error on its console at the end."""
     tab = opened(browser, page)

@@ -144,19 +144,15 @@ def test_the_bar_follows_commands_from_elsewhere(tab, bench):
         tab.wait_for(f"document.querySelector('[data-speed]').selectedOptions[0].text === {text!r}")
 
 
-def test_a_badge_states_whose_page_it_is(browser):
-    bench = fake.Bench()
+def test_a_badge_states_whose_page_it_is(bench, tabs):
     role = "document.querySelector('[data-role]').innerText"
-    with fake.shown(bench) as page:
-        first, second = opened(browser, page), opened(browser, page)
-        first.wait_for(f"{role} === 'OPERATOR'")
-        second.wait_for(f"{role} === 'WATCHING page 0'")
-        bench.now.operator = "page 1"
-        second.wait_for(f"{role} === 'OPERATOR'")
-        bench.now.operator = None
-        first.wait_for(f"{role} === 'WATCHING, no operator'")
-        first.close()
-        second.close()
+    first, second = tabs
+    first.wait_for(f"{role} === 'OPERATOR'")
+    second.wait_for(f"{role} === 'WATCHING page 0'")
+    bench.now.operator = "page 1"
+    second.wait_for(f"{role} === 'OPERATOR'")
+    bench.now.operator = None
+    first.wait_for(f"{role} === 'WATCHING, no operator'")
 
 
 def test_a_page_without_its_server_says_so(browser):

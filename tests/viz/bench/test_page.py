@@ -81,23 +81,19 @@ def test_a_refusal_is_shown_at_its_field(tab, bench):
 
 
 @pytest.mark.release("browser, 3 to 12 s; test_server.py and test_messages.py have the protocol without one")
-def test_one_page_operates_and_gives_over(browser):
-    bench = fake.Bench()
-    with fake.shown(bench) as page:
-        first, second = opened(browser, page), opened(browser, page)
-        second.wait_for("document.body.innerText.includes('Ask to operate')")
-        second.click("text=start")
-        second.wait_for("document.body.innerText.includes('This page is read-only')")
-        assert bench.commands() == []
-        second.click("text=STOP")
-        assert told(bench, 1) == [("stop", {})]
-        second.click("text=Ask to operate")
-        assert told(bench, 2)[1:] == [("ask", {})]
-        bench.now.asking = ("page 1",)
-        first.click("text=Grant control to page 1")
-        assert told(bench, 3)[2:] == [("grant", {"to": "page 1"})]
-        first.close()
-        second.close()
+def test_one_page_operates_and_gives_over(bench, tabs):
+    first, second = tabs
+    second.wait_for("document.body.innerText.includes('Ask to operate')")
+    second.click("text=start")
+    second.wait_for("document.body.innerText.includes('This page is read-only')")
+    assert bench.commands() == []
+    second.click("text=STOP")
+    assert told(bench, 1) == [("stop", {})]
+    second.click("text=Ask to operate")
+    assert told(bench, 2)[1:] == [("ask", {})]
+    bench.now.asking = ("page 1",)
+    first.click("text=Grant control to page 1")
+    assert told(bench, 3)[2:] == [("grant", {"to": "page 1"})]
 
 
 @pytest.mark.release("browser, 3 to 12 s; test_server.py and test_messages.py have the protocol without one")

@@ -4,7 +4,7 @@ import pytest
 
 from tests.browser import needs_a_browser
 from tests.viz.bench import fake
-from tests.viz.bench.on_page import at_rest, opened, show_tab
+from tests.viz.bench.on_page import at_rest, show_tab
 from tests.waiting import wait_for
 
 pytestmark = needs_a_browser
@@ -113,10 +113,6 @@ def test_stop_waits_for_a_channel_that_is_being_opened_again(browser):
 
 
 @IN_A_BROWSER
-def test_heartbeats_state_the_page(browser):
-    bench = fake.Bench()
-    with fake.shown(bench) as page:
-        first, second = opened(browser, page), opened(browser, page)
-        wait_for(lambda: {"page 0", "page 1"} <= set(bench.beats))
-        first.close()
-        second.close()
+@pytest.mark.usefixtures("tabs")
+def test_heartbeats_state_the_page(bench):
+    wait_for(lambda: {"page 0", "page 1"} <= set(bench.beats))

@@ -16,7 +16,7 @@ from spheretwin.viz.recording.status import LEVELS, LimitSpells
 from spheretwin.viz.recording.summary import Summary
 from tests.viz.recording.panels import layouts
 from tests.viz.recording.recordings import session_and_facts, timed
-from tests.viz.tables import table_of
+from tests.viz.tables import chunks, table_of
 
 TICK_s = 1e-3
 
@@ -100,9 +100,8 @@ def test_times_at_a_limit_are_logged_once_for_any_chunks(limited, cuts):
         levels[tick : tick + 3] = np.maximum(levels[tick : tick + 3], level)
     table["voltage_limited"][levels == 1, 1] = 0.3
     table["allocation_scale"][levels == 2] = 0.5
-    spells, results = LimitSpells(), []
-    for first, last in zip([0, *sorted(cuts)], [*sorted(cuts), 300], strict=True):
-        results += spells.of(table.rows(first, last))
+    spells = LimitSpells()
+    results = [change for rows in chunks(table, cuts) for change in spells.of(rows)]
     assert results == slow_spells(table["t_s"], levels)
 
 
@@ -131,8 +130,8 @@ def test_the_headline_names_each_fault_its_start_and_its_detection(facts_with_fa
     table["time_to_detection_s"][25:, 1], table["group_out"][25:, 1] = 0.005, 2
     table["failsafe_reason"][90:] = 1
     summary = Summary(facts_with_faults)
-    for first, last in zip([0, *sorted(cuts)], [*sorted(cuts), 100], strict=True):
-        summary.add(table.rows(first, last), np.zeros(last - first))
+    for rows in chunks(table, cuts):
+        summary.add(rows, np.zeros(len(rows)))
     headline, reason, _, faults, chosen = summary.ended(Status.FAILSAFE).split("  \n")
     assert headline.startswith("**✗ FAILSAFE · hold")
     assert reason == "**failsafe at 0.100 s of 3 s: a coil is too hot**"

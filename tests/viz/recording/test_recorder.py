@@ -1,4 +1,4 @@
-"""Recordings read back: the telemetry bit for bit, of runs that raise, wait, or change their law."""
+"""Recordings read back: the telemetry bit for bit, of runs that raise, wait, or change their law; sizes."""
 
 import threading
 import time
@@ -16,6 +16,9 @@ from spheretwin.records.provenance import facts_of
 from spheretwin.session import Session
 from spheretwin.simulation import follow
 from spheretwin.viz.layout.view import EVENTS, SCENARIO, SUMMARY, TELEMETRY
+from spheretwin.viz.recording import plots, stream
+from spheretwin.viz.recording.currents import CoilCurrents
+from spheretwin.viz.recording.plots import PlotData
 from spheretwin.viz.recording.reader import read
 from spheretwin.viz.recording.recorder import FEWEST_ROWS, Recorder
 from spheretwin.viz.recording.stream import PENDING_CHUNKS
@@ -133,3 +136,27 @@ def test_texts_have_escapes_for_characters_that_the_viewer_cannot_draw(tmp_path)
     assert text.startswith(f"# {name}\n\n\\U0001f600 ±1 N·m – ok\n")
     assert "law \\u6f22.py:Ä" in [text for _, (text,) in timed(path, EVENTS, "TextLog:text")]
     assert read(path).facts["name"] == "漢 α Ж ß"  # for readers of the data
+
+
+def size_and_raw(path, duration_s, rate_Hz):
+    """Bytes of a recording, and of the numbers of all of its run's rows."""
+    session, recorder = opened(path, "sinusoid", rate_Hz, duration=duration_s)
+    ticks = session.initial_scenario.ticks
+    with session, recorder:
+        follow(session, ticks, [recorder])
+    return np.array([path.stat().st_size, ticks * width(session.signals) * np.float64().itemsize])
+
+
+# Shares of the raw numbers: 760 bytes a row that do not compress. Every row has 13 derived quantities
+# in single precision, 18 bars in half precision and 18 colours: 142 bytes, and some 40 of times and places.
+# Of 1000 rows a second, 60 and those that stand out are a tenth. Telemetry, poses, traces, map and states fit
+# into what the compression of the numbers saves.
+@pytest.mark.parametrize(
+    ("rate_Hz", "share", "absent"), [(None, 1.2, ()), (60.0, 0.15, ()), (None, 1.0, (CoilCurrents, PlotData))]
+)
+def test_pictures_take_a_bounded_share_of_the_numbers(tmp_path, monkeypatch, rate_Hz, share, absent):
+    monkeypatch.setattr(plots, "OPENED_AFTER_s", np.inf)  # a slow machine would add a layout
+    monkeypatch.setattr(stream, "PARTS", [part for part in stream.PARTS if part not in absent])
+    brief, long = (size_and_raw(tmp_path / f"{each:g}.rrd", each, rate_Hz) for each in (10.0, 20.0))
+    grown, raw = long - brief
+    assert grown <= share * raw
