@@ -14,6 +14,7 @@ from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
 from spheretwin.envs.episode import BOUNDS, REWARD_TERMS, RUNNING, Episodes, Physics
+from spheretwin.envs.sensing import Sensing
 from spheretwin.envs.settings import settings_of
 from spheretwin.envs.variants import build_variants
 from spheretwin.models.base.errors import InputError, shown
@@ -34,9 +35,10 @@ class EpisodeBatch(VectorEnv[Any, Any, Any]):
             raise InputError(f"environment: expected at least one plant, received num_envs {num_envs}")
         self.settings = settings_of(task, settings)
         self.autoreset_mode = AutoresetMode(autoreset_mode)
-        self.metadata = {"autoreset_mode": self.autoreset_mode, "render_modes": []}
         self.num_envs = num_envs
         self._variants = variants = build_variants(self.settings)
+        self.metadata = {"autoreset_mode": self.autoreset_mode, "render_modes": []}
+        self.sensing = Sensing(self.settings, num_envs)
         by_current, groups = self.settings.actions == "current", variants.parameters[0].torque_gain.size
         self._physics = Physics(
             step_s=self.settings.step_s,
@@ -64,6 +66,7 @@ class EpisodeBatch(VectorEnv[Any, Any, Any]):
         bounds = BOUNDS.astype(np.float32)
         size = groups if by_current else 3
         self.single_observation_space = spaces.Box(-bounds, bounds, dtype=np.float32)
+        self.action_width = size
         self.single_action_space = spaces.Box(-1.0, 1.0, (size,), np.float32)
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self.action_space = batch_space(self.single_action_space, num_envs)
@@ -104,13 +107,21 @@ class EpisodeBatch(VectorEnv[Any, Any, Any]):
             for i, one in enumerate(seeds):
                 if one is not None and mask[i]:
                     self._generators[i] = seeding.np_random(int(one))[0]
+                    if i == 0:
+                        self.sensing.generator = self._generators[0].spawn(1)[0]
         self._start(np.flatnonzero(mask))
         infos = {"variant": self._episodes.variant.copy(), "_variant": mask.copy()}
         return self._observations(), infos
 
     def share_generator(self, generator: np.random.Generator) -> None:
-        """Draw the episodes of every plant from one generator."""
+        """Draw the episodes of every plant, and all noise, from one generator."""
         self._generators = [generator] * self.num_envs
+        self.sensing.generator = generator
+
+    @property
+    def period_s(self) -> float:
+        """Control period, one step."""
+        return self._variants.period_s
 
     def scenario_of(self, plant: int) -> Any:
         """Return the scenario of the present episode of a plant."""

@@ -67,8 +67,8 @@ class Results(NamedTuple):
 class Tabled(NamedTuple):
     """Parameters of all variants."""
 
-    each: Parameters
-    """Each field has a first index of the variant."""
+    each: Any
+    """`Parameters` whose fields have a first index of the variant."""
     magnetics: LaneMagnetics
     """As that of `Plants`, with a plant for each variant."""
 
@@ -98,8 +98,10 @@ class CudaVectorEnv(EpisodeBatch):
             raise InputError(
                 "environment: expected autoreset_mode NextStep or Disabled on a GPU, received SameStep"
             )
+        if self.sensing.acts:
+            raise InputError("environment: expected no noise and no delay on a GPU, received some")
         n, each = num_envs, self._variants.parameters
-        sizes, actions = each[0].magnetics.sizes, self.single_action_space.shape[0]
+        sizes, actions = each[0].magnetics.sizes, self.action_width
         sizes = {"groups": sizes["groups"], "lines": sizes["lines"], "actions": actions}
         rows = DevicePlant.zeros(n, **sizes)
         numbers = rows.view(np.int64).reshape(n, -1)
@@ -179,7 +181,7 @@ def _kernel_of(body: Any, record: Any) -> Any:
 
 
 def _tabled(each: tuple[Parameters, ...]) -> Tabled:
-    columns = {
+    columns: dict[str, Any] = {
         name: np.array([getattr(one, name) for one in each])
         for name in Parameters._fields
         if name not in ("joint", "magnetics")

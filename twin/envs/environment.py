@@ -9,7 +9,11 @@ import numpy as np
 from gymnasium.vector import AutoresetMode
 from numpy.typing import NDArray
 
+from spheretwin.envs.picture import Camera
 from spheretwin.envs.vector import TwinVectorEnv
+from spheretwin.models.base.errors import InputError, shown
+
+RGB = "rgb_array"
 
 
 class TwinEnv(gymnasium.Env[Any, Any]):
@@ -19,6 +23,8 @@ class TwinEnv(gymnasium.Env[Any, Any]):
     ----------
     task : str
         Name of a task, as in its id.
+    render_mode : str, optional
+        ``rgb_array``: `render` returns pictures, which MuJoCo draws with OpenGL.
     **settings
         Fields of `Settings`.
 
@@ -28,9 +34,15 @@ class TwinEnv(gymnasium.Env[Any, Any]):
         A setting is unknown or out of range, or the scenario does not fit.
     """
 
-    def __init__(self, task: str = "Track", **settings: Any) -> None:
-        self.metadata = {"render_modes": []}
+    metadata = {"render_modes": [RGB], "render_fps": 1000}  # noqa: RUF012  Gymnasium reads it of the class
+
+    def __init__(self, task: str = "Track", render_mode: str | None = None, **settings: Any) -> None:
+        if render_mode not in (None, RGB):
+            raise InputError(f"environment: expected render_mode {RGB}, received {shown(render_mode)}")
         self.vector = TwinVectorEnv(1, task, AutoresetMode.DISABLED, **settings)
+        self.render_mode = render_mode
+        self.metadata = {**self.metadata, "render_fps": round(1 / self.vector.period_s)}
+        self._camera: Camera | None = None
         self.observation_space = self.vector.single_observation_space
         self.action_space = self.vector.single_action_space
 
@@ -42,6 +54,29 @@ class TwinEnv(gymnasium.Env[Any, Any]):
         self.vector.share_generator(self.np_random)
         observations, infos = self.vector.reset(options=options)
         return observations[0], {"variant": int(infos["variant"][0])}
+
+    def render(self) -> Any:
+        """Return a picture of the actuator (480, 480, 3) with `render_mode` ``rgb_array``, otherwise None.
+
+        Raises
+        ------
+        InputError
+            OpenGL is missing.
+        """
+        if self.render_mode is None:
+            return None
+        self._camera = self._camera or Camera(self.vector.scenario_of(0).plant.mjcf)
+        return self._camera.image(self.vector.q_rad[0])
+
+    def close(self) -> None:
+        """Free what pictures need."""
+        if self._camera:
+            self._camera.close()
+        self._camera = None
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Return what a pickle holds: everything but the camera, which is made again."""
+        return vars(self) | {"_camera": None}
 
     def step(self, action: Any) -> tuple[NDArray[np.float32], float, bool, bool, dict[str, Any]]:
         """Advance by a control period.

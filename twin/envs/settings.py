@@ -51,6 +51,15 @@ class Settings(BaseModel):
         64, description="different episodes, drawn at the start; each has a seed of its own, unless it is set"
     )
     variants_seed: Annotated[int, Field(ge=0)] = Field(0, description="seed of these")
+    angle_noise_rad: Annotated[float, Field(ge=0, le=1)] = Field(
+        0.0, description="standard deviation of the noise of observed angles, new in each control period"
+    )
+    rate_noise_rad_s: Annotated[float, Field(ge=0, le=1e3)] = Field(
+        0.0, description="standard deviation of the noise of observed rates"
+    )
+    delay_periods: Annotated[int, Field(ge=0, le=1000)] = Field(
+        0, description="control periods by which observed angles and rates are late"
+    )
     reward: Reward = Reward()
 
 

@@ -65,6 +65,10 @@ class TwinVectorEnv(EpisodeBatch):
         super().__init__(num_envs, task, autoreset_mode, settings)
         self._plants = Plants(self._variants.parameters[0], num_envs)
         self._any_over = False
+        self._begun, self._shown = np.arange(0), np.zeros((num_envs, len(BOUNDS)), np.float32)
+        self._compile()
+
+    def _compile(self) -> None:
         # Numba's check of the types of all arguments would take as long as the physics.
         self._advance = for_types_of(
             advance_episodes,
@@ -77,6 +81,20 @@ class TwinVectorEnv(EpisodeBatch):
             np.empty(0),
             np.empty((0, 0)),
         )
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Return what a pickle holds: everything but the compiled function."""
+        return {name: value for name, value in vars(self).items() if name != "_advance"}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        """Take what a pickle holds."""
+        vars(self).update(state)
+        self._compile()
+
+    @property
+    def q_rad(self) -> Array:
+        """True hinge angles (n, 3), a copy."""
+        return self._plants.q_rad
 
     def step(
         self, actions: Any
@@ -122,12 +140,15 @@ class TwinVectorEnv(EpisodeBatch):
             rewards,
             terms,
         )
+        if self.sensing.acts:
+            self.sensing.observe(observations)
         infos: dict[str, Any] = {"reward_terms": terms, "_reward_terms": np.ones(n, np.bool_)}
+        self._shown = observations
         if not (ended or self._any_over):  # the usual case, in a fifth less time
             return observations, rewards, np.zeros(n, np.bool_), np.zeros(n, np.bool_), infos
         if self.autoreset_mode is AutoresetMode.NEXT_STEP:
             self._start(np.flatnonzero(over))
-            self._observe(np.flatnonzero(over), observations)
+            self._begin(observations)
         code = episodes.code
         truncations = code == COMPLETED
         terminations = (code != RUNNING) & ~truncations
@@ -146,7 +167,7 @@ class TwinVectorEnv(EpisodeBatch):
         self._plants.set_state(variants.q_rad[chosen], variants.qdot_rad_s[chosen], plants)
         for column in (episodes.tick, episodes.code, episodes.current, episodes.squares, episodes.largest):
             column[plants] = 0
-        self._any_over = bool(np.any(episodes.code != RUNNING))
+        self._any_over, self._begun = bool(np.any(episodes.code != RUNNING)), plants
 
     def _restart(
         self, plants: NDArray[np.intp], observations: NDArray[np.float32], infos: dict[str, Any]
@@ -163,16 +184,22 @@ class TwinVectorEnv(EpisodeBatch):
             "_final_info": mask,
         }
         self._start(plants)
-        self._observe(plants, observations)
+        self._begin(observations)
 
-    def _observe(self, plants: NDArray[np.intp], observations: NDArray[np.float32]) -> None:
-        for i in plants:
+    def _begin(self, observations: NDArray[np.float32]) -> None:
+        """Write the first observations of the plants that `_start` has started."""
+        for i in self._begun.tolist():
             q, qdot = motion_of(self._plants.blocks[i // LANES], i % LANES)
             observe(q, qdot, i, self._episodes, observations[i])
+        if self.sensing.acts and len(self._begun):
+            first = observations[self._begun]
+            self.sensing.start(self._begun, first)
+            observations[self._begun] = first
 
     def _observations(self) -> NDArray[np.float32]:
-        observations = np.empty((self.num_envs, len(BOUNDS)), np.float32)
-        self._observe(np.arange(self.num_envs), observations)
+        observations = self._shown.copy()
+        self._begin(observations)
+        self._shown = observations.copy()
         return observations
 
     def _infos_of_end(self, mask: NDArray[np.bool_]) -> dict[str, Any]:

@@ -115,9 +115,8 @@ def _rows(file: pyarrow.parquet.ParquetFile) -> StudyTable:
 
     texts = {name: _texts(column(name)) for name in TEXTS}
     # All different: as objects they take four times the memory.
-    keys = np.concatenate(
-        [np.array(chunk.to_pylist(), dtype=str) for chunk in column("key").chunks] or [np.array([])]
-    )
+    kept = [np.array(chunk.to_pylist(), dtype=str) for chunk in column("key").chunks]
+    keys = np.concatenate(kept) if kept else np.zeros(0, str)
     return StudyTable(
         study,
         column("row").to_numpy(),
