@@ -7,11 +7,14 @@ from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
 from typing import Any
 
+import numpy as np
+
 from spheretwin.machine.link import frame_format
 from spheretwin.machine.link.admission import Admission
 from spheretwin.machine.link.codec import LARGEST_FRAME, Codec, Values
 from spheretwin.machine.link.frame_format import Flags, FrameFormat
 from spheretwin.machine.link.transports import StandIn, Transport, open_transport
+from spheretwin.models.base.arrays import Array
 from spheretwin.models.base.errors import InputError
 
 REMEMBERED = 1024
@@ -310,6 +313,20 @@ class FrameChannel:
         self.transport.send(content)
         self._show("sent", content, values)
         return content
+
+    def send_command(
+        self,
+        sequence: int,
+        session: int | None,
+        flags: Flags,
+        t_s: float = 0.0,
+        current_A: Array | None = None,
+    ) -> Values:
+        """Send a command, without currents unless they are given; return its values."""
+        values: Values = {"sequence": sequence, "session": session, "flags": flags, "time": t_s}
+        values["current"] = np.zeros(self.groups) if current_A is None else current_A
+        self.send(values)
+        return values
 
     def receive(self, timeout_s: float) -> list[Values]:
         """Return the new frames of the bytes that arrive within a time; none if nothing arrives."""

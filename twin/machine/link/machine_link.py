@@ -334,10 +334,7 @@ class Link(ExternalPlant):
         if flags & Flags.HELLO:
             self._admission.request(self._sequence)
             session = self._admission.key
-        current_A = np.zeros(self.channel.groups) if current_A is None else current_A
-        self._values: Values = {"sequence": self._sequence, "session": session, "flags": flags, "time": t_s}
-        self._values["current"] = current_A
-        self.channel.send(self._values)
+        self._values = self.channel.send_command(self._sequence, session, flags, t_s, current_A)
 
     def _receive(self, timeout_s: float) -> bool:
         """Store the newest measurement that arrives; return True if it answers the last command."""

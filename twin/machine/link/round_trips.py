@@ -94,7 +94,6 @@ class _Test:
     def __init__(self, channel: FrameChannel, now: Callable[[], float]) -> None:
         self._channel, self._now = channel, now
         self._session, self._sequence = new_session(), 0
-        self._current_A = np.zeros(channel.groups)
         self._sent_s: dict[int, float] = {}
 
     def run(self, rate_Hz: float, requests: int, stop_requested: Callable[[], bool]) -> RateResult:
@@ -117,15 +116,7 @@ class _Test:
     def _request(self) -> None:
         self._sequence = (self._sequence + 1) % self._channel.modulus
         self._sent_s[self._sequence] = self._now()
-        self._channel.send(
-            {
-                "sequence": self._sequence,
-                "session": self._session,
-                "flags": Flags.HELLO,
-                "time": 0.0,
-                "current": self._current_A,
-            }
-        )
+        self._channel.send_command(self._sequence, self._session, Flags.HELLO)
 
     def _receive_until(self, end_s: float, times_s: array[float]) -> None:
         while True:
