@@ -36,7 +36,7 @@ class Player:
 
     Attributes
     ----------
-    name, law, shape, allocation : str
+    scenario, law, shape, allocation : str
         As the file of the run states.
     table : Table
     period_s : float
@@ -62,7 +62,7 @@ class Player:
             )
         scenario = run.record.scenario
         self.period_s = run.period_s
-        self.name, self.law = str(scenario["name"]), str(scenario["controller"]["law"])
+        self.scenario, self.law = str(scenario["name"]), str(scenario["controller"]["law"])
         self.shape, self.allocation = str(scenario["trajectory"]["shape"]), str(scenario["allocation"])
         self.current_limit_A = float(scenario["nominal"]["current_limit_A"])
         self.range_s = float(self.table["t_s"].flat[0]), float(self.table["t_s"].flat[-1])

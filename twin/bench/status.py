@@ -265,11 +265,7 @@ def _names(bench_state: BenchState) -> dict[str, Any]:
     """Return the mode and the names in the active configuration; in a replay, those of the recorded run."""
     player, driver, scenario = bench_state.player, bench_state.driver, bench_state.driver.session.scenario
     if player:
-        return {
-            "mode": "replay",
-            "scenario": player.name,
-            **_attributes(player, "law", "shape", "allocation"),
-        }
+        return {"mode": "replay", **_attributes(player, "scenario", "law", "shape", "allocation")}
     return {
         "mode": "fault" if driver.reason is not None else driver.mode,
         "scenario": scenario.name,

@@ -80,20 +80,15 @@ def _offset(generator, _):
     return field + suffix, size, [(0.0, field, (size * hinge).tolist())]
 
 
-def _friction(alone):
+COULOMB, VISCOUS_FRICTION = (FRICTION, FRICTION_Nm, 1.5e-3, 1.2e-2), (VISCOUS, VISCOUS_Nm_s, 1e-3, 5e-3)
+"""Fields of friction, their values before, and the range of a change."""
+
+
+def _friction(field, before, low, high, *, alone):
     def change(generator, _):
         suffix, hinges = _hinges(generator, alone)
-        size = _log_uniform(generator, 1.5e-3, 1.2e-2)
-        return FRICTION + suffix, size, [(0.0, FRICTION, (FRICTION_Nm + size * hinges).tolist())]
-
-    return change
-
-
-def _viscous(alone):
-    def change(generator, _):
-        suffix, hinges = _hinges(generator, alone)
-        size = _log_uniform(generator, 1e-3, 5e-3)
-        return VISCOUS + suffix, size, [(0.0, VISCOUS, (VISCOUS_Nm_s + size * hinges).tolist())]
+        size = _log_uniform(generator, low, high)
+        return field + suffix, size, [(0.0, field, (before + size * hinges).tolist())]
 
     return change
 
@@ -149,9 +144,9 @@ KINDS = {
     "torque": _torque,
     "group": _group,
     "offset": _offset,
-    "friction of one hinge": _friction(alone=True),
-    "friction of all hinges": _friction(alone=False),
-    "viscous friction": _viscous(alone=False),
+    "friction of one hinge": _friction(*COULOMB, alone=True),
+    "friction of all hinges": _friction(*COULOMB, alone=False),
+    "viscous friction": _friction(*VISCOUS_FRICTION, alone=False),
     "load on one hinge": _load(alone=True, push=False),
     "load on all hinges": _load(alone=False, push=False),
     "push on one hinge": _load(alone=True, push=True),
@@ -164,7 +159,7 @@ KINDS = {
 }
 
 HELD_OUT = {
-    "viscous friction of one hinge": _viscous(alone=True),
+    "viscous friction of one hinge": _friction(*VISCOUS_FRICTION, alone=True),
     "load on two hinges": _two_loads,
     "spikes of a sensor": _sensor,
     "gain of a sensor": _sensor,
