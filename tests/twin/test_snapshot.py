@@ -32,6 +32,32 @@ def test_a_restored_session_goes_on_bit_for_bit(law, engine, at):
     assert other.initial_scenario == original.initial_scenario
 
 
+EVERY_PART = {
+    "hardware": "electronics", "drive.delay_s": 2e-3, "detector.detect": True, "seed": 5,
+    "plant.backlash_rad": [1e-3] * 3, "plant.stiction.on": True, "plant.thermal.on": True,
+    "sensors.potentiometer.hysteresis_rad": 3e-4, "sensors.potentiometer.repeatability_rad": 5e-5,
+    "sensors.encoder.start_error_rad": 0.05, "sensors.encoder.index_rad": 0.1,
+    "controller.governor.acceleration_rad_s2": 5.0, "controller.prediction.on": True,
+    "controller.feed_forward.friction": 0.8, "controller.feed_forward.inertia": 1.0,
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(("law", "estimator"), [("pid", "kalman"), ("afsm", "differentiator")])
+def test_every_part_goes_on_bit_for_bit_from_a_snapshot_and_past_a_change(law, estimator):
+    changes = {"controller.law": law, "estimator.kind": estimator} | cases.WORN | EVERY_PART
+    original, changed, other = cases.session(**changes), cases.session(**changes), cases.session(name="hold")
+    original.advance(150)
+    changed.advance(100)
+    changed.set("plant.group_gain", [1.0] * 18)  # builds plant and controller anew
+    changed.set("disturbance.load", original.scenario.disturbance.load)
+    changed.advance(50)
+    other.advance(11)
+    restored(original, other)
+    expected = cases.rows(original.advance(150))
+    assert cases.rows(other.advance(150)) == expected
+    assert cases.rows(changed.advance(150)) == expected
+
+
 def test_a_snapshot_is_not_moved_by_what_the_session_does_next():
     original = cases.session(**cases.WORN)
     original.advance(50)

@@ -88,28 +88,6 @@ def test_it_is_set_on_the_way_and_leaves_the_law_what_it_learnt():
         assert set(COLUMNS) <= {signal.name for signal in session.advance(10).signals}
 
 
-@pytest.mark.parametrize("name", ["pid", "afsm"])
-def test_a_snapshot_goes_on_bit_for_bit(name):
-    with Session(tilt(**{"controller.law": name}, **ON)) as session:
-        session.advance(37)
-        taken = session.snapshot()
-        expected = session.advance(150).values.tobytes()
-        with Session(tilt(**{"controller.law": "pd"})) as other:
-            other.advance(11)
-            other.restore(taken)
-            assert other.advance(150).values.tobytes() == expected
-    with Session(tilt(**{"controller.law": name}, **ON)) as pieces:
-        parts = [pieces.advance(ticks).values for ticks in (37, 1, 149)]
-        assert np.concatenate(parts[1:]).tobytes() == expected
-
-
-def test_a_change_beside_it_moves_no_bit():
-    with Session(tilt(**ON)) as unchanged, Session(tilt(**ON)) as changed:
-        changed.advance(33)
-        changed.set("plant.group_gain", [1.0] * 18)  # builds the controller anew
-        assert changed.advance(67).values.tobytes() == unchanged.advance(100).rows(33, 100).values.tobytes()
-
-
 @pytest.mark.parametrize("mine", LAWS)
 def test_it_is_set_around_a_law_of_a_user_s_too(mine):
     with Session(tilt(), mine) as session:

@@ -9,7 +9,7 @@ from spheretwin import scenario as scenarios
 from spheretwin.electronics.sensor_chain import SensorChain, SensorsSection, fill_sensors, sense
 from spheretwin.electronics.stages import SensorSetup
 from spheretwin.electronics.transducers import Encoder, EncoderSection, counted
-from spheretwin.session import Session
+from spheretwin.simulation import simulate
 
 COUNTS = st.integers(1, 2**20)
 
@@ -129,20 +129,15 @@ def test_error_of_the_start_fills_its_bound_and_counters_differ():
     assert min(errors) < -0.45
 
 
-def test_telemetry_shows_the_error_until_the_index_and_snapshots_hold_it():
+def test_telemetry_shows_the_error_until_the_index():
     fields = {
         "hardware": "electronics",
         "sensors.encoder.start_error_rad": 0.05,
         "sensors.encoder.index_rad": 0.1,
         "seed": 3,
-        "duration": 2.0,
+        "duration": 1.52,
     }
-    with Session(scenarios.load("sinusoid", fields)) as session:
-        session.advance(20)
-        state = session.snapshot()
-        table = session.advance(1500)
-        session.restore(state)
-        assert session.advance(1500).values.tobytes() == table.values.tobytes()
+    table = simulate(scenarios.load("sinusoid", fields)).telemetry
     error, gamma = table["sensor_state_error_rad"][:, 2], table["q_rad"][:, 2]
     passed = int(np.argmax(gamma > 0.1 - LINE / 2))
     assert passed > 0

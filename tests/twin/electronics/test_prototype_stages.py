@@ -39,21 +39,6 @@ def test_the_law_is_handed_what_the_stages_make_of_the_true_state(kind):
     assert np.abs(table["q_measured_rad"] - table["q_rad"]).max() > 1e-4
 
 
-@pytest.mark.parametrize("kind", MADE)
-def test_snapshots_and_changes_keep_commands_on_their_way_warm_coils_and_memory(kind):
-    scenario = prototype("nutation", **{"estimator.kind": kind, "drive.delay_s": 2e-3, "duration": 1.0})
-    with Session(scenario) as session, Session(prototype()) as other, Session(scenario) as changed:
-        session.advance(150)
-        other.restore(session.snapshot())
-        changed.advance(100)
-        changed.set("disturbance.load", scenario.disturbance.load)
-        changed.set("plant.group_gain", [1.0] * 18)  # builds the plant anew
-        changed.advance(50)
-        expected = session.advance(100).values.tobytes()
-        assert other.advance(100).values.tobytes() == expected
-        assert changed.advance(100).values.tobytes() == expected
-
-
 def test_nothing_flows_before_the_delay_is_over():
     quiet = {"drive.dac_offset_V": 0.0, "drive.amplifier_offset_V": 0.0, "drive.dac_inl_lsb": 0.0}
     table = simulate(prototype(**quiet, **{"drive.delay_s": 2.5e-3, "drive.dac_bits": 0})).telemetry

@@ -4,13 +4,10 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from spheretwin.models import actuator as actuators
-from spheretwin.models import lagrangian, mjcf
+from spheretwin.models import lagrangian
 from spheretwin.models.base.compiled import compiled
 from spheretwin.models.lagrangian import acceleration, coriolis_matrix, gravity_torque, inertia_matrix
-from spheretwin.plant import lagrangian_rotor, mujoco_rotor
-from spheretwin.plant.mass_properties import true_model
-from spheretwin.plant.mujoco_rotor import MujocoRotor
+from spheretwin.plant import lagrangian_rotor
 from tests.twin.plant.allocations import allocates_nothing
 from tests.twin.plant.motions import gradient, ideal_rotor, kinetic_J, order, potential_J
 
@@ -96,19 +93,6 @@ def test_a_step_allocates_nothing(actuator):
     rotor = ideal_rotor(actuator, STEP_S, payload_kg=PAYLOAD_KG)
     rotor.start(START[:3], START[3:])
     assert allocates_nothing(step_first, rotor.rows)
-
-
-def test_one_step_is_mujoco_s(actuator):
-    ours = ideal_rotor(actuator, STEP_S, 0.2, PAYLOAD_KG).start(START[:3], START[3:])
-    model = true_model(mjcf.read(actuators.MJCF_PATH), 0.2, PAYLOAD_KG)
-    rotor = MujocoRotor([model], STEP_S, "RK4")
-    theirs = rotor.start(START[:3], START[3:])
-    for plant, step in ((ours, lagrangian_rotor.step), (theirs, mujoco_rotor.step)):
-        plant.torque_q[:] = [0.35, -0.1, -0.1]
-        step(plant)
-    # Rounding, and the gimbal rings: 1e-12 of an acceleration near 200 rad/s² over 0.5 ms.
-    np.testing.assert_allclose(ours.q, theirs.q, atol=1e-15)
-    np.testing.assert_allclose(ours.qdot, theirs.qdot, atol=1e-12)
 
 
 def test_start_does_not_hold_on_to_its_arguments(actuator):

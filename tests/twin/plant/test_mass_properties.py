@@ -20,7 +20,6 @@ from spheretwin.plant.lagrangian_rotor import LagrangianRotor
 from spheretwin.plant.mass_properties import MassSection, mass_errors, true_model
 from spheretwin.plant.mujoco_rotor import MujocoRotor
 from spheretwin.session import Session
-from spheretwin.simulation import simulate
 from tests.models.model_files import edited, edited_text
 from tests.models.test_joint_chain import full
 from tests.twin.plant import user_models as models
@@ -134,43 +133,6 @@ def test_engines_agree_step_by_step(actuator, payload_kg):
     engine = MujocoRotor([true_model(SHIPPED, 0.2, payload_kg, 9.81, errors)], STEP_s, "RK4")
     equations_of_motion = LagrangianRotor(JointChain.filled(fill_chain, engine.model), STEP_s)
     assert_same_steps(engine, equations_of_motion, ([0.4, -0.3, 0.2], [1.0, 2.0, -3.0]))
-
-
-@pytest.mark.release("compiles four loops for 30 s; accelerations of both engines are compared in less")
-@pytest.mark.parametrize("stiction", [False, True], ids=["smoothed friction", "static friction"])
-def test_closed_loops_on_both_engines_agree(stiction):
-    bearings = {
-        "plant.coulomb_Nm": [5e-3] * 3,
-        "plant.stiction.on": stiction,
-        "plant.viscous_Nm_s": [1e-4] * 3,
-        "plant.cable.stiffness_Nm_rad": [2e-3] * 3,
-    }
-    smooth = {"controller.law": "pd", "disturbance.load": 0.5, "duration": 1.0} | bearings
-    changes = smooth | FIELDS
-    first, second = (
-        simulate(scenarios.load("nutation", changes | {"plant.engine": engine})).telemetry["q_rad"]
-        for engine in ("mujoco", "lagrangian")
-    )
-    # As in the cross-check.
-    np.testing.assert_allclose(second, first, rtol=0, atol=1e-9)
-    ideal = simulate(scenarios.load("nutation", smooth)).telemetry["q_rad"]
-    assert np.abs(ideal - first).max() > 1e-3
-
-
-@pytest.mark.release("1 s of plain Python; test_plant_step.py has the torque matrix of a tilted joint")
-@pytest.mark.uncompiled
-def test_true_orientation_drives_the_coils():
-    # The torque of the coils is that of a pose with the orientation of the tilted joint.
-    tilt = {"plant.mass.axis_tilt_rad": ((0.0, 0.0), (0.0, 0.03), (0.0, 0.0))}
-    changes = {"controller.law": "pd", "plant.engine": "lagrangian", "plant.initial_rad": [0.2, 0.5, 0.3]}
-    rows = []
-    for more in ({}, tilt):
-        with Session(scenarios.load("hold", changes | more)) as session:
-            rows.append(session.advance(1))
-    np.testing.assert_array_equal(*(row["current_command_A"][0] for row in rows))
-    same, other = (row["torque_Nm"][0] for row in rows)
-    # First order in the tilt of 0.03 rad times sin(beta).
-    assert 1e-3 < np.linalg.norm(other - same) / np.linalg.norm(same) < 0.5
 
 
 def test_friction_gains_no_energy_on_a_general_joint():

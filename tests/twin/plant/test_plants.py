@@ -59,13 +59,6 @@ def test_each_plant_moves_as_alone(kind):
     assert_equal(reached, one_by_one(parameters, *case, 20))
 
 
-@pytest.mark.release("1.8 s; test_each_plant_moves_as_alone has plants of one kind")
-def test_plants_of_different_kinds_move_as_alone():
-    parameters = [plant.parameters("tilt", changes) for changes in (*KINDS.values(), TILTED, LOADED | TILTED)]
-    case = motion(len(parameters), seed=1)
-    assert_equal(together(parameters, *case, 10), one_by_one(parameters, *case, 10))
-
-
 def test_torque_curves_of_different_plants_stay_apart():
     shipped = plant.parameters("tilt")
     tables = shipped.magnetics.tables._replace(curve=1.1 * shipped.magnetics.tables.curve)
