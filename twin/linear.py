@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import importlib
+from collections.abc import Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
@@ -20,6 +22,7 @@ from spheretwin.models.lagrangian import gravity_stiffness, gravity_torque, iner
 from spheretwin.models.mjcf_reader import HINGES
 from spheretwin.models.scatter import Scatter, summed_torque_matrix
 from spheretwin.plant.part_scatter import scatter_of
+from spheretwin.scenario import scenario_of
 from spheretwin.scenario.files import Files
 from spheretwin.scenario.sections import ResolvedScenario, Scenario
 
@@ -216,8 +219,9 @@ class LinearModel:
 
 
 def linearise(
-    scenario: Scenario,
+    scenario: Scenario | str | Path,
     pose_rad: ArrayLike | None = None,
+    changes: Mapping[str, Any] | None = None,
     *,
     inputs: Inputs = "torque",
     lag: bool = False,
@@ -228,10 +232,12 @@ def linearise(
 
     Parameters
     ----------
-    scenario : Scenario
-        From `scenario.load`, or built in Python.
+    scenario : Scenario or str or Path
+        From `scenario.load` or built in Python; the name of a shipped scenario or the path of a TOML file.
     pose_rad : (3,) array, rad, optional
         Pose at rest; default: the first pose of the scenario.
+    changes : mapping, optional
+        Values by dotted name, such as ``{"plant.payload_kg": 0.1}``.
     inputs : {"torque", "currents"}
         Inputs of the model: the generalised torque that a law commands (N·m), through the allocation and the
         coils, or the currents of the groups (A).
@@ -266,7 +272,7 @@ def linearise(
     _check_choice("kind", kind, ("scipy", "control"))
     # Before the computation, so that a missing library is reported at once.
     library = python_control() if kind == "control" else importlib.import_module("scipy.signal")
-    config = initial_config(scenario, None, None)
+    config = initial_config(scenario_of(scenario, changes), None, None)
     actuator = config.files.actuator
     pose = _pose(config.scenario.plant.initial_rad if pose_rad is None else pose_rad, actuator)
     data = linearisation_data(config.scenario, config.files, nominal=nominal)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
@@ -19,8 +18,7 @@ from spheretwin.models.telemetry.status import Status
 from spheretwin.models.telemetry.table import Sink, Table, TelemetryBuffer, allocated
 from spheretwin.records.provenance import change_text, record_of
 from spheretwin.run import Run
-from spheretwin.scenario import load
-from spheretwin.scenario.changes import with_change
+from spheretwin.scenario import scenario_of
 from spheretwin.scenario.sections import Scenario
 from spheretwin.session import Session
 from spheretwin.trajectories.trajectory import Sampled
@@ -59,7 +57,7 @@ def simulate(
         The model file, the torque curve, the law or a value of the scenario cannot be used, or the telemetry
         does not fit in memory.
     """
-    scenario = _scenario(scenario, changes or {})
+    scenario = scenario_of(scenario, changes)
     with Session(scenario, law, trajectory) as session:
         record = record_of(session)  # now: with the digests of the files at the start
         run = run_session(session, sinks)
@@ -90,14 +88,6 @@ def run_session(session: Session, sinks: Sequence[Sink] = ()) -> Run:
         status = follow(session, scenario.ticks, sinks, log=log)
         telemetry = Table(session.signals, log[: session.tick])
     return Run(scenario, status, telemetry, session.loop_s, session.actuator, session.law_error)
-
-
-def _scenario(given: Scenario | str | Path, changes: Mapping[str, Any]) -> Scenario:
-    if not isinstance(given, Scenario):
-        return load(os.fspath(given), changes)
-    for dotted, value in changes.items():
-        given = with_change(given, dotted, value)
-    return given
 
 
 def follow(

@@ -68,6 +68,12 @@ def test_viscous_friction_damps_as_the_plant_s_does(actuator, pose):
     np.testing.assert_allclose(model.system.A[3:, 3:], expected, rtol=1e-6, atol=1e-9)
 
 
+def test_a_name_with_changes_is_that_scenario():
+    named, loaded = linearise("hold", TILTED, LOADED), linearise(scenario(), TILTED)
+    for name in "ABCD":
+        np.testing.assert_array_equal(getattr(named.system, name), getattr(loaded.system, name))
+
+
 def test_coulomb_friction_has_no_linear_part():
     smooth, rough = (linearise(scenario({"plant.coulomb_Nm": [each] * 3}), TILTED) for each in (0.0, 5e-3))
     np.testing.assert_array_equal(rough.system.A, smooth.system.A)

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Any
 
 from spheretwin.control.laws import LAWS
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.base.user_code import is_reference
-from spheretwin.scenario.changes import check_events, complete_fields
+from spheretwin.scenario.changes import check_events, complete_fields, with_change
 from spheretwin.scenario.reading import validated
 from spheretwin.scenario.sections import Scenario
 from spheretwin.trajectories import SHAPES
@@ -32,6 +34,21 @@ def load(source: str, overrides: Mapping[str, Any] | None = None) -> Scenario:
         The scenario does not exist, or a field is unknown, of the wrong type or out of range.
     """
     return check_events(validated(complete_fields(source, overrides or {}), source), source)
+
+
+def scenario_of(given: Scenario | str | Path, changes: Mapping[str, Any] | None = None) -> Scenario:
+    """Return a scenario with some changes: itself, that of a shipped name or that of a file.
+
+    Raises
+    ------
+    InputError
+        As `load`.
+    """
+    if not isinstance(given, Scenario):
+        return load(os.fspath(given), changes)
+    for dotted, value in (changes or {}).items():
+        given = with_change(given, dotted, value)
+    return given
 
 
 def from_record(fields: Mapping[str, Any], source: str) -> Scenario:
