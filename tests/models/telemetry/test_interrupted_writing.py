@@ -1,4 +1,4 @@
-"""Telemetry of a process that is killed, of a disk that fills up, and of two processes to one path."""
+"""Telemetry of a process that is killed and of a disk that fills up."""
 
 import errno
 import os
@@ -26,8 +26,8 @@ from pathlib import Path
 from spheretwin.models.telemetry import parquet
 from tests.models.telemetry.streams import PART_ROWS, streamed, table
 parquet.PART_ROWS = PART_ROWS
-path, rows, seed, pause = Path(sys.argv[1]), int(sys.argv[2]), int(sys.argv[3]), sys.argv[4] == "pause"
-file = streamed(path, table(rows, seed=seed), 10)
+path, rows, pause = Path(sys.argv[1]), int(sys.argv[2]), sys.argv[3] == "pause"
+file = streamed(path, table(rows), 10)
 if pause:
     print("written", flush=True)
     sys.stdin.read()
@@ -35,8 +35,8 @@ file.close({})
 """
 
 
-def streaming(path, rows, seed=0, pause=False, **options):
-    command = [sys.executable, "-c", STREAM, str(path), str(rows), str(seed), "pause" if pause else "go"]
+def streaming(path, rows, pause=False, **options):
+    command = [sys.executable, "-c", STREAM, str(path), str(rows), "pause" if pause else "go"]
     pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
     return subprocess.Popen(command, text=True, **pipes, **options)
 
