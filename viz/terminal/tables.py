@@ -5,8 +5,11 @@ from __future__ import annotations
 import copy
 import math
 import os
+import re
+import sys
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from typing import Any, TextIO
 
 from rich import box
 from rich.cells import cell_len
@@ -32,9 +35,24 @@ PADDING, EDGE = 3, 1
 def terminal_console() -> Console:
     """Return a console for stdout: as wide as the terminal; in a pipe or a file of a readable width."""
     console = Console()
-    if console.is_terminal or "COLUMNS" in os.environ:
+    if console.is_terminal:
         return console
-    return Console(width=WIDTH_WITHOUT_TERMINAL)
+    width = None if "COLUMNS" in os.environ else WIDTH_WITHOUT_TERMINAL
+    file: Any = _Unpadded(sys.stdout)
+    return Console(width=width, file=file)
+
+
+class _Unpadded:
+    """Standard output without the spaces at the ends of lines that fill a table."""
+
+    def __init__(self, file: TextIO) -> None:
+        self._file = file
+
+    def write(self, text: str) -> int:
+        return self._file.write(re.sub(" +(?=\n)", "", text))
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._file, name)
 
 
 def new_table(title: str, first: str, *others: str) -> Table:

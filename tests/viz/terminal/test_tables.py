@@ -22,3 +22,12 @@ def test_a_title_is_not_wrapped_to_a_narrow_table(monkeypatch, capsys):
     table.add_row("1", "2")
     tables.terminal_console().print(table)
     assert capsys.readouterr().out.splitlines()[0].rstrip() == "a title much wider than its table [is]"
+
+
+def test_lines_in_a_file_end_with_their_text(capsys):
+    table = tables.new_table("longer than the columns of this table", "name", "value")
+    table.add_row("a", "1")
+    tables.print_table(table)
+    lines = capsys.readouterr().out.splitlines()
+    assert len(lines) == 5
+    assert [line.rstrip() for line in lines] == lines
