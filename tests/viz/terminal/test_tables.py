@@ -29,5 +29,5 @@ def test_lines_in_a_file_end_with_their_text(capsys):
     table.add_row("a", "1")
     tables.print_table(table)
     lines = capsys.readouterr().out.splitlines()
-    assert len(lines) == 5
+    assert len(lines) == 6
     assert [line.rstrip() for line in lines] == lines
