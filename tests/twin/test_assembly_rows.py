@@ -95,6 +95,9 @@ def varied(scenario, random, delay_s):
         ).tolist()
         for name, value in numbers_of(fields).items()
     }
+    for name in ("drive.resistance_ohm", "nominal.resistance_ohm", "nominal.time_constant_s"):
+        if name in numbers and np.size(numbers[name]) > 1 and random.integers(2):
+            numbers[name] = numbers[name][0]  # one number of all groups
     switches = SWITCHES + ELEMENT_SWITCHES * (scenario.hardware == "prototype")
     changes = numbers | {name: bool(random.integers(2)) for name in switches}
     if scenario.hardware == "prototype" and random.integers(2):

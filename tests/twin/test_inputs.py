@@ -7,7 +7,6 @@ import pytest
 
 from spheretwin import scenario as scenarios
 from spheretwin.loop.inputs import BLOCK_TICKS, InputGenerator
-from spheretwin.models.base.columns import Columns
 from spheretwin.models.base.errors import InputError
 from spheretwin.trajectories.shapes import Nutation
 
@@ -93,18 +92,3 @@ def test_one_that_fails_later_is_refused_then():
     assert len(run(lost, end=1700)[0]) == 1700
     with pytest.raises(InputError, match=r"expected a finite trajectory, received NaN at 1\.7 s"):
         lost.rows(1700, 1)
-
-
-def test_the_inputs_of_many_runs_are_those_of_each_run_alone():
-    changes = [
-        {"seed": k, "disturbance.load": 0.1 * k, "sensors.potentiometer.noise_rad": 1e-4 * k}
-        for k in (1, 2, 3)
-    ]
-    every = [scenario(RANDOM_TERM, **change) for change in changes]
-    block = InputGenerator(Columns(every)).block(1700)
-    assert block.first == 1000
-    for run_, alone in enumerate(every):
-        _, *columns = InputGenerator(alone).rows(1000, BLOCK_TICKS)
-        for together, own in zip(block.inputs[1:], columns, strict=True):
-            assert together[min(run_, len(together) - 1)].tobytes() == own.tobytes()
-    assert len(block.inputs.reference) == 1

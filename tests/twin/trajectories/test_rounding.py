@@ -11,7 +11,6 @@ from pydantic import ValidationError
 from spheretwin.trajectories.rounding import Corners, least_acceleration, no_corners, rounded
 from spheretwin.trajectories.shapes import Nutation, Sinusoid, Steps, Tilt
 
-FINE = 1e-4
 ANGLES = st.floats(-2, 2).filter(lambda angle: angle == 0 or abs(angle) > 1e-6)
 POSE = st.tuples(ANGLES, ANGLES, ANGLES)
 
