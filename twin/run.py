@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     import polars as pl
     import pyarrow as pa
     import xarray as xr
+    from matplotlib.figure import Figure
 
 TELEMETRY, RECORDING = ".parquet", ".rrd"
 
@@ -78,7 +79,10 @@ class Run:
         return replace(record, status=self.status)
 
     def save(self, path: str | Path) -> Path:
-        """Save the run as telemetry (``.parquet``) or as a Rerun recording (``.rrd``); return the path.
+        """Save the run; return the path.
+
+        Telemetry with provenance (``.parquet``), a Rerun recording (``.rrd``), columns alone (``.csv``), or a
+        matrix for each signal for MATLAB (``.mat``).
 
         Raises
         ------
@@ -87,7 +91,12 @@ class Run:
         SpheretwinError
             Writing failed; an earlier file is unchanged.
         """
-        writers = {TELEMETRY: self.to_parquet, RECORDING: self.to_rrd}
+        writers = {
+            TELEMETRY: self.to_parquet,
+            RECORDING: self.to_rrd,
+            ".csv": self.to_csv,
+            ".mat": self.to_mat,
+        }
         if (suffix := Path(path).suffix) not in writers:
             expected = " or ".join(f"FILE{suffix}" for suffix in writers)
             raise InputError(f"run: expected {expected}, received {shown(str(path))}")
@@ -103,6 +112,32 @@ class Run:
         """
         self.telemetry.write_parquet(Path(path), self.provenance.metadata())
         return Path(path)
+
+    def to_csv(self, path: str | Path) -> Path:
+        """Write a column for each number; return the path. Errors as `save`."""
+        self.telemetry.write_csv(Path(path))
+        return Path(path)
+
+    def to_mat(self, path: str | Path) -> Path:
+        """Write a matrix for each signal, with units and provenance, for MATLAB; errors as `save`."""
+        self.telemetry.write_mat(Path(path), self.provenance.metadata())
+        return Path(path)
+
+    def plot(self) -> Figure:
+        """Return a Matplotlib figure of the run: angles and references, errors, the largest current.
+
+        Raises
+        ------
+        InputError
+            Matplotlib is not installed, or the run has no tick.
+        """
+        try:
+            from spheretwin.viz.figures import comparison
+        except ModuleNotFoundError:
+            raise missing("run", "matplotlib", "plots") from None
+        if not len(self.telemetry):
+            raise InputError("run: expected at least one tick to plot, received none")
+        return comparison.overview(self.telemetry, self._title())
 
     def to_rrd(self, path: str | Path) -> Path:
         """Write a Rerun recording, as ``simulate --record`` does; return the path.
@@ -180,13 +215,13 @@ class Run:
         return f"<h4>{html.escape(self._title())}</h4><table>{rows}</table>{self._plots()}"
 
     def _plots(self) -> str:
-        if not len(self.telemetry):
-            return ""
         try:
-            from spheretwin.viz.figures import comparison
-        except ModuleNotFoundError:
+            figure = self.plot()
+        except InputError:  # no tick, or no Matplotlib
             return ""
-        return comparison.as_html(comparison.overview(self.telemetry, self._title()))
+        from spheretwin.viz.figures.comparison import as_html
+
+        return as_html(figure)
 
     def _title(self) -> str:
         simulated_s = len(self.telemetry) * self.scenario.controller.period_s

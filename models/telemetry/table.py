@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 from collections.abc import Iterator, Mapping
 from functools import cache
 from pathlib import Path
@@ -11,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spheretwin.models.base.errors import InputError, did_you_mean
+from spheretwin.models.base.files import whole_file
 from spheretwin.models.telemetry import checksums
 from spheretwin.models.telemetry.signals import Signal, merged, offsets, width
 
@@ -112,6 +114,28 @@ class Table:
         """
         table = self.arrow(metadata)
         checksums.write_parquet(path, table.schema, [table], **PARQUET_FORMAT)
+
+    def write_csv(self, path: Path) -> None:
+        """Write a column for each number, each as Python writes it, which loses no bit; errors as above."""
+        with whole_file(path) as temporary, temporary.open("w", encoding="utf-8", newline="") as file:
+            writer = csv.writer(file, lineterminator="\n")
+            writer.writerow(self.scalars().keys())
+            writer.writerows(map(repr, row) for row in self.values.tolist())
+
+    def write_mat(self, path: Path, metadata: Mapping[str, str]) -> None:
+        """Write a MATLAB file: a matrix for each signal, its unit, and `metadata`; errors as above."""
+        from scipy.io import savemat  # slow to import
+
+        columns = {signal.name: self[signal.name] for signal in self.signals}
+        units = {signal.name: signal.unit for signal in self.signals}
+        with whole_file(path) as temporary, temporary.open("wb") as file:
+            savemat(
+                file,
+                {**columns, "unit": units, "provenance": dict(metadata)},
+                long_field_names=True,
+                do_compression=True,
+                oned_as="column",
+            )
 
     def arrow(self, metadata: Mapping[str, str]) -> pa.Table:
         """Return an Arrow table of the columns; units and descriptions are metadata of the fields."""

@@ -1,9 +1,11 @@
 """A run as JSON: the metrics of every run, and functions of the user's own among them."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.io import loadmat
 
 from spheretwin import scenario as scenarios
 from spheretwin.analysis.recorded_run import read
@@ -11,6 +13,8 @@ from spheretwin.metrics import METRICS
 from spheretwin.metrics.figures import Figures
 from spheretwin.metrics.reduction import PlannedRun
 from spheretwin.metrics.user_metrics import OTHER_KEYS
+from spheretwin.models.base.errors import InputError
+from spheretwin.models.telemetry.table import Table
 from spheretwin.run import figures_of, summary
 from spheretwin.session import Session
 from spheretwin.simulation import follow, simulate
@@ -63,3 +67,33 @@ def test_an_event_at_the_end_of_a_run_is_not_in_its_log(tmp_path):
     run = simulate(scenarios.load("hold", {"duration": 0.05, "event": events}))
     log = read(run.save(tmp_path / "run.rrd")).log
     assert [t_s for t_s, _, text in log if "disturbance.load" in text] == [pytest.approx(0.02)]
+
+
+def test_a_matlab_file_has_a_matrix_for_each_signal(run, tmp_path):
+    loaded = loadmat(run.save(tmp_path / "run.mat"), simplify_cells=True)
+    for signal in run.telemetry.signals:
+        np.testing.assert_array_equal(loaded[signal.name], run.telemetry[signal.name], err_msg=signal.name)
+        assert loaded["unit"][signal.name] == (signal.unit or [])
+    assert json.loads(loaded["provenance"]["scenario"])["name"] == "hold"
+
+
+def test_a_csv_file_loses_no_bit(run, tmp_path):
+    table = np.genfromtxt(run.save(tmp_path / "run.csv"), delimiter=",", names=True)
+    scalars = run.telemetry.scalars()
+    assert list(table.dtype.names) == list(scalars)
+    for name in scalars:
+        np.testing.assert_array_equal(table[name], scalars[name], err_msg=name)
+
+
+def test_a_plot_has_angles_errors_and_currents(run):
+    figure = run.plot()
+    angles, errors, currents = figure.axes
+    np.testing.assert_array_equal(angles.lines[0].get_xdata(), run.telemetry["t_s"])
+    assert [bool(axes.lines) for axes in (angles, errors, currents)] == [True] * 3
+
+
+def test_a_run_without_a_tick_has_no_plot(run):
+    empty = replace(run, telemetry=Table(run.telemetry.signals, run.telemetry.values[:0]))
+    with pytest.raises(InputError, match="expected at least one tick to plot"):
+        empty.plot()
+    assert "<svg" not in empty._repr_html_()

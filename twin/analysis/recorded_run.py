@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import ast
-import csv
 import json
 import math
 from collections.abc import Iterator, Mapping, Sequence
@@ -18,7 +17,6 @@ from spheretwin.analysis import recovery
 from spheretwin.analysis.recovery import hold_rows, ticks_of
 from spheretwin.config.active_config import ActiveConfig, initial_config
 from spheretwin.models.base.errors import InputError, shown
-from spheretwin.models.base.files import whole_file
 from spheretwin.models.telemetry import joint_states
 from spheretwin.models.telemetry.checksums import has_checksums
 from spheretwin.models.telemetry.joint_states import ANGLE_NAMES, Topic, group_names
@@ -258,7 +256,7 @@ def _changes(run: Reviewed) -> Iterator[Change]:
     yield from run.record.journal
 
 
-KINDS = (".csv", ".parquet", ".mcap")
+KINDS = (".csv", ".mat", ".parquet", ".mcap")
 
 
 def check(path: Path) -> None:
@@ -271,7 +269,7 @@ def check(path: Path) -> None:
     """
     if path.suffix not in KINDS:
         raise InputError(
-            "command line: expected --export FILE.csv, FILE.parquet or FILE.mcap,"
+            "command line: expected --export FILE.csv, FILE.mat, FILE.parquet or FILE.mcap,"
             f" received {shown(str(path))}"
         )
 
@@ -279,9 +277,10 @@ def check(path: Path) -> None:
 def export(run: Reviewed, path: Path) -> None:
     """Write all columns of a run, a scalar column for each number.
 
-    A Parquet file is again the file of a run. CSV has each number as Python writes it, which loses no bit.
-    MCAP has times to 1 ns, the angles and rates of the controller as topic ``angles``, the commanded currents
-    as ``currents`` and all other columns as ``telemetry``.
+    A MATLAB file has a matrix for each signal. A Parquet file is again the file of a run. CSV has each
+    number as Python writes it, which loses no bit. MCAP has times to 1 ns, the angles and rates of the
+    controller as topic ``angles``, the commanded currents as ``currents`` and all other columns as
+    ``telemetry``.
 
     Raises
     ------
@@ -292,11 +291,10 @@ def export(run: Reviewed, path: Path) -> None:
         run.table.scalars().write_parquet(path, run.metadata)
     elif path.suffix == ".mcap":
         joint_states.write(path, run.table["t_s"], _topics(run.table), run.metadata)
+    elif path.suffix == ".mat":
+        run.table.write_mat(path, run.metadata)
     else:
-        with whole_file(path) as temporary, temporary.open("w", encoding="utf-8", newline="") as file:
-            writer = csv.writer(file, lineterminator="\n")
-            writer.writerow(run.table.scalars().keys())
-            writer.writerows(map(repr, row) for row in run.table.values.tolist())
+        run.table.write_csv(path)
 
 
 def _topics(table: Table) -> dict[str, Topic]:
