@@ -92,6 +92,14 @@ def test_the_files_are_what_the_numbers_make(name, made, committed):
     np.testing.assert_allclose(old.moment_inertia, new.moment_inertia, atol=1e-4 * second_moments)
 
 
+@pytest.mark.release("0.8 s; changes with the mesh library")
+def test_writing_twice_gives_the_same_bytes(tmp_path, actuator):
+    first, second = (make_meshes.write(tmp_path / folder, actuator) for folder in ("first", "second"))
+    assert sorted(path.stem for path in first) == sorted(NAMES)
+    for a, b in zip(first, second, strict=True):
+        assert a.read_bytes() == b.read_bytes()
+
+
 def test_the_meshes_are_those_the_mjcf_draws(made):
     spec = mujoco.MjSpec.from_file(str(actuators.MJCF_PATH))
     assert sorted(made) == sorted(mesh.name for mesh in spec.meshes)

@@ -11,7 +11,7 @@ from tests.docs.snippets import ROOT
 sys.path.insert(0, str(ROOT / "docs" / "scripts"))
 
 import iron_hoop
-from iron_hoop import Iron, Shape, harmonics, torque_curve
+from iron_hoop import Iron, Shape, effect, harmonics, torque_curve
 
 INNER, OUTER, FRONT, SPHERE = 0.0365, 0.0400, 0.0500, 0.0550
 
@@ -80,6 +80,16 @@ def test_without_iron_the_pole_has_its_torque_curve(actuator):
         errors.append(np.abs(curve - exact).max() / exact.max())
     assert errors[1] < 5e-3  # 4e-4 with 24 elements
     assert errors[0] > 4 * errors[1]
+
+
+@pytest.mark.release("finite elements for 1 to 5 s; the image in a sphere is exact, in less")
+@pytest.mark.parametrize("half_angle_deg", [11.0, 180.0])
+def test_the_effect_of_iron_converges_below_its_image(half_angle_deg, actuator):
+    coarse, fine = (effect(actuator.magnet, actuator.coil, half_angle_deg, count) for count in (8, 16))
+    # Singularities at the edges of iron and magnet leave an order of 4/3 and more.
+    assert coarse.mesh > 2 * fine.mesh
+    assert 1 < fine.peak < 1.17  # an infinite plane of iron
+    assert 1 < fine.mean < 1.24
 
 
 def test_the_script_prints_all_caps(monkeypatch, capsys):

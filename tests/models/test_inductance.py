@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from scipy.special import ellipe, ellipk
 
+from spheretwin.models import inductance
 from spheretwin.models.actuator import load
 from spheretwin.models.inductance import coil_pair, mutual_inductance
 from tests.models.design.quadrature import winding_loops, winding_section
@@ -92,3 +93,12 @@ def test_inductance_grows_with_the_square_of_turns_and_with_size():
     pair = coil_pair(COIL, np.radians(30))
     for coil, factor in ((replace(COIL, turns=2 * COIL.turns), 4), (large, 3)):
         assert coil_pair(coil, np.radians(30)) == pytest.approx(factor * pair, rel=1e-12)
+
+
+@pytest.mark.release("0.7 s; the other tests compare with exact inductances")
+def test_twice_the_points_change_the_nearest_neighbours_by_less_than_stated(monkeypatch):
+    angle = np.radians(26.42)
+    coarse = coil_pair(COIL, angle)
+    for name in ("RADIAL", "AXIAL", "AROUND"):
+        monkeypatch.setattr(inductance, name, 2 * getattr(inductance, name))
+    assert coil_pair(COIL, angle) == pytest.approx(coarse, rel=4e-5)

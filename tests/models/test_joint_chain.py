@@ -17,6 +17,9 @@ from spheretwin.models.joint_chain import (
     inertia_at,
 )
 from spheretwin.models.kinematics import rate_jacobian, rotation
+from spheretwin.plant import lagrangian_rotor
+from spheretwin.plant.lagrangian_rotor import LagrangianRotor
+from tests.twin.plant.motions import order
 
 # Rounding of some hundred operations on terms that partly cancel; measured: 2e-14.
 ROUNDING = 1e-12
@@ -124,6 +127,28 @@ def test_ideal_joint_has_the_closed_forms(actuator):
             expected += lagrangian.gravity_torque(q, moment)
             # The rings are isotropic and add nothing: rounding of the terms, 2e-3 kg·m² times (20 rad/s)².
             np.testing.assert_allclose(bias, expected, rtol=0, atol=1e-14)
+
+
+def test_energy_of_the_free_chain_is_kept_to_the_order_of_the_step(actuator):
+    machine = random_machine(3)
+    joint, data = JointChain.filled(fill_chain, machine), mujoco.MjData(machine)
+    machine.opt.enableflags |= int(mujoco.mjtEnableBit.mjENBL_ENERGY)
+    q0, rates0, steps = np.array([0.3, -0.4, 0.2]), np.array([1.0, -2.0, 1.5]), np.array([4e-3, 2e-3, 1e-3])
+
+    def energy(q, qdot):
+        data.qpos[:], data.qvel[:] = q, qdot
+        mujoco.mj_forward(machine, data)
+        return data.energy.sum()
+
+    drifts = []
+    for step_s in steps:
+        plant = LagrangianRotor(joint, step_s).start(q0, rates0)
+        for _ in range(round(0.8 / step_s)):
+            lagrangian_rotor.step(plant)
+        drifts.append(abs(energy(plant.q, plant.qdot) - energy(q0, rates0)))
+    # Order four of the state; the energy of a Runge-Kutta step can be one better, never worse.
+    assert 3.7 < order(steps, drifts) < 5.3
+    assert drifts[-1] < 1e-6 * abs(energy(q0, rates0))
 
 
 def test_full_inertia_matrix_is_solved_as_by_a_library():

@@ -7,6 +7,7 @@ import pytest
 
 from spheretwin.models import actuator as actuators
 from spheretwin.models.magnetics import torque_matrix
+from spheretwin.simulation import simulate
 from tests.models.model_files import edited
 
 RING = re.compile(r'(?s)<replicate count="12" euler="0 0 30">\s*<site name="coil_middle".*?</replicate>')
@@ -39,3 +40,21 @@ def test_the_matrix_has_a_column_for_each_group(model, groups):
             sign = np.sign(shipped.group_axes[same][0] @ axis)
             # The same sum over pole lines, rounded alike but for the sign.
             np.testing.assert_allclose(column, sign * whole[:, same][:, 0], rtol=0, atol=1e-15)
+
+
+@pytest.mark.release("18 s to compile for each number of groups; test_torque_fields tracks with 8")
+@pytest.mark.parametrize("engine", ["mujoco", "lagrangian"])
+@pytest.mark.parametrize("allocation", ["least_norm", "bounded"])
+def test_a_run_tracks_with_the_groups_there_are(model, groups, engine, allocation):
+    changes = {"plant.mjcf": str(model), "duration": 0.4, "plant.engine": engine, "allocation": allocation}
+    run = simulate("hold", changes | {"plant.group_gain": [1.0] * groups})
+    table = run.telemetry
+    assert run.status == "completed"
+    assert table["current_A"].shape == table["current_command_A"].shape == (400, groups)
+    actuator = actuators.load(model)
+    for row in (1, 200, 399):  # what is logged is what the currents give, G_t(q) I (15), amid the first step
+        middle = table["q_rad"][row] + 0.25e-3 * table["qdot_rad_s"][row]
+        G = torque_matrix(middle, actuator)
+        # A product of 3 x 24 numbers, summed in another order.
+        np.testing.assert_allclose(G @ table["current_A"][row], table["torque_Nm"][row], rtol=0, atol=1e-13)
+    assert np.abs(table["error_rad"][-1]).max() < 0.5 * np.abs(table["error_rad"][0]).max()

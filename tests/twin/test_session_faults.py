@@ -53,6 +53,13 @@ def whole():
     return values
 
 
+@pytest.mark.parametrize("length", [1, 7, 333, 1000])
+def test_chunks_move_no_bit(whole, length):
+    with Session(scenario()) as session:
+        pieces = [session.advance(min(length, TICKS - tick)).values for tick in range(0, TICKS, length)]
+    assert np.concatenate(pieces).tobytes() == whole.tobytes()
+
+
 def test_another_seed_is_another_run(whole):
     assert simulate(scenario(seed=7)).telemetry.values.tobytes() != whole.tobytes()
 

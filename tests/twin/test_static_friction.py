@@ -26,6 +26,25 @@ BOTH = STICTION | CABLE | HYSTERESIS | {"plant.viscous_Nm_s": [1e-4, 1e-4, 1e-4]
 COMPILES = pytest.mark.release("compiles loops for 19 s; test_bristle_friction.py has the elements")
 
 
+@COMPILES
+@pytest.mark.parametrize("engine", ENGINES)
+def test_a_cable_swings_the_rotor_about_its_neutral_pose(engine, actuator):
+    """Hinge γ of the upright rotor: a harmonic oscillation about the equilibrium."""
+    changes = STILL | {"plant.engine": engine, "controller.period_s": 5e-4}
+    changes |= {"plant.cable.stiffness_Nm_rad": [0.0, 0.0, 0.05], "plant.cable.neutral_rad": [0.0, 0.0, 0.2]}
+    run = table(8000, "hold", changes | {"plant.cable.torque_Nm": [0.0, 0.0, 5e-3]}, FREE)
+    natural, rest = np.sqrt(0.05 / actuator.inertia[2]), 0.2 + 5e-3 / 0.05
+    exact = rest * (1 - np.cos(natural * run["t_s"]))
+    # The explicit midpoint is early by (natural h)²/24 of the phase of 19 rad in 4 s, times the amplitude.
+    bound = 2 * rest * (natural * 5e-4) ** 2 / 24 * natural * 4
+    assert np.abs(run["q_rad"][:, 2] - exact).max() < bound
+    # No energy is lost or gained: the last swings are as wide as the first.
+    assert run["q_rad"][-3000:, 2].max() == pytest.approx(run["q_rad"][:3000, 2].max(), rel=1e-5)
+    middle = run["q_rad"][:, 2] + 0.5 * 5e-4 * run["qdot_rad_s"][:, 2]
+    np.testing.assert_allclose(run["cable_Nm"][:, 2], 5e-3 - 0.05 * (middle - 0.2), rtol=0, atol=1e-16)
+    assert not run["cable_Nm"][:, :2].any()
+
+
 @pytest.mark.uncompiled
 @pytest.mark.parametrize("engine", ENGINES)
 def test_the_rows_account_for_the_energy_of_friction_and_cable(engine, actuator):

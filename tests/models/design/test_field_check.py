@@ -95,6 +95,15 @@ def test_a_stack_s_field_tends_to_that_of_the_body(actuator):
     assert off[2] < 5e-4
 
 
+@pytest.mark.release("sums over all windings for 1 to 3 s; a flat pole is compared in less")
+def test_a_pair_s_torque_tends_to_the_current_sheet_s(actuator):
+    few, more, many = (pair_errors(actuator, Rule(12, 12, 48, stacked)) for stacked in (6, 12, 24))
+    # Steps miss the front by the square of their number, and nothing else is left.
+    assert_allclose(few / more, 4.0, rtol=0.1)
+    assert_allclose(more / many, 4.0, rtol=0.1)
+    assert np.abs(many).max() < 2e-4  # measured: 1.6e-4
+
+
 def test_a_flat_pole_s_torque_is_the_current_sheet_s(actuator):
     # Its rim lies within the winding near 7 degrees: a quadrature of an infinite field.
     assert np.abs(pair_errors(flat(actuator), direct_summation.FLAT.near)).max() < 5e-4

@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 import weakref
+from concurrent.futures import ThreadPoolExecutor
 
 import pyarrow as pa
 import pyarrow.parquet
@@ -129,3 +130,18 @@ def test_a_disk_that_fills_on_the_way_keeps_what_it_has_and_the_run_goes_on(sign
     assert sorted(os.listdir(part.parent)) == [part.name, list_of(part).name]
     assert join([part], path) == 192
     assert read_parquet(path)[0].values.tobytes() == whole.values.tobytes()
+
+
+@pytest.mark.release("two processes, 1 s; test_files.py has two writers of one path")
+def test_two_processes_that_close_together_leave_one_of_the_two(tmp_path):
+    path = tmp_path / "run.parquet"
+    both = [streaming(path, 300, seed, pause=True) for seed in (1, 2)]
+    for process in both:
+        assert process.stdout.readline() == "written\n"
+    assert len(list(tmp_path.glob(".run.parquet.*.parts"))) == 2
+    with ThreadPoolExecutor(2) as pool:
+        complaints = [said[1] for said in pool.map(lambda process: process.communicate(), both)]
+    assert [process.returncode for process in both] == [0, 0], complaints
+    assert os.listdir(tmp_path) == ["run.parquet"]
+    either = {table(300, seed=seed).values.tobytes() for seed in (1, 2)}
+    assert read_parquet(path)[0].values.tobytes() in either

@@ -90,6 +90,19 @@ def stream(tmp_path_factory):
     return whole, content, [8 + int.from_bytes(content[4:8], "little"), *ends]
 
 
+@pytest.mark.release("cuts at every place for 1.6 s; test_interrupted_writing.py has a killed process")
+def test_wherever_a_stream_is_torn_its_whole_batches_are_taken(stream, tmp_path):
+    whole, content, ends = stream
+    part, path = tmp_path / "000000.arrows", tmp_path / "joined.parquet"
+    for size in range(ends[1], len(content) + 1):
+        part.write_bytes(content[:size])
+        rows = 5 * sum(size >= end for end in ends[1:])
+        assert join([part], path) == rows
+        again, metadata = read_parquet(path)
+        assert again.values.tobytes() == whole.rows(0, rows).values.tobytes()
+        assert metadata == FACTS
+
+
 def test_a_stream_that_is_torn_before_it_has_a_whole_batch_is_refused(stream, tmp_path):
     _, content, ends = stream
     (part := tmp_path / "000000.arrows").touch()

@@ -151,6 +151,22 @@ FREE = STILL | {
 }
 
 
+@pytest.mark.release("compiles two loops for 20 s; crosscheck/test_hinge_references.py has both engines")
+def test_a_thrown_rotor_stays_within_its_range_on_both_engines():
+    """Without end stops the run ends at the end of the range."""
+    on = FREE | {"plant.end_stops.on": True, "plant.viscous_Nm_s": [2e-3, 2e-3, 2e-3]}
+    tables = {}
+    for engine in ("lagrangian", "mujoco"):
+        with Session(scenarios.load("tilt", on | {"plant.engine": engine})) as session:
+            table = session.advance(3000)
+        assert str(session.status) == "running"
+        assert np.all(np.abs(table["q_rad"][:, :2]) < np.radians(80))
+        assert np.any(table["end_stop_Nm"][:, :2])
+        tables[engine] = table["q_rad"]
+    # Both are of fourth order; contacts amplify differences of 1e-13 by the mass ratio, 30, a bounce.
+    np.testing.assert_allclose(tables["mujoco"], tables["lagrangian"], rtol=0, atol=1e-6)
+
+
 def test_without_stops_the_run_ends_at_the_end_of_the_range():
     with Session(scenarios.load("tilt", FREE)) as session:
         table = session.advance(3000)
