@@ -12,13 +12,11 @@ from functools import lru_cache
 from math import pi
 
 import numpy as np
-from numpy.typing import NDArray
 
 from spheretwin.models.actuator import Actuator
+from spheretwin.models.base.arrays import Array
 from spheretwin.models.base.cache import cached_array
 from spheretwin.models.magnet_and_coil import CoilGeometry
-
-Array = NDArray[np.float64]
 
 MU0_OVER_4PI = 1e-7
 

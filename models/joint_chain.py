@@ -18,15 +18,15 @@ from math import asin, atan2
 
 import mujoco
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from spheretwin.models.base.arrays import Array
 from spheretwin.models.base.compiled import allocation_free, inlined
 from spheretwin.models.base.record import Record, Rows, field, put
 from spheretwin.models.kinematics import Triple, generalised_torque, triple, turns
 from spheretwin.models.lagrangian import InertiaEntries, acceleration_entries, inertia_entries, solve_inertia
 from spheretwin.models.mjcf import gravity
 
-Array = NDArray[np.float64]
 Triples = tuple[Triple, Triple, Triple]
 Frame = tuple[Triple, Triple, Triple, Triple]  # axes x, y, z and origin
 

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from spheretwin.models.actuator import Actuator
+from spheretwin.models.base.arrays import Array
 from spheretwin.models.base.cache import cached_array
 from spheretwin.models.base.compiled import allocation_free, inlined
 from spheretwin.models.base.errors import InputError
@@ -29,8 +30,6 @@ from spheretwin.models.base.vectors import (
 from spheretwin.models.kinematics import rotation_rows
 from spheretwin.models.torque_curve import TorqueCurve
 from spheretwin.models.torque_field import TorqueField
-
-Array = NDArray[np.float64]
 
 # The look-up's intervals: wide where |cos phi| is below the knee, narrow above it, where f_t rises and falls
 # (phi below 18 degrees). 780 intervals (25 kB) hold the spline to 2e-7 of its peak; equal intervals would

@@ -18,13 +18,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from spheretwin.models.actuator import Actuator
+from spheretwin.models.base.arrays import Array
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.base.record import put
 from spheretwin.models.kinematics import frame_of_axis, rotation
 from spheretwin.models.magnetics import TorqueModel, coils_by_group, pole_lines, rows_of, torque_model
 from spheretwin.models.torque_field import TorqueField
-
-Array = NDArray[np.float64]
 
 
 class PartErrors(NamedTuple):

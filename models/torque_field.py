@@ -17,9 +17,9 @@ from functools import cached_property
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from spheretwin.models import torque_curve
+from spheretwin.models.base.arrays import Array
 from spheretwin.models.base.errors import InputError, distinct_texts
 from spheretwin.models.torque_curve import (
     COMPUTED_FOR,
@@ -30,8 +30,6 @@ from spheretwin.models.torque_curve import (
     named_numbers,
     read_columns,
 )
-
-Array = NDArray[np.float64]
 
 COLUMNS = ("theta_deg", "phi_deg", "x_Nm_per_A", "y_Nm_per_A", "z_Nm_per_A")
 FEWEST_LATITUDES, FEWEST_MERIDIANS = 7, 8

@@ -18,10 +18,9 @@ ADDITIONS = {
     "plant part": Addition(
         "twin/plant/dashpot.py",
         '''
-import numpy as np
-from numpy.typing import NDArray
 from pydantic import BaseModel, Field
 
+from spheretwin.models.base.arrays import Array
 from spheretwin.models.base.compiled import inlined
 from spheretwin.models.base.record import Record, field
 from spheretwin.plant.plant_part import PlantPart
@@ -36,7 +35,7 @@ class DashpotSection(BaseModel):
 class Dashpot(Record):
     on: bool = field("whether it acts")
     damping_Nm_s: float = field("torque per unit of the delayed rate", "N·m·s")
-    rate_rad_s: NDArray[np.float64] = field("delayed rates", "rad/s", 3, state=True)
+    rate_rad_s: Array = field("delayed rates", "rad/s", 3, state=True)
 
 
 @inlined
@@ -70,8 +69,8 @@ from spheretwin.electronics.stages import FaultLine, fill_fault_line, through
 
 class Gear(Record):
     on: bool = field("whether a ratio has an error")
-    ratio: NDArray[np.float64] = field("ratio of each gear", "", 3)
-    turned_rad: NDArray[np.float64] = field("sum of the angles so far", "rad", 3, state=True)
+    ratio: Array = field("ratio of each gear", "", 3)
+    turned_rad: Array = field("sum of the angles so far", "rad", 3, state=True)
     line: FaultLine = field("of the turned angles, rad", channels=3)
 
 

@@ -21,14 +21,12 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from spheretwin.models.actuator import MJCF_PATH
+from spheretwin.models.base.arrays import Array
 from spheretwin.models.base.extras import missing
 from spheretwin.models.design.rotor_field import linkage
 from spheretwin.models.magnet_and_coil import CoilGeometry, Magnet, read_magnet_and_coil
-
-Array = NDArray[np.float64]
 
 MU0 = 4e-7 * np.pi
 

@@ -2,12 +2,8 @@
 
 from __future__ import annotations
 
-import numpy as np
-from numpy.typing import NDArray
-
+from spheretwin.models.base.arrays import Array
 from spheretwin.models.base.compiled import allocation_free, copy_into
-
-Array = NDArray[np.float64]
 
 
 @allocation_free

@@ -1,11 +1,9 @@
 """Products of small matrices."""
 
 import numpy as np
-from numpy.typing import NDArray
 
+from spheretwin.models.base.arrays import Array
 from spheretwin.models.base.compiled import compiled
-
-Array = NDArray[np.float64]
 
 
 @compiled

@@ -16,14 +16,14 @@ import numpy as np
 from llvmlite import ir
 from numba import types
 from numba.extending import lower_builtin, models, register_model, type_callable
-from numpy.typing import NDArray
+
+from spheretwin.models.base.arrays import Array
 
 WIDTH = 4
 
 Vector = Any
 """A vector or, where a function takes either, a number."""
 
-Array = NDArray[np.float64]
 
 _NUMBER, _INDEX = ir.DoubleType(), ir.IntType(64)
 _NUMBERS, _INDICES = ir.VectorType(_NUMBER, WIDTH), ir.VectorType(_INDEX, WIDTH)

@@ -6,14 +6,12 @@ from collections.abc import Callable, Iterable
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from spheretwin.models.actuator import Actuator
+from spheretwin.models.base.arrays import Array
 from spheretwin.models.base.compiled import compiled
 from spheretwin.models.coil_group import of_each_group
 from spheretwin.models.magnetics import TorqueModel, fill_torque_matrix, scratch_of, torque_model
-
-Array = NDArray[np.float64]
 
 # A direction whose singular value is below this share of the largest one counts as lost: a millionth of
 # the torque for the same current is rounding and model error.

@@ -8,18 +8,16 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from spheretwin.models import torque_curve
 from spheretwin.models.actuator import MJCF_PATH
+from spheretwin.models.base.arrays import Array
 from spheretwin.models.base.checks import Check
 from spheretwin.models.design import geometry_check, pole_torque
 from spheretwin.models.design.pole_torque import Mesh, compute_curve
 from spheretwin.models.magnet_and_coil import CoilGeometry, Magnet, read_magnet_and_coil
 from spheretwin.models.magnetics import lookup_table, place
 from spheretwin.models.torque_curve import TorqueCurve
-
-Array = NDArray[np.float64]
 
 # Angles at which the look-up table is compared with the spline: 64 or more in each of its intervals.
 LOOKUP_POINTS = 50_001

@@ -19,17 +19,15 @@ from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from spheretwin.models.actuator import Actuator
+from spheretwin.models.base.arrays import Array
 from spheretwin.models.base.extras import missing
 from spheretwin.models.design.workspace import pose
 from spheretwin.models.kinematics import frame_of_axis, rotation
 from spheretwin.models.magnet_and_coil import CoilGeometry, Magnet
 from spheretwin.models.magnetics import fill_torque_matrix, scratch_of, torque_model
 from spheretwin.models.scatter import Scatter, no_scatter, scattered_model
-
-Array = NDArray[np.float64]
 
 # Beyond the angle at which a magnet's rim leaves the winding's edge the integrand is smooth.
 RIM_MARGIN = np.radians(2.0)

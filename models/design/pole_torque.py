@@ -16,15 +16,13 @@ from functools import cache
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from spheretwin.models.base.arrays import Array
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.base.extras import missing
 from spheretwin.models.curve_origin import computed_from
 from spheretwin.models.magnet_and_coil import CoilGeometry, Magnet
 from spheretwin.models.torque_curve import TorqueCurve, head
-
-Array = NDArray[np.float64]
 
 # Where the rim of a flat magnet crosses the bore of the winding (8 and 14.7 degrees at the shipped sizes) the
 # second derivative of f_t jumps: a cubic spline through samples 0.5 degrees apart misses 1.3e-4 of the peak

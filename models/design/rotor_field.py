@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spheretwin.models.actuator import polarities
+from spheretwin.models.base.arrays import Array
 from spheretwin.models.base.checks import Check
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.base.extras import missing
@@ -27,8 +28,6 @@ from spheretwin.models.mjcf import read
 from spheretwin.models.mjcf_reader import check_bounded, number, sites
 from spheretwin.models.torque_curve import head
 from spheretwin.models.torque_field import TorqueField, directions, to_csv
-
-Array = NDArray[np.float64]
 
 DEGREE = 150
 """Largest degree: of the shipped actuator the degrees above give 1e-5 of the peak."""

@@ -10,9 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spheretwin.models.actuator import Actuator
+from spheretwin.models.base.arrays import Array
 from spheretwin.models.design.capability import Capability, capability
-
-Array = NDArray[np.float64]
 
 # The nutation of the paper (59) tilts the shaft by 57 degrees at its end.
 LARGEST_TILT_DEG = 57.0

@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any, BinaryIO, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from spheretwin.models.base.arrays import Array
 from spheretwin.models.base.errors import LONGEST_WORD, InputError, shortened, without_breaks
 from spheretwin.models.base.files import regular_file, whole_file
 
@@ -28,7 +29,6 @@ if TYPE_CHECKING:
 NO_CHECKSUMS = "has no checksums, it was written by an earlier version: damage may be unnoticed"
 """Warning for a file that is read without a check."""
 
-Array = NDArray[np.float64]
 
 # Metadata of a Parquet file. Two names: damage to one of them does not look like a file without checksums.
 _SEGMENTS, _FOOTER = "row_group_checksums", "footer_checksum"

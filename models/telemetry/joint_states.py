@@ -17,12 +17,11 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from spheretwin.models.base.arrays import Array
 from spheretwin.models.base.errors import InputError, without_breaks
 from spheretwin.models.base.extras import missing
 from spheretwin.models.base.files import regular_file, whole_file
 from spheretwin.models.telemetry import ros_messages
-
-Array = NDArray[np.float64]
 
 FIELDS = ("position", "velocity", "effort")
 TYPE, ENCODING = "sensor_msgs/msg/JointState", "cdr"

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from spheretwin.models.base.arrays import Array
 from spheretwin.models.base.compiled import allocation_free
 from spheretwin.models.base.record import (
     Record,
@@ -14,8 +15,6 @@ from spheretwin.models.base.record import (
     states_of,
     transfer_rows,
 )
-
-Array = NDArray[np.float64]
 
 
 class Filter(Record):

@@ -10,16 +10,14 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from spheretwin.crosscheck.coil_driven import drive_plant
 from spheretwin.crosscheck.equations import equations_of
 from spheretwin.crosscheck.scale import Scale, scale_of
 from spheretwin.crosscheck.trajectories import solve
 from spheretwin.models.actuator import MJCF_PATH, Actuator
+from spheretwin.models.base.arrays import Array
 from spheretwin.plant.end_stops import EndStopsSection
-
-Array = NDArray[np.float64]
 
 STEP_s = 1e-4
 DURATION_s, SAMPLE_s = 0.2, 1e-3

@@ -24,10 +24,10 @@ from typing import Any, NamedTuple
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
 from spheretwin.crosscheck.equations import ideal_file
 from spheretwin.models.actuator import Actuator
+from spheretwin.models.base.arrays import Array
 from spheretwin.models.base.compiled import compiled
 from spheretwin.models.base.record import Rows
 from spheretwin.models.mjcf import ROTOR, Mjcf, read
@@ -37,8 +37,6 @@ from spheretwin.plant.mass_properties import true_model
 from spheretwin.plant.mujoco_rotor import MujocoRotor
 from spheretwin.plant.rotor import RotorData
 from tests.twin.plant.motions import ideal_rotor
-
-Array = NDArray[np.float64]
 
 STEP_s = 5e-4  # the default physics step
 BISECTIONS = 100  # a double has 52 bits; the bracket is up to a few thousand rates wide

@@ -11,16 +11,14 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from spheretwin.crosscheck.coil_driven import drive_plant
 from spheretwin.crosscheck.equations import equations_of
 from spheretwin.crosscheck.scale import Scale, scale_of
 from spheretwin.crosscheck.trajectories import solve
 from spheretwin.models.actuator import MJCF_PATH, Actuator
+from spheretwin.models.base.arrays import Array
 from spheretwin.plant.bristle_friction import LAST, SLIP_SHARES, StictionSection
-
-Array = NDArray[np.float64]
 
 STEP_s = 5e-4  # the default physics step
 DURATION_s, SAMPLE_s = 1.0, 5e-3
