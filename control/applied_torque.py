@@ -10,16 +10,15 @@ from math import exp, expm1
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from spheretwin.models.base.arrays import Array
 from spheretwin.models.base.compiled import allocation_free
 from spheretwin.models.base.history import push_all
 from spheretwin.models.base.record import Record, Rows, capacity, field, put
 from spheretwin.models.coil_group import PerGroup
 from spheretwin.models.kinematics import generalised_torque
 from spheretwin.models.magnetics import rotor_torque
-
-Array = NDArray[np.float64]
 
 # A delay of a whole number of periods is one to rounding only.
 ROUNDING = 1e-9

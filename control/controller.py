@@ -7,7 +7,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numba import types
-from numpy.typing import NDArray
 
 from spheretwin.control import allocation as allocations
 from spheretwin.control import law as laws
@@ -21,14 +20,13 @@ from spheretwin.control.supervision.enabled_groups import EnabledGroups, mask_di
 from spheretwin.control.supervision.fault_detector import Detector, detect_faults
 from spheretwin.control.supervision.watchdog import GO, Reason, Watchdog, trip, watch
 from spheretwin.models.base.addresses import caller_of
+from spheretwin.models.base.arrays import Array
 from spheretwin.models.base.columns import MixedRowsError, column_of
 from spheretwin.models.base.compiled import allocation_free, part_of_its_caller
 from spheretwin.models.base.record import Record, Rows, field, put
 from spheretwin.models.kinematics import cartesian_torque
 from spheretwin.models.magnetics import Arrangement, CachedMatrix, Tables, TorqueModel, update_cached_matrix
 from spheretwin.models.telemetry.signals import width
-
-Array = NDArray[np.float64]
 
 # A diverging law may command any torque; beyond this the products of the allocation would overflow.
 LARGEST_TORQUE_Nm = 1e100

@@ -13,11 +13,10 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from spheretwin.models.base.arrays import Array
 from spheretwin.models.base.errors import InputError, shown, without_breaks
-
-Array = NDArray[np.float64]
 
 MATRIX = 3  # layout of the parameters: the constant torque, then [A B; C D] by rows
 KINDS = "a state space, or a proper transfer function, or zeros, poles and gain"

@@ -11,14 +11,12 @@ from pathlib import Path
 from typing import Annotated, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, PrivateAttr, model_validator
 
+from spheretwin.models.base.arrays import Array
 from spheretwin.models.base.compiled import allocation_free
 from spheretwin.models.base.record import Record, field
 from spheretwin.models.telemetry.csv_series import TIME, TimeSeries, reached, read
-
-Array = NDArray[np.float64]
 
 # Far beyond the rating of any coil.
 LARGEST_A = 1e3

@@ -4,7 +4,7 @@ from numba import types
 
 from spheretwin.control.allocation.bounded import allocate_bounded
 from spheretwin.control.allocation.least_norm import allocate
-from spheretwin.control.allocation.simplex import Array
+from spheretwin.models.base.arrays import Array
 
 _vector = types.float64[::1]
 _matrix = types.float64[:, ::1]

@@ -31,7 +31,6 @@ from spheretwin.control.allocation.simplex import (
     NOISE,
     NONE,
     TIE,
-    Array,
     Vector,
     add_multiple,
     column,
@@ -41,6 +40,7 @@ from spheretwin.control.allocation.simplex import (
     orthogonal_part,
     unit,
 )
+from spheretwin.models.base.arrays import Array
 from spheretwin.models.base.compiled import compiled
 
 # Demands (desired currents of each group, in limits; beyond ±1 if it is at its limit), their rates along the

@@ -2,13 +2,10 @@
 
 from math import copysign, inf, sqrt
 
-import numpy as np
-from numpy.typing import NDArray
-
+from spheretwin.models.base.arrays import Array
 from spheretwin.models.base.compiled import compiled
 
 Vector = tuple[float, float, float]
-Array = NDArray[np.float64]
 
 NONE: Vector = (0.0, 0.0, 0.0)
 

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import numpy as np
-from numpy.typing import NDArray
-
 from spheretwin.control.applied_torque import AppliedTorque
 from spheretwin.control.compensators.feed_forward import (
     FeedForward,
@@ -13,11 +10,10 @@ from spheretwin.control.compensators.feed_forward import (
 )
 from spheretwin.control.compensators.prediction import Prediction, advance, predict
 from spheretwin.control.compensators.reference_governor import Governor, govern
+from spheretwin.models.base.arrays import Array
 from spheretwin.models.base.compiled import allocation_free
 from spheretwin.models.base.record import Record, field
 from spheretwin.models.magnetics import Arrangement, Tables
-
-Array = NDArray[np.float64]
 
 
 class Compensators(Record):

@@ -20,18 +20,17 @@ from math import sqrt
 from typing import Annotated, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from pydantic import BaseModel, ConfigDict, Field
 
 from spheretwin.control.applied_torque import split_delay
 from spheretwin.control.law import NonNegativeEach, each
+from spheretwin.models.base.arrays import Array
 from spheretwin.models.base.compiled import allocation_free
 from spheretwin.models.base.history import delayed_mean, push
 from spheretwin.models.base.record import Record, Rows, field, put
 from spheretwin.models.kinematics import triple, turns
 from spheretwin.models.lagrangian import coriolis_rows, inertia_entries
-
-Array = NDArray[np.float64]
 
 
 class FeedForwardSection(BaseModel):

@@ -29,10 +29,10 @@ from math import isfinite
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field
 
 from spheretwin.control.applied_torque import AppliedTorque, LagStep, fill_lag_step
+from spheretwin.models.base.arrays import Array
 from spheretwin.models.base.compiled import allocation_free
 from spheretwin.models.base.record import Record, Rows, field, put
 from spheretwin.models.coil_group import PerGroup
@@ -45,8 +45,6 @@ from spheretwin.models.magnetics import (
     rotor_torque,
     update_cached_matrix,
 )
-
-Array = NDArray[np.float64]
 
 MEASURED = 3
 """First row of the measured values."""

@@ -25,15 +25,12 @@ from __future__ import annotations
 
 from math import copysign, isfinite, sqrt
 
-import numpy as np
-from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field
 
 from spheretwin.control.law import PositiveEach
+from spheretwin.models.base.arrays import Array
 from spheretwin.models.base.compiled import allocation_free
 from spheretwin.models.base.record import Record, Rows, field, put
-
-Array = NDArray[np.float64]
 
 # Least share of the acceleration for catching up, whatever the desired motion takes.
 LEAST_SPARE_SHARE = 0.1

@@ -29,7 +29,6 @@ encoder is a pulse of (1 − p) c/T, which decays in 1/ω.
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from spheretwin.control.estimators.estimator import (
     BandwidthEach,
@@ -42,8 +41,7 @@ from spheretwin.control.estimators.estimator import (
     named,
     usable,
 )
-
-Array = NDArray[np.float64]
+from spheretwin.models.base.arrays import Array
 
 DECAY, GAIN = 0, 3  # layout of the parameters: p, and (1 - p) / T
 STARTED, ANGLE, RATE = 0, 3, 6  # layout of the memory

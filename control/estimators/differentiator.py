@@ -72,9 +72,8 @@ from spheretwin.control.estimators.estimator import (
     within_range,
 )
 from spheretwin.control.law import NonNegativeEach, each
+from spheretwin.models.base.arrays import Array
 from spheretwin.models.base.compiled import allocation_free
-
-Array = NDArray[np.float64]
 
 OUTER, MIDDLE, INNER = 2.0, 2.12, 1.1  # Levant's coefficients, from z0 to z2
 END_SLOPE = 1.5  # weight of the innermost term in z1: slope of a parabola at its end

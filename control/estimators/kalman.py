@@ -59,8 +59,7 @@ from spheretwin.control.estimators.estimator import (
     within_range,
 )
 from spheretwin.control.law import NonNegativeEach, each
-
-Array = NDArray[np.float64]
+from spheretwin.models.base.arrays import Array
 
 OF_ANGLE, OF_RATE, PERIOD, FILTERS = 0, 3, 6, 7  # layout of the parameters: alpha, beta / T
 STARTED, ANGLE, RATE, LAST = 0, 3, 6, 9  # layout of the memory

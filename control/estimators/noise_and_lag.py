@@ -7,13 +7,11 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from spheretwin.control.estimators import ESTIMATORS
 from spheretwin.control.estimators.estimator import Sampling, estimates
+from spheretwin.models.base.arrays import Array
 from spheretwin.models.base.errors import InputError
-
-Array = NDArray[np.float64]
 
 BANDWIDTH = "bandwidth_rad_s"
 SETTLING = 0.25  # least share of a record that is not evaluated

@@ -21,6 +21,7 @@ from spheretwin.control.law_components.extended_state_observer import (
     history_layout,
     store_command,
 )
+from spheretwin.models.base.arrays import Array
 from spheretwin.models.base.compiled import allocation_free
 from spheretwin.models.telemetry.signals import ANGLES, Signal
 
@@ -29,8 +30,6 @@ def tracking_rate(rate: NDArray[np.float64], known: NominalModel) -> NDArray[np.
     """Limit rates of back-calculation (1/s) to one over the control period."""
     return np.minimum(rate, 1 / known.period_s)
 
-
-Array = NDArray[np.float64]
 
 INTEGRAL_SIGNAL = Signal("integral_torque_Nm", "N·m", 3, "torque of the integral", ANGLES)
 STIFFNESS, DAMPING, INTEGRAL, TRACKING, FRACTION, PERIOD = 0, 3, 6, 9, 12, 13  # layout of the parameters

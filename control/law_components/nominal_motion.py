@@ -2,9 +2,7 @@
 
 from typing import NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
+from spheretwin.models.base.arrays import Array
 from spheretwin.models.base.compiled import allocation_free, compiled
 from spheretwin.models.kinematics import Triple, Turns, turns
 from spheretwin.models.lagrangian import (
@@ -85,9 +83,6 @@ def _times(M: InertiaEntries, x: Triple) -> Triple:
         M.alpha_beta * x[0] + M.beta * x[1],
         M.alpha_gamma * x[0] + M.gamma * x[2],
     )
-
-
-Array = NDArray[np.float64]
 
 
 @compiled

@@ -6,16 +6,14 @@
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field
 
 from spheretwin.control.law import Law, NominalModel, NonNegativeEach, PositiveEach, each
 from spheretwin.control.law_components.feedback import SLIDING_SIGNAL, sliding_surface
 from spheretwin.control.law_components.fuzzy import CONSEQUENTS, approximate_and_adapt
 from spheretwin.control.law_components.parameters import LawParameters, Level, named, torque_factor
+from spheretwin.models.base.arrays import Array
 from spheretwin.models.telemetry.signals import ANGLES, Signal
-
-Array = NDArray[np.float64]
 
 SIGNALS = (
     SLIDING_SIGNAL,

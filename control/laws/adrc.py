@@ -26,14 +26,12 @@ reproduce rivals` has the figures; the study `tuning` searches both bandwidths.
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field
 
 from spheretwin.control.law import Law, NominalModel, PositiveEach, each
 from spheretwin.control.law_components.parameters import LawParameters, named
+from spheretwin.models.base.arrays import Array
 from spheretwin.models.telemetry.signals import ANGLES, Signal
-
-Array = NDArray[np.float64]
 
 SIGNALS = (Signal("observed_torque_Nm", "N·m", 3, "disturbance torque estimated by the observer, d", ANGLES),)
 BANDWIDTH, FIRST, SECOND, THIRD, INERTIA, PERIOD = 0, 3, 6, 9, 12, 15  # layout of the parameters

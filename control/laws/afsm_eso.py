@@ -69,7 +69,6 @@ from math import exp
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
 from spheretwin.control.law import (
@@ -99,11 +98,10 @@ from spheretwin.control.law_components.nominal_motion import (
     required_torque,
 )
 from spheretwin.control.law_components.parameters import LawParameters, named
+from spheretwin.models.base.arrays import Array
 from spheretwin.models.base.compiled import allocation_free
 from spheretwin.models.kinematics import Triple
 from spheretwin.models.telemetry.signals import ANGLES, Signal
-
-Array = NDArray[np.float64]
 
 SIGNALS = (
     SLIDING_SIGNAL,

@@ -29,7 +29,6 @@ on ideal hardware a faster one is better. `spheretwin reproduce rivals` reports 
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field
 
 from spheretwin.control.law import Law, NominalModel, NonNegativeEach, PositiveEach, each
@@ -41,9 +40,8 @@ from spheretwin.control.law_components.extended_state_observer import (
 from spheretwin.control.law_components.feedback import SLIDING_SIGNAL, sliding_surface, tracking_rate
 from spheretwin.control.law_components.nominal_motion import model_torque
 from spheretwin.control.law_components.parameters import LawParameters, named
+from spheretwin.models.base.arrays import Array
 from spheretwin.models.telemetry.signals import ANGLES, Signal
-
-Array = NDArray[np.float64]
 
 SIGNALS = (
     SLIDING_SIGNAL,

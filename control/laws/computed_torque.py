@@ -19,7 +19,6 @@ the figures; the study `tuning` searches ω and the damping.
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field
 
 from spheretwin.control.law import Law, NominalModel, NonNegativeEach, PositiveEach, each
@@ -31,8 +30,7 @@ from spheretwin.control.law_components.extended_state_observer import (
 from spheretwin.control.law_components.feedback import INTEGRAL_SIGNAL, tracking, triple_pole
 from spheretwin.control.law_components.nominal_motion import model_torque
 from spheretwin.control.law_components.parameters import LawParameters, named
-
-Array = NDArray[np.float64]
+from spheretwin.models.base.arrays import Array
 
 # Layout of the parameters.
 STIFFNESS, DAMPING, INTEGRAL, TRACKING, INERTIA, FRACTION, PERIOD = 0, 3, 6, 9, 12, 15, 16

@@ -7,13 +7,11 @@ errors with them; the study `tuning` searches others.
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field
 
 from spheretwin.control.law import Law, NominalModel, NonNegativeEach, PositiveEach, each
 from spheretwin.control.law_components.parameters import LawParameters, Level, named, torque_factor
-
-Array = NDArray[np.float64]
+from spheretwin.models.base.arrays import Array
 
 STIFFNESS, DAMPING, FACTOR = 0, 3, 6  # layout of the parameters
 

@@ -5,10 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from spheretwin.models.base.arrays import Array
 from spheretwin.models.base.compiled import allocation_free
 from spheretwin.models.base.record import Record, Rows, field
-
-Array = NDArray[np.float64]
 
 IN_USE, REPORTED, DETECTED_OPEN, DETECTED_SHORTED = 0, 1, 2, 3
 """States of a group."""

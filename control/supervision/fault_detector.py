@@ -43,6 +43,7 @@ from spheretwin.control.supervision.enabled_groups import (
     REPORTED,
     EnabledGroups,
 )
+from spheretwin.models.base.arrays import Array
 from spheretwin.models.base.compiled import allocation_free
 from spheretwin.models.base.record import Record, Rows, field, put
 from spheretwin.models.coil_group import PerGroup
@@ -51,8 +52,6 @@ from spheretwin.models.kinematics import angular_velocity
 DEVIATIONS = 6.0
 LEAST_SHARE = 0.01  # of the current limit
 SETTLING = 5.0  # time constants
-
-Array = NDArray[np.float64]
 
 
 class DetectorSection(BaseModel):

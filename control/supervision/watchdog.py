@@ -19,10 +19,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from pydantic import BaseModel, ConfigDict, Field
 
+from spheretwin.models.base.arrays import Array
 from spheretwin.models.base.compiled import allocation_free
 from spheretwin.models.base.record import Record, Rows, field, put
-
-Array = NDArray[np.float64]
 
 DEVIATIONS = 6.0
 
