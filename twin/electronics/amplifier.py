@@ -28,17 +28,15 @@ from math import inf, isnan, log1p, nan
 from typing import Annotated, Any, ClassVar, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
 from spheretwin.electronics.coil import OPEN, GroupCoils, Relaxation, relaxation, relaxations
 from spheretwin.electronics.random_streams import UNIFORM, errors
 from spheretwin.electronics.stages import DriveSetup, DriveStage, FaultLine, fill_fault_line
+from spheretwin.models.base.arrays import Array
 from spheretwin.models.base.compiled import inlined
 from spheretwin.models.base.record import Record, Rows, field, put
 from spheretwin.models.base.vectors import WIDTH, Vector, load, store, within
-
-Array = NDArray[np.float64]
 
 # No motion of the rotor induces as much; the bound keeps squares of currents finite.
 LARGEST_EMF_V = 1e9

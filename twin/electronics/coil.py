@@ -12,16 +12,14 @@ from math import expm1, factorial, inf
 from typing import Annotated, Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from pydantic import BaseModel, ConfigDict, Field
 
 from spheretwin.control.applied_torque import fill_lag_step
+from spheretwin.models.base.arrays import Array, Integers
 from spheretwin.models.base.compiled import inlined
 from spheretwin.models.base.record import Record, Rows, field, put
 from spheretwin.models.coil_group import PerGroup
-
-Array = NDArray[np.float64]
-Integers = NDArray[np.int64]
 
 # Terms -(-x)**n / (n + 1)! and (-x)**n (2**n - 2) / (n + 1)!, without (-x)**n and with the sign of the first;
 # up to x = 1/4, the omitted terms are beyond the last digit.

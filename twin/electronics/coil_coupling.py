@@ -22,16 +22,14 @@ took 27 to 65 times as long: under `afsm_eso` on the prototype some group is at 
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from spheretwin.electronics.amplifier import Amplifier, Step, fill_step
 from spheretwin.electronics.coil import GroupCoils
 from spheretwin.electronics.drive_section import ResolvedDrive
+from spheretwin.models.base.arrays import Array
 from spheretwin.models.base.compiled import inlined
 from spheretwin.models.base.errors import InputError, distinct_texts
 from spheretwin.models.base.record import Record, Rows, field, put
-
-Array = NDArray[np.float64]
 
 # In time constants of the current loop. Between 1 and 2.5 the error of the mean currents hardly changes: a
 # fifth of their change by the coupling at the step of the plant, with one part three fifths.

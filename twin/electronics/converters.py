@@ -20,7 +20,6 @@ from math import isnan, nan
 from typing import Annotated, Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field
 
 from spheretwin.electronics.random_streams import NORMAL, SMOOTH, UNIFORM, errors
@@ -35,11 +34,10 @@ from spheretwin.electronics.stages import (
     through,
 )
 from spheretwin.electronics.transducers import CHANNELS
+from spheretwin.models.base.arrays import Array
 from spheretwin.models.base.compiled import inlined
 from spheretwin.models.base.history import push
 from spheretwin.models.base.record import Record, Rows, field, put
-
-Array = NDArray[np.float64]
 
 HARMONICS = 3
 

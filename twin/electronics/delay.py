@@ -5,14 +5,12 @@ from __future__ import annotations
 from typing import Annotated, Any
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field
 
+from spheretwin.models.base.arrays import Array
 from spheretwin.models.base.compiled import inlined
 from spheretwin.models.base.history import push_all
 from spheretwin.models.base.record import Record, field
-
-Array = NDArray[np.float64]
 
 # Clock times are decimal fractions: a delay is a multiple of a step only up to rounding.
 WHOLE = 1e-9

@@ -12,7 +12,6 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from spheretwin.electronics.amplifier import (
     Amplifier,
@@ -49,11 +48,10 @@ from spheretwin.electronics.coil_coupling import (
 from spheretwin.electronics.delay import Delay, due, latch, steps_of, stored_commands
 from spheretwin.electronics.drive_section import STAGES, ResolvedDrive
 from spheretwin.electronics.stages import DriveSetup, FaultLine, chained, fill_fault_line, through
+from spheretwin.models.base.arrays import Array
 from spheretwin.models.base.compiled import allocation_free, copy_into, inlined
 from spheretwin.models.base.record import Record, Rows, capacity, field, put, record_of, transfer_rows
 from spheretwin.models.kinematics import angular_velocity
-
-Array = NDArray[np.float64]
 
 NORMAL, STUCK, SILENT = 0, 1, 2
 """Output of the controller: its commands, only its last command, or nothing."""

@@ -4,12 +4,8 @@ from __future__ import annotations
 
 from math import exp
 
-import numpy as np
-from numpy.typing import NDArray
-
+from spheretwin.models.base.arrays import Array
 from spheretwin.models.base.compiled import inlined
-
-Array = NDArray[np.float64]
 
 
 @inlined

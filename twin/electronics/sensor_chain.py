@@ -11,13 +11,13 @@ from math import hypot, isfinite, isnan, nan
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import BaseModel, Field
 
 from spheretwin.electronics.converters import AdcSection
 from spheretwin.electronics.random_streams import Seed, Streams, width_of
 from spheretwin.electronics.stages import SensorSetup, SensorStage, TickNoise, chained
 from spheretwin.electronics.transducers import CurrentSection, EncoderSection, PotentiometerSection
+from spheretwin.models.base.arrays import Array, Integers
 from spheretwin.models.base.columns import MixedRowsError
 from spheretwin.models.base.compiled import copy_into, inlined
 from spheretwin.models.base.record import Record, Rows, field, put, record_of
@@ -82,9 +82,6 @@ STAGES: dict[str, type[SensorStage]] = {
 }
 """Classes of the sensor stages by their names, in the order in which the angles pass them."""
 
-
-Array = NDArray[np.float64]
-Integers = NDArray[np.int64]
 
 _NAMES = tuple(STAGES)
 SensorStages = record_of(

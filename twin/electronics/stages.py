@@ -7,17 +7,14 @@ from collections.abc import Mapping
 from math import isnan, nan
 from typing import Any, ClassVar, NamedTuple
 
-import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel
 
 from spheretwin.electronics.random_streams import Seed
+from spheretwin.models.base.arrays import Array, Integers
 from spheretwin.models.base.compiled import inlined
 from spheretwin.models.base.record import Record, Rows, field, put
 from spheretwin.trajectories.rounding import CONFIG
-
-Array = NDArray[np.float64]
-Integers = NDArray[np.int64]
 
 
 @inlined

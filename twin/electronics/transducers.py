@@ -18,11 +18,10 @@ from spheretwin.electronics.stages import (
     fill_fault_line,
     through,
 )
+from spheretwin.models.base.arrays import Array
 from spheretwin.models.base.compiled import inlined
 from spheretwin.models.base.record import Record, Rows, field, put
 from spheretwin.trajectories.rounding import CONFIG
-
-Array = NDArray[np.float64]
 
 CHANNELS = 2
 """Number of angles that are measured as voltages: α and β."""

@@ -6,7 +6,6 @@ from collections.abc import Callable
 from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from spheretwin.control.allocation import ALLOCATIONS
 from spheretwin.control.applied_torque import fill_applied_torque
@@ -41,7 +40,6 @@ from spheretwin.scenario.files import Files
 from spheretwin.scenario.plant_sections import ResolvedNominal, ResolvedPlant
 from spheretwin.scenario.sections import ResolvedScenario
 
-Array = NDArray[np.float64]
 T = TypeVar("T")
 
 

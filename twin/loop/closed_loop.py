@@ -22,6 +22,7 @@ from spheretwin.control.law import Law
 from spheretwin.control.supervision.watchdog import GO, Reason, count_rundown, replace_invalid, trip
 from spheretwin.loop.stages import Stages, call_advance, call_sense, call_write
 from spheretwin.models.base.addresses import caller_of
+from spheretwin.models.base.arrays import Array
 from spheretwin.models.base.callback_errors import report_error
 from spheretwin.models.base.compiled import (
     COMPILES,
@@ -45,8 +46,6 @@ from spheretwin.plant.plant_tick import (
     PlantOutput,
     TickInput,
 )
-
-Array = NDArray[np.float64]
 
 _OFFSETS = offsets(MOTION_SIGNALS)
 TIME, ANGLE, RATE = _OFFSETS["t_s"], _OFFSETS["q_rad"], _OFFSETS["qdot_rad_s"]

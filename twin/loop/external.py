@@ -9,16 +9,14 @@ from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from spheretwin.control.supervision.watchdog import Reason, trip
 from spheretwin.loop.closed_loop import INTERRUPTED, NO_EXTERNAL, External
+from spheretwin.models.base.arrays import Array
 from spheretwin.models.base.compiled import COMPILES, uncompiled
 from spheretwin.models.base.errors import InputError, shown
 from spheretwin.models.base.record import Rows
 from spheretwin.plant.plant_tick import GOING
-
-Array = NDArray[np.float64]
 
 _CALLBACK = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_double)
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from math import inf
 
 import numpy as np
-from numpy.typing import NDArray
 
 from spheretwin.control.applied_torque import delay_capacity
 from spheretwin.control.supervision.fault_detector import NominalCurrents, fill_detector
@@ -19,8 +18,6 @@ from spheretwin.models.base.record import Rows, capacity
 from spheretwin.models.inductance import mutual_inductance
 from spheretwin.scenario.plant_sections import ResolvedNominal
 from spheretwin.scenario.sections import ResolvedScenario, Scenario
-
-Array = NDArray[np.float64]
 
 
 def fault_streams(scenario: Scenario, groups: int) -> Streams:

@@ -18,6 +18,7 @@ from spheretwin.electronics.sensor_chain import sense
 from spheretwin.electronics.transducers import sense_currents
 from spheretwin.loop.channels import TelemetryChannel, logged_channels
 from spheretwin.models.base.addresses import caller_of
+from spheretwin.models.base.arrays import Array
 from spheretwin.models.base.compiled import (
     COMPILES,
     allocation_free,
@@ -30,8 +31,6 @@ from spheretwin.models.base.record import Rows
 from spheretwin.models.magnetics import Tables
 from spheretwin.models.telemetry.signals import Signal
 from spheretwin.plant.plant_tick import PlantOutput, TickInput, engine_step, plant_tick
-
-Array = NDArray[np.float64]
 
 _ROW, _ROWS, _FIELD = types.float64[::1], types.float64[:, ::1], types.float64[:, :, ::1]
 _TABLES = types.NamedTuple((_ROWS, _FIELD), Tables)

@@ -11,13 +11,11 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from spheretwin.models.base.arrays import Array
 from spheretwin.models.base.compiled import inlined
 from spheretwin.models.base.record import Record, Rows, field, put
 from spheretwin.plant.plant_part import PlantPart, PlantSetup
-
-Array = NDArray[np.float64]
 
 
 class Backlash(Record):

@@ -32,10 +32,11 @@ from math import exp
 from typing import Annotated, Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from pydantic import BaseModel, ConfigDict, Field
 
 from spheretwin.electronics.random_streams import Seed
+from spheretwin.models.base.arrays import Array
 from spheretwin.models.base.compiled import allocation_free, copy_into, inlined
 from spheretwin.models.base.record import Record, Rows, field, put
 from spheretwin.models.joint_chain import JointChain, inertia_at
@@ -45,8 +46,6 @@ from spheretwin.plant.cable import CableSection, acts, constant_torque_Nm
 from spheretwin.plant.end_stops import EndStops, fill_end_stops, store_stop, with_stop
 from spheretwin.plant.friction import momentum
 from spheretwin.plant.plant_part import PlantPart, PlantSetup
-
-Array = NDArray[np.float64]
 
 SLIP_SHARES = 0.5, 1.0
 """Slip of the sliders of the bearing over `presliding_rad`."""

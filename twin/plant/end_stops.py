@@ -22,14 +22,13 @@ from __future__ import annotations
 from typing import Annotated
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from pydantic import BaseModel, ConfigDict, Field
 
+from spheretwin.models.base.arrays import Array
 from spheretwin.models.base.compiled import inlined
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.base.record import Record, Rows, field, put
-
-Array = NDArray[np.float64]
 
 
 class EndStopsSection(BaseModel):

@@ -17,8 +17,9 @@ from math import sqrt
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from spheretwin.models.base.arrays import Array
 from spheretwin.models.base.compiled import allocation_free, inlined
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.base.record import Record, Rows, field, put
@@ -27,7 +28,6 @@ from spheretwin.models.kinematics import Triple, triple, turns
 from spheretwin.models.lagrangian import InertiaEntries, inertia_entries, solve_inertia
 from spheretwin.plant.plant_part import PlantPart, PlantSetup
 
-Array = NDArray[np.float64]
 Levels = tuple[Triple, Triple]
 """Coulomb friction of the hinges towards positive and towards negative angles, N·m."""
 

@@ -9,17 +9,16 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from spheretwin.models import mjcf
+from spheretwin.models.base.arrays import Array
 from spheretwin.models.base.compiled import allocation_free, inlined
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.base.record import Rows, put
 from spheretwin.models.joint_chain import JointChain, acceleration_at
 from spheretwin.models.kinematics import Triple, triple
 from spheretwin.plant.rotor import EngineKind, RotorData, RotorSettings
-
-Array = NDArray[np.float64]
 
 
 class LagrangianRotor:

@@ -16,6 +16,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from spheretwin.models.base.arrays import Array
 from spheretwin.models.base.compiled import allocation_free, inlined
 from spheretwin.models.base.record import Record, Rows, field
 from spheretwin.models.base.trigonometry import sine_cosine
@@ -23,8 +24,6 @@ from spheretwin.models.kinematics import Triple, Turns, triple
 from spheretwin.models.lagrangian import acceleration_entries, inertia_entries
 from spheretwin.models.magnetics import Tables, fill_torque_matrix, rotor_torque
 from spheretwin.plant.friction import slowed
-
-Array = NDArray[np.float64]
 
 LANES = 16
 """Plants of a block, a constant of the compiled code. Loops over 8 would be unrolled, not vectorised."""

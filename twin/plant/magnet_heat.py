@@ -15,17 +15,17 @@ from __future__ import annotations
 from typing import Annotated, Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from pydantic import BaseModel, ConfigDict, Field
 
 from spheretwin.electronics.coil import GroupCoils, REFERENCE_degC
+from spheretwin.models.base.arrays import Array
 from spheretwin.models.base.compiled import inlined
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.base.record import Record, Rows, field, put
 from spheretwin.models.coil_group import PerGroup
 from spheretwin.plant.plant_part import PlantPart, PlantSetup
 
-Array = NDArray[np.float64]
 Capacity = Annotated[float, Field(ge=1e-3, le=1e7)]
 Resistance = Annotated[float, Field(ge=1e-6, le=1e6)]
 

@@ -14,16 +14,14 @@ from typing import Annotated, Any, NamedTuple
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field
 
 from spheretwin.electronics.random_streams import UNIFORM, Seed, errors
+from spheretwin.models.base.arrays import Array
 from spheretwin.models.base.columns import Columns
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.mjcf import PAYLOAD, ROTOR, Mjcf
 from spheretwin.models.mjcf_reader import LARGEST_OFFSET_M, LARGEST_TILT_RAD
-
-Array = NDArray[np.float64]
 
 LARGEST_CENTRE_m, LARGEST_PRODUCT_kg_m2, LARGEST_RING_kg_m2 = 0.05, 1.0, 1.0
 # A given and a drawn error together, in two directions, stay within the bounds of a model file.

@@ -9,9 +9,10 @@ from typing import Any
 import mujoco
 import numpy as np
 from numba import types
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from spheretwin.models.base.addresses import external_function
+from spheretwin.models.base.arrays import Array
 from spheretwin.models.base.compiled import COMPILES, allocation_free
 from spheretwin.models.base.memory import read_integer, read_number, write_number
 from spheretwin.models.base.mujoco_library import addresses, step_address
@@ -19,8 +20,6 @@ from spheretwin.models.base.record import put
 from spheretwin.models.mjcf import idle_stages
 from spheretwin.plant.mass_properties import row_of
 from spheretwin.plant.rotor import EngineKind, Number, RotorData, RotorSettings
-
-Array = NDArray[np.float64]
 
 INTEGRATORS = {
     "RK4": mujoco.mjtIntegrator.mjINT_RK4,

@@ -10,8 +10,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from spheretwin.models.base.arrays import Array
 from spheretwin.models.base.compiled import allocation_free, compiled, inlined
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.base.record import Rows
@@ -26,8 +26,6 @@ from spheretwin.models.magnetics import (
 )
 from spheretwin.plant.friction import Levels, slow_hinges
 from spheretwin.plant.lagrangian_rotor import runge_kutta
-
-Array = NDArray[np.float64]
 
 
 class State(NamedTuple):

@@ -5,13 +5,12 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numba
-import numpy as np
 from numba import types
-from numpy.typing import NDArray
 
 from spheretwin.electronics.drive_chain import DriveChain, advance, begin, end
 from spheretwin.electronics.transducers import CurrentSensors
 from spheretwin.models.base.addresses import caller_of
+from spheretwin.models.base.arrays import Array
 from spheretwin.models.base.compiled import compiled_callback, copy_into, inlined
 from spheretwin.models.base.record import Record, field
 from spheretwin.models.joint_chain import torque_on_hinges, update_ideal_motion
@@ -58,9 +57,6 @@ GOING, LEFT_WORKSPACE, DIVERGED, FAILSAFE = 0, 1, 2, 3
 # The fastest motion of the rotor within the workspace is some hundred rad/s. A rate above this bound, which
 # is far below the engine's own bound of 1e10, means divergence.
 FASTEST_RATE_rad_s = 1e6
-
-
-Array = NDArray[np.float64]
 
 
 class Plant(Record):

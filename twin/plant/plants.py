@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from spheretwin.models.base.arrays import is_real, real_array
+from spheretwin.models.base.arrays import Array, is_real, real_array
 from spheretwin.models.base.errors import InputError, shown
 from spheretwin.models.base.record import Rows, put
 from spheretwin.models.magnetics import Tables, scratch_of
@@ -16,7 +16,6 @@ from spheretwin.plant.friction import levels
 from spheretwin.plant.lanes import LANES, LaneMagnetics, PlantBlock
 from spheretwin.plant.plant_step import LONGEST_STEP_s, Parameters, State, check_parameters, roll_out
 
-Array = NDArray[np.float64]
 Plant = int | NDArray[np.integer] | NDArray[np.bool_]
 """Number of one plant, numbers of some, or a mask."""
 

@@ -10,13 +10,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from spheretwin.models.actuator import Actuator
+from spheretwin.models.base.arrays import Array
 from spheretwin.models.base.record import Record, Rows, field
 from spheretwin.models.joint_chain import JointChain, fill_chain, fill_ideal
 from spheretwin.models.lagrangian import loaded_inertia
 from spheretwin.models.mjcf import Mjcf
 from spheretwin.plant.mass_properties import MassErrors, row_of, true_model
 
-Array = NDArray[np.float64]
 Number = float | Array
 
 

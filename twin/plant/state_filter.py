@@ -19,13 +19,11 @@ from math import erfc, exp, inf, isnan, log, pi, sqrt
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from spheretwin.models.base.arrays import Array
 from spheretwin.models.base.compiled import allocation_free, compiled
 from spheretwin.plant.plant_step import Parameters, State
 from spheretwin.plant.plant_step import step_of_checked as step
-
-Array = NDArray[np.float64]
 
 STATES = 9
 """Angles, rates, disturbance; three offsets may follow."""
