@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from spheretwin.config.active_config import initial_config
 from spheretwin.config.plant_model import parameters_of
@@ -18,12 +18,11 @@ from spheretwin.linear import python_control
 from spheretwin.loop.closed_loop import Inputs
 from spheretwin.loop.hardware_assembly import fault_streams
 from spheretwin.loop.runtime import Runtime, RuntimeState
+from spheretwin.models.base.arrays import Array
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.mjcf_reader import HINGES
 from spheretwin.plant.plant_step import State, step
 from spheretwin.scenario.sections import Scenario
-
-Array = NDArray[np.float64]
 
 STATES = tuple(f"{hinge}_{unit}" for unit in ("rad", "rad_s") for hinge in HINGES)
 REFERENCE = tuple(f"{hinge}_ref_{unit}" for unit in ("rad", "rad_s", "rad_s2") for hinge in HINGES)

@@ -9,12 +9,13 @@ from pathlib import Path
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from spheretwin.config.active_config import check_pose, initial_config
 from spheretwin.config.plant_model import parameters_of
 from spheretwin.models.actuator import Actuator
 from spheretwin.models.base import extras
+from spheretwin.models.base.arrays import Array
 from spheretwin.models.base.errors import InputError, distinct_texts, shown
 from spheretwin.models.coil_group import PerGroup, of_each_group
 from spheretwin.models.kinematics import rate_jacobian
@@ -101,8 +102,6 @@ def linearisation_data(scenario: ResolvedScenario, files: Files, *, nominal: boo
         current_limit_A=min(sheet.current_limit_A, drive.current_limit_A),
     )
 
-
-Array = NDArray[np.float64]
 
 # Step of fourth-order differences: with a tenth of it slopes differ by 3e-10 of the largest, with ten times
 # it by 6e-7, as the steps then extend over knots of the spline of the curve.

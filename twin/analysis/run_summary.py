@@ -5,16 +5,14 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from spheretwin.analysis.recorded_run import Reviewed, events, of_the_actuator
 from spheretwin.metrics.figures import Figures
 from spheretwin.metrics.reduction import PlannedRun
+from spheretwin.models.base.arrays import Array
 from spheretwin.models.base.errors import InputError, shown
 from spheretwin.models.telemetry.signals import ANGLES
 from spheretwin.models.telemetry.table import Table
-
-Array = NDArray[np.float64]
 
 
 def mechanical_work_J(table: Table, period_s: float) -> float | None:

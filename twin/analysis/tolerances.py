@@ -8,10 +8,10 @@ from importlib import resources
 from typing import Annotated, Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from spheretwin.analysis.recorded_run import Reviewed
+from spheretwin.models.base.arrays import Array
 from spheretwin.models.base.errors import InputError, did_you_mean
 from spheretwin.models.telemetry.signals import Signal
 from spheretwin.scenario.fields import explain
@@ -78,8 +78,6 @@ def _error_text(error: ValidationError, fields: dict[str, Any]) -> str:
                 return f"signals.{name}: {explain(inner, Tolerance)}"
     return explain(error, Tolerances)
 
-
-Array = NDArray[np.float64]
 
 # A time of whole ticks is exact to rounding only.
 WHOLE = 1e-9

@@ -7,8 +7,8 @@ from importlib import import_module
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from spheretwin.models.base.arrays import Array
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.base.extras import missing
 from spheretwin.models.kinematics import generalised_torque, rotation_rows
@@ -16,8 +16,6 @@ from spheretwin.models.lagrangian import acceleration_entries
 from spheretwin.models.magnetics import KNEE, NARROW_PER_UNIT, WIDE_PER_UNIT
 from spheretwin.models.symbolic import on_symbols, turns_by
 from spheretwin.plant.plant_step import Parameters
-
-Array = NDArray[np.float64]
 
 NAMES = (
     *(f"inertia_{axis}_kg_m2" for axis in "xyz"),

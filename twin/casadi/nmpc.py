@@ -26,7 +26,6 @@ from __future__ import annotations
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field
 
 from spheretwin.casadi.functions import library, rigid_body
@@ -41,10 +40,9 @@ from spheretwin.control.law_components.extended_state_observer import (
 from spheretwin.control.law_components.nominal_motion import RotorModel, RotorMotion, advance_motion
 from spheretwin.control.law_components.parameters import LawParameters, named
 from spheretwin.models import actuator, magnetics
+from spheretwin.models.base.arrays import Array
 from spheretwin.models.kinematics import rate_jacobian
 from spheretwin.models.telemetry.signals import ANGLES, Signal
-
-Array = NDArray[np.float64]
 
 SIGNALS = (
     Signal("observed_disturbance_Nm", "N·m", 3, "disturbance torque estimated by the observer, d̂", ANGLES),

@@ -14,7 +14,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from spheretwin import scenario as scenarios
 from spheretwin.config.active_config import initial_config
@@ -31,12 +30,11 @@ from spheretwin.linear import Magnetics
 from spheretwin.loop import assembly
 from spheretwin.loop.stages import PlantStage, call_advance, plant_stage
 from spheretwin.models.actuator import Actuator
+from spheretwin.models.base.arrays import Array
 from spheretwin.models.base.checks import Check, Checks
 from spheretwin.models.base.compiled import compiled
 from spheretwin.models.mjcf import read
 from spheretwin.plant.plant_tick import GOING, PlantOutput, TickInput
-
-Array = NDArray[np.float64]
 
 ENGINES = {"MuJoCo": "mujoco", "Lagrangian": "lagrangian"}
 

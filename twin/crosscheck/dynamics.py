@@ -16,11 +16,11 @@ from typing import Any, NamedTuple
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
 from spheretwin.crosscheck.equations import equations_of, symmetric
 from spheretwin.crosscheck.scale import scale_of
 from spheretwin.models.actuator import Actuator
+from spheretwin.models.base.arrays import Array
 from spheretwin.models.base.checks import Check
 from spheretwin.models.base.errors import InputError, without_breaks
 from spheretwin.models.joint_chain import JointChain, chain_at, equations, fill_chain, fill_ideal
@@ -82,8 +82,6 @@ def model_of_bodies(model: mujoco.MjModel) -> tuple[Any, int]:
             chain.appendBodyToJoint(placed[body], inertia, pinocchio.SE3.Identity())
     return chain, chain.getJointId("gamma")
 
-
-Array = NDArray[np.float64]
 
 LARGEST_TILT_rad = np.radians(80)  # the hinges' range
 SEED = 0

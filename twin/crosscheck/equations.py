@@ -11,10 +11,10 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from spheretwin.linear import Magnetics, hinge_matrix
 from spheretwin.models.actuator import MJCF_PATH, Actuator
+from spheretwin.models.base.arrays import Array
 from spheretwin.models.base.record import Rows
 from spheretwin.models.joint_chain import (
     JointChain,
@@ -29,8 +29,6 @@ from spheretwin.models.joint_chain import (
 from spheretwin.models.kinematics import rate_jacobian, triple
 from spheretwin.models.lagrangian import coriolis_matrix
 from spheretwin.models.mjcf import PAYLOAD, ROTOR, beyond_an_ideal_joint, read
-
-Array = NDArray[np.float64]
 
 NEGLIGIBLE_RINGS = 1e-9
 """Share of the rotor's inertia from which on rings are part of the equations of motion."""

@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from spheretwin.crosscheck.dynamics import random_states
 from spheretwin.models.actuator import Actuator
+from spheretwin.models.base.arrays import Array
 from spheretwin.models.base.checks import Check, Checks
 from spheretwin.models.kinematics import rotor_rate_jacobian
 from spheretwin.models.lagrangian import coriolis_matrix, coupling_torques, inertia_matrix
-
-Array = NDArray[np.float64]
 
 # A handful of products and sums, each rounded at 1e-16, divided by the size of the terms.
 BOUND = 1e-14

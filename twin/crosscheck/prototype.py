@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from spheretwin import scenario as scenarios
 from spheretwin.crosscheck.scale import nutation_fields, scale_of
@@ -19,8 +18,6 @@ from spheretwin.models.base.checks import Check, Checks
 from spheretwin.models.base.errors import InputError
 from spheretwin.run import Run
 from spheretwin.simulation import simulate
-
-Array = NDArray[np.float64]
 
 STEP_s, FINE_s = 5e-4, 1.25e-4
 SEEDS = (1, 2, 3, 4)

@@ -12,13 +12,11 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from spheretwin.linear import Magnetics, hinge_matrix
 from spheretwin.models import actuator as actuators
 from spheretwin.models.actuator import Actuator
-
-Array = NDArray[np.float64]
+from spheretwin.models.base.arrays import Array
 
 EXCURSION_rad = np.array([0.6, 0.6, 2.3])
 """Angle of each hinge from the middle of its range that the motions take up at most."""

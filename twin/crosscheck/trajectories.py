@@ -14,11 +14,11 @@ from typing import Any, NamedTuple
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
 from spheretwin.crosscheck.equations import Equations, equations_of
 from spheretwin.models.actuator import Actuator
+from spheretwin.models.base.arrays import Array
 from spheretwin.models.base.checks import Check
 from spheretwin.models.base.errors import EngineError
 from spheretwin.models.mjcf import read
@@ -27,8 +27,6 @@ from spheretwin.plant.lagrangian_rotor import LagrangianRotor
 from spheretwin.plant.mass_properties import true_model
 from spheretwin.plant.mujoco_rotor import MujocoRotor
 from spheretwin.trajectories.shapes import Nutation
-
-Array = NDArray[np.float64]
 
 DURATION_s = 5.0
 HOLD_s = 0.01

@@ -23,6 +23,7 @@ from spheretwin.envs.episode import (
     observe,
 )
 from spheretwin.models.base import cuda
+from spheretwin.models.base.arrays import Array
 from spheretwin.models.base.compiled import allocation_free, inlined
 from spheretwin.models.base.errors import InputError, shown
 from spheretwin.models.base.record import Record, field
@@ -31,8 +32,6 @@ from spheretwin.models.magnetics import SCRATCH_COLUMNS, Tables, TorqueModel
 from spheretwin.plant.lanes import LaneMagnetics
 from spheretwin.plant.plant_step import Parameters, advance
 from spheretwin.plant.plants import Plants
-
-Array = NDArray[np.float64]
 
 REFUSED = -1
 """Code of an episode whose action is not finite."""

@@ -9,13 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spheretwin.electronics.coil import advance_lag
+from spheretwin.models.base.arrays import Array
 from spheretwin.models.base.compiled import allocation_free, inlined
 from spheretwin.models.base.record import Rows
 from spheretwin.models.kinematics import Triple
 from spheretwin.plant.lanes import LANES, LaneMagnetics, PlantBlock, advance
 from spheretwin.plant.plant_tick import FASTEST_RATE_rad_s
-
-Array = NDArray[np.float64]
 
 RUNNING, LEFT_WORKSPACE, DIVERGED, COMPLETED = 0, 1, 2, 3
 STATUS = ("running", "left_workspace", "diverged", "completed")

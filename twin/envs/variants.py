@@ -6,7 +6,6 @@ from functools import cache
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from spheretwin import scenario as scenarios
 from spheretwin.config.active_config import initial_config
@@ -14,12 +13,11 @@ from spheretwin.config.plant_model import parameters
 from spheretwin.electronics.coil import CurrentLag, fill_lag
 from spheretwin.envs.settings import Settings
 from spheretwin.loop.inputs import InputGenerator
+from spheretwin.models.base.arrays import Array
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.base.record import Rows
 from spheretwin.plant.plant_step import Parameters
 from spheretwin.scenario.sections import Scenario
-
-Array = NDArray[np.float64]
 
 # What an environment does not have; other values would be dropped.
 _IDEAL = ("sensors", "drive", "fault", "event", "detector", "watchdog", "manual")

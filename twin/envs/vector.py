@@ -20,13 +20,11 @@ from spheretwin.envs.episode import (
     motion_of,
     observe,
 )
-from spheretwin.models.base.arrays import real_array
+from spheretwin.models.base.arrays import Array, real_array
 from spheretwin.models.base.compiled import for_types_of
 from spheretwin.models.base.errors import InputError, shown
 from spheretwin.plant.lanes import LANES
 from spheretwin.plant.plants import Plants
-
-Array = NDArray[np.float64]
 
 
 class TwinVectorEnv(EpisodeBatch):

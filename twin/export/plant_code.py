@@ -7,13 +7,13 @@ from types import SimpleNamespace
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from spheretwin import scenario as scenarios
 from spheretwin.config.active_config import initial_config
 from spheretwin.config.plant_model import parameters
 from spheretwin.export.c_text import constant, definitions, header
 from spheretwin.models import magnetics
+from spheretwin.models.base.arrays import Array
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.coil_group import of_each_group
 from spheretwin.models.magnetics import Arrangement, Tables
@@ -22,7 +22,6 @@ from spheretwin.plant.magnet_heat import initial_degC, remanence
 from spheretwin.plant.plant_step import Parameters
 from spheretwin.scenario.sections import ResolvedScenario
 
-Array = NDArray[np.float64]
 Inputs = Literal["currents", "voltages"]
 
 LARGEST = 1e15

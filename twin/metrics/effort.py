@@ -10,10 +10,8 @@ from numpy.typing import NDArray
 from spheretwin.control.applied_torque import lag_step
 from spheretwin.metrics.reduction import Metric, PlannedRun
 from spheretwin.metrics.tracking import add_largest
+from spheretwin.models.base.arrays import Array, Integers
 from spheretwin.models.base.compiled import rounding_each
-
-Array = NDArray[np.float64]
-Integers = NDArray[np.int64]
 
 
 class CopperState(NamedTuple):

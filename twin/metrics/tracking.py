@@ -5,14 +5,11 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from spheretwin.metrics.reduction import Metric, PlannedRun
+from spheretwin.models.base.arrays import Array, Integers
 from spheretwin.models.base.compiled import rounding_each
 from spheretwin.models.telemetry.signals import ANGLES
-
-Array = NDArray[np.float64]
-Integers = NDArray[np.int64]
 
 
 @rounding_each

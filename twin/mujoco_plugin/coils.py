@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from spheretwin.models.base.arrays import Array, Integers
 from spheretwin.models.base.compiled import allocation_free
 from spheretwin.models.base.memory import read_integer, read_number, write_number
 from spheretwin.models.base.record import Record, Rows, field
@@ -18,9 +18,6 @@ from spheretwin.models.magnetics import (
     update_cached_matrix,
 )
 from spheretwin.mujoco_plugin.configuration import CURRENT, TORQUE, Parts
-
-Array = NDArray[np.float64]
-Integers = NDArray[np.int64]
 
 # Values of `task`.
 ACT_DOT, FORCE, SENSORS = 0, 1, 2

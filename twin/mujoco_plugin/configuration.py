@@ -15,11 +15,11 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationEr
 from spheretwin.models import actuator as actuators
 from spheretwin.models import torque_curve, torque_field
 from spheretwin.models.actuator import Actuator, groups_of, polarities
+from spheretwin.models.base.arrays import Array
 from spheretwin.models.base.errors import InputError, shown
 from spheretwin.models.coil_group import of_each_group
 from spheretwin.models.mjcf_reader import named, sites
 
-Array = NDArray[np.float64]
 Addresses = NDArray[np.int64]
 
 PLUGIN = "spheretwin.coils"

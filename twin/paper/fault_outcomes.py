@@ -8,7 +8,6 @@ from math import isfinite, nan
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from spheretwin.control.allocation.bounded import SCRATCH_ROWS, allocate_bounded
 from spheretwin.control.allocation.least_norm import allocate
@@ -16,6 +15,7 @@ from spheretwin.control.supervision.enabled_groups import REPORTED
 from spheretwin.control.supervision.fault_detector import LEAST_SHARE, DetectorSection
 from spheretwin.control.supervision.watchdog import REASONS, Reason, WatchdogSection
 from spheretwin.models.actuator import Actuator
+from spheretwin.models.base.arrays import Array
 from spheretwin.models.base.compiled import compiled
 from spheretwin.models.design.capability import LOST, torque_matrices
 from spheretwin.models.telemetry.table import Table
@@ -90,8 +90,6 @@ def _fill_most(G: Array, torque_S: Array, limit: float, most: Array, scaled: Arr
         most[i] = MOST * allocate_bounded(G[i], command, limit, current, scratch)
         scaled[i] = MOST * allocate(G[i], command, limit, current)
 
-
-Array = NDArray[np.float64]
 
 PATH_TICKS = 10
 """Interval of the poses on the path: 10 ms, in which the rotor turns by some 4°."""

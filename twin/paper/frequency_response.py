@@ -21,10 +21,10 @@ from scipy.signal import cont2discrete
 from spheretwin.config.active_config import initial_config
 from spheretwin.control.law import Law
 from spheretwin.linear import linearise
+from spheretwin.models.base.arrays import Array
 from spheretwin.models.telemetry.table import Table
 from spheretwin.scenario.sections import Scenario
 
-Array = NDArray[np.float64]
 Response = NDArray[np.complex128]
 
 SETTLING_s, WINDOW_s = 1.0, 1.0

@@ -11,10 +11,10 @@ from itertools import islice
 from typing import Any, NamedTuple, get_type_hints
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import TypeAdapter
 
 from spheretwin.metrics.user_metrics import UserMetric
+from spheretwin.models.base.arrays import Array
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.telemetry.status import Status
 from spheretwin.paper.earlier_runs import EarlierRuns, key_of
@@ -27,8 +27,6 @@ from spheretwin.study.engines.threads import run_each
 from spheretwin.study.grid import Row
 from spheretwin.study.row import RowResult, Rows
 from spheretwin.study.study import FULL, Study
-
-Array = NDArray[np.float64]
 
 PLANT = "plant.engine"
 

@@ -12,9 +12,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from spheretwin.models.base.arrays import Array
 from spheretwin.models.base.errors import shown
 from spheretwin.scenario.fields import quantity_text
-from spheretwin.study.statistics import Array, StudyTable, quantile_text, ranked, strongest
+from spheretwin.study.statistics import StudyTable, quantile_text, ranked, strongest
 from spheretwin.viz.pages import markdown as pieces
 from spheretwin.viz.pages.markdown import Drawing, PageSection, ReportPage, ResultTable
 

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from spheretwin.metrics import METRICS
+from spheretwin.models.base.arrays import Array
 from spheretwin.models.telemetry import checksums
 from spheretwin.models.telemetry.status import Status
 from spheretwin.study.row import FAILED
@@ -22,7 +23,6 @@ if TYPE_CHECKING:
     import pyarrow as pa
     import pyarrow.parquet
 
-Array = NDArray[np.float64]
 Texts = NDArray[np.object_]
 
 MAIN, TILT = "max_abs_error_rad", "max_abs_tilt_error_rad"

@@ -12,10 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, PrivateAttr, model_validator
 
+from spheretwin.models.base.arrays import Array
 from spheretwin.models.base.reuse import reused
 from spheretwin.models.telemetry.csv_series import TIME, LONGEST_s, TimeSeries, check_rising, read
-
-Array = NDArray[np.float64]
 
 # The generator counts in blocks of four numbers; a tick uses the first number of its block.
 NUMBERS_PER_COUNT = 4

@@ -13,12 +13,10 @@ from decimal import ROUND_CEILING, Context
 from typing import Annotated, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field
 
+from spheretwin.models.base.arrays import Array
 from spheretwin.models.telemetry.csv_series import LONGEST_s
-
-Array = NDArray[np.float64]
 
 # Format of the smallest acceleration in messages: six digits, rounded up.
 UP = Context(prec=6, rounding=ROUND_CEILING)

@@ -7,9 +7,9 @@ from typing import Annotated, Literal, NamedTuple
 
 import numpy as np
 from numpy.polynomial.polynomial import polyder, polyval
-from numpy.typing import NDArray
 from pydantic import Field, PrivateAttr
 
+from spheretwin.models.base.arrays import Array
 from spheretwin.models.base.errors import InputError, distinct_texts
 from spheretwin.models.telemetry.csv_series import TIME, TimeSeries, read
 from spheretwin.models.telemetry.signals import ANGLES
@@ -19,7 +19,6 @@ from spheretwin.trajectories.trajectory import Samples, Shape
 AXES = ("alpha", "beta", "gamma")
 COLUMNS = tuple(f"{axis}_rad" for axis in AXES)
 
-Array = NDArray[np.float64]
 Between = Literal["minimum_jerk", "cubic"]
 Limit = Annotated[float, Field(gt=0)]
 

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from spheretwin.models.base.arrays import Array
 from spheretwin.models.base.extras import missing
 from spheretwin.study import optimise as objectives
 from spheretwin.study.optimise import Gain, Optimise
@@ -173,8 +174,6 @@ class Proposer:
             return samplers.RandomSampler(seed=seed)
         return samplers.TPESampler(seed=seed)
 
-
-Array = NDArray[np.float64]
 
 MOVED = 0.5
 """Probability that a perturbation moves a coordinate; one is always moved."""
