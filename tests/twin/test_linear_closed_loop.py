@@ -22,7 +22,7 @@ MISTAKEN = {
 }  # fmt: skip
 
 
-class Step(NamedTuple):
+class StepResponse(NamedTuple):
     """Rests at a pose until the currents are those that hold it, then steps away from it."""
 
     pose: np.ndarray
@@ -62,7 +62,7 @@ def deviation(scenario, pose, controller, size, *, lag=False):
     """Largest difference of the twin's step response from the linear one, over the step."""
     model = linearise(scenario, pose, lag=lag)
     law = Law.from_lti(controller, constant_torque_Nm=model.input_at_rest)
-    run = simulate(scenario, law=law, trajectory=Step(pose, size * DIRECTION))
+    run = simulate(scenario, law=law, trajectory=StepResponse(pose, size * DIRECTION))
     assert run.status == "completed"
     first = round(SETTLING_S / PERIOD_S)
     angles = run.telemetry["q_rad"][first:]

@@ -34,10 +34,10 @@ SWITCHED = (LARGE, ERRORS)
 """Groups with tabs, which are higher: one for the settled runs, others for all values and for differences."""
 
 
-Limits = tuple[float, float]
+AxisRange = tuple[float, float]
 
 
-class Plot(NamedTuple):
+class QuantityPlot(NamedTuple):
     """Plot of one quantity of all runs."""
 
     name: str
@@ -45,8 +45,8 @@ class Plot(NamedTuple):
     group: str
     desired: bool
     """True if the reference is drawn with it."""
-    limits: Limits
-    whole: Limits
+    limits: AxisRange
+    whole: AxisRange
     """Limits that contain all values."""
 
     @property
@@ -62,8 +62,8 @@ class ComparisonView(NamedTuple):
     """Names."""
     leaders: tuple[str, ...]
     """Names of the runs that show the reference."""
-    plots: tuple[Plot, ...]
-    differences: tuple[Plot, ...]
+    plots: tuple[QuantityPlot, ...]
+    differences: tuple[QuantityPlot, ...]
     """Plots of the errors minus those of the first run."""
     duration_s: float
     states: tuple[str, ...]
@@ -112,11 +112,11 @@ def _row(view: ComparisonView, group: str) -> rrb.Container:
     return rrb.Tabs(*tabs, active_tab=0) if len(tabs) > 1 else tabs[0]
 
 
-def _plots(view: ComparisonView, group: str) -> list[Plot]:
+def _plots(view: ComparisonView, group: str) -> list[QuantityPlot]:
     return [plot for plot in view.plots if plot.group == group]
 
 
-def _plot(view: ComparisonView, plot: Plot, limits: Limits) -> rrb.TimeSeriesView:
+def _plot(view: ComparisonView, plot: QuantityPlot, limits: AxisRange) -> rrb.TimeSeriesView:
     contents = [
         *(f"/{REFERENCE}/{run}/{plot.name}" for run in view.leaders if plot.desired),
         *(f"/{run}/{COMPARE}/{plot.name}" for run in view.runs),
@@ -126,13 +126,13 @@ def _plot(view: ComparisonView, plot: Plot, limits: Limits) -> rrb.TimeSeriesVie
     return _time_plot(view, plot.title if limits == plot.limits else plot.heading, contents, limits)
 
 
-def _difference(view: ComparisonView, plot: Plot) -> rrb.TimeSeriesView:
+def _difference(view: ComparisonView, plot: QuantityPlot) -> rrb.TimeSeriesView:
     contents = [f"/{run}/{DIFFERENCE}/{plot.name}" for run in view.runs[1:]]
     return _time_plot(view, plot.title, contents, plot.limits)
 
 
 def _time_plot(
-    view: ComparisonView, title: str, contents: Sequence[str], limits: Limits
+    view: ComparisonView, title: str, contents: Sequence[str], limits: AxisRange
 ) -> rrb.TimeSeriesView:
     return rrb.TimeSeriesView(
         origin="/",

@@ -26,7 +26,7 @@ from spheretwin.viz.comparison.merged_layout import (
     RUNS,
     TIP,
     ComparisonView,
-    Plot,
+    QuantityPlot,
     application,
     layout,
 )
@@ -167,13 +167,13 @@ def _write_reference(
             send_lines(recording, quantity.name, run.table["t_s"], line)
 
 
-def _plot_of(quantity: Quantity, of_quantity: PlotRange, of_runs: Sequence[Array]) -> Plot:
+def _plot_of(quantity: Quantity, of_quantity: PlotRange, of_runs: Sequence[Array]) -> QuantityPlot:
     """Return the plot of a quantity, with limits of all values if some are outside of its range."""
     low, high, outside = of_quantity
     limits = quantity.limits or labelled(low, high, quantity.floor, STEPS)
     heading, desired = _heading(quantity), quantity.desired is not None
     whole = labelled(*value_bounds(of_runs), quantity.floor, STEPS) if outside else limits
-    return Plot(quantity.name, heading, quantity.group, desired, limits, whole)
+    return QuantityPlot(quantity.name, heading, quantity.group, desired, limits, whole)
 
 
 SYMBOLS = {"torque_command_norm_Nm": "τ", "largest_current_A": "i", "torque_margin": "margin"}
@@ -187,7 +187,7 @@ def _heading(quantity: Quantity) -> str:
     return f"{SYMBOLS.get(quantity.name, quantity.title.split()[0])} {quantity.unit}".removesuffix(" 1")
 
 
-class Difference(NamedTuple):
+class ErrorDifference(NamedTuple):
     """Errors of a run minus those of the first one at the ticks of both."""
 
     t_s: Array
@@ -195,22 +195,22 @@ class Difference(NamedTuple):
 
 
 def _difference_plots(
-    errors: Sequence[Quantity], differences: Sequence[Sequence[Difference]], runs: Sequence[ComparedRun]
-) -> tuple[Plot, ...]:
+    errors: Sequence[Quantity], differences: Sequence[Sequence[ErrorDifference]], runs: Sequence[ComparedRun]
+) -> tuple[QuantityPlot, ...]:
     """Return the plots of the differences, with one range."""
     together = [np.concatenate([of.values for of in parts]) for parts in zip(*differences, strict=True)]
     limits = labelled(*settled_bounds(runs[1:], together, ERROR.floor), ERROR.floor, STEPS)
-    return tuple(Plot(of.name, _heading(of), ERRORS, False, limits, limits) for of in errors)
+    return tuple(QuantityPlot(of.name, _heading(of), ERRORS, False, limits, limits) for of in errors)
 
 
-def _differences(quantity: Quantity, runs: Sequence[ComparedRun]) -> list[Difference]:
+def _differences(quantity: Quantity, runs: Sequence[ComparedRun]) -> list[ErrorDifference]:
     """Return the differences of every run but the first."""
     first, *others = runs
     differences = []
     for run in others:
         rows, of_first = common_rows(run.table, first.table)
         values = quantity.column(run.rows)[rows] - quantity.column(first.rows)[of_first]
-        differences.append(Difference(run.table["t_s"][rows], values))
+        differences.append(ErrorDifference(run.table["t_s"][rows], values))
     return differences
 
 

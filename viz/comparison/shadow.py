@@ -47,7 +47,7 @@ SHADE = 0.65
 _FARTHEST = 8.0  # innovations beyond it are cut
 
 
-class Plot(NamedTuple):
+class ShadowPlot(NamedTuple):
     """Lines of a plot for some rows."""
 
     name: str
@@ -157,7 +157,7 @@ def _bands(signals: Sequence[Signal]) -> list[str]:
     return [name for name in BANDS if name in names]
 
 
-def plots_of(telemetry: Table) -> list[Plot]:
+def plots_of(telemetry: Table) -> list[ShadowPlot]:
     """Return the plots of some rows: a quantity of all hinges in each."""
     measured, estimated = telemetry["q_measured_rad"], telemetry["q_estimated_rad"]
     before = [Line(f"{ANGLES[i]} measured", measured[:, i], theme.COMMAND, THICK) for i in range(3)]
@@ -171,13 +171,13 @@ def plots_of(telemetry: Table) -> list[Plot]:
         Line("lower limit", -limit, theme.COMMAND, MIDDLE),
     ]
     plots = [
-        Plot(ANGLE, (*before, *above), _range(measured)),
-        Plot(INNOVATION, (*innovations, *limits), (-farthest, farthest)),
+        ShadowPlot(ANGLE, (*before, *above), _range(measured)),
+        ShadowPlot(INNOVATION, (*innovations, *limits), (-farthest, farthest)),
     ]
     for name in _bands(telemetry.signals):
         lines = tuple(_band(telemetry, name, BANDS[name][1]))
         settled = settled_rows(telemetry, name)
-        plots.append(Plot(name, lines, _range(np.stack([line.values[settled] for line in lines]))))
+        plots.append(ShadowPlot(name, lines, _range(np.stack([line.values[settled] for line in lines]))))
     return plots
 
 

@@ -77,7 +77,7 @@ class StateLanes(RecordingPart):
             recording.send_columns(entity, time_index(np.array(t_s)), rr.StateChange.columns(state=states))
 
 
-class Log(RecordingPart):
+class EventLog(RecordingPart):
     """Lines of what the telemetry shows, and how the run ended."""
 
     def __init__(self, subject: RecordingSubject) -> None:

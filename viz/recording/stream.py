@@ -22,7 +22,7 @@ from spheretwin.viz.recording.part import RecordingPart, RecordingSubject, RowSe
 from spheretwin.viz.recording.plots import PhasePlane, PlotData
 from spheretwin.viz.recording.scene3d import Ending, MovingActuator, Torques, Traces
 from spheretwin.viz.recording.signals import ScenarioText, Signals
-from spheretwin.viz.recording.status import LimitLanes, Log, StateLanes
+from spheretwin.viz.recording.status import EventLog, LimitLanes, StateLanes
 
 PARTS: tuple[type[RecordingPart], ...] = (
     ScenarioText,
@@ -33,7 +33,7 @@ PARTS: tuple[type[RecordingPart], ...] = (
     Ending,
     StateLanes,
     LimitLanes,
-    Log,
+    EventLog,
     CoilCurrents,
     PhasePlane,
     PlotData,  # the last: when a run has ended it sends the layout

@@ -12,7 +12,7 @@ from rich.markup import escape
 from spheretwin.models.telemetry.signals import ANGLES
 from spheretwin.models.telemetry.status import named
 from spheretwin.viz.terminal import tables
-from spheretwin.viz.terminal.runs import NONE, Metric, angle, metrics, print_metrics, print_rows
+from spheretwin.viz.terminal.runs import NONE, ReportedMetric, angle, metrics, print_metrics, print_rows
 from spheretwin.viz.terminal.tables import percent, three_digits
 
 FACTS = ("scenario", "law", "modelling_error", "load", "hardware", "seed", "status", "reason", "simulated_s")
@@ -185,7 +185,7 @@ LARGEST_PERCENT = 1000
 """A larger change is written as a factor."""
 
 
-def _with_difference(first: float | None, value: float | None, row: Metric) -> str:
+def _with_difference(first: float | None, value: float | None, row: ReportedMetric) -> str:
     """Return a figure, and below it the difference from the first, absolute and relative."""
     if first is None or value is None:
         return row.text(value)

@@ -21,7 +21,7 @@ NONE = "–"
 """Cell without a value."""
 
 
-class Metric(NamedTuple):
+class ReportedMetric(NamedTuple):
     """Metric of a run in reports."""
 
     label: str
@@ -42,22 +42,22 @@ class Metric(NamedTuple):
         return percent(value) if self.unit == "1" else f"{three_digits(value)} {self.unit}"
 
 
-def metrics(band_rad: float) -> tuple[Metric, ...]:
+def metrics(band_rad: float) -> tuple[ReportedMetric, ...]:
     """Return the metrics of reports, those of each axis first; with a settling band, rad."""
     settled = f"settled to ±{1e3 * band_rad:g} mrad after"
     return (
-        Metric("largest", "max_abs_error_rad", "rad", each_axis=True),
-        Metric("rms", "rms_error_rad", "rad", each_axis=True),
-        Metric("rms, second half", "tail_rms_error_rad", "rad", each_axis=True),
-        Metric("overshoot", "overshoot_rad", "rad", each_axis=True),
-        Metric(settled, "settling_time_s", "s", each_axis=True, none="never"),
-        Metric("largest current", "max_abs_current_A", "A"),
-        Metric("share of ticks at the limit", "saturated_fraction", "1"),
-        Metric("rms torque", "rms_torque_Nm", "N·m"),
-        Metric("variation of the commands", "current_variation_A_s", "A/s"),
-        Metric("copper loss", "copper_loss_J", "J"),
-        Metric("work on the rotor", "mechanical_work_J", "J", signed=True),
-        Metric("energy", "energy_J", "J"),
+        ReportedMetric("largest", "max_abs_error_rad", "rad", each_axis=True),
+        ReportedMetric("rms", "rms_error_rad", "rad", each_axis=True),
+        ReportedMetric("rms, second half", "tail_rms_error_rad", "rad", each_axis=True),
+        ReportedMetric("overshoot", "overshoot_rad", "rad", each_axis=True),
+        ReportedMetric(settled, "settling_time_s", "s", each_axis=True, none="never"),
+        ReportedMetric("largest current", "max_abs_current_A", "A"),
+        ReportedMetric("share of ticks at the limit", "saturated_fraction", "1"),
+        ReportedMetric("rms torque", "rms_torque_Nm", "N·m"),
+        ReportedMetric("variation of the commands", "current_variation_A_s", "A/s"),
+        ReportedMetric("copper loss", "copper_loss_J", "J"),
+        ReportedMetric("work on the rotor", "mechanical_work_J", "J", signed=True),
+        ReportedMetric("energy", "energy_J", "J"),
     )
 
 
