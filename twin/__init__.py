@@ -15,8 +15,11 @@ if TYPE_CHECKING:
     from spheretwin.analysis.recorded_run import open_run as read
     from spheretwin.analysis.review import review
     from spheretwin.bench import Bench
-    from spheretwin.control.law import Law
+    from spheretwin.control.law import Law, NonNegativeEach, PositiveEach, each
+    from spheretwin.control.law_components.parameters import LawParameters
     from spheretwin.linear import linearise
+    from spheretwin.models.lagrangian import coriolis_matrix, inertia_matrix
+    from spheretwin.models.telemetry.signals import Signal
     from spheretwin.run import Run
     from spheretwin.scenario import load
     from spheretwin.scenario.sections import Scenario
@@ -32,6 +35,13 @@ _MODULES = {
     "load": ("spheretwin.scenario", "load"),
     "Scenario": ("spheretwin.scenario.sections", "Scenario"),
     "Law": ("spheretwin.control.law", "Law"),
+    "LawParameters": ("spheretwin.control.law_components.parameters", "LawParameters"),
+    "NonNegativeEach": ("spheretwin.control.law", "NonNegativeEach"),
+    "PositiveEach": ("spheretwin.control.law", "PositiveEach"),
+    "each": ("spheretwin.control.law", "each"),
+    "Signal": ("spheretwin.models.telemetry.signals", "Signal"),
+    "inertia_matrix": ("spheretwin.models.lagrangian", "inertia_matrix"),
+    "coriolis_matrix": ("spheretwin.models.lagrangian", "coriolis_matrix"),
     "Run": ("spheretwin.run", "Run"),
     "linearise": ("spheretwin.linear", "linearise"),
     "sweep": ("spheretwin.study.runner", "run"),
@@ -42,8 +52,9 @@ _MODULES = {
 }
 
 __all__ = [
-    "Bench", "Law", "Run", "Scenario", "Session", "__version__", "linearise", "load", "read", "review",
-    "sensitivities", "simulate", "sweep",
+    "Bench", "Law", "LawParameters", "NonNegativeEach", "PositiveEach", "Run", "Scenario", "Session",
+    "Signal", "__version__", "coriolis_matrix", "each", "inertia_matrix", "linearise", "load", "read",
+    "review", "sensitivities", "simulate", "sweep",
 ]  # fmt: skip
 
 

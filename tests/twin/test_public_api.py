@@ -58,7 +58,7 @@ def test_every_public_name_is_what_it_says():
         assert getattr(st, name) is not None
     assert st.__version__.count(".") == 2
     misspelt = "simulat"
-    with pytest.raises(AttributeError, match="has no attribute 'simulat'; it has Bench, Law, Run"):
+    with pytest.raises(AttributeError, match="has no attribute 'simulat'; it has Bench, Law, LawParameters"):
         getattr(st, misspelt)
 
 
