@@ -53,29 +53,34 @@ AXIS_KEY = "●α ◆β ▲γ"
 """Markers of the hinges: no legend covers the lines."""
 
 ROLES = {
-    "q_measured_rad": "■ measured, estimated (orange)",
-    "q_predicted_rad": "■ predicted (orange)",
+    "q_measured_rad": "■ measured",
+    "q_predicted_rad": "■ predicted",
     "q_governed_rad": "+ governed",
+    "qdot_estimated_rad_s": "■ estimated (orange band)",
+    "qdot_predicted_rad_s": "■ predicted (orange)",
+    "qdot_governed_rad_s": "+ governed",
 }
-"""Markers of the lines of a hinge that not every run has."""
+"""Markers of the lines of a hinge that not every run has: each has a name in the title of its plot."""
 
 
 def compare(plots: Plots) -> rrb.Container:
     """Angles and rates of each axis with their references; below, the distance between the shaft's tips."""
     angles, rates = _lines(plots, ANGLE_SIGNALS), _lines(plots, RATE_SIGNALS)
-    key = ", ".join(
-        ["● actual, × reference", *(role for name, role in ROLES.items() if name in plots.view.names)]
-    )
     angles_of_each = [
-        plots.whole(f"{name}: {key}", "rad", *angles, least=LEAST_rad, axis=axis)
+        plots.whole(f"{name}: {_key(angles)}", "rad", *angles, least=LEAST_rad, axis=axis)
         for axis, name in enumerate(ANGLES)
     ]
-    turning = plots.about_zero(f"rates, colours as above: {key}", "rad/s", *rates, least=LEAST_rad_s)
+    turning = plots.about_zero(f"rates, colours as above: {_key(rates)}", "rad/s", *rates, least=LEAST_rad_s)
     apart = plots.above_zero(
         "tip's distance from its reference", "mm", quantity(TIP_DISTANCE), least=TIP_DISTANCE.floor
     )
     above = rrb.Horizontal(*angles_of_each)
     return rrb.Vertical(above, turning, apart, row_shares=[4, 4, 3], name="compare")
+
+
+def _key(lines: list[PlotLine]) -> str:
+    """Return marker and name of each line."""
+    return ", ".join(["● actual, × reference", *(ROLES[line.name] for line in lines if line.name in ROLES)])
 
 
 def _lines(plots: Plots, names: tuple[str, ...]) -> list[PlotLine]:

@@ -17,6 +17,9 @@ from spheretwin.viz.quantities import Quantity
 LINE_LOOKS = ("names", "colors", "widths", "aggregation_policy")
 """Properties of `rr.SeriesLines` in a style."""
 
+OPAQUE, BAND = 255, 90
+"""Opacities of lines, and of a noisy signal: its rows fill a band behind the other lines."""
+
 WIDEST, THICK, MIDDLE, THIN = 5.0, 3.0, 1.5, 1.0
 
 _MARK_SIZE = 4.5
@@ -25,7 +28,8 @@ MOST_MARKED = 3
 """Entries up to which the lines of a signal have markers: of many coil groups only the spread matters."""
 
 _COMMANDED = ("q_ref_rad", "qdot_ref_rad_s", "torque_command_Nm", "current_command_A")
-_ESTIMATED = ("q_measured_rad", "qdot_estimated_rad_s", "q_predicted_rad", "qdot_predicted_rad_s")
+_ESTIMATED = ("q_measured_rad", "q_predicted_rad", "qdot_predicted_rad_s")
+_NOISY = ("qdot_estimated_rad_s",)
 _SECONDARY = (
     "disturbance_Nm",
     "q_governed_rad",
@@ -44,6 +48,7 @@ class _Role(NamedTuple):
     colour: theme.Colour | None
     marker: MarkerShape | None
     width: float
+    opacity: int = OPAQUE
 
 
 # Lines are drawn in the order of their names: estimates first, as a rim of the true values,
@@ -51,6 +56,7 @@ class _Role(NamedTuple):
 _ROLES = (
     _Role(_COMMANDED, theme.COMMAND, MarkerShape.Cross, THIN),
     _Role(_ESTIMATED, theme.ESTIMATE, MarkerShape.Square, WIDEST),
+    _Role(_NOISY, theme.ESTIMATE, MarkerShape.Square, THIN, BAND),
     _Role(_SECONDARY, theme.DESIRED_TRACE, MarkerShape.Plus, MIDDLE),
     _Role(_ACTUAL, None, MarkerShape.Circle, THICK),  # with its command in a plot for each hinge
 )
@@ -78,12 +84,13 @@ class LineStyle(NamedTuple):
     colours: list[theme.Colour]
     markers: list[MarkerShape]
     width: float
+    opacity: int = OPAQUE
 
     def lines(self) -> rr.SeriesLines:
         """Return the style of the lines: of rows that share a pixel all are drawn, from least to greatest."""
         return rr.SeriesLines(
             names=self.names,
-            colors=self.colours,
+            colors=self._colours(),
             widths=[self.width] * len(self.names),
             aggregation_policy=AggregationPolicy.MinMax,
         )
@@ -93,10 +100,13 @@ class LineStyle(NamedTuple):
         count = len(self.names)
         return rr.SeriesLines(
             names=self.names * 3,
-            colors=self.colours * 3,
+            colors=self._colours() * 3,
             widths=[THIN] * count + [max(self.width, MIDDLE)] * count + [THIN] * count,
             aggregation_policy=AggregationPolicy.MinMax,
         )
+
+    def _colours(self) -> list[tuple[int, int, int, int]]:
+        return [(*colour, self.opacity) for colour in self.colours]
 
 
 def mark_style(styles: Sequence[LineStyle]) -> rr.SeriesPoints:
@@ -113,7 +123,8 @@ def mark_style(styles: Sequence[LineStyle]) -> rr.SeriesPoints:
 def signal_style(signal: Signal) -> LineStyle:
     """Return the style of a signal's lines."""
     names = _names(signal.name, signal.labels or ("",), signal.unit)
-    return LineStyle(names, _colours(signal), _markers(signal.name, signal.size), _role(signal.name).width)
+    role, markers = _role(signal.name), _markers(signal.name, signal.size)
+    return LineStyle(names, _colours(signal), markers, role.width, role.opacity)
 
 
 @cache
