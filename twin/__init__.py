@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from spheretwin.analysis.recorded_run import open_run as read
     from spheretwin.analysis.review import review
     from spheretwin.bench import Bench
-    from spheretwin.control.law import Law, NonNegativeEach, PositiveEach, each
+    from spheretwin.control.law import Law, NonNegativeEach, PositiveEach
     from spheretwin.control.law_components.parameters import LawParameters
     from spheretwin.linear import linearise
     from spheretwin.models.lagrangian import coriolis_matrix, inertia_matrix
@@ -38,7 +38,6 @@ _MODULES = {
     "LawParameters": ("spheretwin.control.law_components.parameters", "LawParameters"),
     "NonNegativeEach": ("spheretwin.control.law", "NonNegativeEach"),
     "PositiveEach": ("spheretwin.control.law", "PositiveEach"),
-    "each": ("spheretwin.control.law", "each"),
     "Signal": ("spheretwin.models.telemetry.signals", "Signal"),
     "inertia_matrix": ("spheretwin.models.lagrangian", "inertia_matrix"),
     "coriolis_matrix": ("spheretwin.models.lagrangian", "coriolis_matrix"),
@@ -53,7 +52,7 @@ _MODULES = {
 
 __all__ = [
     "Bench", "Law", "LawParameters", "NonNegativeEach", "PositiveEach", "Run", "Scenario", "Session",
-    "Signal", "__version__", "coriolis_matrix", "each", "inertia_matrix", "linearise", "load", "read",
+    "Signal", "__version__", "coriolis_matrix", "inertia_matrix", "linearise", "load", "read",
     "review", "sensitivities", "simulate", "sweep",
 ]  # fmt: skip
 
