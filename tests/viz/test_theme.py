@@ -4,7 +4,9 @@ Luminance, contrast, CIELAB and the simulation of colour blindness are implement
 """
 
 import math
+import re
 from itertools import combinations
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -193,3 +195,13 @@ def test_a_label_is_readable_on_the_grounds_of_labels(colour):
 
 def test_a_readable_colour_is_the_colour_of_its_label():
     assert theme.label_colour((230, 190, 40)) == (230, 190, 40)
+
+
+@pytest.mark.parametrize(("scheme", "ground"), [("light", (255, 255, 255)), ("dark", (36, 36, 36))])
+def test_messages_of_the_bench_are_readable_in_both_themes(scheme, ground):
+    css = (Path(theme.__file__).parent / "bench" / "bench.css").read_text(encoding="utf-8")
+    (rule,) = re.findall(rf"\[data-mantine-color-scheme={scheme}\] {{(.*?)}}", css)
+    colours = dict(re.findall(r"--(\w+): (#[0-9a-f]{6})", rule))
+    assert set(colours) == {"good", "warn", "bad", "work"}
+    for name, colour in colours.items():
+        assert contrast(rgb(colour), ground) >= 4.5, name

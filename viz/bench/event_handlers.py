@@ -60,7 +60,7 @@ class Note:
             self._html.remove()
 
 
-_REFUSED = "color:#ff8787;font-size:0.8em;line-height:1.25;padding:0 0.7em 0.3em;overflow-wrap:anywhere"
+_REFUSED = "color:var(--bad);font-size:0.8em;line-height:1.25;padding:0 0.7em 0.3em;overflow-wrap:anywhere"
 
 
 class PendingCommand(NamedTuple):
