@@ -1,8 +1,8 @@
 """CUDA through numba-cuda: the only module that refers to that package. It is imported where a GPU is used.
 
 The functions of a GPU are those of the processor: numba-cuda compiles what a kernel calls, with the vectors
-and the records as they are. Two of NumPy's functions are missing there. Numba has no public way to add them,
-so the table of its functions is extended here.
+and the records as they are. Functions of NumPy that laws use, such as the square root, are missing there.
+numba-cuda has no public way to add them, so its table is extended here by functions of CUDA's library.
 
 With ``NUMBA_ENABLE_CUDASIM=1`` numba's simulator runs the kernel in Python and what it calls on the
 processor; it needs neither package nor GPU.
@@ -47,7 +47,7 @@ def check_gpu() -> str:
         raise missing("cuda", "numba-cuda", "gpu")
     try:
         name = cuda.get_current_device().name
-    except Exception as error:  # of the driver, of several kinds
+    except Exception as error:  # numba-cuda, cuda-bindings and cuda-core have no common exception
         received = without_breaks(error).rstrip(" :")
         raise InputError(f"cuda: expected a GPU of NVIDIA with its driver, received {received}") from None
     return name.decode() if isinstance(name, bytes) else str(name)
@@ -141,20 +141,60 @@ def fetch(copy: Any, value: Any) -> None:
         copy.copy_to_host(value)
 
 
+_OF_LIBRARY = {
+    np.absolute: "fabs",
+    np.cbrt: "cbrt",
+    np.ceil: "ceil",
+    np.copysign: "copysign",
+    np.exp: "exp",
+    np.expm1: "expm1",
+    np.fabs: "fabs",
+    np.floor: "floor",
+    np.fmod: "fmod",
+    np.log1p: "log1p",
+    np.power: "pow",
+    np.rint: "rint",
+    np.sqrt: "sqrt",
+    np.trunc: "trunc",
+}
+
+
 @cache
 def _add_functions() -> None:
-    if not SIMULATED:
-        from numba.cuda.ufuncs import ufunc_db
+    if SIMULATED:
+        return
+    from numba.cuda.ufuncs import ufunc_db
 
-        ufunc_db()[np.rint], ufunc_db()[np.sign] = {"d->d": _rint}, {"d->d": _sign}
+    table = ufunc_db()
+    for function, name in _OF_LIBRARY.items():
+        if function not in table:
+            table[function] = {f"{'d' * function.nin}->d": _of_library(name)}
+    own = {np.sign: ("d->d", _sign), np.square: ("d->d", _square), np.isfinite: ("d->?", _is_finite)}
+    for other, (kind, implementation) in own.items():
+        if other not in table:
+            table[other] = {kind: implementation}
 
 
-def _rint(context: Any, builder: Any, signature: Any, given: Any, loc: Any = None) -> Any:
-    kind = ir.FunctionType(ir.DoubleType(), [ir.DoubleType()])
-    return builder.call(cgutils.get_or_insert_function(builder.module, kind, "__nv_rint"), given)
+def _of_library(name: str) -> Any:
+    """Return the implementation of a function of numbers in double precision by CUDA's library."""
+
+    def call(context: Any, builder: Any, signature: Any, given: Any, loc: Any = None) -> Any:
+        kind = ir.FunctionType(ir.DoubleType(), [ir.DoubleType()] * len(given))
+        return builder.call(cgutils.get_or_insert_function(builder.module, kind, f"__nv_{name}"), given)
+
+    return call
 
 
 def _sign(context: Any, builder: Any, signature: Any, given: Any, loc: Any = None) -> Any:
     x, one, zero = given[0], ir.Constant(ir.DoubleType(), 1.0), ir.Constant(ir.DoubleType(), 0.0)
     below = builder.select(builder.fcmp_ordered("<", x, zero), ir.Constant(ir.DoubleType(), -1.0), x)
     return builder.select(builder.fcmp_ordered(">", x, zero), one, below)  # 0 or NaN stays
+
+
+def _square(context: Any, builder: Any, signature: Any, given: Any, loc: Any = None) -> Any:
+    return builder.fmul(given[0], given[0])
+
+
+def _is_finite(context: Any, builder: Any, signature: Any, given: Any, loc: Any = None) -> Any:
+    size = _of_library("fabs")(context, builder, signature, given)
+    return builder.fcmp_ordered("<", size, ir.Constant(ir.DoubleType(), np.inf))

@@ -140,6 +140,31 @@ def compiled_bytes(hardware, law):
     return sizes[0]
 
 
+OWN_LAW = """
+import numpy as np
+
+def step(t, reference, measurement, parameters, state, torque):
+    for axis in range(3):
+        x = measurement[0, axis] - reference[0, axis]
+        y = np.sqrt(np.abs(x)) + np.exp(x) + np.expm1(x) + np.log1p(x) + np.cbrt(x) + np.square(x)
+        y += np.floor(x) + np.ceil(x) + np.trunc(x) + np.rint(x) + np.fmod(x, 0.5) + np.power(x, 3.0)
+        y += np.copysign(x, y) + np.sign(x)
+        y += np.sin(x) + np.cos(x) + np.tanh(x) + np.arctan2(x, y) + np.maximum(x, y) + np.fabs(x)
+        torque[axis] = y if np.isfinite(y) else 0.0
+"""
+
+
+def compiled_own_law():
+    """Bytes of the assembly of a kernel with a law in plain Python and functions of NumPy; needs no GPU."""
+    sizes = []
+    with tempfile.TemporaryDirectory() as folder:
+        Path(folder, "own.py").write_text(OWN_LAW)
+        rows, drawn = rows_of(study_of("ideal", f"{folder}/own.py:step", 4, 0.01), 2)
+        with compiled_only(sizes):
+            rows.with_block(CudaBlock).run(drawn)
+    return sizes[0]
+
+
 def compiled_environment():
     """Bytes of the assembly of the kernels of an environment; needs no GPU."""
     sizes = []
@@ -201,6 +226,7 @@ def main():
         print(f"no GPU: {error}")
         for (hardware, law), size in ask(kernels(), "compiled_bytes", together=True).items():
             print(f"{hardware}, {law}: {size / 1e6:.2f} MB of assembly")
+        print(f"own law: {compiled_own_law() / 1e6:.2f} MB of assembly")
         print(f"environment: {compiled_environment() / 1e6:.2f} MB of assembly")
         return
     started, channels, table = time.perf_counter(), kernels(), []

@@ -83,9 +83,9 @@ class CudaBlock(RunBlock):
         given = cuda.on_device(_inputs_between(inputs, row, row + ticks))
         try:
             cuda.launch(self._kernel, len(self._codes), (*self._device, self._fixed, given, tick))
-        except Exception as error:  # of the compiler, of several kinds
+        except Exception as error:  # numba also raises KeyError, for a function that GPUs lack
             law = self._assembly.law
-            if not is_user_law(law):
+            if tick or not is_user_law(law):  # it is compiled for the first ticks: later errors are the GPU's
                 raise
             raise LawError(
                 f"law {law.name}: expected a function that numba compiles for a GPU,"
