@@ -3,7 +3,10 @@
 import os
 import shutil
 import sys
+import warnings
+from functools import cache
 
+import mujoco
 import pytest
 
 from spheretwin.export.compiler import host_compiler
@@ -22,6 +25,18 @@ needs_pseudo_terminal = pytest.mark.skipif(not hasattr(os, "openpty"), reason="n
 
 # With NUMBA_DISABLE_JIT functions stay plain Python, for a debugger: they have no address, no machine code.
 needs_compiled_functions = pytest.mark.skipif(not COMPILES, reason="NUMBA_DISABLE_JIT is set")
+
+
+@cache
+def has_opengl() -> bool:
+    """Whether MuJoCo can draw: with a screen, or without one under MUJOCO_GL=egl and its driver."""
+    with warnings.catch_warnings(record=True) as said:  # GLFW only warns that it has no context
+        warnings.simplefilter("always")  # an error would leave a context half made
+        try:
+            mujoco.GLContext(8, 8).free()
+        except Exception:  # EGL and OSMesa fail with exceptions of their own
+            return False
+    return not said
 
 
 def needs_shell(name: str) -> pytest.MarkDecorator:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from pathlib import Path
 
 import mujoco
@@ -37,13 +38,8 @@ class Camera:
         model = mujoco.MjModel.from_xml_path(str(Path(model_file) if model_file else SCENE))
         self._model, self._data = model, mujoco.MjData(model)
         self._view = -1 if model_file else VIEW
-        try:
-            self._renderer = mujoco.Renderer(model, SIZE, SIZE)
-        except Exception as error:  # of several kinds, as the library that is missing
-            raise InputError(
-                f"environment: expected OpenGL for pictures, received {without_breaks(error)};"
-                " MUJOCO_GL=egl or MUJOCO_GL=osmesa draws without a screen"
-            ) from None
+        _check_opengl()
+        self._renderer = mujoco.Renderer(model, SIZE, SIZE)
 
     def image(self, q_rad: NDArray[np.float64]) -> NDArray[np.uint8]:
         """Return the picture (480, 480, 3) at hinge angles (3,), rad."""
@@ -57,3 +53,19 @@ class Camera:
     def close(self) -> None:
         """Free the context of OpenGL."""
         self._renderer.close()
+
+
+def _check_opengl() -> None:
+    # GLFW only warns that it has no context. MuJoCo's renderer ends the process when it fails a second time.
+    with warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("always")  # an error would leave a context half made
+        try:
+            mujoco.GLContext(SIZE, SIZE).free()
+            received = str(said[0].message) if said else ""
+        except Exception as error:  # EGL, OSMesa and MuJoCo fail with exceptions of their own
+            received = without_breaks(error)
+    if received:
+        raise InputError(
+            f"environment: expected OpenGL for pictures, received {received};"
+            " MUJOCO_GL=egl or MUJOCO_GL=osmesa draws without a screen"
+        )
