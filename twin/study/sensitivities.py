@@ -23,8 +23,9 @@ from spheretwin.scenario.fields import flat
 from spheretwin.simulation import simulate
 from spheretwin.study.engines import engine_in_process
 from spheretwin.study.grid import Row
-from spheretwin.study.row import Rows, is_number
+from spheretwin.study.row import Rows
 from spheretwin.study.study import Study
+from spheretwin.study.template import is_number
 
 PLACES = (1.0, -1.0, 0.5, -0.5)
 """Steps from the scenario of the runs of a field."""

@@ -11,7 +11,7 @@ from spheretwin.metrics import METRICS
 from spheretwin.models.base.errors import InputError
 from spheretwin.scenario.fields import every_field, quantity_text, unit_of
 from spheretwin.scenario.sections import Scenario
-from spheretwin.study import report
+from spheretwin.study import conditions, report
 from spheretwin.study.statistics import (
     StudyTable,
     interval,
@@ -216,7 +216,7 @@ def test_medians_by_condition_are_those_of_each_hinge(tmp_path):
         40, {"max_abs_error_rad": np.radians(errors_deg).max(axis=1)}, {"drive.delay_s": delays}, lost=[3]
     )
     rows = rows._replace(hinges_rad=np.radians(errors_deg))
-    lines = report.condition_section(rows)[0].lines()
+    lines = conditions.section(rows)[0].lines()
     first, second = (line.split("|")[1:-1] for line in lines if "of 20" in line)
     assert [cell.strip() for cell in first[:3]] == ["0.001", "pd", "19 of 20"]
     worse = np.delete(errors_deg[:20, :2].max(axis=1), 3)
@@ -228,6 +228,5 @@ def test_medians_by_condition_are_those_of_each_hinge(tmp_path):
     assert summary(rows)["pd"]["max_abs_error_rad"]["median"] > 3 * tilt
     assert [row[0] for row in report.medians(summary(rows)).rows[1:2]] == ["largest tilt error, rad"]
     assert (
-        report.condition_section(made(2, {"max_abs_error_rad": np.ones(2)}, {"drive.delay_s": delays[19:21]}))
-        == []
+        conditions.section(made(2, {"max_abs_error_rad": np.ones(2)}, {"drive.delay_s": delays[19:21]})) == []
     )

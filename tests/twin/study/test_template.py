@@ -6,7 +6,7 @@ import pytest
 
 from spheretwin.models.base.errors import InputError
 from spheretwin.scenario import reading
-from spheretwin.study.row import is_number, template_of
+from spheretwin.study.template import is_number, template_of
 
 GAPS = ("seed", "plant.payload_kg", "plant.coulomb_Nm.1", "disturbance.load", "duration")
 SOME = (3, 0.01, 0.002, 1, 0.5)
