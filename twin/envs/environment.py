@@ -14,6 +14,8 @@ from spheretwin.envs.vector import TwinVectorEnv
 from spheretwin.models.base.errors import InputError, shown
 
 RGB = "rgb_array"
+RENDERING: dict[str, Any] = {"render_modes": [RGB], "render_fps": 1000}
+"""What Gymnasium asks the class before it makes an environment; each one has the rate of its own period."""
 
 
 class TwinEnv(gymnasium.Env[Any, Any]):
@@ -34,7 +36,7 @@ class TwinEnv(gymnasium.Env[Any, Any]):
         A setting is unknown or out of range, or the scenario does not fit.
     """
 
-    metadata = {"render_modes": [RGB], "render_fps": 1000}  # noqa: RUF012  Gymnasium reads it of the class
+    metadata = RENDERING
 
     def __init__(self, task: str = "Track", render_mode: str | None = None, **settings: Any) -> None:
         if render_mode not in (None, RGB):

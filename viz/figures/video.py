@@ -89,8 +89,8 @@ def frames(runs: Sequence[ComparedRun], title: str) -> Iterator[Image]:
     canvas = FigureCanvasAgg(clip.figure)
     for t_s in np.arange(0.0, clip.end_s + 0.5 / FRAMES_s, 1 / FRAMES_s):
         clip.show(float(t_s))
-        canvas.draw()  # type: ignore[no-untyped-call]
-        yield np.asarray(canvas.buffer_rgba())  # type: ignore[no-untyped-call]
+        canvas.draw()
+        yield np.asarray(canvas.buffer_rgba())
 
 
 def _limits(paths: Sequence[Array]) -> Array:

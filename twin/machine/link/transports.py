@@ -8,6 +8,7 @@ import select
 import socket
 import sys
 import time
+from abc import ABC, abstractmethod
 from collections import Counter, deque
 from collections.abc import Callable, Iterator
 from typing import Any
@@ -33,7 +34,7 @@ MOST_QUEUED = 1_000
 EXPECTED = "udp://HOST:PORT, serial:DEVICE@BAUD, or - for standard input and output"
 
 
-class Transport:
+class Transport(ABC):
     """Connection to one peer.
 
     Attributes
@@ -55,21 +56,21 @@ class Transport:
         self.refused: Counter[str] = Counter()
         self.announce: Callable[[str], None] = lambda _: None
 
+    @abstractmethod
     def send(self, content: bytes) -> None:
         """Send bytes; they are dropped as long as there is no peer."""
-        raise NotImplementedError
 
+    @abstractmethod
     def receive(self, timeout_s: float) -> bytes:
         """Return the received bytes, after at most a time; empty if there are none."""
-        raise NotImplementedError
 
-    def accept(self, *, is_peer: bool = True) -> None:
+    def accept(self, *, is_peer: bool = True) -> None:  # noqa: B027  a line has one sender alone
         """Answer the sender of the last received bytes; as the peer, it is the only one that is heard."""
 
-    def refuse(self) -> None:
+    def refuse(self) -> None:  # noqa: B027  as above
         """Count the sender of the last received bytes as refused, unless it is the peer."""
 
-    def close(self) -> None:
+    def close(self) -> None:  # noqa: B027  a stand-in holds nothing open
         """Close the connection."""
 
 
