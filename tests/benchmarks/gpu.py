@@ -94,7 +94,8 @@ def speed(hardware, law):
     launch, taken = cuda.launch, []
 
     def timed(*arguments):
-        taken.append(seconds_of(lambda: launch(*arguments)))
+        with ALONE[0]:
+            taken.append(seconds_of(lambda: launch(*arguments)))
 
     period_s = 1e-3
     rows, drawn = rows_of(study_of(hardware, law, 2 * WIDE, CALLS * TICKS * period_s), WIDE)
@@ -175,8 +176,13 @@ def compiled_environment():
     return sum(sizes)
 
 
-def work(channel, hardware, law):
+ALONE = []
+"""Lock of the GPU: sets of rows are prepared side by side, and timed one after the other."""
+
+
+def work(channel, alone, hardware, law):
     """Answer the questions of a pipe: names of functions of this file."""
+    ALONE.append(alone)
     with contextlib.suppress(EOFError):  # the other end has what it wants
         while True:
             channel.send(globals()[channel.recv()](hardware, law))
@@ -185,21 +191,19 @@ def work(channel, hardware, law):
 def kernels():
     """Start a process for each kernel; return them by hardware set and law."""
     context, channels = multiprocessing.get_context("spawn"), {}
+    alone = context.Lock()
     for hardware in SETS:
         for law in LAWS:
             channels[hardware, law], other = context.Pipe()
-            context.Process(target=work, args=(other, hardware, law), daemon=True).start()
+            context.Process(target=work, args=(other, alone, hardware, law), daemon=True).start()
     return channels
 
 
-def ask(channels, question, *, together):
-    """Return the answers of all processes to a question, one after the other or together."""
-    answers = {}
-    for chosen in [channels] if together else [{name: own} for name, own in channels.items()]:
-        for channel in chosen.values():
-            channel.send(question)
-        answers |= {name: channel.recv() for name, channel in chosen.items()}
-    return answers
+def ask(channels, question):
+    """Return the answers of all processes to a question."""
+    for channel in channels.values():
+        channel.send(question)
+    return {name: channel.recv() for name, channel in channels.items()}
 
 
 def sweep_seconds():
@@ -224,15 +228,15 @@ def main():
         card = cuda.check_gpu()
     except InputError as error:
         print(f"no GPU: {error}")
-        for (hardware, law), size in ask(kernels(), "compiled_bytes", together=True).items():
+        for (hardware, law), size in ask(kernels(), "compiled_bytes").items():
             print(f"{hardware}, {law}: {size / 1e6:.2f} MB of assembly")
         print(f"own law: {compiled_own_law() / 1e6:.2f} MB of assembly")
         print(f"environment: {compiled_environment() / 1e6:.2f} MB of assembly")
         return
     started, channels, table = time.perf_counter(), kernels(), []
-    for (hardware, law), value in ask(channels, "largest_difference", together=True).items():
+    for (hardware, law), value in ask(channels, "largest_difference").items():
         table.append(row(f"difference of figures, {hardware}, {law}", value, at_most=LAWS[law][1]))
-    for names, value in ask(channels, "speed", together=False).items():
+    for names, value in ask(channels, "speed").items():
         table.append(row(f"ticks/s, {', '.join(names)}", value, at_least=AT_LEAST.get(names)))
     table.append(row("periods/s of environments, currents", periods(), at_least=PERIODS_AT_LEAST))
     seconds = sweep_seconds()
