@@ -118,6 +118,12 @@ def label_colour(colour: Colour) -> Colour:
     return next(shade for shade in shares if _luminance(shade) >= _READABLE)
 
 
+def text_colour(colour: str) -> str:
+    """Return a page's colour for text on white paper, mixed with black to a contrast of 4.5:1."""
+    shades = (mixed(rgb(colour), (0, 0, 0), share / 100) for share in range(101))
+    return "#{:02x}{:02x}{:02x}".format(*next(shade for shade in shades if _luminance(shade) <= _DARK))
+
+
 def law_colour(law: str) -> str:
     """Return the colour of a law for a page; one colour for all laws without their own."""
     return LAW_COLOURS.get(law, OTHER_LAW)
@@ -156,6 +162,8 @@ def run_colours(laws: Sequence[str]) -> list[str]:
 
 _LUMINANCE = (0.2126, 0.7152, 0.0722)
 _READABLE = 0.275
+_DARK = 0.183
+"""Greatest luminance of a text with a contrast of 4.5:1 to white."""
 
 
 def _luminance(colour: Colour) -> float:

@@ -183,7 +183,7 @@ def test_colours_of_many_runs_have_one_luminance(count):
 
 
 CURRENTS = theme.current_colours(np.array([-1.0, 0.0, 1.0]), 1.0).tolist()
-LABELLED = (*theme.AXIS_COLOURS, *CURRENTS, theme.FAILURE, theme.COIL_TORQUE, theme.LOAD, (0, 0, 0))
+LABELLED = (*LAWS, *map(rgb, theme.SPARE), *theme.AXIS_COLOURS, *CURRENTS, theme.FAILURE, theme.COIL_TORQUE, theme.LOAD, (0, 0, 0))
 
 
 @pytest.mark.parametrize("colour", LABELLED, ids=str)
@@ -195,6 +195,17 @@ def test_a_label_is_readable_on_the_grounds_of_labels(colour):
 
 def test_a_readable_colour_is_the_colour_of_its_label():
     assert theme.label_colour((230, 190, 40)) == (230, 190, 40)
+
+
+INKS = (*theme.LAW_COLOURS.values(), *theme.SPARE, theme.OTHER_LAW, "#ffffff", "#000000")
+
+
+@pytest.mark.parametrize("colour", INKS)
+def test_text_in_the_colour_of_a_law_is_readable_on_white(colour):
+    text = theme.text_colour(colour)
+    assert contrast(rgb(text), (255, 255, 255)) >= 4.5
+    if contrast(rgb(colour), (255, 255, 255)) >= 4.6:
+        assert text == colour
 
 
 @pytest.mark.parametrize(("scheme", "ground"), [("light", (255, 255, 255)), ("dark", (36, 36, 36))])

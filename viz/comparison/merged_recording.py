@@ -232,9 +232,15 @@ def _log_legend(
     ends = [[[0.0, y], [1.0, y]] for y in places]
     shade, radii = list(colours), rr.Radius.ui_points(2.0)
     labels = [drawable(f"{run.legend}; {run.errors}" if run.errors else run.legend) for run in runs]
-    recording.log(
-        LEGEND, rr.LineStrips2D(ends, colors=shade, radii=radii, labels=labels, show_labels=True), static=True
+    recording.log(LEGEND, rr.LineStrips2D(ends, colors=shade, radii=radii), static=True)
+    texts = rr.Points2D(
+        [[0.5, y] for y in places],
+        colors=[theme.label_colour(colour) for colour in colours],
+        radii=rr.Radius.ui_points(0.0),
+        labels=labels,
+        show_labels=True,
     )
+    recording.log(f"{LEGEND}/text", texts, static=True)
     outlines = [[0.0, y] + 0.12 * _outline(place) for place, y in enumerate(places)]
     recording.log(f"{LEGEND}/{MARKS}", rr.LineStrips2D(outlines, colors=shade, radii=radii), static=True)
 

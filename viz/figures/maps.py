@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from spheretwin.models.design.capability import Capability
 from spheretwin.models.design.workspace import Workspace
 from spheretwin.viz.figures.style import FAINT, INK, SERIES, WIDTH_in, faint_grid, sheet
-from spheretwin.viz.theme import law_colours
+from spheretwin.viz.theme import law_colours, text_colour
 
 Array = NDArray[np.float64]
 
@@ -141,7 +141,7 @@ def maps(
         _write_map_cells(axes, panel, scale)
         axes.set_xticks(*_ticks(labels[1]))
         axes.set_yticks(*_ticks(labels[0]))
-        axes.set_title(law, fontsize="medium", color=colours[law], fontweight="bold")
+        axes.set_title(law, fontsize="medium", color=text_colour(colours[law]), fontweight="bold")
         axes.set_facecolor("#eceef0")
         axes.tick_params(length=0)
         axes.spines[:].set_visible(False)

@@ -24,7 +24,7 @@ from spheretwin.viz.figures.style import (
     sheet,
     styles,
 )
-from spheretwin.viz.theme import law_colour
+from spheretwin.viz.theme import law_colour, text_colour
 
 Array = NDArray[np.float64]
 
@@ -73,7 +73,9 @@ def lines(groups: Sequence[ErrorGroup], quantity: str, title: str) -> Figure:
         name_rows(panel, [line.label for line in group.lines])
         panel.xaxis.set_major_formatter("{x:g}")
         panel.xaxis.set_minor_formatter(NullFormatter())
-        panel.set_title(group.label, fontsize="small", loc="left", color=colour, fontweight="bold")
+        panel.set_title(
+            group.label, fontsize="small", loc="left", color=text_colour(colour), fontweight="bold"
+        )
     panels[-1].set_xlabel(quantity)
     for inside, label in ((INK, "measured"), ("white", "true")):
         panels[-1].plot([], [], "o", color=INK, markerfacecolor=inside, markersize=5, label=label)
