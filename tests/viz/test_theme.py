@@ -183,7 +183,16 @@ def test_colours_of_many_runs_have_one_luminance(count):
 
 
 CURRENTS = theme.current_colours(np.array([-1.0, 0.0, 1.0]), 1.0).tolist()
-LABELLED = (*LAWS, *map(rgb, theme.SPARE), *theme.AXIS_COLOURS, *CURRENTS, theme.FAILURE, theme.COIL_TORQUE, theme.LOAD, (0, 0, 0))
+LABELLED = (
+    *LAWS,
+    *map(rgb, theme.SPARE),
+    *theme.AXIS_COLOURS,
+    *CURRENTS,
+    theme.FAILURE,
+    theme.COIL_TORQUE,
+    theme.LOAD,
+    (0, 0, 0),
+)
 
 
 @pytest.mark.parametrize("colour", LABELLED, ids=str)
