@@ -34,7 +34,7 @@ Inset = Callable[[str], str]
 
 
 def page(title: str, markdown: str, inset: Inset | None = None, head: str = "", end: str = "") -> str:
-    """Whole page; its figures have a white ground in the dark theme too, wide content scrolls in its box.
+    """Whole page, light or dark as the reader's system is; wide content scrolls in its box.
 
     Parameters
     ----------
