@@ -107,7 +107,16 @@ def on_device(value: Any) -> Any:
         return type(value)(*copies) if hasattr(value, "_fields") else tuple(copies)
     if not isinstance(value, np.ndarray):
         return value
-    return value.copy() if SIMULATED else cuda.to_device(np.ascontiguousarray(value))
+    return value.copy() if SIMULATED else cuda.to_device(with_own_strides(value))
+
+
+def with_own_strides(value: np.ndarray[Any, Any]) -> np.ndarray[Any, Any]:
+    """Return an array in the order of C, whose strides follow from its shape.
+
+    NumPy also regards an array as contiguous if an axis of one entry has a stride of zero. numba-cuda takes
+    that for another type, and would compile the kernel again.
+    """
+    return value.copy() if 0 in value.strides else np.ascontiguousarray(value)
 
 
 def borrowed(value: Any) -> Any:

@@ -188,10 +188,9 @@ def work(channel, alone, hardware, law):
             channel.send(globals()[channel.recv()](hardware, law))
 
 
-def kernels():
-    """Start a process for each kernel; return them by hardware set and law."""
+def kernels(alone):
+    """Start a process for each kernel, with a lock that lives as long; return them by hardware set and law."""
     context, channels = multiprocessing.get_context("spawn"), {}
-    alone = context.Lock()
     for hardware in SETS:
         for law in LAWS:
             channels[hardware, law], other = context.Pipe()
@@ -209,7 +208,7 @@ def ask(channels, question):
 def sweep_seconds():
     """Time of a whole sweep of `robustness`, s."""
     study = (FOLDER / "robustness.toml").read_text()
-    command = [sys.executable, "-m", "spheretwin.cli", "sweep", "many.toml", "--engine", "cuda"]
+    command = [sys.executable, "-m", "spheretwin", "sweep", "many.toml", "--engine", "cuda"]
     with tempfile.TemporaryDirectory() as folder:
         Path(folder, "many.toml").write_text(study.replace("samples = 10000", f"samples = {SWEEP_ROWS}"))
         return seconds_of(lambda: subprocess.run(command, check=True, cwd=folder, stdout=subprocess.DEVNULL))
@@ -224,16 +223,17 @@ def row(name, value, at_most=None, at_least=None):
 def main():
     """Measure, and print the table."""
     as_json = options_of(__doc__).json
+    started, alone = time.perf_counter(), multiprocessing.get_context("spawn").Lock()
     try:
         card = cuda.check_gpu()
     except InputError as error:
         print(f"no GPU: {error}")
-        for (hardware, law), size in ask(kernels(), "compiled_bytes").items():
+        for (hardware, law), size in ask(kernels(alone), "compiled_bytes").items():
             print(f"{hardware}, {law}: {size / 1e6:.2f} MB of assembly")
         print(f"own law: {compiled_own_law() / 1e6:.2f} MB of assembly")
         print(f"environment: {compiled_environment() / 1e6:.2f} MB of assembly")
         return
-    started, channels, table = time.perf_counter(), kernels(), []
+    channels, table = kernels(alone), []
     for (hardware, law), value in ask(channels, "largest_difference").items():
         table.append(row(f"difference of figures, {hardware}, {law}", value, at_most=LAWS[law][1]))
     for names, value in ask(channels, "speed").items():

@@ -123,6 +123,13 @@ def test_names_the_extra_that_is_missing(monkeypatch):
         cuda.check_gpu.__wrapped__()
 
 
+def test_blocks_of_inputs_have_one_type_for_the_compiler():
+    same = np.broadcast_to(np.arange(3.0), (1, 4, 3))[:, :2]  # a reference that no run has of its own
+    own = cuda.with_own_strides(same)
+    assert own.strides == np.empty(same.shape).strides != same.strides
+    np.testing.assert_array_equal(own, same)
+
+
 COMPARISON = """
 import json
 from tests.twin.test_cuda_block import RunBlock, endings, on_gpu, runs_of
