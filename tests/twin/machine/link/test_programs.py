@@ -16,22 +16,15 @@ from spheretwin.machine.link.channel import FrameChannel
 from spheretwin.machine.link.frame_format import Flags
 from spheretwin.machine.link.transports import open_transport
 from spheretwin.models.telemetry.table import read_parquet
-from tests.requirements import C_COMPILER, needs_c_compiler, needs_posix
+from tests.requirements import needs_c_compiler, needs_posix
+from tests.twin.machine.independent.laboratory import CURVE, ROOT, built
 from tests.twin.passive_cases import STILL
 from tests.waiting import UNLIMITED_S
 
-HERE, ROOT = Path(__file__).parent, Path(__file__).parents[4]
-CURVE = ROOT / "models" / "torque_curve.csv"
+HERE = Path(__file__).parent
 EXAMPLE = ROOT / "twin" / "machine" / "link" / "examples" / "pid_controller.c"
 
 pytestmark = [needs_c_compiler, needs_posix]
-
-
-def built(source, folder):
-    program = folder / source.stem
-    options = ["-std=c99", "-O2", "-Wall", "-Wextra", "-pedantic", "-Werror"]
-    subprocess.run([*C_COMPILER, *options, "-o", program, source, "-lm"], check=True)
-    return program
 
 
 @pytest.fixture(scope="module")
@@ -39,10 +32,8 @@ def firmware(tmp_path_factory):
     program = built(HERE / "firmware.c", tmp_path_factory.mktemp("firmware"))
 
     @contextlib.contextmanager
-    def run(noise_urad=0, fault="none", tick=0):
-        process = subprocess.Popen(
-            [program, CURVE, str(noise_urad), fault, str(tick)], stdout=subprocess.PIPE, text=True
-        )
+    def run(*settings):
+        process = subprocess.Popen([program, CURVE, *settings], stdout=subprocess.PIPE, text=True)
         try:
             yield int(process.stdout.readline())
             assert process.wait() == 0  # it has heard the end
@@ -76,7 +67,7 @@ def test_an_independent_firmware_tracks_as_the_twin_does(firmware, capsys, tmp_p
     """Attitude by rotation matrices, Euler equations, other steps and another interpolation."""
     paths = {name: tmp_path / f"{name}.parquet" for name in ("telemetry", "log")}
     files = [text for name, path in paths.items() for text in (f"--{name}", str(path))]
-    code, result = driven(firmware, capsys, *ARMED, "--duration", "2", *files)
+    code, result = driven(firmware, capsys, *ARMED, "--duration", "2", *files, machine=("viscous=1e-4",))
     assert (code, result["status"]) == (0, "completed")
     same = STILL | {"controller.law": "pid", "estimator.kind": "kalman", "duration": 2.0}
     twin = simulation.simulate("sinusoid", same)
@@ -150,7 +141,7 @@ def test_a_limit_ends_the_run_without_currents(firmware, capsys, tmp_path, flags
     assert not np.any(rows["current_command_A"][trip + 1 :])
 
 
-NOISE_urad = 300
+NOISE = "noise=3e-4"
 NOISY = ("--hardware", "electronics")  # its data sheet states noise
 # The tick of the fault, not at the edge of a block, and the largest time until the reason. The rotor rests at
 # tick 503 and is fastest at tick 1003. A disturbance explains the first of what coils without torque lack.
@@ -161,14 +152,16 @@ FAULTS = [
     ("stuck", 503, NOISY, "the motion contradicts the model", 0.2),
     ("stuck", 1003, NOISY, "the motion contradicts the model", 0.06),
     ("reversed", 1003, NOISY, "the motion contradicts the model", 0.06),
-    ("limp", 1003, NOISY, "the motion contradicts the model", 0.24),
+    ("torque=0", 1003, NOISY, "the motion contradicts the model", 0.24),
 ]
 
 
 @LOOPS
 @pytest.mark.parametrize(("fault", "tick", "sheet", "reason", "within_s"), FAULTS)
 def test_a_wrong_sensor_or_motion_ends_the_run(firmware, capsys, fault, tick, sheet, reason, within_s):
-    faulty = (NOISE_urad if sheet else 0, fault, tick)
+    at = (f"at={tick * 1e-3:.3f}", fault) if "=" in fault else ()
+    kind = () if at else (f"fault={fault}@{tick}",)
+    faulty = (*kind, "viscous=1e-4", *((NOISE,) if sheet else ()), *at)
     code, result = driven(firmware, capsys, *ARMED, "--duration", "2", *sheet, machine=faulty)
     assert (code, result["status"], result["reason"]) == (1, "failsafe", reason)
     rundown_s = 0.05
@@ -179,9 +172,7 @@ def test_a_wrong_sensor_or_motion_ends_the_run(firmware, capsys, fault, tick, sh
 @pytest.mark.parametrize("sheet", [(), NOISY], ids=["ideal", "noisy"])
 def test_noise_and_an_error_of_the_torque_are_no_contradiction(firmware, capsys, sheet):
     """Noise of 0.3 mrad on all three angles, also against an ideal data sheet, and 1.2 of the torque."""
-    code, result = driven(
-        firmware, capsys, *ARMED, "--duration", "2", *sheet, machine=(NOISE_urad, "strong", 0)
-    )
+    code, result = driven(firmware, capsys, *ARMED, "--duration", "2", *sheet, machine=(NOISE, "torque=1.2"))
     assert (code, result["status"]) == (0, "completed")
     assert 0 < result["link"]["largest_chi2"] < 10
 
@@ -189,7 +180,7 @@ def test_noise_and_an_error_of_the_torque_are_no_contradiction(firmware, capsys,
 @LOOPS
 def test_higher_limits_leave_a_frozen_sensor_alone(firmware, capsys):
     higher = ["--limit-frozen-ticks", "10000", "--limit-chi2", "1e9"]
-    machine = (NOISE_urad, "frozen", 503)
+    machine = ("fault=frozen@503", NOISE)
     code, _ = driven(firmware, capsys, *ARMED, "--duration", "0.7", *NOISY, *higher, machine=machine)
     assert code == 0
 
