@@ -375,7 +375,8 @@ def _field_of_another(path: tuple[str | int, ...], scenario: type[BaseModel]) ->
 # Ends of names, the longest first.
 UNITS = {
     "_rad_s3": "rad/s³", "_rad_s2": "rad/s²", "_Nm_rad": "N·m/rad", "_kg_m2": "kg·m²", "_rad_s": "rad/s",
-    "_Nm_s": "N·m·s", "_m_s2": "m/s²", "_per_K": "1/K", "_degC": "°C", "_ohm": "Ω", "_rad": "rad",
+    "_Nm_s": "N·m·s", "_m_s2": "m/s²", "_per_K": "1/K", "_degC": "°C", "_ohm": "Ω", "_mrad": "mrad",
+    "_rad": "rad",
     "_A_V": "A/V", "_A_s": "A/s", "_J_K": "J/K", "_K_W": "K/W", "_lsb": "LSB", "_Nm": "N·m", "_kg": "kg",
     "_Hz": "Hz", "_m": "m", "_s": "s", "_A": "A", "_V": "V", "_H": "H", "_J": "J", "duration": "s",
 }  # fmt: skip

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import partial
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from spheretwin.models.base.arrays import Array
 from spheretwin.scenario.fields import quantity_text
-from spheretwin.study.statistics import StudyTable, quantile_text
+from spheretwin.study.conclusion import decimals, factor, mrad_name, rounded
+from spheretwin.study.statistics import StudyTable, interval, quantile_text
 from spheretwin.viz.pages.markdown import PageSection, ResultTable
 
 MOST_CONDITIONS = 60
@@ -37,10 +40,11 @@ def section(rows: StudyTable) -> list[PageSection]:
         for law in rows.law_names
         if np.any((numbers == number) & (rows.laws == law))
     ]
-    figures = [f"{name}, degrees" for name in HINGES] if rows.hinges_rad is not None else [""]
+    figures = [f"{name}, mrad" for name in HINGES] if rows.hinges_rad is not None else [""]
     head = [*map(quantity_text, varied), "law", "rows", *figures]
-    head = [name or quantity_text(str(rows.main)) for name in head]
-    title = f"Medians by condition: {quantity_text(str(rows.main))}"
+    main = quantity_text(mrad_name(str(rows.main)))
+    head = [name or main for name in head]
+    title = f"Medians by condition: {main}"
     return [PageSection(title, [METHOD, ResultTable("", head, body, len(varied) + 1)])]
 
 
@@ -49,13 +53,22 @@ def _row(rows: StudyTable, varied: list[str], chosen: NDArray[np.bool_], law: st
     first = int(np.flatnonzero(chosen)[0])
     values = [rows.axes[field][first] for field in varied]
     if rows.hinges_rad is None:
-        figures = [rows.figures[str(rows.main)][complete]]
+        figures = [factor(str(rows.main)) * rows.figures[str(rows.main)][complete]]
     else:
-        hinges_deg = np.degrees(rows.hinges_rad[complete])
-        figures = [hinges_deg[:, hinges].max(axis=1) for hinges in HINGES.values()]
+        hinges_mrad = 1e3 * rows.hinges_rad[complete]
+        figures = [hinges_mrad[:, hinges].max(axis=1) for hinges in HINGES.values()]
     counted = f"{np.count_nonzero(complete)} of {np.count_nonzero(chosen)}"
-    cells = (quantile_text(figure[np.isfinite(figure)], "{:.4g}".format) for figure in figures)
+    cells = map(_median_text, figures)
     return [*map(_axis_text, values), law, counted, *cells]
+
+
+def _median_text(figure: Array) -> str:
+    """Return the median of the finite values and its interval, with the digits that this supports."""
+    numbers = figure[np.isfinite(figure)]
+    ends = [end for end in interval(numbers) if np.isfinite(end)]
+    places = decimals(float(np.median(numbers)), ends) if len(ends) == 2 else None
+    text = "{:.4g}".format if places is None else partial(rounded, places=places)
+    return quantile_text(numbers, text)
 
 
 def _numbers(rows: StudyTable) -> NDArray[np.int64]:

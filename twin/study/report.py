@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 from spheretwin.models.base.arrays import Array
 from spheretwin.models.base.errors import shown
 from spheretwin.scenario.fields import quantity_text
-from spheretwin.study import conditions
+from spheretwin.study import conclusion, conditions
+from spheretwin.study.conclusion import LEAST_SPREAD
 from spheretwin.study.statistics import StudyTable, ranked, strongest
 from spheretwin.viz.pages import markdown as pieces
 from spheretwin.viz.pages.markdown import Drawing, PageSection, ReportPage, ResultTable
@@ -28,9 +29,6 @@ MOST_BARS, MOST_SCATTERS = 20, 8
 
 # Largest number of values on an axis of a map.
 MOST_SQUARES = 60
-
-LEAST_SPREAD = 10
-"""Least number of completed rows for a distribution."""
 
 MOST_RANKED = 100_000
 """Rows from which on only some of a law, evenly spaced, are ranked and drawn as dots."""
@@ -255,16 +253,18 @@ def write(
         A file cannot be written there.
     """
     study, command = rows.study, f"spheretwin sweep {shlex.quote(source)}"
+    shown_rows = conclusion.in_mrad(rows)
     sections = [
         PageSection("Metrics of the rows", [medians(summary)]),
-        *pieces.figures_section(drawings(rows)),
+        *pieces.figures_section(drawings(shown_rows)),
         *conditions.section(rows),
-        *_worst(rows, command),
+        *_worst(shown_rows, command),
         *_failures(rows),
         PageSection("Varied fields", [_axes(study, rows)]),
     ]
     limit = f" --limit {requested[0]}" if requested[0] < requested[1] else ""
-    lead = "\n".join([study["description"], "", _ends(rows, *requested)])
+    conclusions = f"**Conclusion.** {conclusion.text(rows, summary)}"
+    lead = "\n".join([study["description"], "", conclusions, "", _ends(rows, *requested)])
     return ReportPage(NAME, study["name"], lead, sections, command + limit).write(folder, figure_format)
 
 
@@ -282,7 +282,11 @@ def medians(summary: Mapping[str, Any], title: str = "") -> ResultTable:
     figures = [name for name in next(iter(summary.values()), {}) if name != "statuses"]
     statuses = sorted({status for of_law in summary.values() for status in of_law["statuses"]})
     body = [
-        [quantity_text(name), *(_spread(of_law[name]) for of_law in summary.values())] for name in figures
+        [
+            quantity_text(conclusion.mrad_name(name)),
+            *(conclusion.spread_text(of_law[name], conclusion.factor(name)) for of_law in summary.values()),
+        ]
+        for name in figures
     ]
     body += [
         [f"number of rows: {name}", *(str(of_law["statuses"].get(name, 0)) for of_law in summary.values())]
@@ -291,14 +295,6 @@ def medians(summary: Mapping[str, Any], title: str = "") -> ResultTable:
     return ResultTable(
         title, ["median [its 95 % interval] (95 % range) of the completed rows", *summary], body
     )
-
-
-def _spread(figure: Mapping[str, Any]) -> str:
-    if figure["median"] is None:
-        return "–"
-    low, high = figure["range_95"]
-    ends = ("–" if end is None else f"{end:.4g}" for end in figure["median_95"])
-    return f"{figure['median']:.4g} [{', '.join(ends)}] ({low:.4g} to {high:.4g})"
 
 
 def _worst(rows: StudyTable, command: str) -> list[PageSection]:

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 Texts = NDArray[np.object_]
 
-MAIN, TILT = "max_abs_error_rad", "max_abs_tilt_error_rad"
+MAIN, MAIN_mrad, TILT = "max_abs_error_rad", "max_abs_error_mrad", "max_abs_tilt_error_rad"
 
 TEXTS = ("law", "status", "reason", "error")
 
@@ -78,7 +78,9 @@ class StudyTable(NamedTuple):
     @property
     def main(self) -> str | None:
         """Main figure of the report: the largest error, else the first figure."""
-        return MAIN if MAIN in self.figures else next(iter(self.figures), None)
+        return next(
+            (name for name in (MAIN, MAIN_mrad) if name in self.figures), next(iter(self.figures), None)
+        )
 
 
 def read(table: Path) -> StudyTable:

@@ -77,13 +77,15 @@ def _write_cells(axes: Axes, panel: HeatPanel, scale: SymLogNorm) -> None:
             change = panel.changes[row, column]
             away = abs(float(scale(np.clip(change, -FAR, FAR))) - 0.5) if np.isfinite(change) else 0.0
             axes.text(column, row, _text(value), ha="center", va="center", fontsize="small",
-                      color="white" if away > DARK else "black")  # fmt: skip
+                      color="white" if away > DARK else CELL_INK)  # fmt: skip
 
 
 def _text(value: float) -> str:
     return f"{value:.3f}" if value < 1 else f"{value:.2f}"
 
 
+CELL_INK = "#101214"
+"""Text on a light cell; a dark page inverts black text, which is outside of cells."""
 CELL_in = 0.42
 LIGHT = 0.55  # share of the scale beyond which numbers are written in black
 MANY = 200.0  # beyond this ratio, ticks at whole powers of ten are enough
@@ -223,8 +225,9 @@ def _write_map_cells(axes: Axes, panel: MapPanel, scale: Normalize) -> None:
                       markeredgewidth=1)  # fmt: skip
         if written and np.isfinite(value):
             light = float(scale(value)) > LIGHT
-            axes.text(column, row, f"{value:.2g}", ha="center", va="center", fontsize="x-small",
-                      color="black" if light else "white")  # fmt: skip
+            text = f"{value:.2g}" if abs(value) < 100 else f"{value:.0f}"
+            colour = CELL_INK if light else "white"
+            axes.text(column, row, text, ha="center", va="center", fontsize="x-small", color=colour)
 
 
 def _ticks(labels: Sequence[str]) -> tuple[list[int], list[str]]:

@@ -31,7 +31,7 @@ POLICY = (
 )
 
 LIBRARY = Path(__file__).with_name("plotly-cartesian.min.js.gz")
-"""The part of Plotly's JavaScript that draws these figures, as its authors publish it (npm, 4.1.1, MIT licence).
+"""Part of Plotly's JavaScript that draws these figures, as its authors publish it: npm, 4.1.1, MIT licence.
 
 The Python package has only all of it, which is three times as large.
 """
