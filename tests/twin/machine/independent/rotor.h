@@ -21,14 +21,15 @@ static const double BARE_J[3] = {2.219e-3, 2.176e-3, 2.256e-3}, HEIGHT_M = 0.1, 
 
 /* Parameters; torques in N m on the hinges, angles in rad, rates in rad/s. */
 static double inertia[3] = {1, 1, 1}, viscous[3], coulomb[3], load[3], payload_kg, lag_s[1] = {0.9e-3 / 1.3};
-static double torque[1] = {1}, gain[GROUPS], cogging[1], offset[3], noise[3], count[3], seed[1] = {1};
+static double torque[1] = {1}, gain[GROUPS], cogging[1], offset[3], noise[3], count[3], seed[1] = {1}, transition[1] = {0.008};
 static double amplitude[3] = {0.2, 0.2, 0.2}, frequency[3] = {0.5, 0.5, 0.5}, payload[1];
 
 static const struct { const char *name; double *values; int places; } SETTINGS[] = {
     {"inertia", inertia, 3}, {"viscous", viscous, 3}, {"coulomb", coulomb, 3}, {"load", load, 3},
     {"payload", payload, 1}, {"lag", lag_s, 1}, {"torque", torque, 1}, {"gain", gain, GROUPS},
     {"cogging", cogging, 1}, {"offset", offset, 3}, {"noise", noise, 3}, {"count", count, 3},
-    {"seed", seed, 1}, {"amplitude", amplitude, 3}, {"frequency", frequency, 3}};
+    {"seed", seed, 1}, {"amplitude", amplitude, 3}, {"frequency", frequency, 3},
+    {"transition", transition, 1}};
 
 static struct { double t_s; char *text; } later[64];
 static int waiting;
@@ -158,7 +159,7 @@ static void passive_torque(double out[3])
     out[2] = 0;
     for (int i = 0; i < 3; i++) {
         double rate = dot(dual[i], w);
-        double on_hinge = load[i] + cogging[0] * cog[i] - viscous[i] * rate - coulomb[i] * tanh(rate / 0.008);
+        double on_hinge = load[i] + cogging[0] * cog[i] - viscous[i] * rate - coulomb[i] * tanh(rate / transition[0]);
         for (int k = 0; k < 3; k++) out[k] += on_hinge * dual[i][k];
     }
 }

@@ -85,6 +85,7 @@ def drive(programs, folder, frames=None):
     return done.stdout, json.loads(out), wall_s, rate
 
 
+@pytest.mark.release("three processes; test_admission has the replayed frames")
 def test_frames_of_an_earlier_session_change_nothing_at_any_rate(programs, tmp_path):
     """Lockstep has no clock: each digit of the run stays the same."""
     frames = earlier_frames(tmp_path)
