@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from spheretwin.bench import Bench
     from spheretwin.control.law import Law, NonNegativeEach, PositiveEach
     from spheretwin.control.law_components.parameters import LawParameters
+    from spheretwin.control.policy import PolicyLaw
     from spheretwin.linear import linearise
     from spheretwin.models.lagrangian import coriolis_matrix, inertia_matrix
     from spheretwin.models.telemetry.signals import Signal
@@ -37,6 +38,7 @@ _MODULES = {
     "Law": ("spheretwin.control.law", "Law"),
     "LawParameters": ("spheretwin.control.law_components.parameters", "LawParameters"),
     "NonNegativeEach": ("spheretwin.control.law", "NonNegativeEach"),
+    "PolicyLaw": ("spheretwin.control.policy", "PolicyLaw"),
     "PositiveEach": ("spheretwin.control.law", "PositiveEach"),
     "Signal": ("spheretwin.models.telemetry.signals", "Signal"),
     "inertia_matrix": ("spheretwin.models.lagrangian", "inertia_matrix"),
@@ -51,9 +53,9 @@ _MODULES = {
 }
 
 __all__ = [
-    "Bench", "Law", "LawParameters", "NonNegativeEach", "PositiveEach", "Run", "Scenario", "Session",
-    "Signal", "__version__", "coriolis_matrix", "inertia_matrix", "linearise", "load", "read",
-    "review", "sensitivities", "simulate", "sweep",
+    "Bench", "Law", "LawParameters", "NonNegativeEach", "PolicyLaw", "PositiveEach", "Run",
+    "Scenario", "Session", "Signal", "__version__", "coriolis_matrix", "inertia_matrix",
+    "linearise", "load", "read", "review", "sensitivities", "simulate", "sweep",
 ]  # fmt: skip
 
 

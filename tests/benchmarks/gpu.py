@@ -189,7 +189,7 @@ def work(channel, alone, hardware, law):
 
 
 def kernels(alone):
-    """Start a process for each kernel, with a lock that lives as long; return them by hardware set and law."""
+    """Return a process for each kernel, by hardware set and law; the lock must live as long."""
     context, channels = multiprocessing.get_context("spawn"), {}
     for hardware in SETS:
         for law in LAWS:

@@ -21,16 +21,17 @@ except ModuleNotFoundError:
 from spheretwin.envs.settings import TASKS
 
 if TYPE_CHECKING:
+    from spheretwin.control.policy import OBSERVATION
     from spheretwin.envs.cuda import CudaVectorEnv
     from spheretwin.envs.environment import TwinEnv
-    from spheretwin.envs.episode import OBSERVATION, REWARD_TERMS, STATUS
+    from spheretwin.envs.episode import REWARD_TERMS, STATUS
     from spheretwin.envs.settings import Settings
     from spheretwin.envs.stable_baselines import StableBaselinesEnv
     from spheretwin.envs.vector import TwinVectorEnv
 
 _MODULES = {
     "CudaVectorEnv": "spheretwin.envs.cuda",
-    "OBSERVATION": "spheretwin.envs.episode",
+    "OBSERVATION": "spheretwin.control.policy",
     "REWARD_TERMS": "spheretwin.envs.episode",
     "STATUS": "spheretwin.envs.episode",
     "Settings": "spheretwin.envs.settings",

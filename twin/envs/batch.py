@@ -13,7 +13,8 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
-from spheretwin.envs.episode import BOUNDS, REWARD_TERMS, RUNNING, Episodes, Physics
+from spheretwin.control.policy import BOUNDS
+from spheretwin.envs.episode import REWARD_TERMS, RUNNING, Episodes, Physics
 from spheretwin.envs.sensing import Sensing
 from spheretwin.envs.settings import settings_of
 from spheretwin.envs.variants import build_variants

@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from spheretwin.control.policy import write_observation
 from spheretwin.electronics.coil import advance_lag
 from spheretwin.models.base.arrays import Array
 from spheretwin.models.base.compiled import allocation_free, inlined
@@ -20,25 +21,6 @@ RUNNING, LEFT_WORKSPACE, DIVERGED, COMPLETED = 0, 1, 2, 3
 STATUS = ("running", "left_workspace", "diverged", "completed")
 
 REWARD_TERMS = ("tracking", "rate", "effort", "failure")
-
-
-class Observed(NamedTuple):
-    """Part of an observation: three numbers, of alpha, beta and gamma."""
-
-    name: str
-    unit: str
-    bound: float
-    description: str
-
-
-OBSERVATION = (
-    Observed("error_rad", "rad", 10.0, "hinge angles minus their reference"),
-    Observed("error_rate_rad_s", "rad/s", 1e3, "hinge rates minus their reference"),
-    Observed("q_rad", "rad", 10.0, "hinge angles"),
-    Observed("qdot_rad_s", "rad/s", 1e3, "hinge rates"),
-    Observed("qddot_ref_rad_s2", "rad/s²", 1e5, "acceleration of the reference"),
-)
-BOUNDS = np.repeat([part.bound for part in OBSERVATION], 3)
 
 
 class Episodes(NamedTuple):
@@ -160,14 +142,8 @@ def finish(
 
 @allocation_free
 def observe(q: Triple, qdot: Triple, i: int, episodes: Episodes, row: NDArray[np.float32]) -> None:
-    """Write the observation of episode i; numbers beyond their bounds are cut, NaN is 0."""
-    reference = episodes.reference[episodes.variant[i], episodes.tick[i]]
-    for k in range(3):
-        row[k], row[3 + k] = q[k] - reference[0, k], qdot[k] - reference[1, k]
-        row[6 + k], row[9 + k], row[12 + k] = q[k], qdot[k], reference[2, k]
-    for place in range(15):
-        bound = BOUNDS[place]
-        row[place] = min(max(row[place], -bound), bound) if row[place] == row[place] else 0.0
+    """Write the observation of episode i."""
+    write_observation(q, qdot, episodes.reference[episodes.variant[i], episodes.tick[i]], row)
 
 
 @allocation_free

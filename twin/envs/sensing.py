@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from spheretwin.envs.episode import BOUNDS
+from spheretwin.control.policy import BOUNDS
 from spheretwin.envs.settings import Settings
 
 Array = NDArray[np.float32]

@@ -7,6 +7,7 @@ from typing import Annotated, Any, Literal, NamedTuple
 
 from pydantic import BaseModel, ConfigDict, Field, JsonValue, ValidationError
 
+from spheretwin.control.policy import TORQUE_LIMIT_Nm
 from spheretwin.models.base.errors import InputError, did_you_mean, one_line
 from spheretwin.study.axes import Normal, Uniform
 
@@ -37,8 +38,7 @@ class Settings(BaseModel):
         " current limit of each group",
     )
     torque_limit_Nm: Annotated[float, Field(gt=0, le=1e3)] = Field(
-        0.5,
-        description="largest torque on a hinge, N·m; at the pose 0, 3 A in every group give 0.5 (assumed)",
+        TORQUE_LIMIT_Nm, description="largest torque on a hinge, N·m"
     )
     episode_s: Annotated[float, Field(gt=0, le=600)] = Field(2.0, description="length of an episode")
     step_s: Annotated[float, Field(gt=0, le=0.1)] = Field(

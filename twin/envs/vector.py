@@ -9,9 +9,9 @@ import numpy as np
 from gymnasium.vector import AutoresetMode
 from numpy.typing import NDArray
 
+from spheretwin.control.policy import BOUNDS
 from spheretwin.envs.batch import EpisodeBatch
 from spheretwin.envs.episode import (
-    BOUNDS,
     COMPLETED,
     REWARD_TERMS,
     RUNNING,
