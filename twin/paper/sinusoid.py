@@ -76,7 +76,7 @@ def sizes(file: ExperimentFile, outcomes: Outcomes) -> list[Statement]:
 
 
 def _ratios_text(laws: Sequence[ComparedLaw], ratios: Mapping[ComparedLaw, Array]) -> str:
-    return ", ".join(f"{law.label} {ratios[law].min():.2f} to {ratios[law].max():.2f} times" for law in laws)
+    return ", ".join(f"{law.label} ×{ratios[law].min():.2f} to ×{ratios[law].max():.2f}" for law in laws)
 
 
 def growth(file: ExperimentFile, outcomes: Outcomes) -> list[Statement]:

@@ -13,7 +13,7 @@ from spheretwin.models.telemetry.signals import ANGLES
 from spheretwin.models.telemetry.status import named
 from spheretwin.viz.terminal import tables
 from spheretwin.viz.terminal.runs import NONE, ReportedMetric, angle, metrics, print_metrics, print_rows
-from spheretwin.viz.terminal.tables import percent, three_digits
+from spheretwin.viz.terminal.tables import three_digits
 
 FACTS = ("scenario", "law", "modelling_error", "load", "hardware", "seed", "status", "reason", "simulated_s")
 RESULTS = ("status", "reason", "simulated_s")
@@ -155,14 +155,10 @@ def print_tolerances(reference: str, run: str, signals: Sequence[SignalTolerance
     tables.print_table(table)
 
 
-LARGEST_SHARE = 10
-"""A larger share of a tolerance is written as a factor."""
-
-
 def _share(share: float) -> str:
     if not math.isfinite(share):
         return "exceeded"
-    return percent(share) if share <= LARGEST_SHARE else f"{three_digits(share)} times"
+    return f"×{three_digits(share)}"
 
 
 def differences(runs: Sequence[dict[str, Any]], band_rad: float) -> Iterator[list[str]]:
@@ -179,10 +175,6 @@ def differences(runs: Sequence[dict[str, Any]], band_rad: float) -> Iterator[lis
 
 def _entry(value: Any, place: int | None) -> float | None:
     return value if place is None or value is None else value[place]
-
-
-LARGEST_PERCENT = 1000
-"""A larger change is written as a factor."""
 
 
 def _with_difference(first: float | None, value: float | None, row: ReportedMetric) -> str:
@@ -210,17 +202,11 @@ def _digits(value: float) -> str:
 
 
 def _relative(first: float, value: float, *, signed: bool) -> str:
-    """Return the change in percent, a large one as a factor; nothing if it has no meaning.
+    """Return the ratio to the first value after a multiplication sign; nothing if it has no meaning.
 
     A signed quantity has it only if the change is at most the first value: a smaller value is too close to
-    zero to be a scale. The percentage has the sign of the difference.
+    zero to be a scale.
     """
-    if first == 0 or value / first < 0 or not math.isfinite(value / first):
+    if first == 0 or not 0 <= value / first < math.inf or (signed and value / first > 2):
         return ""
-    change_percent = 100 * (value - first) / abs(first)
-    if signed and abs(change_percent) > 100:
-        return ""
-    if change_percent > LARGEST_PERCENT:
-        return f", {three_digits(value / first)} times"
-    sign = "+" if change_percent > 0 else "-"
-    return f", {sign}{_digits(abs(change_percent))} %"
+    return f", ×{three_digits(value / first)}"

@@ -69,7 +69,7 @@ def test_findings_are_of_the_outcomes():
     printed = [printed_rad(law.law, **AT) for law in PAPER_LAWS]
     (finding,) = sinusoid.sizes(FIGURE7, made_up(printed))
     assert finding.reproduced
-    assert "PD 1.00 to 1.00 times, adaptive fuzzy 1.00 to 1.00 times, AFSM 1.00 to 1.00 times" in finding.text
+    assert "PD ×1.00 to ×1.00, adaptive fuzzy ×1.00 to ×1.00, AFSM ×1.00 to ×1.00" in finding.text
     far = [np.array(error) * factor for error, factor in zip(printed, (1.24, 1.26, 0.76), strict=True)]
     texts = {finding.reproduced: finding.text for finding in sinusoid.sizes(FIGURE7, made_up(far))}
     assert "adaptive fuzzy 1.26" in texts[False]
