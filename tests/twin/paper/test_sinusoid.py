@@ -72,7 +72,7 @@ def test_findings_are_of_the_outcomes():
     assert "PD ×1.00 to ×1.00, adaptive fuzzy ×1.00 to ×1.00, AFSM ×1.00 to ×1.00" in finding.text
     far = [np.array(error) * factor for error, factor in zip(printed, (1.24, 1.26, 0.76), strict=True)]
     texts = {finding.reproduced: finding.text for finding in sinusoid.sizes(FIGURE7, made_up(far))}
-    assert "adaptive fuzzy 1.26" in texts[False]
+    assert "adaptive fuzzy ×1.26 to ×1.26" in texts[False]
     assert "closer than the paper says" not in texts[False]
     assert all(law in texts[True] for law in ("PD", "AFSM"))
     right, broken = (sinusoid.order(FIGURE7, made_up(each))[0] for each in ([3.0, 2.0, 1.0], [3.0, 1.0, 2.0]))
