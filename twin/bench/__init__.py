@@ -208,7 +208,8 @@ class Bench:
             not show what a current does between them. The signals are ``t_s``, ``q_rad``, ``q_ref_rad``,
             ``error_rad``, ``torque_command_Nm``, ``torque_Nm``, ``disturbance_Nm``, ``current_command_A``,
             ``current_A``, ``allocation_scale``, the rates, and ``coil_temperature_degC``, which is NaN if
-            the hardware has no windings with temperatures.
+            the hardware has no windings with temperatures. References and error are NaN where none applies:
+            in the modes ``off`` and ``manual``.
         """
         return (self._bench_state.player or self._bench_state).history.read(after)
 

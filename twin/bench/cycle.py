@@ -18,6 +18,7 @@ from spheretwin.bench.status import BenchStatus, bench_status
 from spheretwin.bench.supervisor import COMMAND_s, Supervisor, TICKS_s
 from spheretwin.models.base.errors import InputError, SpheretwinError, exception_text, one_line
 from spheretwin.models.base.user_code import only_loaded
+from spheretwin.viz.bench.protocols import NO_REFERENCE
 
 # Longest time that a thread may keep the interpreter from the loop: three of Python's 5 ms make a chunk late.
 SWITCH_s = 1e-3
@@ -216,7 +217,7 @@ class Cycle:
                 rows = driver.advance(ticks - done)
             if rows is not None and len(rows):
                 done += len(rows)
-                bench_state.history.write(first, rows)
+                bench_state.history.write(first, rows, driver.mode not in NO_REFERENCE)
                 bench_state.capture.write(rows)
                 recording.write(rows)
             recording.note_changes(driver.session)

@@ -19,6 +19,9 @@ LENGTH_s = 60.0
 
 TEMPERATURE = "coil_temperature_degC"
 
+REFERENCE = ("q_ref_rad", "qdot_ref_rad_s", "error_rad")
+"""Signals that need a reference."""
+
 # Time over which the variation of the commanded currents is averaged.
 CHATTER_s = 1.0
 
@@ -73,11 +76,14 @@ class History:
         self._bins: deque[Bin] = deque(maxlen=round(LENGTH_s * RATE_Hz))
         self._last_command: Array | None = None
 
-    def write(self, first_tick: int, rows: Table) -> None:
-        """Add rows, in any chunks."""
+    def write(self, first_tick: int, rows: Table, with_reference: bool = True) -> None:
+        """Add rows, in any chunks; without a reference that applies, it and the error are NaN."""
         if not len(rows):
             return
         values = plotted_values(rows, self._signals)
+        if not with_reference:
+            names = [signal.name for signal in self._signals for _ in range(signal.size)]
+            values[:, np.isin(names, REFERENCE)] = np.nan
         variation = self._variation(rows["current_command_A"].reshape(len(rows), -1))
         numbers = (first_tick + np.arange(len(values))) // self._stride
         starts = np.flatnonzero(np.diff(numbers, prepend=numbers[0] - 1))[-(self._bins.maxlen or 0) :]

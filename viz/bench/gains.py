@@ -142,6 +142,7 @@ class GainHistory:
         self._seen = bins.run, bins.numbers[-1]
         counts = bins.rows["t_s"].reshape(-1) > self._since_s + SETTLING_S
         squares = np.sum(bins.rows["error_rad"][counts] ** 2, axis=1)
+        squares = squares[np.isfinite(squares)]  # NaN: no reference applied
         for slot, gains in self._slots.items():
             if gains == self._present:
                 total, count = self._squares[slot]

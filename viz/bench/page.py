@@ -16,7 +16,7 @@ from spheretwin.viz.bench.access import Access
 from spheretwin.viz.bench.event_handlers import Event, EventHandlers, client_name
 from spheretwin.viz.bench.feed import Feed
 from spheretwin.viz.bench.modes_tab import ModesTab
-from spheretwin.viz.bench.protocols import BenchProtocol, Choices
+from spheretwin.viz.bench.protocols import NO_REFERENCE, BenchProtocol, Choices
 from spheretwin.viz.bench.scene import Scene
 from spheretwin.viz.bench.settings_tab import SettingsTab
 from spheretwin.viz.bench.status_panel import status_html
@@ -229,7 +229,7 @@ class Page:
 
 
 def _desired(state: Any) -> Any:
-    return None if state.mode in ("off", "manual", "fault") else np.array(state.q_ref_rad)
+    return None if state.mode in NO_REFERENCE else np.array(state.q_ref_rad)
 
 
 def _set_camera(server: viser.ViserServer) -> None:

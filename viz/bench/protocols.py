@@ -11,6 +11,9 @@ from numpy.typing import NDArray
 
 from spheretwin.models.actuator import Actuator
 
+NO_REFERENCE = ("off", "manual", "fault")
+"""Modes in which no reference applies: an error would be that against an old one."""
+
 
 class TicketProtocol(Protocol):
     """Outcome of a command."""

@@ -6,6 +6,8 @@ from html import escape
 from math import isinf
 from typing import Any
 
+from spheretwin.viz.bench.protocols import NO_REFERENCE
+
 GOOD, WARN, BAD, QUIET, WORKING = "good", "warn", "bad", "quiet", "working"
 """Classes of the style sheet."""
 
@@ -42,12 +44,15 @@ def _cells(state: Any) -> list[tuple[str, str, str]]:
     speed = "as fast as possible" if isinf(state.speed) or state.speed > 1e3 else f"{state.speed:g}×"
     faults, files = ", ".join(state.active_faults), ", ".join(state.recording)
     digits = ".2f" if state.error_mrad < 1e5 else ".2e"  # γ may turn without an end
+    error, explanation = f"{state.error_mrad:{digits}} mrad", f"error: {state.error_deg:.3f}°"
+    if state.mode in NO_REFERENCE:
+        error, explanation = "–", f"no reference in the mode {state.mode}"
     red, green = BAD if faults else "", GOOD if files else ""
     config = f"scenario {state.scenario}, {state.shape}, {state.allocation}"
     return [
         ("time", f"<b>{state.t_s:.3f} s</b>", "simulated time"),
         ("speed", f"<b>{state.realtime_factor:.2f}×</b>", f"simulated over wall time; commanded: {speed}"),
-        ("error |e|", f"<b>{state.error_mrad:{digits}} mrad</b>", f"error: {state.error_deg:.3f}°"),
+        ("error |e|", f"<b>{error}</b>", explanation),
         ("torque margin", _bar(state.torque_margin), "remaining share of the current limit"),
         ("chatter", f"<b>{state.chatter_A_s:.1f} A/s</b>", "variation of the commands, mean of the groups"),
         ("missed deadlines", f"<b>{state.missed}</b>", f"late chunks of {state.chunks}"),

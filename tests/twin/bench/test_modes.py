@@ -97,3 +97,15 @@ def test_a_changed_field_of_the_trajectory_keeps_its_phase(made):
     made.advance(2000)
     t = made.state().t_s
     np.testing.assert_allclose(made.state().q_ref_rad, 0.1 * np.sin(np.pi * t), atol=1e-12)
+
+
+@pytest.mark.parametrize("mode", MODES)
+def test_the_history_has_an_error_only_in_modes_with_a_reference(mode):
+    with begun() as bench:
+        done(bench, mode, **MODES[mode])
+        last = bench.bins().numbers[-1:] or [-1]
+        bench.advance(200)
+        bins = bench.bins(last[0] + 1)
+    for name in ("q_ref_rad", "error_rad"):
+        assert np.isnan(bins.high[name]).all() == np.isnan(bins.low[name]).any() == (mode in BY_HAND)
+    assert np.isfinite(bins.high["q_rad"]).all()
