@@ -25,15 +25,15 @@ const bench = {header: {}, fixed: null, listeners: [], selected: [], query: {run
 
   const build = () => {
     const speeds = Object.keys(SPEEDS).map((name) => `<option>${name}</option>`).join("");
-    const bar = bench.element(`<div id="bench-bar"><div class="row">
+    const bar = bench.element(`<header id="bench-bar"><h1>bench</h1><div class="row">
       <button class="stop" data-send="stop">STOP</button>
-      <select title="what STOP does: currents off at once, or hold and then off" data-stop><option value="off">currents off</option><option value="hold">hold first</option></select>
+      <select title="what STOP does: currents off at once, or hold and then off" aria-label="what STOP does" data-stop><option value="off">currents off</option><option value="hold">hold first</option></select>
       <span class="set">${buttons(["start", "pause", "step", "reset"], "send")}</span>
-      <select title="speed" data-speed>${speeds}<option hidden></option></select>
+      <select aria-label="speed" title="speed" data-speed>${speeds}<option hidden></option></select>
       <span class="set">${buttons(MODES, "mode")}</span>
       <span class="role"><span class="badge quiet" data-role>connecting</span><button data-ask hidden></button>
-      <button data-theme title="light or dark">◐</button></span>
-      </div><div id="bench-status" data-bench="status"></div></div>`);
+      <button data-theme title="light or dark" aria-label="light or dark">◐</button></span>
+      </div><div id="bench-status" data-bench="status"></div></header>`);
     document.body.append(bar);
     const find = (what) => bar.querySelector(`[data-${what}]`);
     bar.addEventListener("click", ({target, detail}) => {

@@ -120,9 +120,9 @@
   };
 
   addEventListener("DOMContentLoaded", () => {
-    canvas = bench.element(`<canvas id="bench-coils"></canvas>`);
-    menu = bench.element(`<div id="bench-menu" hidden></div>`);
-    tip = bench.element(`<div id="bench-tip" hidden></div>`);
+    canvas = bench.element(`<canvas id="bench-coils" aria-hidden="true"></canvas>`);
+    menu = bench.element(`<div id="bench-menu" role="dialog" aria-label="coil" hidden></div>`);
+    tip = bench.element(`<div id="bench-tip" role="tooltip" hidden></div>`);
     document.body.append(canvas, menu, tip);
     draw();
   });
