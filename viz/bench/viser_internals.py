@@ -87,8 +87,8 @@ TITLE = b"<title>Viser</title>"
 """Title of the page, as viser serves it."""
 
 
-CLIENT_FILES = ("bench.css", "bar.js", "coils.js", "plots.js", "panel.js")
-"""Style and scripts of the bar, the marks of the coils, the plots, and the panel."""
+CLIENT_FILES = ("bench.css", "bar.js", "coils.js", "plots.js", "dock.js", "panel.js")
+"""Style and scripts of the bar, the marks of the coils, the plots, their dock, and the panel."""
 
 
 def with_head(page: bytes, title: str) -> bytes:

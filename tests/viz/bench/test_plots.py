@@ -40,6 +40,29 @@ def tab(tab):
     return tab
 
 
+@pytest.fixture
+def forgetful(tab):
+    """The page, whose layout another test has not left behind."""
+    tab.evaluate("localStorage.clear()")
+    return tab
+
+
+PANES = "[...document.querySelectorAll('[data-pane]')].map((each) => each.dataset.pane)"
+
+
+def select(tab, *panes):
+    """Choose the quantities of as many plots."""
+    tab.click(f"[data-count='{len(panes)}']")
+    for place, name in enumerate(panes):
+        choose(tab, f"document.querySelectorAll('[data-pane] select')[{place}]", name)
+    assert tab.evaluate(PANES) == list(panes)
+
+
+def choose(tab, element, value):
+    change = f"e.value = {value!r}; e.dispatchEvent(new Event('change', {{bubbles: true}}));"
+    tab.evaluate(f"((e) => {{ {change} }})({element})")
+
+
 def values(pane):
     return f"document.querySelector('[data-pane={pane}] .values').innerText"
 
@@ -82,6 +105,7 @@ def test_no_extreme_is_lost_in_a_column_of_pixels(tab):
 
 
 def test_the_cursor_shows_the_values_at_its_time_in_every_pane(tab, bench):
+    select(tab, "β", "error", "torque")
     tab.wait_for("document.querySelector('[data-pane=error]')?.scale !== undefined")
     at = tab.evaluate(
         "((pane) => { const {x, y, height} = pane.getBoundingClientRect();"
@@ -95,9 +119,11 @@ def test_the_cursor_shows_the_values_at_its_time_in_every_pane(tab, bench):
     bins = bench.bins()
     place = int(np.flatnonzero(bins.low["t_s"][:, 0] <= cursor + 1e-9)[-1])
     low, high = bins.low["torque_command_Nm"][place, 1], bins.high["torque_command_Nm"][place, 1]
-    tab.wait_for(f"{values('torque')}.includes('β {low:.2f}…{high:.2f}')")
-    assert "torque, N·m" in tab.evaluate(values("torque"))
-    assert "β, °" in tab.evaluate(values("β"))
+    tab.wait_for(f"{values('torque')}.includes('β {low:.3f}…{high:.3f}')")
+    quantity = (
+        "[...document.querySelectorAll('[data-pane] select')].map((each) => each.selectedOptions[0].text)"
+    )
+    assert tab.evaluate(quantity) == ["β, °", "error, mrad", "torque, N·m"]
     assert "desired" in tab.evaluate(values("β"))
 
 
@@ -116,8 +142,6 @@ def test_window_pause_and_zoom(tab, bench):
     assert tab.evaluate("bench.plots.range()") == [1, 2]
     tab.click("[data-do=pause]")
     assert tab.evaluate("bench.plots.view.end") is None
-    tab.click("[data-show=torque]")
-    tab.wait_for("document.querySelector('[data-pane=torque]') === null")
 
 
 def test_a_capture_is_armed_shown_with_every_row_and_left(tab, bench):
@@ -148,3 +172,81 @@ def test_a_capture_is_armed_shown_with_every_row_and_left(tab, bench):
     assert tab.evaluate("bench.plots.range()") == pytest.approx([0.0, 0.98])
     tab.click("[data-do=captured]")
     tab.wait_for("bench.plots.shown === bench.plots.live")
+
+
+def test_one_to_four_plots_change_places_and_are_remembered(forgetful, page):
+    tab = forgetful
+    for count in (1, 4, 2, 3):
+        tab.click(f"[data-count='{count}']")
+        shown = tab.evaluate(PANES)
+        assert len(shown) == len(set(shown)) == count
+    select(tab, "currents", "error", "angles")
+    choose(tab, "document.querySelectorAll('[data-pane] select')[0]", "angles")  # the two change places
+    assert tab.evaluate(PANES) == ["angles", "error", "currents"]
+    tab.wait_for("document.querySelector('[data-pane=error]').scale !== undefined")
+    tab.click("[data-pane=error] [data-scale]")
+    choose(tab, "document.querySelectorAll('[data-pane=error] [data-end]')[1]", "40")
+    tab.wait_for("document.querySelector('[data-pane=error]').scale?.high === 40")
+    tab.go(f"http://127.0.0.1:{page._server.get_port()}/")
+    tab.wait_for("document.querySelector('[data-pane=error]')?.scale?.high === 40")
+    assert tab.evaluate(PANES) == ["angles", "error", "currents"]
+    tab.click("[data-pane=error] [data-scale]")
+    tab.wait_for("document.querySelector('[data-pane=error]').scale?.high > 400")
+
+
+def test_a_page_without_storage_or_with_a_foreign_entry_has_its_own_layout(forgetful, page):
+    tab = forgetful
+    address = f"http://127.0.0.1:{page._server.get_port()}/"
+    for entry in ("[1]", "{", '{"panes": [{"show": "nothing"}]}', '{"panes": [{"show": "__proto__"}]}'):
+        tab.evaluate(f"localStorage.setItem('spheretwin-bench', {entry!r})")
+        tab.go(address)
+        tab.wait_for(f"{PANES}.length === 3")
+    denied = "Object.defineProperty(window, 'localStorage', {get() { throw new Error('denied'); }})"
+    tab.command("Page.addScriptToEvaluateOnNewDocument", source=denied)
+    tab.go(address)
+    tab.click("[data-count='1']")
+    tab.wait_for(f"{PANES}.length === 1")
+
+
+def test_two_cursors_show_the_difference(forgetful, bench):
+    tab = forgetful
+    select(tab, "α")
+    tab.wait_for("document.querySelector('[data-pane=α]').scale !== undefined")
+    tab.click("[data-do=marks]")
+    for place, t_s in enumerate((0.2, 0.7)):
+        choose(tab, f"document.querySelectorAll('[data-mark]')[{place}]", str(t_s))
+    bins = bench.bins()
+    a, b = (
+        np.degrees((bins.low["q_rad"][place, 0] + bins.high["q_rad"][place, 0]) / 2) for place in (10, 35)
+    )
+    tab.wait_for(f"{values('α')}.includes('Δ {b - a:.1f}')")
+    assert tab.evaluate("document.querySelector('[data-difference]').innerText") == "Δ 0.500 s"
+    before = tab.evaluate("bench.plots.view.marks")
+    at = (
+        "((pane, t) => {{ const {{x, y, height}} = pane.querySelector('canvas').getBoundingClientRect();"
+        " const {{start, end, left, right}} = pane.scale;"
+        " return [x + left + (t - start) / (end - start) * (right - left), y + height / 2]; }})"
+        "(document.querySelector('[data-pane=α]'), {})"
+    )
+    tab.drag(tab.evaluate(at.format(0.2)), tab.evaluate(at.format(0.5)))
+    after = tab.evaluate("bench.plots.view.marks")
+    assert after[0] == pytest.approx(0.5, abs=0.05)
+    assert after[1] == before[1]
+    tab.click("[data-do=marks]")
+    tab.wait_for("bench.plots.view.marks === null")
+
+
+def test_the_bars_have_the_scale_of_the_run_and_the_limit_is_named(forgetful, bench):
+    tab = forgetful
+    bench.now.current_A = (0.2,) + (0.0,) * (fake.GROUPS - 1)
+    scale = "document.querySelector('[data-pane=groups]').scale"
+    select(tab, "groups")
+    bench.bins = lambda after=-1: small_currents(fake.Bench.bins(bench, after))
+    bench.run = 2
+    tab.wait_for(f"{scale}?.high < 0.3 && {scale}.high > 0.2")
+    assert "limit ±8" in tab.evaluate(values("groups"))
+
+
+def small_currents(bins):
+    parts = ({**part, "current_A": 0 * part["current_A"] + 0.01} for part in (bins.rows, bins.low, bins.high))
+    return type(bins)(bins.run, bins.numbers, *parts)
