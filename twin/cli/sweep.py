@@ -25,6 +25,7 @@ from spheretwin.models.telemetry.status import Status
 from spheretwin.study import report, statistics
 from spheretwin.study.engines import ENGINES
 from spheretwin.study.grid import Grid
+from spheretwin.study.relative import absolute
 from spheretwin.study.row import Rows
 from spheretwin.study.runner import StudyResult
 from spheretwin.study.runner import run as run_study
@@ -82,7 +83,7 @@ def run(options: argparse.Namespace) -> bool:
     Rows in its journal are not run again: an interrupted study continues. Exit code 1 if it is not
     complete, or if a row ended as failsafe or by an exception of a law or a metric.
     """
-    study = load(options.study)
+    study = absolute(load(options.study))
     if options.twin:
         study = _over_twin(study, options.twin, options.draws or DRAWS)
     if options.optimise:

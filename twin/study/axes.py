@@ -9,6 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, JsonValue, field_validator, model_validator
 
+from spheretwin.models.base.errors import InputError
+
 # A larger number is a mistake: at a millisecond a row it would take weeks.
 MOST_VALUES = 1_000_000
 
@@ -34,6 +36,18 @@ class Axis(BaseModel):
     zip: str | None = Field(
         None, description="axes of the same name go together, value by value; all others are crossed"
     )
+    relative: bool = Field(
+        False,
+        exclude=True,
+        description="whether the values are factors of the field's own value: from 0.9 to 1.1 is ±10 %",
+    )
+
+    @abstractmethod
+    def scaled(self, own: float) -> Axis:
+        """Return the axis with factors of a value in place of values, no longer relative."""
+
+    def _with(self, **numbers: Any) -> Axis:
+        return type(self).model_validate(self.model_dump() | numbers)
 
 
 class ListedAxis(Axis):
@@ -64,6 +78,10 @@ class Linspace(ListedAxis):
         """Values at equal distances."""
         return list(np.linspace(self.first, self.last, self.count).tolist())
 
+    def scaled(self, own: float) -> Axis:
+        """Both ends times a value."""
+        return self._with(first=own * self.first, last=own * self.last)
+
 
 Positive = Annotated[float, Field(gt=0, le=LARGEST)]
 
@@ -79,6 +97,10 @@ class Logspace(ListedAxis):
     def listed(self) -> list[Any]:
         """Values at equal ratios."""
         return list(np.geomspace(self.first, self.last, self.count).tolist())
+
+    def scaled(self, own: float) -> Axis:
+        """Both ends times a value."""
+        return self._with(first=own * self.first, last=own * self.last)
 
 
 class Normal(DrawnAxis):
@@ -100,6 +122,10 @@ class Normal(DrawnAxis):
         least = ndtr(-self.most_deviations)
         return self.mean + self.deviation * ndtri(least + (1 - 2 * least) * uniform)
 
+    def scaled(self, own: float) -> Axis:
+        """Mean and deviation times a value."""
+        return self._with(mean=own * self.mean, deviation=abs(own) * self.deviation)
+
 
 class Uniform(DrawnAxis):
     """Uniform distribution between two bounds."""
@@ -117,6 +143,11 @@ class Uniform(DrawnAxis):
     def quantile(self, uniform: NDArray[np.float64]) -> NDArray[np.float64]:
         """Inverse of the cumulative distribution."""
         return self.low + (self.high - self.low) * uniform
+
+    def scaled(self, own: float) -> Axis:
+        """Both bounds times a value."""
+        low, high = sorted((own * self.low, own * self.high))
+        return self._with(low=low, high=high)
 
 
 class Values(ListedAxis):
@@ -137,6 +168,13 @@ class Values(ListedAxis):
     def listed(self) -> list[Any]:
         """Given values."""
         return list(self.values)
+
+    def scaled(self, own: float) -> Axis:
+        """Numbers times a value."""
+        numbers = [own * value for value in self.values if isinstance(value, int | float)]
+        if len(numbers) < len(self.values):
+            raise InputError(f"axis over {self.field}: expected numbers as factors, received {self.values!r}")
+        return self._with(values=tuple(numbers))
 
 
 AnyAxis = Annotated[

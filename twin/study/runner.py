@@ -15,6 +15,7 @@ from spheretwin.study.engines import ENGINES
 from spheretwin.study.engines.engine import Engine, Order, Work
 from spheretwin.study.grid import Grid
 from spheretwin.study.journal import Journal, digest_of
+from spheretwin.study.relative import absolute
 from spheretwin.study.row import Rows
 from spheretwin.study.study import Study, load
 
@@ -149,7 +150,7 @@ def run(
         are stored.
     """
     started = time.perf_counter()
-    study = load(study) if isinstance(study, str) else study
+    study = absolute(load(study) if isinstance(study, str) else study)
     folder = Path(out) if out is not None else Path(f"{study.name}_study")
     chosen = _engine(engine, address)
     grid = Grid(study)

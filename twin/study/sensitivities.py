@@ -23,6 +23,7 @@ from spheretwin.scenario.fields import flat
 from spheretwin.simulation import simulate
 from spheretwin.study.engines import engine_in_process
 from spheretwin.study.grid import Row
+from spheretwin.study.relative import number
 from spheretwin.study.row import Rows
 from spheretwin.study.study import Study
 from spheretwin.study.template import is_number
@@ -100,15 +101,11 @@ def _signal_names() -> set[str]:
 
 def _number(rows: Rows, name: str) -> float:
     """Return the number of a field, or of an entry of a list."""
-    known = flat(rows.base.model_dump(mode="json"))
-    whole, _, place = name.rpartition(".")
-    listed = known.get(whole)
-    if isinstance(listed, list) and place.isdecimal() and int(place) < len(listed):
-        known[name] = listed[int(place)]
-    value: Any = known.get(name)
-    if not is_number(value):
-        raise InputError(f"sensitivities: expected a field with a number, received {name} = {shown(value)}")
-    return float(value)
+    value = number(known := flat(rows.base.model_dump(mode="json")), name)
+    if value is None:
+        message = f"expected a field with a number, received {name} = {shown(known.get(name))}"
+        raise InputError(f"sensitivities: {message}")
+    return value
 
 
 def _columns(rows: Rows, runs: Sequence[Row], figures: Sequence[str]) -> dict[str, NDArray[np.float64]]:
