@@ -43,6 +43,7 @@ html_title = f"spheretwin {release}"
 html_theme_options = {"sidebar_hide_name": False, "navigation_with_keys": True}
 html_static_path = ["_static"]
 html_css_files = ["site.css"]
+html_js_files = ["site.js"]
 html_copy_source = False
 html_show_sourcelink = False
 

@@ -56,6 +56,12 @@ def test_every_picture_and_link_has_a_text(name):
         )
 
 
+@pytest.mark.parametrize("name", TEXTS)
+def test_every_column_of_a_table_has_a_header(name):
+    for opened, following in pairwise(MARKDOWN.parse(FRONT_MATTER.sub("", TEXTS[name]))):
+        assert opened.type != "th_open" or following.content.strip(), opened.map
+
+
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
 def test_every_link_leads_to_a_file_of_the_repository(page):
     """Also where the sources are read: pages that `make docs` generates are not there."""
