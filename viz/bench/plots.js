@@ -139,7 +139,7 @@
       const [a, b] = [label(least[place], by), label(most[place], by)];
       return view.cursor === null && !line.spread ? label(middle(line, place), by) : a === b ? b : `${a}…${b}`;
     };
-    const dashed = lines.some(({name, dash}) => dash && !name) ? " <i>desired: dashed</i>" : "";
+    const dashed = lines.some(({name, bounds: [least]}) => !name && !Number.isNaN(least[to - 1])) ? " <i>desired: dashed</i>" : "";
     return lines.filter(({name}) => name).map((line) =>
       `<span style="border-bottom:2px solid ${line.colour}">${line.name} ${text(line)}</span>`).join(" ") + dashed;
   };
@@ -232,7 +232,7 @@
     const y = levels(plot, low, high), wide = (area.right - area.left) / current_A.length;
     Object.assign(paint, {textAlign: "center", textBaseline: "top"});
     const every = Math.ceil(step(current_A.length, (area.right - area.left) / (2.2 * size)));
-    for (let group = 0; group < current_A.length - 2; group += every) {
+    for (let group = 0; (group + 0.5) * wide < area.right - area.left - 3.8 * size; group += every) {
       paint.fillText(group, area.left + (group + 0.5) * wide, area.bottom + 0.5 * size);
     }
     paint.textAlign = "right";
