@@ -111,14 +111,14 @@ format: .venv-wheel/installed
 
 setup: .venv/installed
 
-# What the demo needs and no more; what is there already stays.
+# What the demo needs and no more, with its recording; what is there already stays.
 .venv/demo: uv.lock pyproject.toml $(TOOLS)/uv
-	$(SYNC) --inexact --compile-bytecode
+	$(SYNC) --inexact --compile-bytecode --extra record
 	@touch $@
 
-# What the tests need: every extra that they use is among their group.
+# What the tests need: every extra that they use is among their group. Packages of make extras stay.
 .venv/installed: uv.lock pyproject.toml $(TOOLS)/uv
-	$(SYNC) --compile-bytecode --group test
+	$(SYNC) --inexact --compile-bytecode --group test
 	@touch $@ .venv/demo
 
 # What the site needs beyond the tests: its API pages import the package.

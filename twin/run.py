@@ -16,7 +16,7 @@ from spheretwin.metrics.reduction import PlannedRun
 from spheretwin.metrics.user_metrics import UserMetric, check_names, own_value
 from spheretwin.models.actuator import Actuator
 from spheretwin.models.base.errors import InputError, LawError, shown
-from spheretwin.models.base.extras import missing
+from spheretwin.models.base.extras import check_recordings, missing
 from spheretwin.models.telemetry.run_record import RunRecord, versions
 from spheretwin.models.telemetry.signals import ANGLES
 from spheretwin.models.telemetry.status import Status
@@ -147,6 +147,7 @@ class Run:
         InputError, SpheretwinError
             As `save`.
         """
+        check_recordings("run")
         from spheretwin.viz.recording.recorder import Recorder  # Rerun is slow to import
 
         facts = facts_of(self.scenario)

@@ -16,6 +16,7 @@ from spheretwin.models.symbolic import on_symbols, turns_by
 from spheretwin.models.telemetry.signals import ANGLES
 from spheretwin.models.telemetry.table import Table
 from spheretwin.viz import theme
+from spheretwin.viz.scene.places import shaft_tip
 
 Array = NDArray[np.float64]
 
@@ -207,8 +208,6 @@ MEASURED_ANGLE = by_axis(
 
 def tip_distance(rows: QuantityRows) -> Array:
     """Distance between the tip and the desired tip, (n, 1) in mm."""
-    from spheretwin.viz.scene.entities import shaft_tip  # Rerun is slow to import
-
     actual = shaft_tip(rows.table["q_rad"], rows.actuator)
     desired = shaft_tip(rows.table["q_ref_rad"], rows.actuator)
     return 1e3 * np.sqrt(np.sum((actual - desired) ** 2, axis=1))[:, None]

@@ -15,6 +15,7 @@ from urllib.request import url2pathname
 from spheretwin.models.base.errors import InputError
 
 PURPOSES = {
+    "record": "recordings of runs, their live view and their review",
     "plots": "figures and pages of studies, experiments and reviews",
     "bench": "the page in a browser that drives the twin",
     "video": "clips of runs as MP4",
@@ -32,7 +33,7 @@ PURPOSES = {
     "cross": "exported C code for other platforms",
     "fem": "field of the iron hoop by finite elements",
 }
-"""Purpose of each extra, the most common first."""
+"""Purpose of each extra, the most common first; the extra all has those of all others except gpu."""
 
 
 def missing(place: str, package: str, extra: str, purpose: str = "") -> InputError:
@@ -41,6 +42,23 @@ def missing(place: str, package: str, extra: str, purpose: str = "") -> InputErr
     return InputError(
         f"{place}: expected {wanted}, which the extra {extra} installs: {install_command(extra)}"
     )
+
+
+def check_recordings(place: str) -> None:
+    """Check that recordings can be written and read.
+
+    Parameters
+    ----------
+    place : str
+        What needs them, for the message.
+
+    Raises
+    ------
+    InputError
+        Rerun is not installed.
+    """
+    if find_spec("rerun") is None:
+        raise missing(place, "rerun-sdk", "record", "for recordings")
 
 
 def install_command(*extras: str) -> str:

@@ -11,8 +11,7 @@ from spheretwin.models.telemetry.table import Table
 from spheretwin.records.provenance import facts_of
 from spheretwin.viz.comparison import merged_recording, trajectories
 from spheretwin.viz.comparison import shadow as shadow_recording
-from spheretwin.viz.comparison.runs import ComparedRun, EarlyEnd
-from spheretwin.viz.comparison.trajectories import LawTrajectory
+from spheretwin.viz.comparison.runs import ComparedRun, EarlyEnd, LawTrajectory
 from spheretwin.viz.quantities import QuantityRows
 from spheretwin.viz.recording.live import LiveView
 from spheretwin.viz.recording.part import RecordingSubject

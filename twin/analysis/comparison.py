@@ -18,6 +18,7 @@ from spheretwin.analysis.run_summary import amplitudes, peaks
 from spheretwin.metrics.tracking import BAND_rad
 from spheretwin.models.actuator import Actuator
 from spheretwin.models.base.errors import InputError, shortened, shown, without_breaks
+from spheretwin.models.base.extras import check_recordings
 from spheretwin.models.base.files import check_writable
 from spheretwin.models.base.user_code import short_names
 from spheretwin.models.telemetry.signals import ANGLES
@@ -106,6 +107,7 @@ def merge(runs: Sequence[Reviewed], path: Path) -> None:
     SpheretwinError
         The file cannot be written; the previous file is unchanged.
     """
+    check_recordings("review")
     from spheretwin.viz.comparison import merged_recording  # Rerun is slow to import
     from spheretwin.viz.recording.part import RecordingSubject
 
@@ -208,6 +210,7 @@ def _rows(run: Reviewed, table: Table) -> QuantityRows:
 
 def subject_of(scenario: ResolvedScenario, actuator: Actuator) -> RecordingSubject:
     """Return what is drawn of a machine without a run."""
+    check_recordings("live view")
     from spheretwin.viz.recording.part import RecordingSubject  # Rerun is slow to import
 
     return RecordingSubject(actuator, (), facts_of(scenario))

@@ -17,6 +17,7 @@ from spheretwin.analysis import recovery
 from spheretwin.analysis.recovery import hold_rows, ticks_of
 from spheretwin.config.active_config import ActiveConfig, initial_config
 from spheretwin.models.base.errors import InputError, shown
+from spheretwin.models.base.extras import check_recordings
 from spheretwin.models.telemetry import joint_states
 from spheretwin.models.telemetry.checksums import has_checksums
 from spheretwin.models.telemetry.joint_states import ANGLE_NAMES, Topic, group_names
@@ -207,6 +208,7 @@ def _of_telemetry(
 
 
 def _of_recording(path: Path) -> Reviewed:
+    check_recordings(f"review {path}")
     from spheretwin.viz.recording import reader  # Rerun is slow to import
     from spheretwin.viz.recording.signals import RATE
 

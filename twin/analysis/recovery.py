@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spheretwin.models.base.errors import InputError, without_breaks
+from spheretwin.models.base.extras import check_recordings
 from spheretwin.models.telemetry.parquet import join
 from spheretwin.models.telemetry.partial_files import list_of, read_schema
 from spheretwin.models.telemetry.table import Table, read_parquet
@@ -119,6 +120,7 @@ def recover(path: Path, out: Path) -> Recovered:
         rows = join(parts, out)
         return Recovered(rows, rows * period_s, are_checked(left))
     if left.suffix in RECORDINGS or is_recording(left):
+        check_recordings(f"recover {left}")
         from spheretwin.viz import rerun_internals
         from spheretwin.viz.recording import reader  # Rerun is slow to import
 

@@ -21,7 +21,7 @@ from spheretwin.machine.link.real_time import PRIORITY, real_time
 from spheretwin.models.base import cache
 from spheretwin.models.base.extras import PURPOSES, install_command, missing_packages
 
-PACKAGES = ("mujoco", "numba", "llvmlite", "numpy", "scipy", "pyarrow", "pydantic", "rerun-sdk")
+PACKAGES = ("mujoco", "numba", "llvmlite", "numpy", "scipy", "pyarrow", "pydantic")
 
 BROWSERS = ("chromium", "chromium-browser", "google-chrome", "firefox", "microsoft-edge")
 
@@ -79,8 +79,7 @@ def versions() -> Iterator[Fact]:
         try:
             yield Fact(name, version(name), ok=True)
         except PackageNotFoundError:
-            optional = name == "rerun-sdk"
-            yield Fact(name, "missing", ok=optional, advice="install spheretwin with its dependencies")
+            yield Fact(name, "missing", ok=False, advice="install spheretwin with its dependencies")
 
 
 def compile_cache() -> Fact:
@@ -119,8 +118,7 @@ def viewer() -> Fact:
     path = str(near) if near.exists() else shutil.which("rerun")
     if path:
         return Fact("viewer", path, ok=True)
-    advice = "recordings are written and reviewed without it; rerun-sdk contains it"
-    return Fact("viewer", "no rerun command", ok=False, advice=advice)
+    return Fact("viewer", "no rerun command", ok=False, advice=install_command("record"))
 
 
 def graphics() -> Fact:

@@ -14,7 +14,7 @@ from spheretwin.run import Run
 from spheretwin.viz.pages.markdown import Drawing, ResultTable
 
 if TYPE_CHECKING:
-    from spheretwin.viz.comparison.trajectories import LawTrajectory
+    from spheretwin.viz.comparison.runs import LawTrajectory
 
 Array = Annotated[NDArray[np.float64], PlainValidator(lambda numbers: np.array(numbers, np.float64))]
 

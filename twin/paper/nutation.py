@@ -25,7 +25,7 @@ from spheretwin.run import Run
 from spheretwin.viz.pages.markdown import Drawing
 
 if TYPE_CHECKING:
-    from spheretwin.viz.comparison.trajectories import LawTrajectory
+    from spheretwin.viz.comparison.runs import LawTrajectory
 
 FILE = ExperimentFile("figure8")
 
@@ -113,7 +113,7 @@ def errors(items: Items) -> Drawing:
 def paths(items: Items) -> Drawing:
     """Paths of the shaft tip of the first seed."""
     from spheretwin.viz.figures import over_time as figures
-    from spheretwin.viz.scene.entities import shaft_tip
+    from spheretwin.viz.scene.places import shaft_tip
 
     actuator, desired = actuators.load(), _longest(items)
     by_label = {
@@ -174,7 +174,7 @@ def _in_figures(outcomes: Outcomes) -> Items:
 
 def trajectories(outcomes: Outcomes) -> dict[str, LawTrajectory]:
     """Runs of the first seed for a recording, by the labels of their laws."""
-    from spheretwin.viz.comparison.trajectories import LawTrajectory
+    from spheretwin.viz.comparison.runs import LawTrajectory
 
     return {
         item["label"]: LawTrajectory(item["law"], *item.runs[0].data.trajectory)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
+from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -19,7 +20,7 @@ from spheretwin.study.statistics import finite_ends
 from spheretwin.viz.pages.markdown import PageSection, ReportPage, ResultTable, save_text
 
 if TYPE_CHECKING:
-    from spheretwin.viz.comparison.trajectories import LawTrajectory
+    from spheretwin.viz.comparison.runs import LawTrajectory
 
 
 TITLE = "Reproduction of the paper's results"
@@ -80,7 +81,8 @@ def write(folder: Path, chapters: Sequence[Chapter], command: str, figure_format
     """
     lead, sections = _results(chapters)
     sections += map(_chapter, chapters)
-    recordings = [_recorded(folder, chapter) for chapter in chapters if chapter.trajectories]
+    recorded = [chapter for chapter in chapters if chapter.trajectories and find_spec("rerun")]
+    recordings = [_recorded(folder, chapter) for chapter in recorded]
     for chapter in chapters:
         if len(chapter.commands) > MOST_COMMANDS:
             save_text(folder / _commands_file(chapter), "\n".join([*chapter.commands, ""]))

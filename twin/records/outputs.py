@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from spheretwin.models.base.errors import InputError, SpheretwinError
+from spheretwin.models.base.extras import check_recordings
 from spheretwin.models.base.files import check_writable
 from spheretwin.models.telemetry.parquet import TelemetryFile
 from spheretwin.models.telemetry.run_record import RunFacts, RunRecord
@@ -39,6 +40,7 @@ def check(record: Path | None, telemetry: Path | None, logs: Sequence[Path] = ()
         A file cannot be written, its name is that of another format, or two paths are equal.
     """
     if record:
+        check_recordings("output")
         check_writable(record, ".rrd")
     if telemetry:
         check_writable(telemetry, ".parquet")
@@ -216,6 +218,7 @@ class _FromTick:
 
 
 def _live_view(session: Session, facts: RunFacts, view: str, window_s: float) -> LiveView:
+    check_recordings("live view")
     from spheretwin.viz.recording.live import LiveView  # Rerun is slow to import
 
     live = LiveView(session.actuator, session.signals, facts, shown=view, window_s=window_s)
@@ -226,6 +229,7 @@ def _live_view(session: Session, facts: RunFacts, view: str, window_s: float) ->
 def _recorder_at_rate(
     session: Session, facts: RunFacts, path: Path, view: str, rate_Hz: float | None
 ) -> Recorder:
+    check_recordings("output")
     from spheretwin.viz.recording.recorder import Recorder  # Rerun is slow to import
 
     return Recorder(session.actuator, session.signals, facts, path=path, shown=view, rate_Hz=rate_Hz)

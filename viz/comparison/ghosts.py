@@ -16,8 +16,9 @@ from spheretwin.viz import theme
 from spheretwin.viz.recording.part import RecordingPart, RecordingSubject, scalars, time_index
 from spheretwin.viz.recording.recorder import MOST_ROWS
 from spheretwin.viz.recording.scene3d import Frames, send_path, style_path
-from spheretwin.viz.scene.entities import body_quaternions, shaft_tip
+from spheretwin.viz.scene.entities import body_quaternions
 from spheretwin.viz.scene.meshes import WORLD
+from spheretwin.viz.scene.places import shaft_tip
 
 Array = NDArray[np.float64]
 

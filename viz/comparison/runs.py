@@ -19,6 +19,16 @@ Event = tuple[float, Level, str]
 """Simulated time in s, level, text."""
 
 
+class LawTrajectory(NamedTuple):
+    """Trajectory of one run under a law."""
+
+    law: str
+    t_s: NDArray[np.float64]  # (n,)
+    q_rad: NDArray[np.float64]  # (n, 3)
+    q_ref_rad: NDArray[np.float64]  # (n, 3)
+    torque_Nm: NDArray[np.float64]  # (n,) norm
+
+
 class EarlyEnd(NamedTuple):
     """End of a run that is not complete."""
 

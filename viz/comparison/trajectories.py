@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 import rerun as rr
@@ -15,27 +14,19 @@ from spheretwin.models.actuator import Actuator
 from spheretwin.models.telemetry.signals import ANGLES
 from spheretwin.viz import theme
 from spheretwin.viz.comparison.ghosts import Line, send_lines, send_point, style_point
+from spheretwin.viz.comparison.runs import LawTrajectory
 from spheretwin.viz.layout.layout import blueprint
 from spheretwin.viz.layout.plots import time_axis, time_range
 from spheretwin.viz.layout.view import application_of
 from spheretwin.viz.recording.recorder import recorded
 from spheretwin.viz.recording.scene3d import send_path, style_path
-from spheretwin.viz.scene.entities import TRAIL_S, shaft_tip
+from spheretwin.viz.scene.entities import TRAIL_S
 from spheretwin.viz.scene.meshes import WORLD
+from spheretwin.viz.scene.places import shaft_tip
 
 Array = NDArray[np.float64]
 
 DESIRED = "desired"
-
-
-class LawTrajectory(NamedTuple):
-    """Trajectory of one run under a law."""
-
-    law: str
-    t_s: Array  # (n,)
-    q_rad: Array  # (n, 3)
-    q_ref_rad: Array  # (n, 3)
-    torque_Nm: Array  # (n,) norm
 
 
 def write(path: Path, trajectories: Mapping[str, LawTrajectory], actuator: Actuator, name: str) -> Path:

@@ -19,7 +19,7 @@ from spheretwin.models.base.files import make_folder, whole_file
 from spheretwin.viz.comparison.runs import ComparedRun
 from spheretwin.viz.figures.style import FAINT, INK, draw_line, name_runs, plain, run_styles
 from spheretwin.viz.quantities import ERROR_ANGLE
-from spheretwin.viz.scene.entities import shaft_tip
+from spheretwin.viz.scene.places import shaft_tip
 
 FRAMES_s = 25
 """Frames for each second of a run."""

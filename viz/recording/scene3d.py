@@ -24,11 +24,11 @@ from spheretwin.viz.scene.entities import (
     gravity_torque,
     labels,
     load_torque,
-    shaft_tip,
     size_of,
     static_scene,
 )
 from spheretwin.viz.scene.meshes import FAILURE, FAILURE_TEXT, TORQUES, WORLD
+from spheretwin.viz.scene.places import shaft_tip
 
 Array = NDArray[np.float64]
 

@@ -23,6 +23,7 @@ from spheretwin.viz.scene.meshes import (
     WORLD,
     Meshes,
 )
+from spheretwin.viz.scene.places import point_in_stator
 
 Array = NDArray[np.float64]
 
@@ -169,21 +170,6 @@ def body_quaternions(q: NDArray[np.float64]) -> dict[str, NDArray[np.float64]]:
     about_x, about_y, about_z = (_about(axis, q[:, axis]) for axis in range(3))
     inner = _product(about_x, about_y)
     return {"outer_ring": about_x, "inner_ring": inner, "rotor": _product(inner, about_z)}
-
-
-def shaft_tip(q: NDArray[np.float64], actuator: Actuator) -> NDArray[np.float64]:
-    """Position of the shaft's tip, wherever in the rotor it is: (n, 3) in m, for hinge angles (n, 3)."""
-    return point_in_stator(q, actuator.shaft_tip_m)
-
-
-def point_in_stator(q: NDArray[np.float64], point_m: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Position in the stator frame of a point of the rotor: (n, 3) in m, for hinge angles (n, 3)."""
-    (ca, cb, cg), (sa, sb, sg) = np.cos(q).T, np.sin(q).T
-    x, y, z = point_m
-    x, y = cg * x - sg * y, sg * x + cg * y  # about z, then y, then x
-    x, z = cb * x + sb * z, cb * z - sb * x
-    y, z = ca * y - sa * z, sa * y + ca * z
-    return np.stack([x, y, z], axis=1)
 
 
 def _about(axis: int, angle: NDArray[np.float64]) -> NDArray[np.float64]:

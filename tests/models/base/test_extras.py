@@ -52,7 +52,9 @@ def test_an_environment_uses_its_own_python(monkeypatch, url, pip, command):
 
 def test_every_extra_of_the_package_has_a_purpose():
     named = set(distribution("spheretwin").metadata.get_all("Provides-Extra"))
-    assert set(extras.PURPOSES) == named
+    assert {*extras.PURPOSES, "all"} == named
+    (every,) = [line for line in distribution("spheretwin").requires if line.startswith("spheretwin[")]
+    assert set(every[every.index("[") + 1 : every.index("]")].split(",")) == {*extras.PURPOSES} - {"gpu"}
 
 
 @pytest.mark.parametrize("extra", extras.PURPOSES)

@@ -11,7 +11,8 @@ from spheretwin.models.telemetry.signals import Signal, common_signals
 from spheretwin.viz.comparison import ghosts
 from spheretwin.viz.comparison.ghosts import Tip
 from spheretwin.viz.comparison.runs import leaders
-from spheretwin.viz.scene.entities import FRAME_RATE_Hz, shaft_tip
+from spheretwin.viz.scene.entities import FRAME_RATE_Hz
+from spheretwin.viz.scene.places import shaft_tip
 from tests.viz.comparison.compared import SIGNALS, T_s
 from tests.viz.recording.recordings import timed
 from tests.viz.tables import chunks, table_of

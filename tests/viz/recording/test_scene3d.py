@@ -14,8 +14,9 @@ from spheretwin.models.telemetry.table import Table
 from spheretwin.viz.recording import stream
 from spheretwin.viz.recording.recorder import Recorder
 from spheretwin.viz.recording.scene3d import Ending, MovingActuator, Torques, Traces
-from spheretwin.viz.scene.entities import TRACES, METRES_PER_Nm, shaft_tip
+from spheretwin.viz.scene.entities import TRACES, METRES_PER_Nm
 from spheretwin.viz.scene.meshes import FAILURE, FAILURE_TEXT, TORQUES
+from spheretwin.viz.scene.places import shaft_tip
 from tests.models.model_files import edited
 from tests.viz.recording.recordings import opened, recorded, session_and_facts, static, timed
 

@@ -15,8 +15,9 @@ from scipy.spatial.transform import Rotation
 from spheretwin.models import actuator as actuators
 from spheretwin.models.kinematics import rotation
 from spheretwin.viz import theme
-from spheretwin.viz.scene.entities import body_quaternions, coil_texture, current_scale, shaft_tip, size_of
+from spheretwin.viz.scene.entities import body_quaternions, coil_texture, current_scale, size_of
 from spheretwin.viz.scene.meshes import SECTIONS, WORLD, read_meshes
+from spheretwin.viz.scene.places import shaft_tip
 from tests.models.model_files import edited
 
 poses = st.tuples(*[st.floats(-1.4, 1.4)] * 2, st.floats(-40, 40)).map(lambda q: np.array([q]))
