@@ -25,7 +25,8 @@ def test_the_recipe_has_the_dependencies_of_the_package():
         for name, bounds in listed
         if name not in ("python", "setuptools")
     }
-    needed = dict(re.match(r"([\w-]+)(\S+)", line).groups() for line in PROJECT["dependencies"])
+    lines = PROJECT["dependencies"] + PROJECT["optional-dependencies"]["record"]
+    needed = dict(re.match(r"([\w-]+)(\S+)", line).groups() for line in lines)
     assert recipe == needed
 
 
