@@ -82,7 +82,8 @@ def _rendered(markdown: str, inset: Inset | None) -> str:
         # A block is in no paragraph.
         if content.type == "inline" and re.fullmatch(rf"!\[[^]]*\]\({BLOCK}[^)]*\)", content.content):
             before.hidden = after.hidden = True
-    return str(reader.renderer.render(tokens, reader.options, {}))
+    # Code that is wider than the page scrolls by keyboard; texts are escaped.
+    return str(reader.renderer.render(tokens, reader.options, {})).replace("<pre>", '<pre tabindex="0">')
 
 
 BLOCK = "block:"
