@@ -1,7 +1,7 @@
 // Panel of viser: names of its controls for screen readers, folders by keyboard, and the section of the present mode.
 {
   const ICONS = {"tabler-icon-adjustments": "configuration and diagnostics", "tabler-icon-arrow-back": "back to the controls",
-    "tabler-icon-list-search": "command palette", "tabler-icon-x": "close"};
+    "tabler-icon-list-search": "command palette"};
   const SECTION = {hold: "point"};  // the other modes have a section of their name, or none
 
   const nameOf = (control) => {
@@ -23,9 +23,10 @@
       const label = !control.labels?.length && nameOf(control);
       if (label) control.setAttribute("aria-label", label);
     }
-    for (const button of document.querySelectorAll("#root button:not([aria-label])")) {
+    for (const button of document.querySelectorAll("#root button:not([aria-label]), button[class*=closeButton]:not([aria-label])")) {
       const icon = !button.innerText.trim() && [...button.querySelector("svg")?.classList ?? []].find((each) => each in ICONS);
-      if (icon) button.setAttribute("aria-label", ICONS[icon]);
+      const close = button.className.includes("closeButton") && "close";
+      if (icon || close) button.setAttribute("aria-label", ICONS[icon] ?? close);
     }
     for (const {head, open} of folders()) {
       head.setAttribute("aria-expanded", open);
@@ -46,13 +47,8 @@
   };
 
   addEventListener("DOMContentLoaded", () => {
-    let due = false, present = "";
-    const later = () => {
-      if (due) return;
-      due = true;
-      setTimeout(() => { due = false; name(); }, 200);
-    };
-    new MutationObserver(later).observe(document.getElementById("root"), {childList: true, subtree: true});
+    let present = "";
+    setInterval(name, 250);
     bench.listeners.push(({mode}) => { if (mode !== present && follow(mode)) present = mode; });
   });
 }
