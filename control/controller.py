@@ -24,7 +24,7 @@ from spheretwin.models.base.arrays import Array
 from spheretwin.models.base.columns import MixedRowsError, column_of
 from spheretwin.models.base.compiled import allocation_free, part_of_its_caller
 from spheretwin.models.base.record import Record, Rows, field, put
-from spheretwin.models.kinematics import cartesian_torque
+from spheretwin.models.kinematics import cartesian_torque, generalised_torque
 from spheretwin.models.magnetics import Arrangement, CachedMatrix, Tables, TorqueModel, update_cached_matrix
 from spheretwin.models.telemetry.signals import width
 
@@ -65,6 +65,7 @@ class ControllerData(Record):
     supervision: Supervision = field("detector and watchdog")
     manual: Manual = field("currents instead of those of the law")
     python_law: int = field("address of a function of the time that calls a law in plain Python; 0: none")
+    cartesian: bool = field("whether the law writes the torque of the stator frame")
     logged: int = field("leading numbers of the law's memory that are logged")
     torque_q: Array = field("torque commanded by the law in this tick", "N·m", 3)
     torque_S: Array = field("the same in the stator frame", "N·m", 3)
@@ -132,7 +133,7 @@ def controller(
     limit_A = np.minimum(current_limit_A, column_of([member.current_limit_A for member in members]))
     rows["logged"], rows["estimator_on"] = width(members[0].signals), estimators[0] is not None
     rows["arrangement"], rows["matrix"]["q"], rows["authority"] = magnetics.arrangement, np.nan, 1.0
-    put(rows, current_limit_A=limit_A)
+    put(rows, current_limit_A=limit_A, cartesian=column_of([member.cartesian for member in members]))
     numbers = *_numbers("law", members), *_numbers("estimator", estimators)
     return Controller(rows, *numbers, magnetics.tables)
 
@@ -158,7 +159,7 @@ def control_tick(
     measurement: Array,
     command: Array,
 ) -> float:
-    """Run the law, map its generalised torque to a Cartesian one, and allocate currents.
+    """Run the law, map its generalised torque to a Cartesian one unless it gives that, and allocate currents.
 
     The map is taken at the pose that the law receives, the allocation uses the nominal torque matrix.
 
@@ -247,6 +248,11 @@ def _call_law(
         call_python_law(data.python_law, t)
     else:
         call_law(law, t, reference, measurement, controller.parameters, controller.memory, torque_q[:])
+    if data.cartesian:
+        for i in range(3):
+            data.torque_S[i] = torque_q[i]
+        pose = compensators.prediction.pose if compensators.prediction.on else data.pose
+        generalised_torque(pose, data.torque_S, torque_q)
     if compensators.feed_forward.on:
         for i in range(3):
             torque_q[i] += compensators.feed_forward.torque_q[i]
@@ -273,7 +279,8 @@ def _allocate(data: ControllerData, allocate: Any, command: Array) -> float:
     )
     if prediction.on:
         pose, G = prediction.pose, prediction.matrix.G
-    cartesian_torque(pose, data.torque_q, data.torque_S)
+    if not data.cartesian or data.compensators.feed_forward.on:  # the feed-forward acts on the hinges
+        cartesian_torque(pose, data.torque_q, data.torque_S)
     mask_disabled_groups(groups, G)
     # Slices: the addressed function takes arrays, not fields of a record.
     return call_allocation(

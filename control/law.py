@@ -83,6 +83,10 @@ class Law:
     current_limit_A : float
         Largest group current that the controller commands under the law, A, if it is less than that of the
         data sheet: the allocation scales the torque of law and feed-forward.
+    cartesian : bool
+        True if the step writes the Cartesian torque in the stator frame (N·m) instead of the generalised
+        one. The controller allocates it as it is: nothing divides by cos β. The applied torque of
+        `measurement` is generalised also then.
 
     Raises
     ------
@@ -100,6 +104,7 @@ class Law:
     asks_torque: bool = False
     period_s: float | None = None
     current_limit_A: float = np.inf
+    cartesian: bool = False
 
     @classmethod
     def from_lti(
@@ -146,10 +151,11 @@ class Law:
             raise InputError(f"law {self.name}: expected step as a function, received {shown(self.step)}")
         for field in ("parameters", "state"):
             object.__setattr__(self, field, _numbers(self.name, field, getattr(self, field)))
-        if not isinstance(self.asks_torque, bool):
-            raise InputError(
-                f"law {self.name}: expected asks_torque as True or False, received {shown(self.asks_torque)}"
-            )
+        for field in ("asks_torque", "cartesian"):
+            if not isinstance(value := getattr(self, field), bool):
+                raise InputError(
+                    f"law {self.name}: expected {field} as True or False, received {shown(value)}"
+                )
         object.__setattr__(self, "signals", _signals(self.name, self.signals))
         if width(self.signals) > len(self.state):
             raise InputError(
