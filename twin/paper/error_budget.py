@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from spheretwin.control.laws import LAWS
+from spheretwin.control.laws import HINGE_LAWS
 from spheretwin.models import actuator
 from spheretwin.models.telemetry.signals import ANGLES
 from spheretwin.paper.cells import Numbers, of_axis, table
@@ -17,7 +17,7 @@ from spheretwin.paper.experiment_file import BY_LAW, ExperimentFile
 from spheretwin.scenario.hardware import HARDWARE, MACHINE
 from spheretwin.viz.pages.markdown import Drawing
 
-FILE = ExperimentFile("budget", law=[{"law": law} for law in LAWS])
+FILE = ExperimentFile("budget", law=[{"law": law} for law in HINGE_LAWS])
 STAGES: Sequence[Mapping[str, Any]] = FILE["stage"]
 BASES = {stage["stage"]: stage["base"] for stage in STAGES}
 
@@ -59,7 +59,7 @@ class Budget:
 
     def __init__(self, outcomes: Outcomes) -> None:
         self._runs = {(item["law"], item["stage"]): item.runs for item in FILE.runs(outcomes)}
-        self.laws = [law for law in LAWS if any(law == of for of, _ in self._runs)]
+        self.laws = [law for law in HINGE_LAWS if any(law == of for of, _ in self._runs)]
 
     def runs(self, law: str, stage: str) -> Sequence[RunOutcome]:
         """Runs of a stage under a law; empty if there are none."""
@@ -90,7 +90,7 @@ class Budget:
 
 def law_name(law: str) -> str:
     """Label of a law, with the preset of its gains if it has presets."""
-    preset = getattr(LAWS[law](law=law), "preset", None)
+    preset = getattr(HINGE_LAWS[law](law=law), "preset", None)
     return f"{BY_LAW[law].label}, preset {preset}" if preset else BY_LAW[law].label
 
 

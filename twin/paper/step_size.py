@@ -6,14 +6,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from spheretwin.control.laws import LAWS
+from spheretwin.control.laws import HINGE_LAWS
 from spheretwin.paper.experiment import Array, ExperimentSection, Outcomes, Statement
 from spheretwin.paper.experiment_file import CaseRuns, ExperimentFile
 from spheretwin.run import Run
 from spheretwin.scenario.plant_sections import PlantSection
 from spheretwin.viz.pages.markdown import ResultTable
 
-FILE = ExperimentFile("step_size", law=[{"law": law} for law in LAWS])
+FILE = ExperimentFile("step_size", law=[{"law": law} for law in HINGE_LAWS])
 
 SAMPLE_s = 0.01
 FINE_s = 1.25e-5
@@ -76,7 +76,7 @@ def _table(outcomes: Outcomes, every: Costs, scenario: str) -> ResultTable:
     errors = {item["law"]: f"{1e3 * np.max(item.runs[0].max_abs_error):.3g}" for item in items}
     rows = [
         (law, *(_cell(every.get((law, scenario, ms))) for ms in steps_ms), errors.get(law, "not run"))
-        for law in LAWS
+        for law in HINGE_LAWS
     ]
     head = ("law", *(f"{ms:g} ms" for ms in steps_ms), f"tracking error at {1e3 * DEFAULT_s:g} ms")
     return ResultTable(f"Difference in mrad: {scenario}", head, rows)

@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from spheretwin.control.laws import LAWS
+from spheretwin.control.laws import HINGE_LAWS
 from spheretwin.models.telemetry.status import Status
 from spheretwin.paper import rival_conditions, rivals
 from spheretwin.paper.experiment import Outcomes
@@ -31,7 +31,7 @@ def frozen(hardware):
 
 
 def test_every_law_has_a_label_and_marks_of_its_own():
-    assert set(BY_LAW) == set(LAW_MARKS) == set(LAW_COLOURS) == set(LAWS)
+    assert set(BY_LAW) == set(LAW_MARKS) == set(LAW_COLOURS) == set(HINGE_LAWS)
     assert len({marker for marker, _ in LAW_MARKS.values()}) == len(LAW_MARKS)
 
 
@@ -39,15 +39,15 @@ def test_every_law_has_a_label_and_marks_of_its_own():
 def test_every_law_is_searched_with_all_of_its_gains_and_the_same_budget(hardware):
     study = hardware.study
     assert [law["law"] for law in study.law] == list(dict.fromkeys(law["law"] for law in study.law))
-    assert {law["law"] for law in study.law} == set(LAWS)
+    assert {law["law"] for law in study.law} == set(HINGE_LAWS)
     assert study.common_seeds
     searched = Rows(study)
     for law in study.law:
         result = tuning_gains.gains_of(study, law, searched)
         fields = set(tuning_gains.values(result, tuning_gains.middle(result)))
         named = {field.split(".")[1] for field in fields}
-        base = set(LAWS["pd"].model_fields) - {"stiffness", "damping"}
-        own = set(LAWS[law["law"]].model_fields) - base - {"preset", "coupled"}
+        base = set(HINGE_LAWS["pd"].model_fields) - {"stiffness", "damping"}
+        own = set(HINGE_LAWS[law["law"]].model_fields) - base - {"preset", "coupled"}
         # The fuzzy approximator of AFSM-ESO is off as shipped: its numbers are no gains then.
         own = {each for each in own if not (law["law"] == "afsm_eso" and each.startswith("fuzzy"))}
         assert own <= named
@@ -63,7 +63,7 @@ def test_every_law_is_searched_with_all_of_its_gains_and_the_same_budget(hardwar
 def test_frozen_gains_are_within_their_ranges_and_limits(hardware):
     study = hardware.study
     ranges = {(gain.law, gain.called): gain for gain in study.optimise.gain}
-    assert set(frozen(hardware)) == set(LAWS)
+    assert set(frozen(hardware)) == set(HINGE_LAWS)
     for law, result in frozen(hardware).items():
         for each in result:
             assert each["limit"] in hardware.search.limits
