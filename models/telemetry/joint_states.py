@@ -22,6 +22,7 @@ from spheretwin.models.base.errors import InputError, without_breaks
 from spheretwin.models.base.extras import missing
 from spheretwin.models.base.files import regular_file, whole_file
 from spheretwin.models.telemetry import ros_messages
+from spheretwin.models.telemetry.table import Table
 
 FIELDS = ("position", "velocity", "effort")
 TYPE, ENCODING = "sensor_msgs/msg/JointState", "cdr"
@@ -70,7 +71,6 @@ def write(path: Path, t_s: Array, topics: Mapping[str, Topic], metadata: Mapping
 
     if not np.all((t_s >= 0) & (t_s < 2**31)):
         raise InputError(f"MCAP {path}: expected times from 0 to 2**31 s, received others")
-    stamps = np.rint(t_s * ros_messages.SECOND_ns).astype(np.int64).tolist()
     with whole_file(path) as temporary, temporary.open("wb") as file:
         writer = Writer(file, enable_data_crcs=True)
         writer.start(profile="ros2", library="spheretwin")
@@ -80,11 +80,29 @@ def write(path: Path, t_s: Array, topics: Mapping[str, Topic], metadata: Mapping
             (writer.register_channel(f"/{name}", ENCODING, schema), MessageEncoder(topic))
             for name, topic in topics.items()
         ]
-        for row, stamp in enumerate(stamps):
+        for row, stamp in enumerate(stamps_ns(t_s)):
             for channel, encoder in channels:
                 writer.add_message(channel, stamp, encoder.message(row, stamp), stamp)
         # mcap annotates its other methods, but not this one.
         writer.finish()  # type: ignore[no-untyped-call]
+
+
+ANGLES = (("q_estimated_rad", "qdot_estimated_rad_s"), ("q_measured_rad", "qdot_estimated_rad_s"))
+"""Columns of angles and rates as a shadow or a controller knows them, before those of the plant."""
+
+
+def topics_of(table: Table) -> dict[str, Topic]:
+    """Return the topics of a run or of a shadow: angles and rates, currents, and all other columns."""
+    known = {signal.name for signal in table.signals}
+    q, qdot = next((pair for pair in ANGLES if known.issuperset(pair)), ("q_rad", "qdot_rad_s"))
+    current = "current_command_A" if "current_command_A" in known else "current_A"
+    others = [signal for signal in table.signals if signal.name not in ("t_s", q, qdot, current)]
+    scalars = [scalar.name for signal in others for scalar in signal.scalars()]
+    return {
+        "angles": Topic(ANGLE_NAMES, {"position": table[q], "velocity": table[qdot]}),
+        "currents": Topic(group_names(table[current].shape[1]), {"effort": table[current]}),
+        "telemetry": Topic(scalars, {"effort": np.column_stack([table[signal.name] for signal in others])}),
+    }
 
 
 def group_names(groups: int) -> list[str]:
@@ -117,6 +135,12 @@ class MessageEncoder:
             if values.size:
                 body = _aligned(body, 8) + values[row].tobytes()
         return _LITTLE_ENDIAN + body
+
+
+def stamps_ns(t_s: Array) -> list[int]:
+    """Return times as whole nanoseconds."""
+    stamps: list[int] = np.rint(t_s * ros_messages.SECOND_ns).astype(np.int64).tolist()
+    return stamps
 
 
 def _aligned(body: bytes, size: int) -> bytes:

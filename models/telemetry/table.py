@@ -296,6 +296,13 @@ def rank_lost(rows: Table) -> NDArray[np.bool_]:
     return np.equal(rows["allocation_scale"], 0)
 
 
+def with_currents(telemetry: Table, current_A: NDArray[np.float64]) -> Table:
+    """Return the telemetry of a shadow with the currents (n, groups) of the log; NaN is 0."""
+    currents = Signal("current_A", "A", current_A.shape[1], "group currents")
+    values = np.hstack([telemetry.values, np.nan_to_num(current_A)])
+    return Table((*telemetry.signals, currents), values)
+
+
 class Sink(Protocol):
     """Receiver of a run while it runs: a recorder, a progress bar, a file."""
 

@@ -20,7 +20,6 @@ from spheretwin.models.base.errors import InputError, shown
 from spheretwin.models.base.extras import check_recordings
 from spheretwin.models.telemetry import joint_states
 from spheretwin.models.telemetry.checksums import has_checksums
-from spheretwin.models.telemetry.joint_states import ANGLE_NAMES, Topic, group_names
 from spheretwin.models.telemetry.run_record import Change, RunRecord
 from spheretwin.models.telemetry.status import Event, Events, Level, Status
 from spheretwin.models.telemetry.table import Table, read_parquet
@@ -292,24 +291,8 @@ def export(run: Reviewed, path: Path) -> None:
     if path.suffix == ".parquet":
         run.table.scalars().write_parquet(path, run.metadata)
     elif path.suffix == ".mcap":
-        joint_states.write(path, run.table["t_s"], _topics(run.table), run.metadata)
+        joint_states.write(path, run.table["t_s"], joint_states.topics_of(run.table), run.metadata)
     elif path.suffix == ".mat":
         run.table.write_mat(path, run.metadata)
     else:
         run.table.write_csv(path)
-
-
-def _topics(table: Table) -> dict[str, Topic]:
-    """Return the topics of a run; angles and rates are those of the controller, if they are columns."""
-    columns = {signal.name for signal in table.signals}
-    sensed = {"q_measured_rad", "qdot_estimated_rad_s"} <= columns
-    q, qdot = ("q_measured_rad", "qdot_estimated_rad_s") if sensed else ("q_rad", "qdot_rad_s")
-    others = [signal for signal in table.signals if signal.name not in ("t_s", q, qdot, "current_command_A")]
-    scalars = [scalar.name for signal in others for scalar in signal.scalars()]
-    return {
-        "angles": Topic(ANGLE_NAMES, {"position": table[q], "velocity": table[qdot]}),
-        "currents": Topic(
-            group_names(table["current_command_A"].shape[1]), {"effort": table["current_command_A"]}
-        ),
-        "telemetry": Topic(scalars, {"effort": np.column_stack([table[signal.name] for signal in others])}),
-    }

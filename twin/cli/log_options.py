@@ -52,6 +52,8 @@ STREAM = f"""{LOG}
         as the frames state)
     --key FILE  frames of a stream are authenticated by the key in a file, as those of `drive` and `machine`
     --live      follow the data in a viewer on 127.0.0.1; a file is played at the pace of its times
+    --publish PORT  publish angles, currents and estimates at ws://127.0.0.1:PORT, for Foxglove and ROS 2; a
+        file is played at the pace of its times
 """
 """One log, or the address of a stream."""
 
@@ -93,11 +95,13 @@ def known_fields(options: argparse.Namespace, log: Log | None) -> dict[str, Any]
 def blocks(
     options: argparse.Namespace, log: Log | None, groups: int, stop_requested: Callable[[], bool]
 ) -> Iterator[Log]:
-    """Return the blocks of a stream, or the log of a file: with a live view as time goes by, else at once."""
+    """Return the blocks of a stream, or the log of a file: with viewers as time goes by, else at once."""
     if log is None:
         address, frame, key = options.logs, options.frame, read_key(options.key)
         return streamed(address, groups, frame, options.currents, key, stop_requested=stop_requested)
-    return played(log, stop_requested=stop_requested) if options.live else iter([log])
+    if options.live or options.publish is not None:
+        return played(log, stop_requested=stop_requested)
+    return iter([log])
 
 
 @contextmanager

@@ -76,6 +76,7 @@ READERS: dict[str, Any] = {
     "HZ": number("a number of Hz above 0"),
     "MS": number("a number of ms above 0"),
     "N": whole(),
+    "PORT": whole(65535, first=0, name="a port"),
     "ROWS": whole(),
     "S": number("a number of s above 0"),
 }

@@ -32,8 +32,9 @@ from spheretwin.machine.state_estimation import (
     signals,
 )
 from spheretwin.models.base.errors import InputError
+from spheretwin.models.telemetry.joint_state_server import published
 from spheretwin.models.telemetry.signals import ANGLES
-from spheretwin.models.telemetry.table import Table
+from spheretwin.models.telemetry.table import Table, with_currents
 from spheretwin.records import outputs
 from spheretwin.viz.terminal import runs
 
@@ -69,6 +70,7 @@ def run(options: argparse.Namespace) -> bool:
         shadow(log.rows(0, 2), model, settings=settings)  # compiles
     with (
         interruptible() as stop_requested,
+        published(options.publish) as publishers,
         live_view(options, model, signals(options.offsets), stop_requested) as view,
     ):
 
@@ -76,6 +78,8 @@ def run(options: argparse.Namespace) -> bool:
             if view:
                 text = verdict.markdown(part)
                 view.show(telemetry, part.current_A, text)
+            for publisher in publishers:
+                publisher.write(with_currents(telemetry, part.current_A))
 
         started_s = time.process_time()
         log, result = followed(blocks(options, log, model.groups, stop_requested), model, settings, show)

@@ -23,6 +23,7 @@ from spheretwin.models.base.errors import InputError, SpheretwinError
 from spheretwin.models.base.mujoco_library import timers_stopped
 from spheretwin.models.telemetry.checksums import NO_CHECKSUMS, has_checksums
 from spheretwin.models.telemetry.fault_log import FaultLog
+from spheretwin.models.telemetry.joint_state_server import published
 from spheretwin.models.telemetry.signals import ANGLES
 from spheretwin.models.telemetry.status import Status
 from spheretwin.models.telemetry.table import Sink, TelemetryBuffer
@@ -47,6 +48,7 @@ from spheretwin.viz.terminal.progress import Progress
     --telemetry
     --live                   run in real time, with a viewer on 127.0.0.1
     --live-window S          time that the live plots show; default: {LIVE_WINDOW_S:g} s
+    --publish PORT           run in real time, with data for Foxglove and ROS 2
     --view TAB               first tab of the recording: {", ".join(VIEW_NAMES)}
     --replay RUN.parquet     replay the run of a telemetry file
     --twin
@@ -73,7 +75,11 @@ def run(options: argparse.Namespace) -> bool:
     exported = export.check_paths(options.export_log, options.export_truth)
     outputs.check(options.record, options.telemetry, exported)
     outputs.check_rate(options.record_rate, options.record, plan.scenario.controller.period_s)
-    with interruptible() as stop_requested, Session(plan.scenario) as session:
+    with (
+        interruptible() as stop_requested,
+        published(options.publish) as publishers,
+        Session(plan.scenario) as session,
+    ):
         figures = Figures(PlannedRun(session.initial_scenario, session.actuator, plan.ticks))
         progress = Progress(plan.scenario.name, plan.ticks)
         faults = FaultLog()
@@ -96,9 +102,9 @@ def run(options: argparse.Namespace) -> bool:
                 status = follow(
                     session,
                     plan.ticks,
-                    [*sinks, *files.sinks, *log_files.sinks],
+                    [*sinks, *files.sinks, *log_files.sinks, *publishers],
                     journal=plan.journal,
-                    live=options.live,
+                    live=options.live or options.publish is not None,
                     stop_requested=stop_requested,
                 )
             values, own_faults = _own_values(own, session, status, telemetry)

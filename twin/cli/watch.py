@@ -27,6 +27,8 @@ from spheretwin.machine.state_estimation import Shadow, signals
 from spheretwin.machine.twin_file import read_drifts
 from spheretwin.machine.watching import WATCHED, Watch, WatchSettings
 from spheretwin.models.base.errors import InputError, SpheretwinError
+from spheretwin.models.telemetry.joint_state_server import published
+from spheretwin.models.telemetry.table import with_currents
 from spheretwin.viz.terminal import runs
 
 MOST_VARIANCE = 1.5
@@ -102,9 +104,10 @@ def _watch(options: argparse.Namespace) -> _Watched:
     last, count, seconds, warned = "none", 0, 0.0, False
     with (
         interruptible() as stop_requested,
+        published(options.publish) as publishers,
         live_view(options, model, signals(False), stop_requested, watched=True) as view,
     ):
-        estimator = Shadow(model) if view else None
+        estimator = Shadow(model) if view or publishers else None
         for block in blocks(options, log, model.groups, stop_requested):
             alarms = watch.advance(block)
             if not (warned or count) and watch.misfit > MOST_VARIANCE:
@@ -114,9 +117,13 @@ def _watch(options: argparse.Namespace) -> _Watched:
                 of_log = {"log": options.logs, "log_sha256": log and log.digest}
                 print_json({**alarm._asdict(), **of_log, "accepted_findings": list(block.accepted)})
                 last = f"{alarm.onset_s:.2f} s: {alarm.text()}"
-            if view and estimator:
-                view.judge(watch.judged, [(alarm.t_s, alarm.text()) for alarm in alarms])
-                view.show(estimator.advance(block), block.current_A)
+            if estimator:
+                estimated = estimator.advance(block)
+                for publisher in publishers:
+                    publisher.write(with_currents(estimated, block.current_A))
+                if view:
+                    view.judge(watch.judged, [(alarm.t_s, alarm.text()) for alarm in alarms])
+                    view.show(estimated, block.current_A)
             count += len(alarms)
             seconds += len(block) * float(np.median(np.diff(block.t_s)))
     if seconds <= settings.calibration_s + settings.window_s:

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from spheretwin.models.telemetry.signals import ANGLES, Signal
 from spheretwin.models.telemetry.status import Level
-from spheretwin.models.telemetry.table import Table
+from spheretwin.models.telemetry.table import Table, with_currents
 from spheretwin.viz import theme
 from spheretwin.viz.comparison.ghosts import ROTOR, Ghost, Line, PartBelow, send_lines, write_part
 from spheretwin.viz.decimation import FirstRows
@@ -105,13 +105,6 @@ def parts_of_shadow(subject: RecordingSubject) -> list[RecordingPart]:
         PartBelow(TWIN, Ghost(subject, theme.ESTIMATE, "q_estimated_rad")),
         ShadowPlots(subject),
     ]
-
-
-def with_currents(telemetry: Table, current_A: Array) -> Table:
-    """Return the telemetry of a shadow with the currents (n, groups) of the log; NaN is 0."""
-    currents = Signal("current_A", "A", current_A.shape[1], "group currents")
-    values = np.hstack([telemetry.values, np.nan_to_num(current_A)])
-    return Table((*telemetry.signals, currents), values)
 
 
 def write(path: Path, telemetry: Table, current_A: Array, subject: RecordingSubject, text: str) -> None:

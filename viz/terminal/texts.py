@@ -57,9 +57,7 @@ def print_findings(title: str, findings: Sequence[tuple[str, str, str, str]], li
 def print_sections(sections: Sequence[str]) -> None:
     """Print the names of the sections, and how their fields are printed."""
     width = tables.terminal_console().width
-    text = (
-        f"sections: {', '.join(sections)}. --help SECTION prints the fields of one, --help all every field."
-    )
+    text = f"sections (--help SECTION): {', '.join(sections)}"
     print("\n" + "\n".join(_wrapped(text, width, 0)))
 
 
