@@ -226,7 +226,7 @@
     const {t, bounds} = live, from = first(t, t[t.length - 1] - view.window);
     const past = t.length ? extremes([bounds.currents], from, t.length) : [0];
     const now = Math.max(...current_A.map(Math.abs)), peak = Math.max(now, ...past.map(Math.abs));
-    const most_A = Math.max(1.08 * peak, 0.01);
+    const most_A = Math.max(1.08 * peak, limit_A / 200, 0.01);  // the noise of a sensor stays small
     const [low, high] = plot.fixedRange ?? [-most_A, most_A];
     area.bottom -= 0.35 * size;  // room for the marks of groups
     const y = levels(plot, low, high), wide = (area.right - area.left) / current_A.length;
