@@ -82,7 +82,7 @@ class Run:
         """Save the run; return the path.
 
         Telemetry with provenance (``.parquet``), a Rerun recording (``.rrd``), columns alone (``.csv``), or a
-        matrix for each signal for MATLAB (``.mat``).
+        matrix for each signal for MATLAB (``.mat``) or HDF5 (``.h5``).
 
         Raises
         ------
@@ -96,6 +96,7 @@ class Run:
             RECORDING: self.to_rrd,
             ".csv": self.to_csv,
             ".mat": self.to_mat,
+            ".h5": self.to_hdf5,
         }
         if (suffix := Path(path).suffix) not in writers:
             expected = " or ".join(f"FILE{suffix}" for suffix in writers)
@@ -121,6 +122,11 @@ class Run:
     def to_mat(self, path: str | Path) -> Path:
         """Write a matrix for each signal, with units and provenance, for MATLAB; errors as `save`."""
         self.telemetry.write_mat(Path(path), self.provenance.metadata())
+        return Path(path)
+
+    def to_hdf5(self, path: str | Path) -> Path:
+        """Write a data set for each signal, with units and provenance; errors as `save`."""
+        self.telemetry.write_hdf5(Path(path), self.provenance.metadata())
         return Path(path)
 
     def plot(self) -> Figure:

@@ -20,6 +20,7 @@ PURPOSES = {
     "bench": "the page in a browser that drives the twin",
     "video": "clips of runs as MP4",
     "tables": "runs as tables of pandas, polars and xarray",
+    "hdf5": "runs as HDF5 files",
     "magnetics": "torque curve and field from the geometry",
     "machine": "logs as MCAP, live data for Foxglove and ROS 2, a machine at a serial line",
     "rl": "environments of Gymnasium, trained networks as laws",

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spheretwin.models.base.errors import InputError, did_you_mean
+from spheretwin.models.base.extras import missing
 from spheretwin.models.base.files import whole_file
 from spheretwin.models.telemetry import checksums
 from spheretwin.models.telemetry.signals import Signal, merged, offsets, width
@@ -136,6 +137,25 @@ class Table:
                 do_compression=True,
                 oned_as="column",
             )
+
+    def write_hdf5(self, path: Path, metadata: Mapping[str, str]) -> None:
+        """Write an HDF5 file: a data set for each signal with unit and meaning, and `metadata` in a group.
+
+        Raises
+        ------
+        InputError
+            h5py is not installed, or the file cannot be written there.
+        """
+        try:
+            import h5py
+        except ModuleNotFoundError:
+            raise missing(f"{path}", "h5py", "hdf5", "for HDF5 files") from None
+        with whole_file(path) as temporary, h5py.File(temporary, "w") as file:
+            for name, text in metadata.items():
+                file[f"provenance/{name}"] = text  # an attribute would have 64 kB at most
+            for signal in self.signals:
+                data = file.create_dataset(signal.name, data=self[signal.name], compression="gzip")
+                data.attrs.update(unit=signal.unit, meaning=signal.meaning, labels=",".join(signal.labels))
 
     def arrow(self, metadata: Mapping[str, str]) -> pa.Table:
         """Return an Arrow table of the columns; units and descriptions are metadata of the fields."""

@@ -1,8 +1,10 @@
 """A run as JSON: the metrics of every run, and functions of the user's own among them."""
 
 import json
+import sys
 from dataclasses import replace
 
+import h5py
 import numpy as np
 import pytest
 from scipy.io import loadmat
@@ -75,6 +77,22 @@ def test_a_matlab_file_has_a_matrix_for_each_signal(run, tmp_path):
         np.testing.assert_array_equal(loaded[signal.name], run.telemetry[signal.name], err_msg=signal.name)
         assert loaded["unit"][signal.name] == (signal.unit or [])
     assert json.loads(loaded["provenance"]["scenario"])["name"] == "hold"
+
+
+def test_an_hdf5_file_has_a_data_set_for_each_signal_with_its_unit(run, tmp_path):
+    with h5py.File(run.save(tmp_path / "run.h5")) as file:
+        assert set(file) == {"provenance", *(signal.name for signal in run.telemetry.signals)}
+        for signal in run.telemetry.signals:
+            np.testing.assert_array_equal(file[signal.name], run.telemetry[signal.name], err_msg=signal.name)
+            assert dict(file[signal.name].attrs)["unit"] == signal.unit
+        assert json.loads(file["provenance/scenario"].asstr()[()])["name"] == "hold"
+
+
+def test_without_h5py_an_hdf5_file_is_refused_with_its_extra(run, tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "h5py", None)
+    with pytest.raises(InputError, match="expected h5py for HDF5 files, which the extra hdf5 installs: "):
+        run.save(tmp_path / "run.h5")
+    assert not (tmp_path / "run.h5").exists()
 
 
 def test_a_csv_file_loses_no_bit(run, tmp_path):

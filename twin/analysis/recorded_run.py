@@ -257,7 +257,7 @@ def _changes(run: Reviewed) -> Iterator[Change]:
     yield from run.record.journal
 
 
-KINDS = (".csv", ".mat", ".parquet", ".mcap")
+KINDS = (".csv", ".mat", ".h5", ".parquet", ".mcap")
 
 
 def check(path: Path) -> None:
@@ -270,7 +270,7 @@ def check(path: Path) -> None:
     """
     if path.suffix not in KINDS:
         raise InputError(
-            "command line: expected --export FILE.csv, FILE.mat, FILE.parquet or FILE.mcap,"
+            "command line: expected --export FILE.csv, FILE.mat, FILE.h5, FILE.parquet or FILE.mcap,"
             f" received {shown(str(path))}"
         )
 
@@ -278,8 +278,8 @@ def check(path: Path) -> None:
 def export(run: Reviewed, path: Path) -> None:
     """Write all columns of a run, a scalar column for each number.
 
-    A MATLAB file has a matrix for each signal. A Parquet file is again the file of a run. CSV has each
-    number as Python writes it, which loses no bit. MCAP has times to 1 ns, the angles and rates of the
+    A MATLAB or HDF5 file has a matrix for each signal. A Parquet file is again the file of a run. CSV has
+    each number as Python writes it, which loses no bit. MCAP has times to 1 ns, the angles and rates of the
     controller as topic ``angles``, the commanded currents as ``currents`` and all other columns as
     ``telemetry``.
 
@@ -294,5 +294,7 @@ def export(run: Reviewed, path: Path) -> None:
         joint_states.write(path, run.table["t_s"], joint_states.topics_of(run.table), run.metadata)
     elif path.suffix == ".mat":
         run.table.write_mat(path, run.metadata)
+    elif path.suffix == ".h5":
+        run.table.write_hdf5(path, run.metadata)
     else:
         run.table.write_csv(path)

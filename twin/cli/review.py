@@ -26,7 +26,7 @@ from spheretwin.viz.terminal.runs import print_written
     RUN...                 telemetry (.parquet) or a recording (.rrd), also of a killed process
     --tolerance FILE.toml  compare the other runs with the first, signal by signal; a file or a shipped
         one: {", ".join(tolerances.shipped())}
-    --export FILE    write the columns of the run as .csv, .mat, .parquet or .mcap
+    --export FILE    write the columns of the run as .csv, .mat, .h5, .parquet or .mcap
     --merge OUT.rrd  write all runs into one new recording, with a layout for comparison
     --figures DIR    draw all runs: SVG and one page with interactive plots, without viewer or network
     --figure-format
