@@ -61,9 +61,14 @@ def parameters_of(scenario: ResolvedScenario, files: Files) -> Parameters:
     Raises
     ------
     InputError
-        The model has physics that the equations of motion do not have.
+        The model has physics that the equations of motion do not have, or a learned torque.
     """
     section, cable = scenario.plant, scenario.plant.cable
+    if section.learned_torque.file:
+        raise InputError(
+            "plant parameters: expected no learned torque, which the step does not have, received"
+            " plant.learned_torque"
+        )
     engine = section.model_copy(update={"engine": "lagrangian", "integrator": "RK4"})
     rotor = cast("LagrangianRotor", assembly.rotor_of(scenario.model_copy(update={"plant": engine}), files))
     joint = rotor.joint

@@ -21,6 +21,7 @@ from spheretwin.models.base.compiled import inlined, uncompiled
 from spheretwin.models.telemetry.signals import ANGLES, Signal, offsets
 from spheretwin.plant.bristle_friction import log_cable, log_end_stops, log_presliding
 from spheretwin.plant.cable import acts
+from spheretwin.plant.learned_torque import log_learned_torque
 from spheretwin.plant.magnet_heat import log_heat
 from spheretwin.scenario.sections import Scenario
 
@@ -208,6 +209,18 @@ def heat(row: NDArray, plant: Any) -> None:
 
 
 @channel(
+    lambda scenario: bool(scenario.plant.learned_torque.file),
+    each_hinge("learned_torque_Nm", "N·m", "learned torque on the hinges, in the last physics step"),
+    single(
+        "learned_share", "1", "factor of the learned torque: 1 within the range of its logs, 0 far outside"
+    ),
+)
+def learned_torque(row: NDArray, plant: Any) -> None:
+    """Write the columns of one tick."""
+    log_learned_torque(plant.parts.learned_torque, row)
+
+
+@channel(
     lambda scenario: scenario.drive.supply_V is not None,
     single("supply_power_W", "W", "drawn from the supply, mean over the control period"),
     each_group("coil_power_W", "W", "at the ends of the coils, mean over the control period"),
@@ -275,6 +288,7 @@ CHANNELS: tuple[TelemetryChannel, ...] = (
     cable,
     end_stops,
     heat,
+    learned_torque,
     drive,
     faults,
     watchdog,

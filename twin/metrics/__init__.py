@@ -3,6 +3,7 @@
 from spheretwin.metrics.effort import (
     CopperLoss,
     CurrentVariation,
+    LearnedRange,
     MaxAbsCurrent,
     RmsTorque,
     RotorTemperature,
@@ -24,5 +25,5 @@ METRICS: dict[str, type[Metric]] = {
     "copper_loss_J": CopperLoss,
 }
 
-CHECKS: tuple[type[Metric], ...] = (RotorTemperature,)
+CHECKS: tuple[type[Metric], ...] = (RotorTemperature, LearnedRange)
 """Quantities that give warnings and no figures."""

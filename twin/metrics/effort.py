@@ -228,3 +228,35 @@ class RotorTemperature(Metric):
             f"the magnets reached {largest:.1f} °C, above plant.thermal.knee_degC"
             f" {knee_degC:g} °C: a lasting loss of remanence is possible and not simulated"
         ]
+
+
+@rounding_each
+def _add_share(rows: Array, first: int, columns: tuple[int, ...], outside: Array, run: int) -> None:
+    (share,) = columns
+    if share >= 0:
+        for i in range(rows.shape[0]):
+            outside[run] += rows[i, share] < 1.0
+
+
+class LearnedRange(Metric):
+    """Ticks outside of the range of a learned torque, which only decide about a warning."""
+
+    reads = ("learned_share",)
+    add = staticmethod(_add_share)
+
+    def start(self, planned: PlannedRun) -> Array:
+        """Return the ticks (runs,)."""
+        return np.zeros(planned.runs)
+
+    def results(self, rows: Integers) -> list[float | None]:
+        """Return the share of the ticks of each run."""
+        return (self.state / rows).tolist()
+
+    def warnings(self) -> list[str]:
+        """Return a warning if the learned torque was left, or fades there."""
+        if not self.state[0]:
+            return []
+        return [
+            f"{100 * self.state[0] / self.rows[0]:.1f} % of the ticks are outside of the logs of"
+            " plant.learned_torque, which fades to 0 there: learned_share in the telemetry"
+        ]

@@ -11,6 +11,7 @@ from spheretwin.models.base.record import record_of
 from spheretwin.plant.backlash import BACKLASH
 from spheretwin.plant.bristle_friction import BRISTLES
 from spheretwin.plant.friction import FRICTION
+from spheretwin.plant.learned_torque import LEARNED_TORQUE, LearnedTorqueSection
 from spheretwin.plant.magnet_heat import HEAT
 from spheretwin.plant.plant_part import PlantPart
 
@@ -19,6 +20,7 @@ PARTS: dict[str, PlantPart] = {
     "friction": FRICTION,
     "bristles": BRISTLES,
     "heat": HEAT,
+    "learned_torque": LEARNED_TORQUE,
 }
 """By the names of their fields, in the order in which they act."""
 
@@ -36,6 +38,8 @@ if TYPE_CHECKING:
 
     class PartSections(BaseModel):
         """Sections of the parts."""
+
+        learned_torque: LearnedTorqueSection = LearnedTorqueSection()
 
 else:
     PartSections = create_model(
