@@ -14,7 +14,9 @@ from spheretwin.electronics.sensor_chain import SensorsSection
 from spheretwin.models.actuator import Actuator
 from spheretwin.models.base.arrays import Array
 from spheretwin.models.base.errors import InputError
+from spheretwin.models.base.record import Rows
 from spheretwin.models.coil_group import PerGroup
+from spheretwin.plant.learned_torque import LearnedTorqueSection, learned_torque
 from spheretwin.plant.plant_step import Parameters
 from spheretwin.scenario.sections import ResolvedScenario, Scenario
 
@@ -41,6 +43,8 @@ class Model(NamedTuple):
     """Standard deviation of the noise of each angle (3,); of one that counts, before it counts."""
     half_count_rad: Array
     """Half a count of each angle (3,); 0 if it is not counted."""
+    learned: Rows
+    """Array of one learned torque, which is no part of the parameters."""
 
     @property
     def groups(self) -> int:
@@ -75,13 +79,19 @@ def model_of(scenario: Scenario | str, changes: Mapping[str, Any] | None = None)
     return Model(
         scenario=resolved,
         actuator=config.files.actuator,
-        parameters=parameters_of(resolved, config.files),
+        parameters=parameters_of(_without_learned_torque(resolved), config.files),
         delay_s=resolved.drive.delay_s,
         lag_s=resolved.drive.lag_s,
         offset_rad=np.array(resolved.sensors.angle_offset_rad),
         noise_rad=noise_rad,
         half_count_rad=half_count_rad,
+        learned=learned_torque(resolved.plant.learned_torque),
     )
+
+
+def _without_learned_torque(scenario: ResolvedScenario) -> ResolvedScenario:
+    plant = scenario.plant.model_copy(update={"learned_torque": LearnedTorqueSection()})
+    return scenario.model_copy(update={"plant": plant})
 
 
 def _without_draws(scenario: Scenario) -> Scenario:

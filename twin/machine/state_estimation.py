@@ -88,6 +88,7 @@ class Shadow:
             longest_step_s=self.settings.longest_step_s,
             slopes=np.zeros((size, size)),
             product=np.zeros((size, size)),
+            learned=self.model.learned,
         )
         groups = self.model.groups
         self._t_s, self._present_A = np.empty(0), np.zeros(groups)

@@ -125,6 +125,7 @@ def history_drawing(history: Sequence[Identification]) -> Drawing:
 
 
 FORMAT = 1
+LEARNED_FILE = "plant.learned_torque.file"
 UNCHECKED = "unchecked"
 """Digest of a file that was written or edited by hand."""
 UNSIGNED = f'sha256 = "{UNCHECKED}"'
@@ -160,7 +161,11 @@ def write_twin(
     """
     if not result.accepted or result.covariance is None or result.held_out is None:
         raise InputError(f"twin {path}: expected an accepted identification, received {result.reasons[0]}")
-    date = now or datetime.now(UTC)
+    date, fields = now or datetime.now(UTC), {**changes, **result.fields}
+    if learned := fields.get(LEARNED_FILE):
+        beside = path.with_suffix(".learned.npz")
+        beside.write_bytes(Path(learned).read_bytes())
+        fields[LEARNED_FILE] = beside.name
     values = {name: (one.value, *one.interval) for name, one in result.parameters.items()}
     history = [*read_history(path), Identification(date, values)]
     lines = [
@@ -173,7 +178,7 @@ def write_twin(
         "",
         "# Fields of the scenario with the values that were found, after those that were known.",
         "[fields]",
-        *(f"{_text(name)} = {_text(value)}" for name, value in {**changes, **result.fields}.items()),
+        *(f"{_text(name)} = {_text(value)}" for name, value in fields.items()),
         "",
         "# 95 % intervals, and their widths over those that noise alone gives.",
         *(
@@ -211,6 +216,8 @@ def read_twin(path: Path) -> dict[str, Any]:
         The file cannot be read or is not that of a twin.
     """
     fields: dict[str, Any] = _content(path)["fields"]
+    if learned := fields.get(LEARNED_FILE):  # it is next to the twin
+        fields[LEARNED_FILE] = str(path.parent / learned)
     return fields
 
 

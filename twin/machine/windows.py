@@ -27,6 +27,7 @@ from spheretwin.machine.state_estimation import Shadow, hold_last_value
 from spheretwin.models.base.arrays import Array, Booleans
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.coil_group import PerGroup, of_each_group
+from spheretwin.plant.learned_torque import learned_torques
 from spheretwin.plant.plants import Plants
 
 # Rows may be this share of their distance from where they should be; the plant step assumes equal distances.
@@ -121,14 +122,31 @@ class Window(NamedTuple):
         plants.set_state(starts[:, :3], starts[:, 3:])
         means = {times: self.currents(*times) for times in {(one.delay_s, one.lag_s) for one in setups}}
         currents = np.stack([means[one.delay_s, one.lag_s] + one.current_offset_A for one in setups], axis=1)
-        steps = ceil(self.period_s / LONGEST_STEP_s - 0.05)
-        angles_rad = plants.roll_out(currents, np.zeros(3), self.period_s / steps, steps)
+        angles_rad = self._roll_out(plants, currents)
         reached = np.concatenate([starts[None, :, :3], angles_rad])
         first = self.log.angle_rad[self.first]
         return np.stack([sensor_angles(setup, reached[:, lane], first) for lane, setup in enumerate(setups)])
 
+    def _roll_out(self, plants: Plants, currents: Array) -> Array:
+        """Return the angles that plants reach under currents (rows, setups, groups)."""
+        model, steps = self.machine.model, ceil(self.period_s / LONGEST_STEP_s - 0.05)
+        step_s = self.period_s / steps
+        if not model.learned["on"][0]:
+            return plants.roll_out(currents, np.zeros(3), step_s, steps)
+        angles_rad, size = [], max(round(_HELD_s / self.period_s), 1)
+        for first in range(0, len(currents), size):  # the learned torque of the middle of some rows is held
+            rows, qdot = currents[first : first + size], plants.qdot_rad_s
+            middle = plants.q_rad + 0.5 * len(rows) * self.period_s * qdot
+            mean_A = rows[:, 0].mean(axis=0)
+            torque_Nm = learned_torques(model.learned, model.parameters, middle, qdot, mean_A)
+            angles_rad.append(plants.roll_out(rows, -torque_Nm, step_s, steps))
+        return np.concatenate(angles_rad)
+
 
 _ROWS_BEFORE = 20
+
+# The rotor hardly moves meanwhile.
+_HELD_s = 0.005
 
 
 def angle_deviation(model: Model, turned_rad: Array, is_count: Booleans) -> Array:

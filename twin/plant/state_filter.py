@@ -22,6 +22,8 @@ import numpy as np
 
 from spheretwin.models.base.arrays import Array
 from spheretwin.models.base.compiled import allocation_free, compiled
+from spheretwin.models.base.record import Rows
+from spheretwin.plant.learned_torque import LearnedTorque, learned_torques
 from spheretwin.plant.plant_step import Parameters, State
 from spheretwin.plant.plant_step import step_of_checked as step
 
@@ -48,6 +50,7 @@ class StateFilter(NamedTuple):
     longest_step_s: float
     slopes: Array  # (9 or 12, 9 or 12) working space
     product: Array  # (9 or 12, 9 or 12) working space
+    learned: Rows = LearnedTorque.zeros()  # array of one learned torque of the machine
 
 
 class Estimates(NamedTuple):
@@ -115,6 +118,11 @@ def _predict(filter: StateFilter, parameters: Parameters, current: Array, dt: fl
     size, white = mean.shape[0], filter.torque_noise_Nm_s**2 / dt
     start = State(mean[:3].copy(), mean[3:6].copy())
     torque = mean[6:9].copy()
+    if filter.learned[0].on:  # its slopes are neglected
+        middle = start.q_rad + 0.5 * dt * start.qdot_rad_s
+        torque -= learned_torques(
+            filter.learned, parameters, middle.reshape(1, 3), mean[3:6].copy().reshape(1, 3), current
+        )[0]
     end = step(start, current, torque, parameters, dt)
     for column in range(STATES):
         kind, i = column // 3, column % 3

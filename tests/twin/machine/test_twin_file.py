@@ -105,3 +105,18 @@ def test_the_line_that_accepts_an_edited_file_or_one_of_an_earlier_version(path,
         read_twin(path)
     path.write_text(re.sub("^sha256 = .*$", UNSIGNED, edited, count=1, flags=re.MULTILINE))
     assert read_twin(path)["plant.coulomb_Nm"] == [0.003, 0.003, 0.005]
+
+
+def test_a_learned_torque_is_stored_next_to_the_twin(tmp_path):
+    (tmp_path / "elsewhere.npz").write_bytes(content := b"arrays")
+    learned = {
+        "plant.learned_torque.file": str(tmp_path / "elsewhere.npz"),
+        "plant.learned_torque.sha256": "0",
+    }
+    (tmp_path / "other").mkdir()
+    write_twin(path := tmp_path / "other" / "twin.toml", RESULT, "hold", learned, [LOG])
+    assert '"plant.learned_torque.file" = "twin.learned.npz"' in path.read_text()
+    (tmp_path / "other").rename(tmp_path / "moved")
+    fields = read_twin(tmp_path / "moved" / "twin.toml")
+    assert fields["plant.learned_torque.file"] == str(tmp_path / "moved" / "twin.learned.npz")
+    assert (tmp_path / "moved" / "twin.learned.npz").read_bytes() == content
