@@ -115,19 +115,23 @@ static void axis(double latitude, double longitude, double out[3])
 /* Torque of one ampere in a group, in the rotor's frame: the 36 coils turn around the rotor. */
 static void group_torque(int group, double column[3])
 {
-    double s[3], s_R[3], r[3], normal[3];
-    axis(group < 12 ? 28 : 0, 30.0 * (group % 12), s);
+    static double coil[GROUPS][3], pole_axis[POLES][3];
+    static int is_ready;
+    double s_R[3], normal[3];
+    if (!is_ready) {
+        for (int j = 0; j < GROUPS; j++) axis(j < 12 ? 28 : 0, 30.0 * (j % 12), coil[j]);
+        for (int p = 0; p < POLES; p++) axis(p < POLES / 2 ? 18 : -18, 45.0 * (p % 8), pole_axis[p]);
+        is_ready = 1;
+    }
+    for (int i = 0; i < 3; i++)
+        s_R[i] = R[0][i] * coil[group][0] + R[1][i] * coil[group][1] + R[2][i] * coil[group][2];
     column[0] = column[1] = column[2] = 0;
-    for (int side = -1; side <= 1; side += 2) {
-        for (int i = 0; i < 3; i++) s_R[i] = side * (R[0][i] * s[0] + R[1][i] * s[1] + R[2][i] * s[2]);
-        for (int pole = 0; pole < POLES; pole++) {
-            axis(pole < POLES / 2 ? 18 : -18, 45.0 * (pole % 8), r);
-            cross(r, s_R, normal);
-            double sine = sqrt(dot(normal, normal));
-            if (sine < 1e-9) continue;
-            double pull = (pole % 2 ? -1 : 1) * f(RADIAN * atan2(sine, dot(r, s_R))) / sine;
-            for (int i = 0; i < 3; i++) column[i] += pull * normal[i];
-        }
+    for (int p = 0; p < POLES; p++) {
+        cross(pole_axis[p], s_R, normal);
+        double sine = sqrt(dot(normal, normal)), deg = RADIAN * atan2(sine, dot(pole_axis[p], s_R));
+        if (sine < 1e-9) continue;
+        double pull = (p % 2 ? -1 : 1) * (f(deg) - f(180 - deg)) / sine; /* of the coil and the opposite one */
+        for (int i = 0; i < 3; i++) column[i] += pull * normal[i];
     }
 }
 
