@@ -305,7 +305,7 @@ def records() -> str:
         "# Records of a run",
         "",
         "Generated from the declarations. A run is one record, `run`; a nested record has a section of its"
-        " own. *Kept*: the field belongs to the state, which a snapshot has. *Faults*: faults write it.",
+        " own. *Use* is kept: the field belongs to the state, which a snapshot has; or faults: faults write it.",
     ]
     for place, kind in _records("run", RunData):
         kinds = kinds_of(kind)
@@ -320,7 +320,7 @@ def records() -> str:
             for name, declared in kind.fields().items()
         ]
         lines += ["", f"## {kind.__name__}", "", f"`{place}`. {_summary(kind)}", ""]
-        lines += _table(("field", "unit", "shape", "", "meaning"), rows)
+        lines += _table(("field", "unit", "shape", "use", "meaning"), rows)
     return _page(lines)
 
 
