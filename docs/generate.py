@@ -305,7 +305,7 @@ def records() -> str:
         "# Records of a run",
         "",
         "Generated from the declarations. A run is one record, `run`; a nested record has a section of its"
-        " own. *Use* is kept: the field belongs to the state, which a snapshot has; or faults: faults write it.",
+        " own. *Use*: kept, a field of the state, which a snapshot has; faults, a field that faults write.",
     ]
     for place, kind in _records("run", RunData):
         kinds = kinds_of(kind)
