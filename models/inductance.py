@@ -64,6 +64,20 @@ def _all_groups(actuator: Actuator) -> Array:
 
 def coil_pair(coil: CoilGeometry, angle_rad: float) -> float:
     """Return the mutual inductance (H) of two equal coils whose axes enclose an angle (rad)."""
+    points, elements = filaments(coil)
+    c, s = np.cos(angle_rad), np.sin(angle_rad)
+    rotation = np.array([[c, 0, s], [0, 1, 0], [-s, 0, c]])
+    others = rotation @ points
+    squares = (points**2).sum(axis=0)
+    distance = np.sqrt(squares[:, None] + squares - 2 * points.T @ others)
+    return float(MU0_OVER_4PI * coil.turns**2 * np.sum(elements.T @ (rotation @ elements) / distance))
+
+
+def filaments(coil: CoilGeometry) -> tuple[Array, Array]:
+    """Return points of the winding of a coil whose axis is z, and their conductor elements, (3, m), m.
+
+    The elements are those of a single turn, spread over the section.
+    """
     radius, radial = _gauss(RADIAL, coil.inner_radius_m, coil.outer_radius_m)
     height, axial = _gauss(AXIAL, coil.distance_m - coil.length_m / 2, coil.distance_m + coil.length_m / 2)
     turn = 2 * pi * np.arange(AROUND) / AROUND
@@ -71,12 +85,7 @@ def coil_pair(coil: CoilGeometry, angle_rad: float) -> float:
     shares = np.repeat(np.outer(radial, axial).ravel(), AROUND) * r * (2 * pi / AROUND)
     points = np.array([r * np.cos(psi), r * np.sin(psi), z])  # (3, m)
     elements = shares * np.array([-np.sin(psi), np.cos(psi), 0 * psi])  # (3, m)
-    c, s = np.cos(angle_rad), np.sin(angle_rad)
-    rotation = np.array([[c, 0, s], [0, 1, 0], [-s, 0, c]])
-    others = rotation @ points
-    squares = (points**2).sum(axis=0)
-    distance = np.sqrt(squares[:, None] + squares - 2 * points.T @ others)
-    return float(MU0_OVER_4PI * coil.turns**2 * np.sum(elements.T @ (rotation @ elements) / distance))
+    return points, elements
 
 
 def _gauss(points: int, first: float, last: float) -> tuple[Array, Array]:
