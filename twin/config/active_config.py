@@ -161,6 +161,8 @@ def _nominal(scenario: Scenario, drive: ResolvedDrive, actuator: Actuator) -> Re
     section = scenario.nominal
     known = section.equals_truth
     sheet = true_sheet(scenario, drive, actuator) if known else _model_sheet(actuator, scenario.hardware)
+    if scenario.sensors.hall.on:  # no set of hardware and no model file states its angles
+        sheet = {**sheet, "angle_noise_rad": scenario.sensors.angle_noise_rad}
     return _nominal_of(section, sheet, nominal_curve(scenario))
 
 

@@ -11,9 +11,10 @@ from math import hypot, isfinite, isnan, nan
 from typing import Any
 
 import numpy as np
-from pydantic import BaseModel, Field
+from pydantic import BaseModel, Field, model_validator
 
 from spheretwin.electronics.converters import AdcSection
+from spheretwin.electronics.hall_array import HallSection
 from spheretwin.electronics.random_streams import Seed, Streams, width_of
 from spheretwin.electronics.stages import SensorSetup, SensorStage, TickNoise, chained
 from spheretwin.electronics.transducers import CurrentSection, EncoderSection, PotentiometerSection
@@ -39,10 +40,26 @@ class SensorsSection(BaseModel):
     adc: AdcSection = AdcSection()
     encoder: EncoderSection = EncoderSection()
     current: CurrentSection = CurrentSection()
+    hall: HallSection = HallSection()
+
+    @model_validator(mode="after")
+    def _measures_once(self) -> SensorsSection:
+        if self.hall.on and not self.hinge_sensors_ideal:
+            given = [name for name in STAGES if not getattr(self, name).ideal]
+            raise ValueError(
+                "expected no errors of potentiometer, adc and encoder with sensors.hall, which replaces them,"
+                f" received those of {', '.join(given) or 'angle_offset_rad'}"
+            )
+        return self
 
     @property
     def ideal(self) -> bool:
         """True if the controller receives the true angles."""
+        return self.hinge_sensors_ideal and not self.hall.on
+
+    @property
+    def hinge_sensors_ideal(self) -> bool:
+        """True if no stage of the sensors of the hinges changes an angle."""
         stages = (getattr(self, name) for name in STAGES)
         return not any(self.angle_offset_rad) and all(stage.ideal for stage in stages)
 
@@ -65,6 +82,8 @@ class SensorsSection(BaseModel):
     @property
     def angle_noise_rad(self) -> Triple:
         """Standard deviation of the noise of each angle; with oversampling, of the mean of conversions."""
+        if self.hall.on:
+            return self.hall.angle_noise_rad
         noise_rad = self.conversion_noise_V / self.potentiometer.volts_per_rad / self.adc.oversampling**0.5
         return noise_rad, noise_rad, 0.0
 
@@ -136,7 +155,8 @@ def _draws(section: SensorsSection) -> list[tuple[str, int]]:
 
 def noise_streams(section: SensorsSection) -> Streams:
     """Return the random streams that `sense` needs, with their widths."""
-    return tuple((f"sensors.{name} noise", width) for name, width in _draws(section) if width)
+    stages = tuple((f"sensors.{name} noise", width) for name, width in _draws(section) if width)
+    return stages + section.hall.streams
 
 
 def sensor_sheet(sensors: SensorsSection) -> dict[str, Any]:

@@ -129,6 +129,7 @@ def _check(scenario: ResolvedScenario, law: Law) -> None:
         "watchdog.on": scenario.watchdog.on,
         "detector.detect": scenario.detects,
         "manual": scenario.manual.on,
+        "sensors.hall": scenario.sensors.hall.on,
     }
     if received := [name for name, is_on in present.items() if is_on]:
         raise InputError(

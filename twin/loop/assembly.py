@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
@@ -16,6 +16,8 @@ from spheretwin.control.controller import Controller, ControllerData, controller
 from spheretwin.control.estimators.estimator import Estimator, Sampling
 from spheretwin.control.law import Law, NominalModel
 from spheretwin.control.laws import LAWS
+from spheretwin.electronics.hall_array import HallArray, fill_hall
+from spheretwin.electronics.hall_array import sizes_of as hall_sizes
 from spheretwin.electronics.sensor_chain import SensorChain, fill_sensors
 from spheretwin.faults.schedule import part_names
 from spheretwin.loop.channels import CHANNELS
@@ -106,7 +108,7 @@ def signals_of(scenario: ResolvedScenario, actuator: Actuator, law: Law) -> tupl
     signals = common_signals(groups)
     for channel in CHANNELS:
         if channel.logged(scenario):
-            signals += channel.signals(groups)
+            signals += channel.signals(scenario.sensors.hall.readings if channel.of_readings else groups)
     return signals + law.signals
 
 
@@ -147,11 +149,30 @@ class RunData(Record):
     )
 
 
-def empty_run(scenario: ResolvedScenario, true: TorqueModel, nominal: TorqueModel, runs: int = 1) -> Rows:
-    """Return an array of RunData of the sizes of a scenario, in which all numbers are 0."""
+class HallRunData(Record):
+    """Data of a run with a Hall array."""
+
+    plant: Plant = RunData.plant
+    sensors: SensorChain = RunData.sensors
+    controller: ControllerData = RunData.controller
+    hall: HallArray = field("Hall array")
+
+
+def empty_run(
+    scenario: ResolvedScenario,
+    true: TorqueModel,
+    nominal: TorqueModel,
+    runs: int = 1,
+    hall: Mapping[str, int] | None = None,
+) -> Rows:
+    """Return an array of RunData of the sizes of a scenario, in which all numbers are 0.
+
+    With the sizes of a Hall array it is an array of HallRunData.
+    """
     sizes = true.sizes | {f"nominal_{name}": size for name, size in nominal.sizes.items()}
     parts = len(part_names(sizes["groups"]))
-    return RunData.zeros(runs, parts=parts, **sizes, **delays_of(scenario))
+    sizes |= {"parts": parts, **delays_of(scenario)}
+    return HallRunData.zeros(runs, **sizes, **hall) if hall else RunData.zeros(runs, **sizes)
 
 
 class Assembly(NamedTuple):
@@ -177,7 +198,7 @@ class Assembly(NamedTuple):
 
     def stages(self) -> Stages:
         """Compile the stages of the runs."""
-        parts = {name: self.rows[name] for name in ("controller", "sensors", "plant")}
+        parts = {name: self.rows[name] for name in self.rows.dtype.names or ()}
         stage = plant_stage(parts["plant"], self.tables, self.scenario.plant.engine)
         return compiled_stages(parts, stage, self.signals)
 
@@ -216,10 +237,16 @@ def assembled(
         true_magnetics(scenario.plant, scenario.seed, files.actuator),
     )
     rotor = rotor or started_rotor(scenario, files)
-    rows = empty_run(scenario, true, nominal, runs)
+    hall = scenario.sensors.hall.on and hall_sizes(scenario.sensors.hall, files.actuator)
+    rows = empty_run(scenario, true, nominal, runs, hall or None)
     controllers = controllers_of(rows["controller"], scenario, laws, nominal, estimators, files.nominal)
     fill_sensors(rows["sensors"], scenario.sensors, scenario.seed, bool(scenario.fault))
     fill_plant(rows["plant"], scenario, files.actuator, true, rotor.rows)
+    if hall:
+        for row, run in enumerate(_runs(scenario)):
+            machine = files.actuator, scatter_of(run.plant, run.seed, files.actuator)
+            section, period_s = run.sensors.hall, run.controller.period_s
+            fill_hall(rows["hall"][row : row + 1], section, *machine, period_s, run.seed)
     estimate = estimators[0].step if estimators[0] else None
     return Assembly(
         scenario,

@@ -39,7 +39,10 @@ class TelemetryChannel(NamedTuple):
     write: Any
     """``write(row, plant)`` writes the columns into the beginning of `row`, once in each tick, after the
     plant has advanced. Its other arguments name the parts that it reads: one or two of `controller`,
-    `sensors` and `plant`."""
+    `sensors`, `plant` and `hall`."""
+
+    of_readings: bool = False
+    """True if the number is that of the readings of the Hall array, not of the groups."""
 
     @property
     def parts(self) -> tuple[str, ...]:
@@ -48,12 +51,14 @@ class TelemetryChannel(NamedTuple):
         return code.co_varnames[1 : code.co_argcount]
 
 
-def channel(logged: Callable[[Scenario], bool], *columns: Column) -> Callable[[Any], TelemetryChannel]:
+def channel(
+    logged: Callable[[Scenario], bool], *columns: Column, of_readings: bool = False
+) -> Callable[[Any], TelemetryChannel]:
     """Decorate the function that writes the columns of a channel.
 
     Parameters
     ----------
-    logged, write
+    logged, write, of_readings
         As in `TelemetryChannel`.
     *columns : callable
         Columns in their order.
@@ -63,7 +68,7 @@ def channel(logged: Callable[[Scenario], bool], *columns: Column) -> Callable[[A
     def signals(groups: int) -> tuple[Signal, ...]:
         return tuple(column(groups) for column in columns)
 
-    return lambda write: TelemetryChannel(signals, logged, inlined(write))
+    return lambda write: TelemetryChannel(signals, logged, inlined(write), of_readings)
 
 
 def single(name: str, unit: str, meaning: str, states: tuple[str, ...] = ()) -> Column:
@@ -80,6 +85,13 @@ def each_group(name: str, unit: str, meaning: str, states: tuple[str, ...] = ())
     """Return a column with a number for each coil group."""
     return lambda groups: Signal(
         name, unit, groups, meaning, tuple(f"group {j}" for j in range(groups)), states
+    )
+
+
+def each_reading(name: str, unit: str, meaning: str) -> Column:
+    """Return a column with a number for each reading of the Hall array."""
+    return lambda readings: Signal(
+        name, unit, readings, meaning, tuple(f"reading {r}" for r in range(readings))
     )
 
 
@@ -123,6 +135,21 @@ def measured_currents(row: NDArray, plant: Any) -> None:
     measured_A = plant.current_sensors.measured_A
     for j in range(measured_A.shape[0]):
         row[j] = measured_A[j]
+
+
+@channel(
+    lambda scenario: scenario.sensors.hall.on,
+    each_reading("hall_field_T", "T", "field as the Hall array reads it, at the tick"),
+    single("hall_innovation_T", "T", "readings less the field that the pose filter predicts, rms"),
+    single("hall_remanence", "1", "remanence as the pose filter estimates it, over the nominal one"),
+    of_readings=True,
+)
+def hall_array(row: NDArray, hall: Any) -> None:
+    """Write the columns of one tick."""
+    readings = hall.reading_T.shape[0]
+    for r in range(readings):
+        row[r] = hall.reading_T[r]
+    row[readings], row[readings + 1] = hall.pose.innovation_T, hall.pose.remanence
 
 
 @channel(
@@ -280,6 +307,7 @@ CHANNELS: tuple[TelemetryChannel, ...] = (
     sensed_motion,
     sensor_states,
     measured_currents,
+    hall_array,
     reference_governor,
     prediction,
     feed_forward,

@@ -53,7 +53,9 @@ class CudaBlock(RunBlock):
 
     def __init__(self, scenarios: Sequence[ResolvedScenario], files: Files, metrics: Iterable[str]) -> None:
         first = scenarios[0]
-        check_gpu_runs(first.plant.engine, check_bounds=first.controller.check_bounds)
+        check_gpu_runs(
+            first.plant.engine, check_bounds=first.controller.check_bounds, hall=first.sensors.hall.on
+        )
         super().__init__(scenarios, files, metrics)
         own = self._assembly
         estimator, columns, signals = estimator_of(first), self._reduction.arguments[0], own.signals
@@ -117,19 +119,21 @@ class _Fixed(NamedTuple):
     unused: NDArray[np.float64]
 
 
-def check_gpu_runs(engine: str, *, check_bounds: bool) -> None:
+def check_gpu_runs(engine: str, *, check_bounds: bool, hall: bool) -> None:
     """Check that there is a GPU, and that it can run scenarios of a plant.
 
     Raises
     ------
     InputError
-        There is no GPU, or it is another engine, or the law checks bounds.
+        There is no GPU, or it is another engine, or the law checks bounds, or there is a Hall array.
     """
     cuda.check_gpu()
     if engine != ENGINE:
         raise InputError(f"cuda: expected plant.engine {ENGINE}, received {engine}, which runs on processors")
     if check_bounds:
         raise InputError("cuda: expected controller.check_bounds = false, received true")
+    if hall:
+        raise InputError("cuda: expected no sensors.hall, received a Hall array, which runs on processors")
 
 
 def _inputs_between(inputs: Inputs, first: int, last: int) -> Inputs:

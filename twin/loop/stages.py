@@ -14,6 +14,7 @@ import numpy as np
 from numba import types
 from numpy.typing import NDArray
 
+from spheretwin.electronics.hall_array import sense_pose
 from spheretwin.electronics.sensor_chain import sense
 from spheretwin.electronics.transducers import sense_currents
 from spheretwin.loop.channels import TelemetryChannel, logged_channels
@@ -117,7 +118,8 @@ def compiled_stages(parts: Mapping[str, Rows], plant: PlantStage, signals: tuple
     Parameters
     ----------
     parts : mapping of str to array of records
-        `controller`, `sensors` and `plant`; they must exist as long as the stages are called.
+        `controller`, `sensors` and `plant`, and `hall` of runs with a Hall array, which then senses the
+        angles; they must exist as long as the stages are called.
     plant : PlantStage
     signals : tuple of Signal
         Columns of the runs: their channels are among them.
@@ -128,9 +130,12 @@ def compiled_stages(parts: Mapping[str, Rows], plant: PlantStage, signals: tuple
         _function(_WRITE, _writer(channel), *(parts[name] for name in channel.parts)) for channel in logged
     ]
     runs = len(parts["plant"])
+    sense_angles, sensors = (
+        (sense_hall_stage, parts["hall"]) if "hall" in parts else (sense_stage, parts["sensors"])
+    )
     return Stages(
-        _function(_SENSE, uncompiled(sense_stage), parts["sensors"], parts["plant"]),
-        _data(parts["sensors"]),
+        _function(_SENSE, uncompiled(sense_angles), sensors, parts["plant"]),
+        _data(sensors),
         *plant,
         np.array(writers, np.intp) if COMPILES else writers,
         _table([_data(parts[names[0]]) for names in reads], runs),
@@ -168,6 +173,19 @@ def sense_stage(
         sense_currents(currents, plant.current, draws)
         copy_into(measured_A, 0, currents.measured_A, measured_A.shape[0])
     return bool(is_finite)
+
+
+@allocation_free
+def sense_hall_stage(
+    hall: Any, plant: Any, noise: Array, draws: Array, measurement: Array, fresh: Array, measured_A: Array
+) -> bool:
+    """Measure currents, field and pose as `sense_stage`; every angle is new."""
+    currents = plant.current_sensors
+    sense_currents(currents, plant.current, draws)
+    copy_into(measured_A, 0, currents.measured_A, measured_A.shape[0])
+    for i in range(fresh.shape[0]):
+        fresh[i] = 1.0
+    return bool(sense_pose(hall, plant, noise, measurement))
 
 
 @allocation_free

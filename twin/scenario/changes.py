@@ -42,6 +42,7 @@ FIXED = (
     "plant.mjcf",
     "plant.initial_rad",
     "plant.initial_rad_s",
+    "sensors.hall",
 )
 
 

@@ -129,6 +129,15 @@ _ELECTRONICS = {
     **_values(_SOFTWARE),
     **PROTOTYPE_NOMINAL,
 }
+HINGE_SENSORS = (
+    "sensors.potentiometer.",
+    "sensors.adc.",
+    "sensors.encoder.",
+    f"{NOMINAL}.angle_noise_rad",
+    f"{NOMINAL}.angle_resolution_rad",
+)
+"""Beginnings of the fields of a set that a Hall array replaces."""
+
 HARDWARE: dict[str, dict[str, Any]] = {
     "ideal": {},
     "electronics": _ELECTRONICS,
@@ -252,8 +261,14 @@ def hardware_defaults(fields: dict[str, Any]) -> dict[str, Any]:
     return {
         dotted: value
         for dotted, value in hardware_fields(name if isinstance(name, str) else "", equals_truth).items()
-        if not _is_given(fields, dotted)
+        if not (_is_given(fields, dotted) or (_has_hall_array(fields) and dotted.startswith(HINGE_SENSORS)))
     }
+
+
+def _has_hall_array(fields: Any) -> bool:
+    sensors = fields.get("sensors")
+    hall = sensors.get("hall") if isinstance(sensors, dict) else None
+    return isinstance(hall, dict) and bool(hall.get("count") or hall.get("longitude_deg"))
 
 
 def hardware_fields(name: str, equals_truth: bool) -> dict[str, Any]:

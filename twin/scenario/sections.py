@@ -150,6 +150,10 @@ class Scenario(Section):
             step_s = {"adc": self.controller.period_s, "controller": self.plant.step_s}.get(fault.kind.name)
             if fault.mode == "delay" and step_s is not None:
                 _check_late(f"fault.{place}.value", fault.effective_value, step_s, self.controller.period_s)
+            if fault.kind.measured and self.sensors.hall.on:
+                raise ValueError(
+                    f"fault.{place}: expected no fault of {fault.target} with sensors.hall, which replaces it"
+                )
         check_gains(self.fault)
         return self
 
@@ -170,7 +174,7 @@ class Scenario(Section):
     @property
     def senses_currents(self) -> bool:
         """True if there are current sensors."""
-        return self.detects or self.sensors.current.noise_A > 0
+        return self.detects or self.sensors.current.noise_A > 0 or self.sensors.hall.on
 
     @property
     def measures_truth(self) -> bool:

@@ -239,7 +239,7 @@ class Rows:
         No other number depends on it, and it is most of a row's random numbers.
         """
         sensors = scenario.sensors
-        is_read = scenario.detects or scenario.event or self.study.telemetry or self._own
+        is_read = scenario.detects or sensors.hall.on or scenario.event or self.study.telemetry or self._own
         if is_read or not sensors.current.noise_A:
             return scenario
         current = sensors.current.model_copy(update={"noise_A": 0.0})

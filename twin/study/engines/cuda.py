@@ -35,7 +35,8 @@ def prepare(rows: Rows) -> Rows:
     if own := next(filter(is_reference, rows.study.metrics), None):
         raise InputError(f"cuda: expected figures of this package, received {own}; engine processes runs it")
     engine = FAST if rows.chooses_plant else rows.base.plant.engine
-    check_gpu_runs(engine, check_bounds=rows.base.controller.check_bounds)
+    base = rows.base
+    check_gpu_runs(engine, check_bounds=base.controller.check_bounds, hall=base.sensors.hall.on)
     return rows.with_block(CudaBlock)
 
 
