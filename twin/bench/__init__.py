@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import inspect
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from types import TracebackType
 from typing import Any
 
@@ -27,6 +27,7 @@ from spheretwin.bench.status import BenchStatus
 from spheretwin.models.actuator import Actuator
 from spheretwin.models.base.arrays import Array
 from spheretwin.models.base.errors import InputError, SpheretwinError
+from spheretwin.models.telemetry.table import Sink
 from spheretwin.scenario.reading import described_fields
 from spheretwin.scenario.sections import Scenario
 from spheretwin.scenario.writing import as_command, as_toml
@@ -58,6 +59,8 @@ class Bench:
     machine : Session, optional
         Session of the scenario whose plant is a machine, from `machine.Link.session`. Commands that stop or
         change the time, or that only a simulated plant can follow, are refused.
+    sinks : sequence of Sink, optional
+        Receive the rows of all runs.
 
     Notes
     -----
@@ -71,8 +74,9 @@ class Bench:
         operators: Operators | None = None,
         folder: Folder | None = None,
         machine: Session | None = None,
+        sinks: Sequence[Sink] = (),
     ) -> None:
-        self._bench_state = BenchState(scenario, operators or Operators(), folder, machine)
+        self._bench_state = BenchState(scenario, operators or Operators(), folder, machine, sinks)
         self._processor = CommandProcessor(self._bench_state)
         self._cycle = Cycle(self._bench_state, self._processor)
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -18,7 +18,7 @@ from spheretwin.bench.recording import Recording
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.telemetry.run_record import RunRecord
 from spheretwin.models.telemetry.signals import common_signals
-from spheretwin.models.telemetry.table import Table
+from spheretwin.models.telemetry.table import Sink, Table
 from spheretwin.scenario.sections import Scenario
 from spheretwin.session import Session
 
@@ -104,6 +104,8 @@ class BenchState:
         Folder of the files that commands name; default: the working folder, and files may be anywhere.
     machine : Session, optional
         Session whose plant is a machine, instead of one of the scenario.
+    sinks : sequence of Sink
+        Receive the rows of all runs.
 
     Attributes
     ----------
@@ -138,8 +140,9 @@ class BenchState:
         operators: Operators,
         folder: Folder | None = None,
         machine: Session | None = None,
+        sinks: Sequence[Sink] = (),
     ) -> None:
-        self.is_machine = machine is not None
+        self.sinks, self.is_machine = sinks, machine is not None
         scenario = machine.initial_scenario if machine else with_end_stops(scenario)
         self.folder = folder or Folder(None, scenario)
         self.driver, self.operators = Driver(scenario, machine or compiled_session(scenario)), operators

@@ -220,6 +220,8 @@ class Cycle:
                 bench_state.history.write(first, rows, driver.mode not in NO_REFERENCE)
                 bench_state.capture.write(rows)
                 recording.write(rows)
+                for sink in bench_state.sinks:
+                    sink.write(rows)
             recording.note_changes(driver.session)
         if driver.reason is not None:
             bench_state.pause()

@@ -26,13 +26,14 @@ from spheretwin.bench.operators import GONE_s, Operators
 from spheretwin.cli.common import interruptible, print_message, warn
 from spheretwin.cli.drive import LIMITS, LINK, limited_rate, open_link
 from spheretwin.cli.machine import FRAME, STANDARD_STREAMS
-from spheretwin.cli.options import from_zero, number, verb, whole
+from spheretwin.cli.options import READERS, from_zero, number, verb
 from spheretwin.control.laws import LAWS
 from spheretwin.faults.targets import TARGETS
 from spheretwin.machine.link.controller_scenario import left_out
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.base.extras import missing
 from spheretwin.models.base.mujoco_library import timers_stopped
+from spheretwin.models.telemetry.joint_state_server import published
 from spheretwin.records import outputs
 from spheretwin.scenario import reading
 from spheretwin.scenario.fields import families, without_indices
@@ -176,9 +177,6 @@ PORT = 8080
 
 EXAMPLE = "bench"
 
-LARGEST_PORT = 65_535
-
-
 @verb(
     f"""
     [SCENARIO]={EXAMPLE}  {", ".join(shipped())}, or a .toml file; {EXAMPLE} unless given
@@ -187,12 +185,13 @@ LARGEST_PORT = 65_535
     --hold-after S={GONE_s:g}  time for which the twin continues after its page is closed; {GONE_s:g} s
         unless given
     --record FILE.rrd  record from the start
+    --publish PORT    publish data for Foxglove and ROS 2
     --folder DIR      files that the page names are below it; the working folder unless given
     --machine ADDRESS  drive a machine at udp://HOST:PORT or serial:DEVICE@BAUD, with the options of
         `drive`: --arm, --frame, --limit-angle-deg, …
     """,
     has_fields=True,
-    port=whole(LARGEST_PORT, first=0, name="a port"),
+    port=READERS["PORT"],
     hold_after=number("a time from 0 s on", from_zero),
     folder={"type": Path, "default": Path()},
     usage="[SCENARIO]",
@@ -223,7 +222,9 @@ def run(options: argparse.Namespace) -> bool:
     with listening, interruptible() as stop_requested, contextlib.ExitStack() as stack:
         stack.enter_context(timers_stopped())
         machine = stack.enter_context(_machine(options, scenario, stop_requested))
-        bench = stack.enter_context(Bench(scenario, Operators(options.hold_after), folder, machine))
+        publishers = stack.enter_context(published(options.publish))
+        operators = Operators(options.hold_after)
+        bench = stack.enter_context(Bench(scenario, operators, folder, machine, publishers))
         page = stack.enter_context(Page(bench, choices_of(bench, options.folder), listening))
         bench.begin()
         _record(bench, recordings)

@@ -11,10 +11,11 @@ import pytest
 from spheretwin import scenario as scenarios
 from spheretwin.analysis import recorded_run as reviewed
 from spheretwin.analysis import run_summary
+from spheretwin.bench import Bench
 from spheretwin.bench.recording import RecordingThread
 from spheretwin.models.telemetry.parquet import TelemetryFile
 from spheretwin.scenario import reading
-from tests.twin.bench.cases import begun, done, kept_rows, said
+from tests.twin.bench.cases import FREE, begun, done, kept_rows, said
 
 
 @pytest.fixture(scope="module")
@@ -151,3 +152,15 @@ def test_a_change_is_logged_at_the_first_tick_on_which_it_acts(tmp_path, chunk):
         done(made, "keep")
     (t_s,) = (t_s for t_s, _, text in reviewed.read(path).log if "disturbance.load" in text)
     assert t_s == pytest.approx(chunk * 1e-3, abs=1e-9)
+
+
+def test_sinks_receive_the_rows_of_all_runs():
+    sink = Mock()
+    with Bench(scenarios.load("sinusoid", FREE), sinks=[sink]) as made:
+        done(made, "start")
+        made.advance(25)
+        done(made, "reset")
+        done(made, "start")
+        made.advance(10)
+    t_s = np.concatenate([call.args[0]["t_s"] for call in sink.write.call_args_list])
+    np.testing.assert_allclose(t_s, 1e-3 * np.concatenate([np.arange(25), np.arange(10)]), atol=1e-12)
