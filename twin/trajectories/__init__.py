@@ -4,6 +4,7 @@ from typing import Annotated, get_args
 
 from pydantic import Field
 
+from spheretwin.trajectories.rotations import GreatCircle
 from spheretwin.trajectories.shapes import Chirp, Hold, Jog, Multisine, Nutation, Sinusoid, Steps, Tilt
 from spheretwin.trajectories.trajectory import Shape
 from spheretwin.trajectories.waypoints import Waypoints
@@ -17,6 +18,7 @@ Trajectory = Annotated[
     | Chirp
     | Multisine
     | Steps
+    | GreatCircle
     | Waypoints,
     Field(discriminator="shape"),
 ]

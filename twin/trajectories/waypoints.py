@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Literal, NamedTuple
+from typing import Annotated, Literal
 
 import numpy as np
 from numpy.polynomial.polynomial import polyder, polyval
@@ -13,23 +13,14 @@ from spheretwin.models.base.arrays import Array
 from spheretwin.models.base.errors import InputError, distinct_texts
 from spheretwin.models.telemetry.csv_series import TIME, TimeSeries, read
 from spheretwin.models.telemetry.signals import ANGLES
+from spheretwin.trajectories.rotations import AXES, OrientationPath, PathPeak
 from spheretwin.trajectories.rounding import LARGEST
 from spheretwin.trajectories.trajectory import Samples, Shape
 
-AXES = ("alpha", "beta", "gamma")
 COLUMNS = tuple(f"{axis}_rad" for axis in AXES)
 
-Between = Literal["minimum_jerk", "cubic"]
+Between = Literal["minimum_jerk", "cubic", "slerp"]
 Limit = Annotated[float, Field(gt=0)]
-
-
-class PathPeak(NamedTuple):
-    """Largest rate or acceleration of a path."""
-
-    value: float
-    """Magnitude, rad/s or rad/s²."""
-    t_s: float
-    axis: str
 
 
 class WaypointPath:
@@ -44,7 +35,7 @@ class WaypointPath:
         both ends.
     """
 
-    def __init__(self, poses: TimeSeries, between: Between) -> None:
+    def __init__(self, poses: TimeSeries, between: Literal["minimum_jerk", "cubic"]) -> None:
         self._key = poses, between
         self._times, self._poses = poses.t_s, poses.values
         self._lasts = np.diff(poses.t_s)
@@ -111,7 +102,7 @@ class Waypoints(Shape):
     between: Between = Field(
         "minimum_jerk",
         description="minimum jerk from rest at each pose to rest at the next, or one cubic spline, at rest at"
-        " both ends",
+        " both ends, or minimum jerk along the shorter rotation",
     )
     largest_rate_rad_s: Limit | None = Field(
         None, description="rate that no axis may exceed, rad/s; any unless given"
@@ -120,7 +111,7 @@ class Waypoints(Shape):
         None, description="acceleration that no axis may exceed, rad/s²; any unless given"
     )
 
-    _path: WaypointPath = PrivateAttr()
+    _path: WaypointPath | OrientationPath = PrivateAttr()
 
     def sharp(self, t: Array) -> Samples:
         """Return the motion without rounded corners, as `Shape.sharp`."""
@@ -142,7 +133,7 @@ class Waypoints(Shape):
         poses = read("waypoints", Path(self.file), COLUMNS, LARGEST)
         if len(poses.t_s) < 2:
             raise InputError(f"waypoints {self.file}: expected at least two poses, received one")
-        self._path = WaypointPath(poses, self.between)
+        self._path = OrientationPath(poses) if self.between == "slerp" else WaypointPath(poses, self.between)
         rate, acceleration = self._path.peaks()
         self._check_limit("rate", "rad/s", rate, self.largest_rate_rad_s)
         self._check_limit("acceleration", "rad/s²", acceleration, self.largest_acceleration_rad_s2)

@@ -87,6 +87,7 @@ def test_a_start_erases_the_memory(tmp_path):
     ("changes", "said"),
     [
         ({"controller.law": "adrc"}, "expected a law pd, pid, lqi, afsm, afsm_eso, received adrc"),
+        ({"controller.law": "geometric_pd"}, "afsm, afsm_eso, received geometric_pd"),
         ({"controller.prediction.on": True}, "received controller.prediction.on"),
         ({"watchdog.on": True, "detector.detect": True}, "received watchdog.on, detector.detect"),
         ({"manual.currents_A": [0.0] * 18}, "received manual"),
