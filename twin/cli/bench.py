@@ -177,6 +177,7 @@ PORT = 8080
 
 EXAMPLE = "bench"
 
+
 @verb(
     f"""
     [SCENARIO]={EXAMPLE}  {", ".join(shipped())}, or a .toml file; {EXAMPLE} unless given
