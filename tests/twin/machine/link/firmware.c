@@ -1,4 +1,4 @@
-/* Firmware of the independent machine in `../independent/rotor.h`.
+/* Firmware of the independent machine in `../../../independent/rotor.h`.
  *
  *   firmware torque_curve.csv [fault=KIND@TICK] [NAME=VALUE...]
  *
@@ -14,7 +14,7 @@
 #include <sys/socket.h>
 #include <sys/time.h>
 
-#include "../independent/rotor.h"
+#include "../../../independent/rotor.h"
 
 enum { ARMED = 1, HELLO = 2, END = 4 };
 

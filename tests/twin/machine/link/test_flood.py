@@ -14,7 +14,7 @@ from spheretwin.machine.link.channel import FrameChannel
 from spheretwin.machine.link.frame_format import Flags
 from spheretwin.machine.link.transports import open_transport
 from tests.requirements import needs_c_compiler, needs_posix
-from tests.twin.machine.independent.laboratory import CURVE, ROOT, built
+from tests.independent.laboratory import CURVE, ROOT, built
 from tests.waiting import UNLIMITED_S
 
 pytestmark = [needs_c_compiler, needs_posix]

@@ -17,7 +17,7 @@ from spheretwin.machine.link.frame_format import Flags
 from spheretwin.machine.link.transports import open_transport
 from spheretwin.models.telemetry.table import read_parquet
 from tests.requirements import needs_c_compiler, needs_posix
-from tests.twin.machine.independent.laboratory import CURVE, ROOT, built
+from tests.independent.laboratory import CURVE, ROOT, built
 from tests.twin.passive_cases import STILL
 from tests.waiting import UNLIMITED_S
 

@@ -8,8 +8,8 @@ from spheretwin.machine.learning import learn, samples_of
 from spheretwin.machine.parameters import Machine
 from spheretwin.plant.learned_torque import write_arrays
 from tests.requirements import needs_c_compiler, needs_posix
-from tests.twin.machine.independent.laboratory import DATA_SHEET, SCENARIO, read_log
-from tests.twin.machine.independent.test_laboratory import ALIKE
+from tests.independent.laboratory import DATA_SHEET, SCENARIO, read_log
+from tests.independent.test_laboratory import ALIKE
 
 pytestmark = [
     needs_c_compiler,

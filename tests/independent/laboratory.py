@@ -9,7 +9,7 @@ from spheretwin import machine
 from spheretwin.machine.workflow import NOMINAL
 from tests.requirements import C_COMPILER
 
-HERE, ROOT = Path(__file__).parent, Path(__file__).parents[4]
+HERE, ROOT = Path(__file__).parent, Path(__file__).parents[2]
 CURVE = ROOT / "models" / "torque_curve.csv"
 
 SCENARIO, DATA_SHEET = "sinusoid", NOMINAL

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from spheretwin.machine import Alarm, Watch
-from tests.twin.machine.independent.laboratory import DATA_SHEET, SCENARIO, read_log
+from tests.independent.laboratory import DATA_SHEET, SCENARIO, read_log
 
 DURATION_s = 3.9
 
