@@ -220,7 +220,7 @@ def test_text_in_the_colour_of_a_law_is_readable_on_white(colour):
 @pytest.mark.parametrize(("scheme", "ground"), [("light", (255, 255, 255)), ("dark", (36, 36, 36))])
 def test_messages_of_the_bench_are_readable_in_both_themes(scheme, ground):
     css = (Path(theme.__file__).parent / "bench" / "bench.css").read_text(encoding="utf-8")
-    (rule,) = re.findall(rf"\[data-mantine-color-scheme={scheme}\] {{(.*?)}}", css)
+    (rule,) = re.findall(rf"(?m)^\[data-mantine-color-scheme={scheme}\] {{(.*?)}}", css)
     colours = dict(re.findall(r"--(\w+): (#[0-9a-f]{6})", rule))
     assert set(colours) == {"good", "warn", "bad", "work"}
     for name, colour in colours.items():
