@@ -8,11 +8,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from spheretwin.models.base.arrays import Array
 from spheretwin.models.telemetry.fault_log import ColumnChanges
 from spheretwin.models.telemetry.status import QUIET_S
 from spheretwin.models.telemetry.table import Table
-
-Array = NDArray[np.float64]
 
 
 class Envelope(NamedTuple):

@@ -6,9 +6,9 @@ from collections.abc import Callable, Collection, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from spheretwin.models.actuator import Actuator
+from spheretwin.models.base.arrays import Array
 from spheretwin.models.coil_group import of_each_group
 from spheretwin.models.kinematics import generalised_torque
 from spheretwin.models.lagrangian import coriolis_rows, inertia_entries
@@ -17,8 +17,6 @@ from spheretwin.models.telemetry.signals import ANGLES
 from spheretwin.models.telemetry.table import Table
 from spheretwin.viz import theme
 from spheretwin.viz.scene.places import shaft_tip
-
-Array = NDArray[np.float64]
 
 
 class QuantityRows(NamedTuple):

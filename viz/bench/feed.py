@@ -12,13 +12,11 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from spheretwin.models.actuator import Actuator
+from spheretwin.models.base.arrays import Array
 from spheretwin.viz import theme
 from spheretwin.viz.bench.protocols import BenchProtocol
-
-Array = NDArray[np.float64]
 
 DATA, CAPTURE = "/bench.data", "/capture.data"
 

@@ -7,9 +7,9 @@ from typing import Any, NamedTuple, cast
 
 import numpy as np
 import rerun as rr
-from numpy.typing import NDArray
 from rerun.chunk import Chunk
 
+from spheretwin.models.base.arrays import Array
 from spheretwin.models.telemetry.status import Status
 from spheretwin.models.telemetry.table import Table
 from spheretwin.viz import theme
@@ -19,8 +19,6 @@ from spheretwin.viz.recording.scene3d import Frames, send_path, style_path
 from spheretwin.viz.scene.entities import body_quaternions
 from spheretwin.viz.scene.meshes import WORLD
 from spheretwin.viz.scene.places import shaft_tip
-
-Array = NDArray[np.float64]
 
 
 class SubtreeStream:

@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from spheretwin.models.base.arrays import Array
 from spheretwin.models.telemetry.status import Level
 from spheretwin.models.telemetry.table import Table
 from spheretwin.viz.layout.extents import CLIPPED_FROM, MARGIN, USUAL, number
@@ -99,9 +100,6 @@ def _same(one: Table, other: Table) -> bool:
     rows, others = common_rows(one, other)
     apart = np.abs(one["q_ref_rad"][rows] - other["q_ref_rad"][others])
     return bool(apart.max(initial=0.0) <= SAME_rad)
-
-
-Array = NDArray[np.float64]
 
 
 class Spectrum(NamedTuple):

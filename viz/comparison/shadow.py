@@ -15,6 +15,7 @@ import rerun as rr
 import rerun.blueprint as rrb
 from numpy.typing import NDArray
 
+from spheretwin.models.base.arrays import Array
 from spheretwin.models.telemetry.signals import ANGLES, Signal
 from spheretwin.models.telemetry.status import Level
 from spheretwin.models.telemetry.table import Table, with_currents
@@ -33,8 +34,6 @@ from spheretwin.viz.recording.recorder import recorded
 from spheretwin.viz.recording.scene3d import MovingActuator
 from spheretwin.viz.scene.entities import FRAME_RATE_Hz, size_of
 from spheretwin.viz.scene.meshes import WORLD
-
-Array = NDArray[np.float64]
 
 MACHINE, TWIN, TEXT, PLOTS = "machine", "twin", "verdict", "plots"
 

@@ -5,12 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path
 
-import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
-from numpy.typing import NDArray
 
 from spheretwin.models.actuator import Actuator
+from spheretwin.models.base.arrays import Array
 from spheretwin.models.telemetry.signals import ANGLES
 from spheretwin.viz import theme
 from spheretwin.viz.comparison.ghosts import Line, send_lines, send_point, style_point
@@ -23,8 +22,6 @@ from spheretwin.viz.recording.scene3d import send_path, style_path
 from spheretwin.viz.scene.entities import TRAIL_S
 from spheretwin.viz.scene.meshes import WORLD
 from spheretwin.viz.scene.places import shaft_tip
-
-Array = NDArray[np.float64]
 
 DESIRED = "desired"
 

@@ -11,6 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
+from spheretwin.models.base.arrays import Array
 from spheretwin.viz.figures.style import (
     FAINT,
     INK,
@@ -27,8 +28,6 @@ from spheretwin.viz.figures.style import (
     sheet,
     styles,
 )
-
-Array = NDArray[np.float64]
 
 ByLaw = Mapping[str, Array]
 

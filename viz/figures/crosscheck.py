@@ -10,8 +10,8 @@ from collections.abc import Mapping
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
+from spheretwin.models.base.arrays import Array
 from spheretwin.models.telemetry.signals import ANGLES
 from spheretwin.viz.figures.style import (
     AXES,
@@ -23,8 +23,6 @@ from spheretwin.viz.figures.style import (
     name_rows,
     sheet,
 )
-
-Array = NDArray[np.float64]
 
 LEAST_SHARE = 1e-14  # of a bound: less is drawn as this much
 NOTHING = 1e-18  # what a difference of exactly zero is drawn as, on a logarithmic axis

@@ -10,13 +10,11 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
-from numpy.typing import NDArray
 
+from spheretwin.models.base.arrays import Array
 from spheretwin.viz.figures.maps import fit_scale
 from spheretwin.viz.figures.style import FAINT, INK, WIDTH_in, legend_below, plain, sheet
 from spheretwin.viz.theme import law_colours
-
-Array = NDArray[np.float64]
 
 ACROSS = 3
 MOST_DOTS = 2000  # of a law in a panel: more only blacken it

@@ -9,11 +9,9 @@ from matplotlib.axes import Axes
 from matplotlib.colors import BoundaryNorm, LogNorm
 from matplotlib.figure import Figure
 from matplotlib.ticker import NullFormatter
-from numpy.typing import NDArray
 
+from spheretwin.models.base.arrays import Array
 from spheretwin.viz.figures.style import INK, SERIES, WIDTH_in, faint_grid, name_axes, sheet
-
-Array = NDArray[np.float64]
 
 MARKERS = ("o", "s", "^", "D", "v")
 COLOURS = "cividis"  # distinct for the colour-blind, and in grey

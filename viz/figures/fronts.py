@@ -10,6 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from spheretwin.models.base.arrays import Array
 from spheretwin.viz.figures.style import (
     FAINT,
     INK,
@@ -24,8 +25,6 @@ from spheretwin.viz.figures.style import (
     styles,
 )
 from spheretwin.viz.theme import law_colour
-
-Array = NDArray[np.float64]
 
 MARGIN = 1.15
 SIZES = {"*": 9.0}

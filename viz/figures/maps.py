@@ -14,12 +14,11 @@ from matplotlib.projections.polar import PolarAxes
 from matplotlib.ticker import LogLocator, NullLocator
 from numpy.typing import NDArray
 
+from spheretwin.models.base.arrays import Array
 from spheretwin.models.design.capability import Capability
 from spheretwin.models.design.workspace import Workspace
 from spheretwin.viz.figures.style import FAINT, INK, SERIES, WIDTH_in, faint_grid, sheet
 from spheretwin.viz.theme import law_colours, text_colour
-
-Array = NDArray[np.float64]
 
 ROW_in = 0.3
 NEAR, FAR = 0.003, 0.1  # degrees: less change is hardly coloured, more has the full colour

@@ -11,8 +11,8 @@ from matplotlib.figure import Figure
 from matplotlib.patheffects import withStroke
 from matplotlib.ticker import NullFormatter
 from mpl_toolkits.mplot3d import Axes3D
-from numpy.typing import NDArray
 
+from spheretwin.models.base.arrays import Array
 from spheretwin.viz.figures.style import (
     INK,
     LawStyle,
@@ -25,8 +25,6 @@ from spheretwin.viz.figures.style import (
     styles,
 )
 from spheretwin.viz.theme import law_colour, text_colour
-
-Array = NDArray[np.float64]
 
 LEAST_deg = 1e-3  # less is drawn as this much, on a logarithmic axis
 LINE_in = 0.235

@@ -20,12 +20,11 @@ from matplotlib.text import Text
 from matplotlib.ticker import FixedLocator, NullFormatter, NullLocator
 from numpy.typing import NDArray
 
+from spheretwin.models.base.arrays import Array
 from spheretwin.models.base.files import whole_file
 from spheretwin.viz.comparison.runs import ComparedRun
 from spheretwin.viz.decimation import envelope
 from spheretwin.viz.theme import AXIS_COLOURS, law_colours, law_marks, run_colours
-
-Array = NDArray[np.float64]
 
 AXES = tuple(f"#{r:02x}{g:02x}{b:02x}" for r, g, b in AXIS_COLOURS)
 # Distinct for normal and colour-blind sight: CIE76 differences of 35 and more.

@@ -5,14 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
-import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import NullLocator
-from numpy.typing import NDArray
 
+from spheretwin.models.base.arrays import Array
 from spheretwin.viz.figures.style import BROKEN, FAINT, INK, SERIES, legend_below, plain, sheet
-
-Array = NDArray[np.float64]
 
 COLOURS = (SERIES[1], SERIES[0])
 """Of a machine before and after its identification."""

@@ -14,6 +14,7 @@ from matplotlib.figure import Figure
 from mpl_toolkits.mplot3d.art3d import Line3D
 from numpy.typing import NDArray
 
+from spheretwin.models.base.arrays import Array
 from spheretwin.models.base.errors import SpheretwinError
 from spheretwin.models.base.files import make_folder, whole_file
 from spheretwin.viz.comparison.runs import ComparedRun
@@ -28,7 +29,6 @@ SIZE_in, DPI = (12.8, 7.2), 100
 """Size of a frame: 1280 x 720 pixels."""
 
 Image = NDArray[np.uint8]
-Array = NDArray[np.float64]
 
 
 class Clip:

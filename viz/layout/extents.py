@@ -9,10 +9,9 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from spheretwin.models.base.arrays import Array
 from spheretwin.models.telemetry.signals import ANGLES, COMMON_NAMES, Signal
 from spheretwin.models.telemetry.table import Table
-
-Array = NDArray[np.float64]
 
 # Extents up to this factor beyond the range of the settled run are drawn completely.
 CLIPPED_FROM = 2.5

@@ -11,6 +11,7 @@ import pyarrow as pa
 import rerun as rr
 from numpy.typing import NDArray
 
+from spheretwin.models.base.arrays import Array
 from spheretwin.models.telemetry.status import Status
 from spheretwin.models.telemetry.table import Table
 from spheretwin.viz import theme
@@ -21,8 +22,6 @@ from spheretwin.viz.recording.part import RecordingPart, RecordingSubject, scala
 from spheretwin.viz.rerun_internals import ArrowComponent
 from spheretwin.viz.scene.entities import FRAME_RATE_Hz, current_scale_labels
 from spheretwin.viz.scene.meshes import COILS, CURRENT_SCALE
-
-Array = NDArray[np.float64]
 
 BAR_WIDTH = 0.8
 

@@ -7,8 +7,8 @@ from time import monotonic
 
 import numpy as np
 import rerun as rr
-from numpy.typing import NDArray
 
+from spheretwin.models.base.arrays import Array
 from spheretwin.models.telemetry.signals import ANGLES, Signal
 from spheretwin.models.telemetry.status import Status
 from spheretwin.models.telemetry.table import Table
@@ -46,8 +46,6 @@ from spheretwin.viz.recording.part import (
     vectors,
 )
 from spheretwin.viz.recording.summary import Summary
-
-Array = NDArray[np.float64]
 
 # From beyond any range of a plot to beyond its other end, in steps: a viewer draws with single precision, and
 # would lose a line between two points that are far outside of a narrow range.

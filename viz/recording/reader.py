@@ -18,6 +18,7 @@ import rerun as rr
 from numpy.typing import NDArray
 from rerun.chunk import Chunk, RrdReader
 
+from spheretwin.models.base.arrays import Array
 from spheretwin.models.base.errors import LONGEST_WORD, InputError, SpheretwinError, shortened, without_breaks
 from spheretwin.models.telemetry.run_record import RunFacts
 from spheretwin.models.telemetry.signals import COMMON_NAMES, Signal
@@ -146,8 +147,6 @@ def _exact(t_ns: NDArray[np.float64], period_s: float) -> NDArray[np.float64]:
     """Return times of ticks from whole nanoseconds, exact to the last bit: sessions make them as products."""
     return np.round(t_ns * _NS / period_s) * period_s
 
-
-Array = NDArray[np.float64]
 
 _VALUES = component(VALUES, 0)
 

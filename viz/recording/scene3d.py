@@ -7,6 +7,7 @@ import rerun as rr
 from numpy.typing import NDArray
 
 from spheretwin.models import mjcf
+from spheretwin.models.base.arrays import Array
 from spheretwin.models.telemetry.run_record import RunFacts
 from spheretwin.models.telemetry.status import Level, Status
 from spheretwin.models.telemetry.table import Table
@@ -29,8 +30,6 @@ from spheretwin.viz.scene.entities import (
 )
 from spheretwin.viz.scene.meshes import FAILURE, FAILURE_TEXT, TORQUES, WORLD
 from spheretwin.viz.scene.places import shaft_tip
-
-Array = NDArray[np.float64]
 
 LARGEST_rad = 1e6
 """Beyond it a pose is meaningless, and its sine has no correct digits."""

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from rerun.chunk import Chunk
 
 from spheretwin.models.actuator import Actuator
+from spheretwin.models.base.arrays import Array
 from spheretwin.viz import theme
 from spheretwin.viz.rerun_internals import LogEncoder
 from spheretwin.viz.scene.meshes import (
@@ -24,8 +25,6 @@ from spheretwin.viz.scene.meshes import (
     Meshes,
 )
 from spheretwin.viz.scene.places import point_in_stator
-
-Array = NDArray[np.float64]
 
 AXES_LENGTH_m = 0.05
 """Length of the stator's axes: the unit of all lengths in the scene."""

@@ -15,6 +15,7 @@ import numpy as np
 import rerun as rr
 from numpy.typing import NDArray
 
+from spheretwin.models.base.arrays import Array
 from spheretwin.models.base.errors import InputError, without_breaks
 from spheretwin.models.base.mujoco_library import compiler_warnings
 from spheretwin.models.magnet_and_coil import CoilGeometry, read_coil
@@ -138,8 +139,6 @@ PAYLOAD = f"{WORLD}/rotor/payload"
 CURRENT_SCALE = f"{WORLD}/current_scale"
 """Scale of the colours with its labels, and the range of the bars."""
 
-
-Array = NDArray[np.float64]
 
 POLES = {1: ("poles_north", theme.NORTH), -1: ("poles_south", theme.SOUTH)}
 """Name and colour of poles by their polarity."""

@@ -8,7 +8,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from spheretwin.models.base.arrays import Array
 
 
 @dataclass(frozen=True)
