@@ -33,20 +33,20 @@ MOST_CENTRES = 24
 FEATURES = 3
 """1, own rate, own torque."""
 
-Digest = Annotated[str, Field(pattern=r"^([0-9a-f]{64})?$")]
+Digest = Annotated[str, Field(pattern=r"^[0-9a-f]{64}$")]
 
 
 class LearnedTorqueSection(BaseModel):
-    """Torque that `machine.learn` has found besides the model."""
+    """Torque that `machine.learning.learn` has found besides the model."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
 
-    file: str = Field("", description="file of the learned torque; none if empty")
-    sha256: Digest = Field("", description="its digest")
+    file: str | None = Field(None, description="file of the learned torque", json_schema_extra={"path": True})
+    sha256: Digest | None = Field(None, description="its digest")
 
     @model_validator(mode="after")
     def _has_both(self) -> LearnedTorqueSection:
-        if bool(self.file) != bool(self.sha256):
+        if (self.file is None) != (self.sha256 is None):
             raise ValueError("expected file and sha256 of a learned torque, received one of them")
         return self
 
@@ -152,7 +152,7 @@ def learned_torque(section: LearnedTorqueSection) -> Rows:
         The file cannot be read, has another digest or other arrays.
     """
     rows = LearnedTorque.zeros()
-    if section.file:
+    if section.file and section.sha256:
         fill_learned_torque(rows, read_arrays(section.file, section.sha256))
     return rows
 
@@ -205,7 +205,7 @@ def read_arrays(file: str, sha256: str) -> dict[str, Array]:
 
 def _fill(rows: Rows, setup: PlantSetup) -> None:
     section = setup.scenario.plant.learned_torque
-    if section.file:
+    if section.file and section.sha256:
         fill_learned_torque(rows, read_arrays(section.file, section.sha256))
 
 
