@@ -165,7 +165,7 @@ class GreatCircle(Shape):
     """Turn to and fro by ``turn sin(2 pi f t)`` about a fixed axis; the shaft follows a great circle."""
 
     shape: Literal["great_circle"] = Field("great_circle", description="kind of trajectory")
-    start_rad: Triple = Field(ZERO, description="pose in the middle of the turn, rad")
+    middle_rad: Triple = Field(ZERO, description="pose in the middle of the turn, rad")
     axis: tuple[Bounded, Bounded, Bounded] = Field(
         (1.0, 1.0, 0.0), description="axis of the turn in the stator frame; only its direction counts"
     )
@@ -174,7 +174,7 @@ class GreatCircle(Shape):
 
     def sharp(self, t: Array) -> Samples:
         """Return the motion without rounded corners, as `Shape.sharp`."""
-        w, start = 2 * np.pi * self.frequency_Hz, np.array(self.start_rad)
+        w, start = 2 * np.pi * self.frequency_Hz, np.array(self.middle_rad)
         axis = rotation(start).T @ np.array(self.axis) / np.linalg.norm(self.axis)
         sine, cosine = np.sin(w * t), np.cos(w * t)
         angle = self.turn_rad * np.stack([sine, w * cosine, -(w**2) * sine], axis=1)

@@ -28,7 +28,7 @@ OTHERS = {
         ),
     },
     "waypoints": {"between": "cubic"},
-    "great_circle": {"start_rad": (0.2, 1.2, -2.0), "axis": (0.3, -0.2, 1.0)},
+    "great_circle": {"middle_rad": (0.2, 1.2, -2.0), "axis": (0.3, -0.2, 1.0)},
 }
 ROUNDED = {"rounding_rad_s2": 40.0}
 CASES = [

@@ -23,7 +23,7 @@ def written(path, t, poses):
 @given(st.tuples(*[st.floats(-0.7, 0.7)] * 3), st.floats(0.0, 2 * np.pi))
 def test_great_circle_turns_about_the_axis_of_the_stator(start, direction):
     axis = np.array([np.cos(direction), np.sin(direction), 0.5])
-    shape = GreatCircle(start_rad=start, axis=tuple(3 * axis), turn_rad=0.6, frequency_Hz=0.4)
+    shape = GreatCircle(middle_rad=start, axis=tuple(3 * axis), turn_rad=0.6, frequency_Hz=0.4)
     n, t = axis / np.linalg.norm(axis), np.linspace(0, 4, 41)
     for time, (q, qdot, _) in zip(t, shape.sample(t), strict=True):
         phase = 2 * np.pi * 0.4 * time
@@ -74,8 +74,8 @@ def test_a_path_through_the_locked_pose_is_refused():
     with pytest.raises(
         InputError, match=r"expected β within ±89.5°, received 89.9.° at 0.* s, where the hinges lock"
     ):
-        GreatCircle(start_rad=(0.0, 1.0, 0.0), axis=(0.0, 1.0, 0.0), turn_rad=1.0)
-    GreatCircle(start_rad=(0.0, 1.0, 0.0), axis=(0.0, 1.0, 0.0), turn_rad=0.56)
+        GreatCircle(middle_rad=(0.0, 1.0, 0.0), axis=(0.0, 1.0, 0.0), turn_rad=1.0)
+    GreatCircle(middle_rad=(0.0, 1.0, 0.0), axis=(0.0, 1.0, 0.0), turn_rad=0.56)
 
 
 def test_a_path_on_which_a_hinge_would_jump_is_refused(tmp_path):
