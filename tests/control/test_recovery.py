@@ -15,7 +15,9 @@ FAULTS = {
     "dropout": {"target": "encoder.gamma", "mode": "dropout", "end_s": 0.65},
 }
 PRESETS = {"afsm_eso": {"controller.preset": "robust"}}
-LATE = {"afsm": 0.2, "pd": 5e-3, "adaptive_fuzzy": 5e-3}
+LARGEST_rad = {"rotation_afsm": 0.45}
+"""Largest error; 0.4 of the others. A blind AFSM goes on with its adapted gains, on hinges up to 0.37 rad."""
+LATE = {"afsm": 0.2, "rotation_afsm": 0.2, "pd": 5e-3, "adaptive_fuzzy": 5e-3}
 """Further error after the recovery, rad; 2e-3 of the others. The switching gains of AFSM never decrease, and
 the two without an integral move slowly."""
 
@@ -47,5 +49,5 @@ def test_the_pose_is_held_again_after_wrong_samples(law, estimator):
     undisturbed = errors(law, estimator, [])
     for name, fault in FAULTS.items():
         disturbed = errors(law, estimator, [{**fault, "start_s": 0.6}])
-        assert disturbed.max() < max(0.4, undisturbed.max() + 0.01), name
+        assert disturbed.max() < max(LARGEST_rad.get(law, 0.4), undisturbed.max() + 0.01), name
         assert disturbed[950:].max() < undisturbed[950:].max() + LATE.get(law, 2e-3), name
