@@ -41,7 +41,13 @@ def test_every_folder_of_the_package_with_code_has_an_init():
 
 def test_tests_mirror_the_folders_of_the_package():
     folders = {folder_of(path).removeprefix("tests/") for path in files() if path.name.startswith("test_")}
-    assert folders <= {folder_of(path) for path in INITS} | {"tests", "benchmarks", "content", "docs", "independent"}
+    assert folders <= {folder_of(path) for path in INITS} | {
+        "tests",
+        "benchmarks",
+        "content",
+        "docs",
+        "independent",
+    }
 
 
 @pytest.mark.parametrize("path", INITS, ids=folder_of)

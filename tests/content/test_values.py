@@ -10,7 +10,7 @@ from spheretwin.viz import decimation, quantities, theme
 from spheretwin.viz.comparison import merged_recording, runs
 from spheretwin.viz.layout import extents, styles, view
 from spheretwin.viz.layout.extents import ExtentTracker, PlotChannel
-from spheretwin.viz.scene import entities, meshes, solids
+from spheretwin.viz.scene import entities, meshes, places, solids
 from tests.content.content import Cases, content_test
 from tests.content.runs import FAULTS, rows_of, session_of
 from tests.content.values import array, number
@@ -192,9 +192,9 @@ def shapes() -> str:
     actuator = session_of().actuator
     q = 0.01 * np.stack([COUNT[:50], -COUNT[:50], 2 + COUNT[:50] % 7], axis=1)
     lines += [f"{name} {array(turned)}" for name, turned in entities.body_quaternions(q).items()]
-    lines.append(f"tip {array(entities.shaft_tip(q, actuator))} size {number(entities.size_of(actuator))}")
+    lines.append(f"tip {array(places.shaft_tip(q, actuator))} size {number(entities.size_of(actuator))}")
     point = np.array([0.01, 0.02, -0.03])
-    lines.append(f"point {array(entities.point_in_stator(q, point))}")
+    lines.append(f"point {array(places.point_in_stator(q, point))}")
     lines.append(f"load {array(entities.load_torque(q, 0.1 * q[:, ::-1]))}")
     gravity = entities.gravity_torque(q, 0.4, point, np.array([0.0, 1.0, -9.81]))
     lines.append(f"gravity {array(gravity)} {signature(entities.gravity_torque)}")

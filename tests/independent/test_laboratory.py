@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from spheretwin import cli, machine
-from tests.requirements import needs_c_compiler, needs_posix
 from tests.independent.changes import HELD_OUT, KINDS, judged
 from tests.independent.laboratory import DATA_SHEET, SCENARIO, COUNT_rad, read_log, write_log
+from tests.requirements import needs_c_compiler, needs_posix
 
 pytestmark = [needs_c_compiler, needs_posix]
 

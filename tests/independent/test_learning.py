@@ -7,9 +7,9 @@ from spheretwin import machine
 from spheretwin.machine.learning import learn, samples_of
 from spheretwin.machine.parameters import Machine
 from spheretwin.plant.learned_torque import write_arrays
-from tests.requirements import needs_c_compiler, needs_posix
 from tests.independent.laboratory import DATA_SHEET, SCENARIO, read_log
 from tests.independent.test_laboratory import ALIKE
+from tests.requirements import needs_c_compiler, needs_posix
 
 pytestmark = [
     needs_c_compiler,

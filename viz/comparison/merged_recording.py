@@ -11,8 +11,9 @@ import numpy as np
 import rerun as rr
 from rerun.components import MarkerShape
 
+from spheretwin.models.base.arrays import Array
 from spheretwin.viz import theme
-from spheretwin.viz.comparison.ghosts import Array, Ghost, Line, Tip, below, send_lines, write_part
+from spheretwin.viz.comparison.ghosts import Ghost, Line, Tip, below, send_lines, write_part
 from spheretwin.viz.comparison.merged_layout import (
     BESIDE_TEXTS,
     COMPARE,

@@ -11,6 +11,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from spheretwin.models.base.arrays import Array
 from spheretwin.models.telemetry.signals import ANGLES
 from spheretwin.models.telemetry.status import Level
 from spheretwin.models.telemetry.table import Table
@@ -39,7 +40,7 @@ from spheretwin.viz.figures.style import (
     run_styles,
     sheet,
 )
-from spheretwin.viz.quantities import Array, Quantity
+from spheretwin.viz.quantities import Quantity
 
 MOST_CELLS = 200
 """Cells of a row of an image."""

@@ -16,12 +16,13 @@ from matplotlib.collections import PolyCollection, QuadMesh
 from matplotlib.colors import to_hex, to_rgba
 from matplotlib.lines import Line2D
 
+from spheretwin.models.base.arrays import Array
 from spheretwin.viz.comparison.runs import ComparedRun, Spectrum
 from spheretwin.viz.figures import comparison
 from spheretwin.viz.figures.style import DASHES
 from spheretwin.viz.pages import markdown
 from spheretwin.viz.pages.markdown import BLOCK
-from spheretwin.viz.quantities import Array, Quantity
+from spheretwin.viz.quantities import Quantity
 from spheretwin.viz.theme import run_colours
 
 # The browser contacts no host.

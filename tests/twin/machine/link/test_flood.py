@@ -13,8 +13,8 @@ from spheretwin.machine.link import frame_format
 from spheretwin.machine.link.channel import FrameChannel
 from spheretwin.machine.link.frame_format import Flags
 from spheretwin.machine.link.transports import open_transport
-from tests.requirements import needs_c_compiler, needs_posix
 from tests.independent.laboratory import CURVE, ROOT, built
+from tests.requirements import needs_c_compiler, needs_posix
 from tests.waiting import UNLIMITED_S
 
 pytestmark = [needs_c_compiler, needs_posix]

@@ -16,8 +16,8 @@ from spheretwin.machine.link.channel import FrameChannel
 from spheretwin.machine.link.frame_format import Flags
 from spheretwin.machine.link.transports import open_transport
 from spheretwin.models.telemetry.table import read_parquet
-from tests.requirements import needs_c_compiler, needs_posix
 from tests.independent.laboratory import CURVE, ROOT, built
+from tests.requirements import needs_c_compiler, needs_posix
 from tests.twin.passive_cases import STILL
 from tests.waiting import UNLIMITED_S
 
