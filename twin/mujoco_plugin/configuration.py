@@ -99,14 +99,15 @@ def read(model: mujoco.MjModel, instance: int, texts: dict[str, str]) -> Parts:
     InputError
         An attribute is invalid, or the model lacks a part.
     """
+    own = np.flatnonzero(model.actuator_plugin == instance)
     attributes = _attributes({name: text for name, text in texts.items() if text})
+    attributes = _with_prefix(attributes, _prefix(model, own, attributes.hinges[0]))
     hinges = _hinges(model, attributes.hinges)
     actuator = _actuator(model, attributes, *model.jnt_bodyid[hinges[[0, 2]]])
     groups = len(actuator.groups)
     for name in ("gain", "resistance_ohm", "inductance_H"):
         if (count := len(getattr(attributes, name))) not in (1, groups):
             raise InputError(f"{name}: expected one number or {groups}, received {count}")
-    own = np.flatnonzero(model.actuator_plugin == instance)
     if len(own) != groups:
         raise InputError(f"expected {groups} actuators, one for each group of coils, received {len(own)}")
     _check_actuators(model, own, hinges, attributes.input)
@@ -154,6 +155,27 @@ def _attributes(texts: dict[str, str]) -> Attributes:
         name = str(error.errors()[0]["loc"][0])
         meaning = Attributes.model_fields[name].description
         raise InputError(f"{name}: expected {meaning}; received {shown(texts[name])}") from None
+
+
+def _prefix(model: mujoco.MjModel, actuators: NDArray[np.int64], hinge: str) -> str:
+    """Return the prefix that an attachment has put before the names of a model, but not into attributes.
+
+    It is that of the hinge in the transmission of the actuators; empty if no hinge there has such a name.
+    """
+    for tendon in model.actuator_trnid[actuators[:1], 0]:
+        first = model.tendon_adr[tendon]
+        for joint in model.wrap_objid[first : first + model.tendon_num[tendon]]:
+            name = model.joint(joint).name
+            if name.endswith(hinge):
+                return str(name.removesuffix(hinge))
+    return ""
+
+
+def _with_prefix(attributes: Attributes, prefix: str) -> Attributes:
+    names = {"poles": prefix + attributes.poles, "coils": prefix + attributes.coils}
+    return attributes.model_copy(
+        update={**names, "hinges": tuple(prefix + name for name in attributes.hinges)}
+    )
 
 
 def _hinges(model: mujoco.MjModel, names: tuple[str, ...]) -> NDArray[np.int64]:

@@ -151,3 +151,18 @@ def test_an_invalid_model_is_refused_in_one_line(text, message):
 def test_an_unknown_attribute_is_refused_by_name():
     with pytest.raises(ValueError, match="unrecognized attribute 'plugin:resistance'"):
         compiled(configured(resistance=1))
+
+
+def test_names_follow_the_prefix_of_an_attachment(actuator):
+    spec = mujoco.MjSpec()
+    spec.option.timestep, spec.option.integrator = 5e-4, mujoco.mjtIntegrator.mjINT_RK4
+    for prefix, x in (("left_", -0.3), ("right_", 0.3)):
+        child = mujoco.MjSpec.from_file(str(mujoco_plugin.EXAMPLE))
+        spec.attach(child, prefix=prefix, frame=spec.worldbody.add_frame(pos=[x, 0, 0]))
+    model, random = spec.compile(), np.random.default_rng()
+    data = forward(model, random.uniform(-3, 3, 36), random.uniform(-1, 1, 6), random.normal(size=6))
+    for half, name in enumerate(("left_", "right_")):
+        q, current = data.qpos[3 * half :][:3], data.ctrl[18 * half :][:18]
+        expected = magnetics.torque_matrix(q, actuator) @ current
+        # Sums of 18 products below 0.1 N·m in another order.
+        np.testing.assert_allclose(data.sensor(f"{name}coil_torque").data, expected, rtol=0, atol=1e-15)
