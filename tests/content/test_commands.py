@@ -94,6 +94,7 @@ def runs():
     """Tables and JSON of runs, of a complete one, one with faults, and one that leaves the workspace."""
     folder = recorded()
     lagrangian, own = "--plant.engine lagrangian", f"--metric {folder}/own.py:"
+    hold = "simulate hold --controller.law pid --duration 0.02"
     return several(
         [
             f"simulate nutation --duration 0.05 --json {lagrangian}",
@@ -104,9 +105,9 @@ def runs():
             ],
             f"simulate sinusoid --controller.law pd --disturbance.load 900 --json {lagrangian}",
             f"simulate sinusoid --controller.law pd --disturbance.load 900 {lagrangian}",
-            f"simulate hold --controller.law pid --duration 0.02 --json {lagrangian} {own}highest {own}broken",
-            f"simulate hold --controller.law pid --duration 0.02 {lagrangian} {own}strange {own}highest",
-            f"simulate hold --controller.law pid --duration 0.02 --json {lagrangian} {own}highest {own}highest",
+            f"{hold} --json {lagrangian} {own}highest {own}broken",
+            f"{hold} {lagrangian} {own}strange {own}highest",
+            f"{hold} --json {lagrangian} {own}highest {own}highest",
             f"simulate --replay {folder}/b.parquet --json",
             f"simulate --replay {folder}/c.parquet",
             f"simulate --replay {folder}/b.parquet --seed 3",
