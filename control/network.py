@@ -68,6 +68,7 @@ def network_of(path: str, inputs: int) -> tuple[Layer, ...]:
 def _network_of(path: str, inputs: int, changed_ns: int, size: int) -> tuple[Layer, ...]:
     try:
         import onnx
+        from google.protobuf.message import DecodeError
     except ModuleNotFoundError:
         raise missing(f"policy {path}", "onnx", "rl") from None
     try:
@@ -79,7 +80,7 @@ def _network_of(path: str, inputs: int, changed_ns: int, size: int) -> tuple[Lay
             return _layers(_chain(graph, constants), constants, inputs)
     except _RefusalError as error:
         raise InputError(f"policy {path}: {error}") from None
-    except Exception as error:  # protobuf, onnx and NumPy have no common exception
+    except (DecodeError, LookupError, TypeError, ValueError) as error:  # no file of ONNX, or a damaged one
         received = without_breaks(error)
         raise InputError(f"policy {path}: expected a network as ONNX, received {received}") from None
 

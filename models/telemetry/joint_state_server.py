@@ -56,7 +56,7 @@ class JointStateServer:
             self._server = foxglove.start_server(
                 name="spheretwin", host=HOST, port=port, context=self._context
             )
-        except Exception as error:  # its package raises errors of several kinds
+        except RuntimeError as error:
             raise SpheretwinError(
                 f"publish: expected a free port, received {port}: {without_breaks(error)}"
             ) from None
